@@ -57,6 +57,43 @@ def test_kernels_do_what_the_plain_loop_does() -> None:
         assert flow.state[:n, kernels.S] == pytest.approx(s, rel=1e-12)
 
 
+def test_one_pass_over_channels_has_the_bits_of_two() -> None:
+    """`sub_step` against flows and sums of nodes by themselves, with copies of other ranks' nodes, leak-off, wet and
+    dry nodes and all conditions."""
+    rng = np.random.default_rng(5)
+    n, copies, m, dt, bulk = 40, 6, 150, 1e-3, 1e5
+    first = rng.integers(0, n + copies, m)
+    ends = np.column_stack([first, (first + rng.integers(1, n, m)) % (n + copies)])
+    channels = np.column_stack([rng.uniform(1e-5, 1e-4, m), rng.uniform(-2e-9, 1e-8, m), rng.uniform(1e-4, 1e-3, m),
+                                rng.uniform(1.0, 2.0, m)])  # fmt: skip
+    laws = np.zeros((2, kernels.LAW))
+    laws[:, kernels.LEAK], laws[:, kernels.FRONT] = (1e-8, 1e-6), (0.0, 1.0)
+    since = np.where(rng.random(m) < 0.7, rng.uniform(0.0, 1.0, m), math.inf)
+    condition, table = rng.integers(0, 4, n), np.array([[does, 3e3 * does] for does in range(4)], np.float64)
+    table[kernels.RATE, 1] = -0.3
+    begin, channel, side = at_nodes(ends, n)
+    held = np.zeros((n, kernels.NODE))
+    held[:, kernels.V] = np.bincount(ends.reshape(-1), np.repeat(channels[:, kernels.HALF], 2), n + copies)[:n] + 1e-4
+    held[:, kernels.W] = held[:, kernels.V] * rng.choice([0.0, 0.4, 1.0, 1.2], n)
+    start = np.column_stack(
+        [rng.choice([0.0, 1e4, 2e4], n + copies), rng.random(n + copies), rng.normal(0.0, 1e3, n + copies)]
+    )
+    law, found = rng.integers(0, 2, m), []
+    for leaks in (False, True):
+        along = law, laws, since, leaks, 2.0, 2.0 + dt
+        for one_pass in (True, False):
+            nodes, state, q, lost = held.copy(), start.copy(), np.zeros(m), np.zeros(m)
+            told = dt, condition, table, bulk, nodes, state
+            if one_pass:
+                kernels.sub_step(ends, *along, channels, q, lost, *np.full((2, n + copies), 7.0), *told)
+            else:
+                kernels.flows(1, ends, *along, channels, state, q, lost)
+                kernels.fill_threaded(2, begin, channel, side, q, leaks, lost, *told)
+            found.append(np.concatenate([nodes.reshape(-1), state.reshape(-1), q, lost]))
+    assert np.array_equal(found[0], found[1]) and np.array_equal(found[2], found[3])
+    assert not np.array_equal(found[0], found[2])
+
+
 def test_one_channel_by_hand() -> None:
     """Two nodes, 1 m apart, 0.1 mm: 1e-12 / 12e-3 = 8.333e-11 m2/(Pa s), times 1 kPa."""
     mesh = rectangle(1, 1, 1.0, 1.0)

@@ -98,25 +98,37 @@ def longest_step(begin, channel, ends, channels, nodes, state, bulk):
     return least
 
 
+@njit(cache=True, error_model="numpy")
+def _along(c, ends, channels, state):
+    """What flows in a channel from its first end on."""
+    a, b = ends[c, 0], ends[c, 1]
+    head = (state[a, P] - state[b, P]) + (state[a, E] - state[b, E]) * channels[c, WEIGHT]
+    s = 0.5 * (state[a, S] + state[b, S])
+    up = state[a, S] if (head > 0.0) == (channels[c, CONDUCT] > 0.0) else state[b, S]
+    return channels[c, CONDUCT] * part(min(s, up)) * head
+
+
+@njit(cache=True, error_model="numpy")
+def _leaking(c, ends, row, began, before, after, channels, state):
+    """What each end of a channel loses to the rock in a sub-step."""
+    a, b = ends[c, 0], ends[c, 1]
+    over = 0.5 * (state[a, P] + state[b, P]) - row[PORE]
+    if over > 0.0 and row[LEAK] > 0.0 and began <= before:
+        length = 2.0 * channels[c, HALF] / channels[c, APERTURE]  # in space an area
+        roots = math.sqrt(after - began) - math.sqrt(before - began)
+        drive = math.sqrt(over) if row[FRONT] > 0.0 else over
+        s = 0.5 * (state[a, S] + state[b, S])
+        return 2.0 * part(s) * row[LEAK] * drive * length * roots  # half of both walls, to each end
+    return 0.0
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _flows(t, threads, ends, law, laws, since, leaks, before, after, channels, state, q, lost):
     n = len(ends)
     for c in range(n * t // threads, n * (t + 1) // threads):
-        a, b = ends[c, 0], ends[c, 1]
-        head = (state[a, P] - state[b, P]) + (state[a, E] - state[b, E]) * channels[c, WEIGHT]
-        s = 0.5 * (state[a, S] + state[b, S])
-        up = state[a, S] if (head > 0.0) == (channels[c, CONDUCT] > 0.0) else state[b, S]
-        q[c] = channels[c, CONDUCT] * part(min(s, up)) * head
+        q[c] = _along(c, ends, channels, state)
         if leaks:
-            row = laws[law[c]]
-            over = 0.5 * (state[a, P] + state[b, P]) - row[PORE]
-            if over > 0.0 and row[LEAK] > 0.0 and since[c] <= before:
-                length = 2.0 * channels[c, HALF] / channels[c, APERTURE]  # in space an area
-                roots = math.sqrt(after - since[c]) - math.sqrt(before - since[c])
-                drive = math.sqrt(over) if row[FRONT] > 0.0 else over
-                lost[c] = 2.0 * part(s) * row[LEAK] * drive * length * roots  # half of both walls, to each end
-            else:
-                lost[c] = 0.0
+            lost[c] = _leaking(c, ends, laws[law[c]], since[c], before, after, channels, state)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -138,6 +150,66 @@ def flows_threaded(threads, ends, law, laws, since, leaks, before, after, channe
         _flows(t, threads, ends, law, laws, since, leaks, before, after, channels, state, q, lost)
 
 
+@njit(cache=True, error_model="numpy")
+def _take(i, into, leaks, gone, dt, condition, table, bulk, nodes, state):
+    """A sub-step of a node: `into` [m2/s] comes, `gone` [m2] leaks away."""
+    w, v = nodes[i, W] + dt * into, nodes[i, V]
+    if leaks:
+        gone = min(gone, max(w, 0.0))
+        w -= gone
+        nodes[i, LEAKED] += gone
+    does, value = table[condition[i], 0], table[condition[i], 1]
+    if does == FREE:
+        nodes[i, INFLOW] = 0.0
+    else:
+        if does == RATE:
+            more = max(dt * value, -max(w, 0.0))
+        else:
+            p = value - state[i, E] if does == SURFACE else value
+            if does == PRESSURE or p > 0.0:
+                more = v * (1.0 + p / bulk) - w
+            else:
+                more = min(v - w, 0.0)
+        w += more
+        nodes[i, GIVEN] += more
+        nodes[i, INFLOW] = more / dt
+    nodes[i, W] = w
+    if w >= v:
+        state[i, P], state[i, S] = bulk * ((w - v) / v), 1.0
+    else:
+        state[i, P], state[i, S] = 0.0, w / v
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sub_step(
+    ends, law, laws, since, leaks, before, after, channels, q, lost, into, gone, dt, condition, table, bulk, nodes,
+    state,
+):  # fmt: skip
+    """A sub-step dt [s] of the owned nodes: their fluid, pressure and saturation after what flows in channels and leaks
+    away, as in `flows`. into, gone (n,): what comes to all nodes, copies too [m2/s], and leaks from them [m2].
+
+    condition (nodes,): row of the table (rows, 2) of what is prescribed and its value: pressure [Pa]; energy of the
+    surface [Pa]: hydrostatic below it, above it fluid can leave (a seepage face); rate [m2/s], as far as there is fluid
+    to take. One pass over the channels: a node's sum is in the order of channels, as in `fill_threaded`.
+    """
+    into[:] = 0.0
+    if leaks:
+        gone[:] = 0.0
+    for c in range(len(ends)):
+        a, b = ends[c, 0], ends[c, 1]
+        flow = _along(c, ends, channels, state)
+        q[c] = flow
+        into[a] -= flow
+        into[b] += flow
+        if leaks:
+            leak = _leaking(c, ends, laws[law[c]], since[c], before, after, channels, state)
+            lost[c] = leak
+            gone[a] += leak
+            gone[b] += leak
+    for i in range(len(nodes)):
+        _take(i, into[i], leaks, gone[i], dt, condition, table, bulk, nodes, state)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table, bulk, nodes, state):
     n = len(nodes)
@@ -147,45 +219,13 @@ def _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table
             into += side[m] * q[channel[m]]
             if leaks:
                 gone += lost[channel[m]]
-        w, v, more = nodes[i, W] + dt * into, nodes[i, V], 0.0
-        if leaks:
-            gone = min(gone, max(w, 0.0))
-            w -= gone
-            nodes[i, LEAKED] += gone
-        does, value = table[condition[i], 0], table[condition[i], 1]
-        if does == RATE:
-            more = max(dt * value, -max(w, 0.0))
-        elif does != FREE:
-            p = value - state[i, E] if does == SURFACE else value
-            if does == PRESSURE or p > 0.0:
-                more = v * (1.0 + p / bulk) - w
-            else:
-                more = min(v - w, 0.0)
-        w += more
-        nodes[i, GIVEN] += more
-        nodes[i, INFLOW] = more / dt
-        nodes[i, W] = w
-        if w >= v:
-            state[i, P], state[i, S] = bulk * ((w - v) / v), 1.0
-        else:
-            state[i, P], state[i, S] = 0.0, w / v
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def fill(threads, *args):
-    """A sub-step dt [s] of the owned nodes: their fluid, pressure and saturation after these flows.
-
-    begin (n + 1,), channel, side (k,): see network.at_nodes; condition (n,): row of the table (rows, 2) of what is
-    prescribed and its value: pressure [Pa]; energy of the surface [Pa]: hydrostatic below it, above it fluid can leave
-    (a seepage face); rate [m2/s], as far as there is fluid to take.
-    """
-    for t in range(threads):
-        _fill(t, threads, *args)
+        _take(i, into, leaks, gone, dt, condition, table, bulk, nodes, state)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def fill_threaded(threads, begin, channel, side, q, leaks, lost, dt, condition, table, bulk, nodes, state):
-    """The same on several threads."""
+    """What `sub_step` does with the nodes after `flows`, on several threads. begin (n + 1,), channel, side (k,): see
+    network.at_nodes."""
     for t in prange(threads):
         _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table, bulk, nodes, state)
 

@@ -622,6 +622,7 @@ class Flow(SurfaceLoad):
         self._begin, self._channel, self._side = at_nodes(self._ends, len(mine))
         self._lead = row * blocks.x.shape[1] + blocks.local.stride * (leads % 4)
         self._q, self._lost_fluid = np.zeros(len(ends)), np.zeros(len(ends))
+        self._sums = np.zeros((2, len(self.state)))
         self.note_leaks()
         self._bind_loads(loaded, local)
         self._sides, self._law, lost = self._sides_of(self._channels)
@@ -831,8 +832,9 @@ class Flow(SurfaceLoad):
             if self.carried is not None:
                 self.carried = np.zeros(len(self._ends))
                 self._leaked_before = self.nodes[:, kernels.LEAKED].copy()
+            condition = self.condition[self.number]
             for _ in range(self.sub_steps):
-                self._sub_step()
+                self._sub_step(condition)
             self.cycles += 1
         if self.cycles % LOOK == 0:
             self._check()
@@ -845,17 +847,23 @@ class Flow(SurfaceLoad):
             self._table, self.state, self._q, self._lost_fluid,
         )  # fmt: skip
 
-    def _sub_step(self) -> None:
-        threads, before = self.blocks.threads, self.time
-        self._find_flows(self.dt)
+    def _sub_step(self, condition: np.ndarray) -> None:
+        """condition (n,): rows of the conditions of the owned nodes."""
+        blocks, before, after = self.blocks, self.time, self.time + self.dt
+        told = self.dt, condition, self.conditions_at(after), self.fluid("fluid_bulk"), self.nodes, self.state
+        if blocks.threads == 1:
+            into, gone = self._sums
+            kernels.sub_step(
+                self._ends, self._law, self._law_table, self._since, self._leaks, before, after, self._table, self._q,
+                self._lost_fluid, into, gone, *told,
+            )  # fmt: skip
+        else:
+            self._find_flows(self.dt)
+            links = self._begin, self._channel, self._side, self._q, self._leaks, self._lost_fluid
+            kernels.fill_threaded(blocks.threads, *links, *told)
+        self.time = after
         if self.carried is not None:
             self.carried += self.dt * self._q
-        self.time += self.dt
-        kernel = kernels.fill if threads == 1 else kernels.fill_threaded
-        kernel(
-            threads, self._begin, self._channel, self._side, self._q, self._leaks, self._lost_fluid, self.dt,
-            self._condition, self.conditions_at(self.time), self.fluid("fluid_bulk"), self.nodes, self.state,
-        )  # fmt: skip
         if self.wells:
             self._pump(before)
         self._refresh()
@@ -906,10 +914,6 @@ class Flow(SurfaceLoad):
         if self.carried is None or not self.blocks.options.hydraulic or len(self._leaked_before) != len(nodes):
             return np.zeros(len(nodes))
         return nodes - self._leaked_before
-
-    @property
-    def _condition(self) -> np.ndarray:
-        return self.condition[self.number]
 
     def conditions_at(self, time: float) -> np.ndarray:
         """The table of conditions (rows, 2) at a flow time: heights as potential energies."""

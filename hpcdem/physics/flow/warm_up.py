@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem.groups import CHANNEL
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.warm_up import ROCK
@@ -34,3 +35,4 @@ def _flow(mesh: Mesh, threads: int) -> None:
     flow.assign(None, WATER)
     flow.prescribe(None, kernels.PRESSURE, 1.0)
     sim.step()
+    flow.values(CHANNEL, "flow_rate")
