@@ -361,6 +361,54 @@ def test_a_well_in_nothing_is_refused_by_implicit_steps() -> None:
         pass
 
 
+def test_all_of_it_at_once_is_that_of_small_explicit_steps() -> None:
+    """A well with stages, a table, a level, a rate, gravity, cracks that leak into rock that is not saturated; then a
+    part is taken out. What leaks depends on the length of steps as its square root, as leak-off begins at once."""
+    found = {}
+    for small in (True, False):
+        mesh = shaken(rectangle(8, 4, 0.8, 0.4), 0.2)
+        sim, flow = standing(
+            mesh, fluid_bulk=1e6, aperature_initial=1e-4, leak_off=1.0, matrix_permeability=1e-14, matrix_porosity=0.2,
+            matrix_saturation=0.3,
+        )  # fmt: skip
+        sim.gravity(0.0, -9.81)
+        sim.table("pump", [(0.0, 0.0), (1.0, 1e4)])
+        changes.crack(sim, inner(mesh)[::2])
+        flow.fill(None, saturation=0.7)
+        nodes = flow.numbers("flow-node")
+        flow.drill("w", nodes[10:13])
+        for does, value, duration in ((RATE, 1e-4, 0.02), (SHUT, 0.0, 0.01), (RATE, -1e-5, math.inf)):
+            flow.stage("w", does, value, duration, 3e5 if value > 0.0 else math.inf)
+        hold(flow, nodes[:2], "pump")
+        flow.prescribe(nodes[20:22], kernels.SURFACE, 0.3)
+        flow.prescribe(nodes[30:31], kernels.RATE, 1e-5)
+        if small:
+            sim.flow_clock(dt=2e-5)
+        account = []
+        for time in (0.04, 0.01):
+            if small:
+                for _ in range(round(time / 2e-5)):
+                    sim.step()
+            else:
+                over(sim, time, round(time / 1e-4))
+            account.append(flow.account())
+            if len(account) == 1:
+                state = [flow.values("flow-node", name) for name in ("pressure", "saturation")]
+                changes.null(sim, np.arange(4))
+        assert max(one["relative"] for one in account) < (1e-12 if small else 1e-9)
+        assert (
+            account[0]["removed"] == 0.0 < account[1]["removed"] and account[1]["leaked"] > account[0]["leaked"] > 0.0
+        )
+        found[small] = *state, flow.well_value("w", "injected"), account
+    one, other = found[True], found[False]
+    assert other[0] == pytest.approx(one[0], rel=1e-6, abs=1e-6) and one[0].max() > 100.0
+    assert other[1] == pytest.approx(one[1], abs=1e-3)
+    assert other[2] == pytest.approx(one[2], rel=1e-9)
+    for before, after in zip(one[3], other[3]):
+        assert after["given"] == pytest.approx(before["given"], rel=2e-4)
+        assert after["leaked"] == pytest.approx(before["leaked"], rel=0.03)
+
+
 # ---- flow and equilibrium ------------------------------------------------------------------------------------------
 
 LENGTH, HEIGHT = 4.0, 2.0
@@ -503,6 +551,34 @@ def test_a_file_in_mid_injection(tmp_path) -> None:
         one, other = (Flow.of(sim).values("flow-node", name) for sim in (whole, again))
         assert other == pytest.approx(one, rel=1e-9, abs=1e-12 * np.abs(one).max())
     assert Flow.of(again).implicit_dt == Flow.of(whole).implicit_dt
+
+
+def test_injection_goes_on_where_a_part_is_dug_away(tmp_path) -> None:
+    """A well with stages, leak-off into rock that is not saturated; elements on both sides of wet channels are taken
+    out. From a checkpoint before that, the same."""
+    leak = {"leak_off": 1.0, "matrix_permeability": 1e-18, "matrix_porosity": 0.2, "matrix_saturation": 0.4}
+    whole, flow = plate()
+    flow.adjust(None, leak)
+    equilibrium.solve_elastic(whole)
+    flow.drill("w", at(whole, 0.0, 0.0))
+    for does, value, duration in ((RATE, 1e-5, 12.0), (SHUT, 0.0, 3.0), (RATE, 1e-5, math.inf)):
+        flow.stage("w", does, value, duration, 4e6 if does == RATE else math.inf)
+    over(whole, 10.0, 20)
+    saved_state.save(whole, tmp_path / "middle.sav")
+    before, again = flow.account(), Blocks()
+    saved_state.restore(again, tmp_path / "middle.sav")
+    accounts = []
+    for sim in (whole, again):
+        x, y = sim.mesh.centroids().T
+        changes.null(sim, np.flatnonzero((x > 0.6) & (np.abs(y) < 0.25)))
+        over(sim, 10.0, 20)
+        assert Flow.of(sim).well_value("w", "stage") == 3.0
+        accounts.append(Flow.of(sim).account())
+    one, other = accounts
+    assert before["removed"] == 0.0 < one["removed"] and one["leaked"] > before["leaked"] > 0.0
+    assert one["relative"] < 1e-9 and other["relative"] < 1e-9
+    for name in ("given", "stored", "leaked", "removed"):
+        assert other[name] == pytest.approx(one[name], rel=1e-9)
 
 
 # ---- faces that touch ----------------------------------------------------------------------------------------------
