@@ -151,11 +151,14 @@ def test_the_opening_converges_with_the_mesh(launch, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("penalty", [10.0, 50.0, 100.0])
-def test_joints_on_the_line_are_hardly_softer(launch, tmp_path, penalty):
-    """Whole joints lie ahead of the crack only: penalties of 10 to 100 E change the opening by little more than 1 %."""
-    found = opened(launch, tmp_path / "one", 20, penalty)["middle"]
-    assert found == pytest.approx(-0.0295, abs=0.013)
+@pytest.mark.parametrize(("penalty", "volume"), [(10.0, -4.1), (50.0, -4.6), (100.0, -4.7)])
+def test_joints_on_the_line_are_hardly_softer(launch, tmp_path, penalty, volume):
+    """Whole joints lie ahead of the crack only: penalties of 10 to 100 E change the opening by little more than 1 %.
+    Errors of the volume are those of a probe by others."""
+    found = opened(launch, tmp_path / "one", 20, penalty)
+    print(found)
+    assert found["middle"] == pytest.approx(-0.0295, abs=0.013)
+    assert 100.0 * found["volume"] == pytest.approx(volume, abs=0.4)
 
 
 @pytest.mark.slow
