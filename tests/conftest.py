@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+pytest_plugins = ["tests.browser"]
 ROOT = Path(__file__).resolve().parent.parent
 BIN = Path(sys.executable).parent
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import base64
 import copy
 import io
-import os
 import re
-import shutil
 import subprocess
 import sys
 import time
@@ -18,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.conftest import BIN, absent, end, popen, run
+from tests.conftest import BIN, end, popen, run
 
 REQUEST: dict[str, Any] = {
     "number": 300,
@@ -42,36 +40,6 @@ def wanted():
         return copy.deepcopy(REQUEST) | values
 
     return make
-
-
-# --- a browser -------------------------------------------------------------------------------------------------
-
-# Root in a container has no sandbox, and the page under test is ours; a canvas that is read often changes over from the
-# graphics card to the processor, which rounds differently.
-BROWSER_OPTIONS = ["--no-sandbox", "--force-color-profile=srgb", "--disable-accelerated-2d-canvas"]
-BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-
-
-def executable() -> str | None:
-    """A browser of the Chromium family on this machine; HPCDEM_TEST_BROWSER names another."""
-    named = os.environ.get("HPCDEM_TEST_BROWSER")
-    return named or next(filter(None, map(shutil.which, BROWSERS)), None)
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """A headless browser, or the reason to skip."""
-    try:
-        from playwright import sync_api
-    except ImportError:
-        absent("browser", "no playwright here: pip install playwright")
-    program = executable()
-    if program is None:
-        absent("browser", f"no browser here: apt-get install {BROWSERS[0]}, or set HPCDEM_TEST_BROWSER")
-    with sync_api.sync_playwright() as play:
-        found = play.chromium.launch(executable_path=program, args=BROWSER_OPTIONS)
-        yield found
-        found.close()
 
 
 class Served:

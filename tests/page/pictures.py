@@ -10,8 +10,9 @@ from typing import Any
 
 from PIL import Image
 
+from tests.browser import BROWSER_OPTIONS, executable
 from tests.conftest import ROOT, end, popen
-from tests.page.conftest import BROWSER_OPTIONS, Page, Served, command_line, executable
+from tests.page.conftest import Page, Served, command_line
 
 GRADING = ROOT / "examples" / "grading.txt"
 FOLDER = ROOT / "docs" / "figures"
