@@ -429,7 +429,7 @@ MODELS = {
     "salt bar": Model(creeping, crept, it_creeps, creep_more, steps=1000, middle=401),
     "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
     "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10),
-    "glowing": Model(glowing, hot, it_glows, glow_on, steps=900, middle=501, come=10, slow=True),
+    "glowing": Model(glowing, hot, it_glows, glow_on, steps=900, middle=501, come=1, slow=True),
     "soil that gets warm": Model(
         warm_soil, warm_and_flowing, it_is_warm, dig_soil, steps=1000, middle=401, come=10, slow=True
     ),
