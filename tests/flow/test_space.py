@@ -427,6 +427,69 @@ def test_fluid_that_is_pumped_into_a_joint_opens_it() -> None:
     assert flow.account()["relative"] < 1e-12
 
 
+def _cracked(**stress: float) -> tuple[Blocks, Flow, np.ndarray]:
+    """Rock under stress with a crack all along z = 0.1 full of fluid, held below and above, and the joints of the crack
+    away from both ends."""
+    mesh = box((6, 2, 2), (0.6, 0.2, 0.2))
+    sim = body(mesh, dynamic=False, young=1e9)
+    sim.option(large_strain=False, collision=True)
+    joints = on_plane(mesh, 2, 0.1)
+    law = {"friction": 30.0, "cohesion": 8e6, "tensile_strength": 2e6, "gf1": 1.0, "gf2": 4.0, "penalty_normal": 1e11}
+    sim.joint_model(joints, "classic_intrinsic_cohesive_interface", law)
+    changes.crack(sim, joints)
+    sim.initial_stress(None, **stress)
+    sim.velocity_condition(None, vy=0.0)
+    for z in (0.0, 0.2):
+        sim.velocity_condition(points_at(mesh, z=z), vx=0.0, vy=0.0, vz=0.0)
+    flow = Flow.of(sim)
+    flow.assign(joints, {**WATER, "aperature_initial": 1e-5, "aperature_minumum": 1e-6})
+    flow.fill(None, saturation=1.0)
+    middle = np.abs(mesh.points[mesh.face_points(flow.network.channels)][:, :, 0].mean(axis=1) - 0.3) < 0.11
+    return sim, flow, middle
+
+
+def _held_at(sim: Blocks, flow: Flow, pressure: float, middle: np.ndarray) -> np.ndarray:
+    """Normal and shear stress (n, 2) [Pa] of the joints of the crack after a second at this pressure."""
+    hold(flow, flow.numbers("flow-node"), pressure)
+    with Coupled(sim, 1.0) as run:
+        run.advance(flow.time + 1.0)
+        found = sim.local.joint_means(sim.local.slot_of(flow.network.channels))
+    return found[middle, 2:]
+
+
+def test_faces_of_a_crack_press_on_each_other() -> None:
+    """It is carried, command after command; with pressure in the crack its faces press by the rest, and part where the
+    pressure is larger."""
+    sim, flow, middle = _cracked(zz=-1e6)
+    sim.velocity_condition(None, vx=0.0)
+    for pressure in (0.0, 4e5, 4e5, 1.5e6):
+        normal, shear = _held_at(sim, flow, pressure, middle).T
+        assert np.abs(shear).max() < 1e3
+        assert normal == pytest.approx(min(pressure - 1e6, 0.0), rel=0.05, abs=1.0)
+        assert (flow.values("flow-channel", "aperture").min() > 1.1e-5) == (pressure > 1e6)
+    assert diagnostics.joint_counts(sim) == (0, 0, 0)  # a crack, not a joint that broke
+    assert not sim.event_rows and not (sim.broken > 0).any()
+
+
+@pytest.mark.parametrize("friction", [0.0, 30.0])
+def test_faces_of_a_crack_rub(friction: float) -> None:
+    """No more shear than friction holds, and as much where they slip; pressure of the fluid takes it away."""
+    sim, flow, middle = _cracked(zz=-1e6, xz=8e5)
+    sim.joint_property(flow.network.channels, {"friction": friction})
+    for pressure in (0.0, 5e5):
+        normal, shear = _held_at(sim, flow, pressure, middle).T
+        assert normal.mean() == pytest.approx(pressure - 1e6, rel=0.05)
+        assert np.abs(shear).mean() == pytest.approx(
+            -math.tan(math.radians(friction)) * normal.mean(), rel=0.02, abs=1.0
+        )
+
+
+def test_where_surfaces_may_overlap_faces_of_a_crack_do_not_press() -> None:
+    sim, flow, middle = _cracked(zz=-1e6)
+    sim.option(collision=False)
+    assert np.abs(_held_at(sim, flow, 0.0, middle)).max() == 0.0
+
+
 def test_the_matrix_is_the_derivative_of_what_is_lacking() -> None:
     """Newton's method of the coupled problem needs few iterations in tangled states: slip, dilation, leak-off, height,
     partly dry; each is the derivative of the residual by differences."""

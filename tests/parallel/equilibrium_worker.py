@@ -256,7 +256,7 @@ def solid(sim: Blocks, solver: str, out: str) -> None:
 
 
 def burst(sim: Blocks, solver: str, out: str) -> None:
-    """A plane of joints between tetrahedra that a well opens, then shuts in."""
+    """A plane of joints between tetrahedra that a well opens, then shuts in; where they broke they press and rub."""
     mesh = box((12, 2, 4), (1.2, 0.2, 0.4), 6)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
@@ -264,7 +264,7 @@ def burst(sim: Blocks, solver: str, out: str) -> None:
     joints = joints[(np.abs(mesh.points[mesh.face_points(joints)][:, :, 2] - 0.2) < 1e-9).all(axis=1)]
     law = {**JOINT, "friction": 30.0, "tensile_strength": 1e6, "gf1": 20.0, "penalty_normal": 100.0 * ROCK["young"]}
     sim.joint_model(joints, "classic_intrinsic_cohesive_interface", law)
-    sim.option(dynamic=False, large_strain=False, collision=False)
+    sim.option(dynamic=False, large_strain=False, collision=True)
     sim.initial_stress(None, zz=-1e6)
     x, y, z = mesh.points.T
     sim.velocity_condition(np.flatnonzero(np.abs(np.abs(z - 0.2) - 0.2) < 1e-9), vx=0.0, vy=0.0, vz=0.0)
@@ -275,7 +275,8 @@ def burst(sim: Blocks, solver: str, out: str) -> None:
     flow.stage("pump", RATE, 1e-5, 0.43, math.inf)
     flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
     sim.gravity(5.0, 1.0, -2.0)
-    go_on(sim, 0.5, solver)
+    for end in (0.3, 0.45, 0.5):
+        go_on(sim, end, solver)
     found = {name: diagnostics.values(sim, name) for name in SPACE}
     for name in FLUID:
         found[name] = flow.values("flow-node", name)

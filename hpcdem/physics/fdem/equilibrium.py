@@ -394,7 +394,9 @@ def touching(sim: Blocks) -> list[tuple[int, int]]:
     force = np.sqrt((on_face * on_face).sum(axis=1))
     total = exact_sum(diagnostics.contributing(sim, seen), sim.comm)
     at = np.flatnonzero((seen.touching > 0) & (force > TOUCH * total))
-    mine = list(zip(pairs.element[pairs.first[at]].tolist(), pairs.element[pairs.second[at]].tolist()))
+    first, second = pairs.first[at], pairs.element[pairs.second[at]]
+    first = pairs.face[first] // 4 if sim.dim == 3 else pairs.element[first]
+    mine = list(zip(first.tolist(), second.tolist()))
     return sorted({pair for part in sim.comm.allgather(mine) for pair in part})
 
 

@@ -24,17 +24,19 @@ APART = 0.1
 
 
 def opposite(sim: Blocks, x: np.ndarray) -> np.ndarray:
-    """Lower faces of joints that are open and lie opposite each other at these positions of the nodes (nn, 2); none
+    """Lower faces of joints that are open and lie opposite each other at these positions of the nodes (nn, dim); none
     where surfaces may overlap."""
     lower = np.flatnonzero(sim.open & sim.joint_exists() & (sim.joint_row > 0))
-    if sim.dim == 3 or not sim.options.collision or not len(lower):
+    if not sim.options.collision or not len(lower):
         return lower[:0]
     mesh, node = sim.the_mesh(), sim.node.reshape(-1)
-    one, other = (x[node[mesh.face_corners(faces)]] for faces in (lower, sim.partner[lower]))
-    a, b, p, q = one[:, 0], one[:, 1], other[:, 0], other[:, 1]
-    way = 0.5 * ((b + p) - (a + q))
-    far = np.maximum(np.abs(q - a).max(axis=1), np.abs(p - b).max(axis=1))
-    return lower[far <= APART * np.hypot(way[:, 0], way[:, 1])]
+    one, other = (mesh.face_corners(faces) for faces in (lower, sim.partner[lower]))
+    point = mesh.cells.reshape(-1)
+    order = (point[one][:, :, None] == point[other][:, None, :]).argmax(axis=2)
+    a, p = x[node[one]], x[node[np.take_along_axis(other, order, axis=1)]]
+    side = np.roll(a + p, -1, axis=1) - (a + p)
+    length = 0.5 * np.sqrt((side * side).sum(axis=2)).max(axis=1)
+    return lower[np.abs(p - a).max(axis=(1, 2)) <= APART * length]
 
 
 def join(sim: Blocks, nodes: Nodes) -> np.ndarray:
