@@ -1198,7 +1198,7 @@ class BlockCommands:
 
     @property
     def energies(self) -> dict[str, float]:
-        """The energy budget of the blocks [J per m of thickness], after ``option(energy=True)``. Collective."""
+        """The energy budget of the blocks [J/m], in space [J], after ``option(energy=True)``. Collective."""
         return fdem.queries.energies(self._blocks.project())
 
     @property

@@ -17,8 +17,7 @@ class Splitting:
     """strength: 2 P / (pi D) at the peak [Pa]; peak_force: P there [N/m]; centre_x, centre_y: mean stress in the
     middle, across the load and along it, over 2 P / (pi D) while it rises: 1 and -3 in an elastic disc; curve:
     (shortening over diameter, 2 P / (pi D) [Pa]) pairs; tension, mixed, shear: broken joints by mode; energy_error:
-    closing error of the energy budget over its largest flow (in three dimensions NaN). In three dimensions P is that of
-    a metre of thickness."""
+    closing error of the energy budget over its largest flow. In three dimensions P is that of a metre of thickness."""
 
     strength: float
     peak_force: float

@@ -83,13 +83,8 @@ mixed = int(broken.sum()) - tension - shear
 energy_error = pcdc.energies['relative']         # of the energy budget, part of its largest flow
 """
 """tension, mixed, shear: broken joints by mode; energy_error."""
-ENERGY = "pcdc model option energy on\n"
-"""The budget is kept."""
 
 
 def in_space(text: str) -> str:
-    """The same for three dimensions, in which no budget is kept yet, and charts have no model beside them."""
-    text = text.replace(
-        "pcdc.energies['relative']         # of the energy budget, part of its largest flow", "math.nan"
-    )
-    return text.replace(ENERGY, "").replace(".png' cracks\n", ".png'\n")
+    """The same for three dimensions, in which charts have no model beside them."""
+    return text.replace(".png' cracks\n", ".png'\n")

@@ -15,7 +15,8 @@ from hpcdem.cases.rock import CRACKS, ELASTIC, JOINTS, SURFACES, WAVES, Rock, in
 class Strength:
     """peak [Pa], peak_strain: greatest stress along z, and its strain; criterion [Pa]: strength after Mohr and Coulomb
     under the least pressure p, 2 c sqrt(N) + N p; curve: (strain, stress along z [Pa]) pairs, compression positive;
-    tension, mixed, shear: broken joints by mode; energy_error: NaN, there is no budget in three dimensions."""
+    tension, mixed, shear: broken joints by mode; energy_error: closing error of the
+    energy budget over its largest flow."""
 
     peak: float
     peak_strain: float
@@ -89,6 +90,7 @@ for name, sense in (('below', 1), ('above', -1)):
     pcdc table create '[name]' values (0,0) ([4*transit],[sense*speed])
     pcdc node boundary mech-vel-b-c velocity-z table '[name]' range group '[name]' set 'moved'
 
+pcdc model option energy on
 pcdc model step 1                                # the time step is known from here on
 every = max(1, round(0.1 * transit / pcdc.time))
 for name in ('below', 'above'):

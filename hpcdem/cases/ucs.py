@@ -15,8 +15,8 @@ from hpcdem.cases.rock import CRACKS, PROPERTIES, WAVES, Dimensions, Rock, in_sp
 @dataclass(frozen=True)
 class Compression:
     """peak, modulus [Pa], peak_strain: of the curve; curve: (strain, stress [Pa]) pairs, compression positive; tension,
-    mixed, shear: broken joints by mode; energy_error: closing error of the energy budget over its largest flow (in
-    three dimensions NaN)."""
+    mixed, shear: broken joints by mode; energy_error: closing error of the energy budget over its largest
+    flow."""
 
     peak: float
     peak_strain: float

@@ -258,7 +258,6 @@ REFUSED_IN_SPACE = [
     ("element c-model user 'a.py:a' property density 1", "'user' is for two dimensions"),
     ("element law 'a.py:a'", "'element law' is for two dimensions"),
     ("element property parameter 'a' 3", "'parameter' is for two dimensions"),
-    ("model option energy on", "'energy' is for two dimensions"),
 ]  # fmt: skip
 
 

@@ -147,6 +147,7 @@ def hexes_that_flow(sim: Blocks) -> None:
         {**soil, "cohesion": Over("weaker", PLASTIC_STRAIN)},
     )  # fmt: skip
     creep.switch(sim, True)
+    diagnostics.account_energy(sim)
 
 
 def dig_hexes_that_flow(sim: Blocks) -> None:
@@ -166,6 +167,7 @@ def flow_and_creep(sim: Blocks, notes: dict[str, Any]) -> Found:
 def they_flow_and_creep(found: Found) -> None:
     assert (found["plastic_shear_strain"] > 1e-5).sum() > 100 and (found["plastic_state"] % 2 == 1).any()
     assert (np.abs(found["creep_strain_xx"]) > 1e-6).sum() > 90 and (found["creep_work"] > 0.0).sum() > 90
+    assert found["energy_relative"] < 0.01 and min(found["energy_plastic_lost"], found["energy_creep_lost"]) > 0.0
 
 
 def dig_hexes(sim: Blocks) -> None:
@@ -243,6 +245,7 @@ def shattering(sim: Blocks) -> None:
     sim.gravity(4.0, 0.0, -9.81)
     changes.set_velocity(sim, np.arange(begin[1], len(mesh.points)), 30.0, 0.5, -9.0)
     changes.set_velocity(sim, np.arange(begin[-3], begin[-2]), -30.0, 0.0, -9.0)
+    diagnostics.account_energy(sim)
 
 
 def dig_beam(sim: Blocks) -> None:
@@ -317,6 +320,8 @@ def result(sim: Blocks, notes: dict[str, Any]) -> Found:
     found["time"] = np.array([sim.clock.time, sim.clock.dt, diagnostics.unbalanced_ratio(sim)])
     came = sim.comm.allgather(len(set(sim.number[sim.owned].tolist()) - notes["first"]))
     found["about"] = np.array([sim.rebuilds, sim.rebuild_state.late, 0, sum(came)])
+    if sim.budget is not None:
+        found |= {f"energy_{name}": np.array(value) for name, value in diagnostics.energies(sim).items()}
     return found
 
 
@@ -374,6 +379,7 @@ def in_pieces(sim: Blocks, notes: dict[str, Any]) -> Found:
 def it_shatters(found: Found) -> None:
     counts = np.bincount(found["state"][np.isfinite(found["state"])].astype(int), minlength=4)
     assert counts[1] > 30 and counts[2] > 30 and counts[3] > 100
+    assert found["energy_relative"] < 0.01 and found["energy_joints_lost"] > 0.0
     assert len(found["contact_face"]) > 20 and (found["event_mode"] > 1.9).any() and (found["event_mode"] < 1.1).any()
 
 

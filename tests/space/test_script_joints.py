@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -22,6 +23,8 @@ pcdc face-joint group 'weak' range x 0.1 0.1
 pcdc face-joint property tensile-strength 1e6 range group 'weak'
 pcdc node boundary mech-vel-b-c velocity-x 0 velocity-y 0 velocity-z 0 range x 0 0
 pcdc node boundary mech-vel-b-c velocity-x 0.1 range x 0.4 0.4
+pcdc model option energy on
+pcdc history create 'lost' model value joint-loss every 50
 pcdc history create 'broken' model value broken-joints every 50
 pcdc history create 'open' joint value opening maximum every 50 range group 'weak'
 pcdc output vtk 'bar' every 500
@@ -38,6 +41,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "bar.sc").write_text(SCRIPT, encoding="utf-8")
     done = run([sys.executable, "-m", "hpcdem", "bar.sc"], cwd=folder)
     assert done.returncode == 0, done.stderr
+    (folder / "said.txt").write_text(done.stdout, encoding="utf-8")
     return folder
 
 
@@ -51,6 +55,17 @@ def test_it_breaks_where_it_is_weak(alone: Path) -> None:
     assert broken[0, 2] == 0 and broken[-1, 2] == len(rows) == 8
     opened = np.loadtxt(alone / "data" / "history_open.csv", delimiter=",", skiprows=1)
     assert opened[0, 2] > 0.0
+
+
+def test_what_joints_took_is_told_in_joules(alone: Path) -> None:
+    """At least gf1 of the area that broke."""
+    path = alone / "data" / "history_lost.csv"
+    assert "[J]" in path.read_text(encoding="utf-8").splitlines()[0]
+    lost = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert 0.0 <= lost[0, 2] < 1e-3 and 0.04 < lost[-1, 2] < 0.1
+    log = (alone / "said.txt").read_text(encoding="utf-8")
+    closing = re.search(r"energy: closing error (\S+) of the largest flow", log)
+    assert closing and float(closing[1]) < 0.01
 
 
 def test_frames_have_joints_as_triangles(alone: Path) -> None:

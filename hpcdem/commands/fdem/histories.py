@@ -20,11 +20,7 @@ from hpcdem.physics.fdem.connectivity import nearest_point
 from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids, Range
 from hpcdem.physics.flow.model import Flow
 
-IN_SPACE = (
-    "time", "cycle", "ratio", "intact_joints", "yielded_joints", "broken_joints", "flow_time", "fluid_given",
-    "fluid_stored", "fluid_leaked", "proppant_came", "proppant_stored", "proppant_packed", "proppant_left", "heat_time",
-    "heat_given", "heat_stored",
-)  # fmt: skip
+IN_SPACE = tuple(name for name in UNITS[MODEL] if name not in ("disc_work", "liner_work", "heat_in_fluid"))
 """What a history of a model in three dimensions can follow."""
 FLUSH = 500
 """Records that wait at most before they go to the file."""

@@ -85,6 +85,7 @@ def close(project: Project, figure: bool = True) -> None:
     both = project.coupled
     if log is None or not (blocks.timers.steps or (both is not None and both.particles.timers.steps)):
         return
+    joule = "J" if blocks.dim == 3 else "J/m"
     if blocks.budget is not None:
         energies = diagnostics.energies(blocks)
         rows = [
@@ -93,14 +94,14 @@ def close(project: Project, figure: bool = True) -> None:
             if name not in ("work_discs", "work_bolts", "work_liners", "work_heat", "plastic_lost", "creep_lost")
             or energies[name]
         ]
-        log.table("energy budget", ("energy", "J/m"), rows)
+        log.table("energy budget", ("energy", joule), rows)
         log.info(f"energy: closing error {energies['relative']:.2g} of the largest flow")
         for support in supports.ALL:
             there = support.there(blocks)
             if there is not None:
                 found = there.energies()
                 rows = [(SUPPORT_WORDS[name], f"{found[name]:.6g}") for name in SUPPORT_WORDS if name in found]
-                log.table(f"energy of {support.name}", ("energy", "J/m"), rows)
+                log.table(f"energy of {support.name}", ("energy", joule), rows)
     flow, volume = Flow.there(blocks), "m2" if blocks.dim == 2 else "m3"
     if flow is not None:
         found = flow.account()
@@ -112,8 +113,7 @@ def close(project: Project, figure: bool = True) -> None:
     heat = Heat.there(blocks)
     if heat is not None:
         found = heat.account()
-        unit = "J" if blocks.dim == 3 else "J/m"
-        log.table("heat", ("heat", unit), [(HEAT_WORDS[k], f"{found[k]:.6g}") for k in HEAT_WORDS])
+        log.table("heat", ("heat", joule), [(HEAT_WORDS[k], f"{found[k]:.6g}") for k in HEAT_WORDS])
     _tell_both(project)
     if figure:
         path = last_figure(project)

@@ -626,7 +626,7 @@ _MODEL = (
                        default="on"),
                 Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
                 Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
-                       "histories of the model, a table at the end", default="off", dims=PLANE),
+                       "histories of the model, a table at the end", default="off"),
                 Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model", default="on"),
                 Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off"),
                 Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "

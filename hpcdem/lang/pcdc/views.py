@@ -56,7 +56,7 @@ class Model:
 
     @property
     def energies(self) -> dict[str, float]:
-        """The energy budget [J per m of thickness]."""
+        """The energy budget [J/m], in space [J]."""
         return self._look(lambda: fdem.queries.energies(self._project))
 
     @property

@@ -24,7 +24,8 @@ it."""
 
 
 class Budget:
-    """The account of one model. accounts: work of each kind up to the last interruption [J/m]; commands: changes by
+    """The account of one model. accounts: work of each kind up to the last interruption [J/m],
+    in space [J]; commands: changes by
     commands of what is stored; start, left: what was stored at the beginning and at the interruption; discs: the part
     of the work from outside that discs did, this rank's share, as an integer of exact_sum.as_integer; heat: changes of
     what is stored by temperatures, of_joints: those of them in joints; by_heat: that is what interrupts the account
@@ -57,8 +58,8 @@ class Budget:
         """Velocities are new, positions still old: book the work of this moment's forces."""
         local, pairs = sim.local, sim.local.pairs
         with sim.timers("energy"):
-            self._book(
-                sim, self._before, sim.v, 0.5, 0.5, local.of_joints, pairs.pushed, local.felt, local.outside,
+            local.book(
+                self._before, sim.v, 0.5, 0.5, local.of_joints, pairs.pushed, local.felt, local.outside,
                 sim.cold["work"],
             )  # fmt: skip
 
@@ -162,9 +163,7 @@ class Budget:
         seen, local = sim.evaluate(), sim.local
         with sim.timers("energy"):
             kinetic = np.empty(sim.n_own)
-            energy.kinetic(
-                sim.n_left, sim.n_own, sim.the_mesh().cells, sim.number, sim.v, seen.v_next, local.mass, kinetic
-            )
+            local.kinetic(sim.v, seen.v_next, kinetic)
             _, strain = local.stresses()
             in_joints = local.stored_in_joints()
             half = np.zeros((sim.n_own, energy.WORK))
@@ -172,27 +171,9 @@ class Budget:
                 half[:, WORK.index("plastic")] = -local.plastic_columns(slice(None))[:, plasticity.WORK]
             if local.creeps:
                 half[:, WORK.index("creep")] = -local.lost_by_creep()
-            self._book(sim, sim.v, sim.v, 0.5, 0.0, seen.of_joints, seen.pushed, seen.felt, seen.outside, half)
+            local.book(sim.v, sim.v, 0.5, 0.0, seen.of_joints, seen.pushed, seen.felt, seen.outside, half)
             stored = dict(zip(STORED, (exact_sum(part, sim.comm) for part in (kinetic, strain, in_joints))))
             return stored, {name: exact_sum(half[:, k], sim.comm) for k, name in enumerate(WORK)}
-
-    @staticmethod
-    def _book(
-        sim: Blocks, before: np.ndarray, after: np.ndarray, a: float, b: float, of_joints: np.ndarray,
-        pushed: np.ndarray, felt: np.ndarray, outside: np.ndarray, work: np.ndarray,
-    ) -> None:  # fmt: skip
-        local, o, dt = sim.local, sim.options, sim.clock.dt
-        energy.book(
-            sim.n_left, sim.n_own, local.triangle_rows[: local.count], local.quad_rows, local.c, local.q, sim.x, before,
-            after, a, b, of_joints, local.true_mass, o.gx, o.gy, o.mass_damping,
-            o.stiffness_damping, dt, work,
-        )  # fmt: skip
-        pairs = local.pairs
-        energy.book_contact(pairs.rows, sim.n_left, pairs.corners, pushed, before, after, a, b, dt, work)
-        energy.book_nodes(
-            local.node_begin, local.node_place, felt, outside, before, after, a, b, dt, sim.n_left, sim.n_own,
-            sim.v.shape[1], work,
-        )  # fmt: skip
 
     # ---- state on disk ---------------------------------------------------------------------------------------------
 

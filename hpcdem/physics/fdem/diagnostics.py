@@ -602,8 +602,6 @@ def added_mass(sim: Blocks) -> float:
 
 def account_energy(sim: Blocks, on: bool = True) -> None:
     """Keep the energy budget from now on. In dynamic mode only. Collective."""
-    if on:
-        sim.refuse_in_space("the energy budget")
     if on and not sim.options.dynamic:
         raise CommandError("the energy budget is kept in dynamic mode: masses of the static mode are fictitious")
     if on and (laws := user_laws.in_use(sim)):
@@ -617,7 +615,7 @@ def account_energy(sim: Blocks, on: bool = True) -> None:
 
 
 def energies(sim: Blocks) -> dict[str, float]:
-    """The energy budget [J/m] since `account_energy`; CommandError without it. Collective.
+    """The energy budget [J/m], in space [J], since `account_energy`; CommandError without it. Collective.
 
     Stored now: kinetic, strain, joints (what they give back). Since the start: joints_lost (fracture and friction
     in joints), contact (stored or lost there), viscous_lost, plastic_lost, creep_lost, work_gravity, work_outside

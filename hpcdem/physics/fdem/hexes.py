@@ -100,13 +100,13 @@ class Hexes:
         self.h[:n, hexes.H_ETA] = eta
         self.modulus = models[model, space.LAME] + models[model, space.MU2]
 
-    def forces(self, force: np.ndarray, s0: np.ndarray) -> None:
-        """Into the rows (n, 16) [N] of these tetrahedra; s0: see `hexes.forces`."""
+    def forces(self, force: np.ndarray, v: np.ndarray, gravity: tuple[float, float, float], s0: np.ndarray) -> None:
+        """Into the rows (n, 16) [N] of these tetrahedra, with the velocities v (n, 16); s0: see `hexes.forces`."""
         sim, o = self.sim, self.sim.options
         kernel: Any = hexes.forces if sim.threads == 1 else hexes.forces_threaded
         kernel(
-            sim.threads, self.count, self.place, sim.x, sim.v, self.parts, self.h, self.remember, s0,
-            not o.large_strain, force, o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping,
+            sim.threads, self.count, self.place, sim.x, v, self.parts, self.h, self.remember, s0,
+            not o.large_strain, force, *gravity, o.mass_damping, o.stiffness_damping,
         )  # fmt: skip
 
     def add_contact(self, pairs: Any, force: np.ndarray) -> None:

@@ -1215,6 +1215,28 @@ class Local:
         )  # fmt: skip
         return out
 
+    def book(
+        self, before: np.ndarray, after: np.ndarray, a: float, b: float, of_joints: np.ndarray, pushed: np.ndarray,
+        felt: np.ndarray, outside: np.ndarray, work: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Add to work (n_own, energy.WORK) what these forces, of one moment, do in a step with a times the velocities
+        before their kick and b times those after it."""
+        sim, o, pairs, dt = self.sim, self.sim.options, self.pairs, self.sim.clock.dt
+        energy.book(
+            sim.n_left, sim.n_own, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, sim.x, before,
+            after, a, b, of_joints, self.true_mass, o.gx, o.gy, o.mass_damping, o.stiffness_damping, dt, work,
+        )  # fmt: skip
+        energy.book_contact(pairs.rows, sim.n_left, pairs.corners, pushed, before, after, a, b, dt, work)
+        energy.book_nodes(
+            self.node_begin, self.node_place, felt, outside, before, after, a, b, dt, sim.n_left, sim.n_own,
+            sim.v.shape[1], work,
+        )  # fmt: skip
+
+    def kinetic(self, before: np.ndarray, after: np.ndarray, out: np.ndarray) -> None:
+        """Kinetic energy of the owned elements into out (n_own,), of velocities before and after the kick."""
+        sim = self.sim
+        energy.kinetic(sim.n_left, sim.n_own, sim.the_mesh().cells, sim.number, before, after, self.mass, out)
+
     def slot_of(self, faces: np.ndarray) -> np.ndarray:
         """Slots of faces of owned elements."""
         return self.first_slot[self.sim.where[faces // 4] - self.sim.n_left] + faces % 4

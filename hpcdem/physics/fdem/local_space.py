@@ -10,7 +10,7 @@ import numpy as np
 from hpcdem.physics.fdem.definition import TRACTIONS
 from hpcdem.physics.fdem.hexes import Hexes, place_masses
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
-from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
+from hpcdem.physics.fdem.kernels import elements, energy_space, joints_space, space, tets
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE
 from hpcdem.physics.fdem.laws_space import LawsSpace
@@ -257,24 +257,33 @@ class LocalSpace(LawsSpace):
             self.move_nodes()
 
     def _fill(self, force: np.ndarray, of_joints: np.ndarray, keep: bool) -> None:
-        sim, o = self.sim, self.sim.options
+        o = self.sim.options
         self.obey()
+        self._element_forces(force, self.sim.v, (o.gx, o.gy, o.gz), self.jointed, of_joints, keep)
+        if self.hexes is None:
+            self.pairs.add_to(force)
+        else:
+            self.hexes.add_contact(self.pairs, force)
+
+    def _element_forces(
+        self, force: np.ndarray, v: np.ndarray, gravity: tuple[float, float, float], jointed: bool,
+        of_joints: np.ndarray, keep: bool,
+    ) -> None:  # fmt: skip
+        """Forces of elements and their joints with the velocities v (n, 16)."""
+        sim, o = self.sim, self.sim.options
         stressed = sim.stress0 is not None or self.plastic or self.creeps or self.heated
         hexes = self.hexes
         some = 0 if hexes is not None and 6 * hexes.count == self.count else self.count
         self._forces(
-            sim.threads, some, self.rows, sim.x, sim.v, self.c, self.s0, stressed, not o.large_strain, force,
-            o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping, self.jointed, self.slot_size, self.slot_link,
+            sim.threads, some, self.rows, sim.x, v, self.c, self.s0, stressed, not o.large_strain, force,
+            *gravity, o.mass_damping, o.stiffness_damping, jointed, self.slot_size, self.slot_link,
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
             self.joint_table, self.joint_beyond, keep, of_joints, sim.clock.step, self.tally,
         )  # fmt: skip
-        if hexes is None:
-            self.pairs.add_to(force)
-        else:
+        if hexes is not None:
             if some:
                 force[hexes.rows.reshape(-1)] = 0.0  # the forces of their tetrahedra
-            hexes.forces(force, self.quad_s0)
-            hexes.add_contact(self.pairs, force)
+            hexes.forces(force, v, gravity, self.quad_s0)
 
     def open_joints(self) -> None:
         """See `Local.open_joints`."""
@@ -385,6 +394,39 @@ class LocalSpace(LawsSpace):
         if self.hexes is not None:
             self.hexes.spread(stress, energy, at, quad_s0, self.hexes_store(plastic, crept))
         return stress, energy
+
+    def stored_in_joints(self) -> np.ndarray:
+        """As in the plane (n_own,) [J]."""
+        sim = self.sim
+        out = np.zeros(sim.n_own)
+        energy_space.stored_in_joints(
+            self.slots, self.slot_face, self.slot_link, self.slot_size, self.slot_kind, self.slot_state,
+            self.slot_history, sim.where, sim.x, self.joint_table, self.joint_beyond, sim.n_left, out,
+        )  # fmt: skip
+        return out
+
+    def book(
+        self, before: np.ndarray, after: np.ndarray, a: float, b: float, of_joints: np.ndarray, pushed: np.ndarray,
+        felt: np.ndarray, outside: np.ndarray, work: np.ndarray,
+    ) -> None:  # fmt: skip
+        """As in the plane. Forces of elements are linear in the velocities: damping is what they are more than at
+        rest."""
+        sim, o, pairs, dt = self.sim, self.sim.options, self.pairs, self.sim.clock.dt
+        damping, at_rest = (np.zeros((len(sim.number), tets.ROW)) for _ in range(2))
+        for force, v in ((damping, before), (at_rest, np.zeros_like(before))):
+            self._element_forces(force, v, (0.0, 0.0, 0.0), False, self.of_joints, False)
+        damping -= at_rest
+        energy_space.book(
+            sim.n_left, sim.n_own, before, after, a, b, of_joints, damping, self.true_mass, o.gx, o.gy, o.gz, dt, work
+        )
+        energy_space.book_contact(pairs.rows, sim.n_left, pushed, before, after, a, b, dt, work)
+        energy_space.book_nodes(
+            self.node_begin, self.node_corner, felt, outside, before, after, a, b, dt, sim.n_left, sim.n_own, work
+        )
+
+    def kinetic(self, before: np.ndarray, after: np.ndarray, out: np.ndarray) -> None:
+        """As in the plane."""
+        energy_space.kinetic(self.sim.n_left, self.sim.n_own, before, after, self.mass, out)
 
     def _edges(self, slots: np.ndarray) -> np.ndarray:
         """See `joints_space.faces_now`; behind no forces, which the plane has."""

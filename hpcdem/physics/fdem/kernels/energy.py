@@ -148,7 +148,7 @@ def kinetic(first, n_own, cells, number, before, after, mass, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _stored_at_point(o, s, h, law, beyond, history, g):
+def stored_at_point(o, s, h, law, beyond, history, g):
     """Energy per area [J/m2] that a point of a joint gives back when it is unloaded."""
     sigma, tau, o_u, s_u, damage, _, _ = laws.yielded_point(
         o, s, h, 1.0 / h, law[0], law[1], law[2], law[3], law[4], beyond[0], beyond[1], beyond[2], beyond[3],
@@ -189,7 +189,7 @@ def stored_in_joints(slots, face, at, kind, state, history, where, cells, x, tab
         h = math.sqrt(h2)
         oa, sa, ob, sb = oa / h, sa / h, ob / h, sb / h
         law, more = table[kind[s]], beyond[kind[s]]
-        ends = _stored_at_point(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, law, more, history[s], 0)
-        ends += _stored_at_point(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, law, more, history[s], 2)
-        middle = _stored_at_point(0.5 * (oa + ob), 0.5 * (sa + sb), h, law, more, history[s], 1)
+        ends = stored_at_point(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, law, more, history[s], 0)
+        ends += stored_at_point(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, law, more, history[s], 2)
+        middle = stored_at_point(0.5 * (oa + ob), 0.5 * (sa + sb), h, law, more, history[s], 1)
         out[r - first] += 0.5 * h * (5.0 / 18.0 * ends + 8.0 / 18.0 * middle)
