@@ -236,7 +236,9 @@ class Fluid:
         leaks = bool(np.isfinite(since).any())
         wet = state.copy()
         wet[:, kernels.S] = np.maximum(wet[:, kernels.S], 0.0)  # trial states may lack it
-        kernels.flows(1, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, wet, q, lost)
+        threads = self.flow.blocks.threads
+        flows = kernels.flows if threads == 1 else kernels.flows_threaded
+        flows(threads, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, wet, q, lost)
         volume = np.bincount(self.end, table[self.both, kernels.HALF], self.n)
         fluid = volume * (state[:, kernels.S] + state[:, kernels.P] / self.bulk)
         dt, stored = step.dt, fluid - step.fluid
@@ -301,11 +303,10 @@ class Fluid:
         width = self.at.shape[1] * dim
         corners = np.ascontiguousarray(x[self.at].reshape(self.m, width))
         begin, args = width * np.arange(self.m), (self.law, self.laws, corners, self.flow.viscosity, table)
-        if dim == 2:
-            kernels.geometry(1, begin, begin + 4, *args)
-        else:
-            near = begin[:, None] + 3 * np.arange(3)
-            kernels_space.geometry(1, near, near + 9, *args)
+        threads, of = self.flow.blocks.threads, kernels if dim == 2 else kernels_space
+        near = begin if dim == 2 else begin[:, None] + 3 * np.arange(3)
+        geometry = of.geometry if threads == 1 else of.geometry_threaded
+        geometry(threads, near, near + (4 if dim == 2 else 9), *args)
         return table
 
     def _opens(self, x: np.ndarray, delta: np.ndarray) -> np.ndarray:
