@@ -596,6 +596,8 @@ PCDC_KEYWORDS = {
     "what slip adds to the aperture at most": "滑移使开度增加的最大值",
     "leak-off: part of the pores that was full before; below 1 a sharp front fills the rest":
     "滤失:岩石的初始饱和度;小于 1 时其余孔隙由陡峭的湿润锋面充满",
+    "fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any Reynolds number":
+    "流速较高时按紊流计算,采用 Blasius 光滑壁摩阻;否则任何雷诺数下均按层流计算",
     "density of the grains": "支撑剂颗粒的密度",
     "diameter of the grains": "支撑剂颗粒的直径",
     "channels narrower than so many grains carry none: they bridge": "宽度小于这么多个粒径的通道不携带颗粒:发生桥堵",

@@ -23,7 +23,10 @@ from tests.space.support import box
 LEAKS = {
     "leak_off": 1.0, "matrix_permeability": 1e-14, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9,
 }  # fmt: skip
-WIDE = {**WATER, "fluid_bulk": 1e7, "aperature_initial": 2e-4, "aperature_minumum": 5e-5, "aperature_maximum": 5e-3}
+WIDE = {
+    **WATER, "fluid_bulk": 1e7, "aperature_initial": 2e-4, "aperature_minumum": 5e-5, "aperature_maximum": 5e-3,
+    "turbulence": 1.0,
+}  # fmt: skip
 
 
 SOIL = {

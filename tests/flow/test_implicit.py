@@ -23,9 +23,10 @@ from tests.flow.support import WATER, at, hold, inner, line, over, standing
 # ---- flow alone ---------------------------------------------------------------------------------------------------
 
 
-def test_derivatives_are_those_of_differences() -> None:
+@pytest.mark.parametrize("viscosity", [1e-6, 1e-9])
+def test_derivatives_are_those_of_differences(viscosity: float) -> None:
     """The residual of nodes that are full, half full and nearly dry, with gravity and leak-off, by all variables and
-    positions; and forces on faces by the variables."""
+    positions; and forces on faces by the variables. Of the thin fluid flow is turbulent."""
     mesh = shaken(rectangle(4, 3, 0.4, 0.3), 0.2)
     sim = jointed(model(mesh))
     sim.option(dynamic=False, large_strain=False, collision=False)
@@ -34,8 +35,9 @@ def test_derivatives_are_those_of_differences() -> None:
     matrix = {"matrix_permeability": 1e-13, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9}
     flow.assign(
         joints,
-        {**WATER, "fluid_bulk": 1e7, "aperature_initial": 1e-4, "shear_dilation": 30.0, "leak_off": 1.0, **matrix},
-    )
+        {**WATER, "fluid_bulk": 1e7, "aperature_initial": 1e-4, "shear_dilation": 30.0, "leak_off": 1.0,
+         "viscosity": viscosity, "turbulence": 1.0, **matrix},
+    )  # fmt: skip
     flow.adjust(joints[4:7], {"matrix_porosity_compressibility": 0.0, "matrix_saturation": 0.5})
     changes.crack(sim, joints[:4])
     flow.prescribe(at(sim, 0.0), kernels.SURFACE, 0.1)
@@ -55,6 +57,7 @@ def test_derivatives_are_those_of_differences() -> None:
             u[np.searchsorted(fluid.numbers, flow.well(name).points[0])] = value
         x = run.x + rng.uniform(-1e-6, 1e-6, run.x.shape)
         now = fluid.balance(step, u, x)
+        assert now.slow is not None and ((now.slow < 1.0).mean() > 0.5) == (viscosity < 1e-6)
         matrix_of = np.zeros((2 * (count + fluid.n),) * 2)
         for piece in fluid.pieces(step, now, u, x, count):
             for node, part in zip(piece.node, piece.stiffness):

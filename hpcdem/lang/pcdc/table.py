@@ -375,7 +375,7 @@ _APERTURES = {
     "aperature-minumum": ("a{perature}-min{imum}", "a{perture}-min{imum}", "a{perture}-min{umum}"),
 }  # fmt: skip
 _POROUS = tuple(
-    replace(o, values=(BOOL,), unit="", default="off") if o.name == "leak-off" else o for o in declared(
+    replace(o, values=(BOOL,), unit="", default="off") if o.name in ("leak-off", "turbulence") else o for o in declared(
         POROUS_PROPERTIES, "f{luid}-den{sity}", "f{luid}-b{ulk}", "vis{cosity}", "a{perature}-i{nitial}",
         "a{perature}-min{umum}", "a{perature}-max{imum}", "leak-off", "m{atrix}-p{ore}-p{ressure}",
         "m{atrix}-p{ermeability}", "m{atrix}-p{orosity}-c{ompressibility}", "m{atrix}-p{orosity}", "sh{ear}-d{ilation}",

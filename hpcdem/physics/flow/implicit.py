@@ -56,7 +56,7 @@ class Balance:
     state (n, kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a complementarity;
     pumped: by well the fluid that came in [m2], None: what its nodes lack; table (l, kernels.CHANNEL), q [m2/s], lost
     [m2] (l,): of the links of channels, see kernels.py; packs (2, n): what packs of proppant push with [Pa], and its
-    derivative by the volume. In space m3 for m2.
+    derivative by the volume; slow (l,): flow over that of the cubic law, None: it is laminar. In space m3 for m2.
     """
 
     residual: np.ndarray
@@ -72,6 +72,7 @@ class Balance:
     q: np.ndarray
     lost: np.ndarray
     packs: np.ndarray | None = None
+    slow: np.ndarray | None = None
 
 
 @dataclass
@@ -231,6 +232,9 @@ class Fluid:
             self.thicken(self.ends, table)
         does, value = step.conditions[self.condition].T
         state = self.state_of(u, x)
+        slow = self.flow.slowness(self.ends, table, state)
+        if slow is not None:
+            table[:, kernels.CONDUCT] *= slow
         q, lost = np.empty(len(table)), np.zeros(len(table))
         since = self.flow.since[self.channels][self.of]
         leaks = bool(np.isfinite(since).any())
@@ -266,7 +270,7 @@ class Fluid:
             level += PLACES / ROUNDING * float(np.abs(x).max()) * np.bincount(self.end, wall, self.n)
         packs = None if self.packs is None else self.packs(volume)
         return Balance(
-            residual, plain, sizes, ROUNDING * level, fluid, volume, state, held, pumped, table, q, lost, packs
+            residual, plain, sizes, ROUNDING * level, fluid, volume, state, held, pumped, table, q, lost, packs, slow
         )
 
     def _well_lacks(
@@ -347,6 +351,8 @@ class Fluid:
             self._channel_pieces(step, now, u, x, first, mine), *own,
             self._face_pieces(self._rises(u, now)[0], x, first + self.first),
         ]  # fmt: skip
+        if now.slow is not None:
+            made.append(self._turbulent_pieces(step, now, u, first, mine))
         if now.packs is not None:
             packs = first + self.n + np.arange(self.n)
             made += [*self._pack_pieces(now, x, packs, mine), self._face_pieces(np.ones(self.n), x, packs)]
@@ -426,16 +432,42 @@ class Fluid:
         dim, first_row = self.dim, by_x.shape[1] if self.flow.blocks.options.mechanical else 0
         fill = state[:, kernels.S] + state[:, kernels.P] / self.bulk
         out = np.zeros((m, first_row + 2 * dim, first_row + 2 * dim))
+        cubic = 3.0 if now.slow is None else np.where(now.slow[mine] < 1.0, 12.0 / 7.0, 3.0)  # of q by delta
         for end in range(2):
             row = first_row + dim * end
             out[:, row, first_row::dim] = sign[end] * dt * by_u + leak_u
             if first_row:
                 stored = half / delta * fill[ends[:, end]]
-                out[:, row, :first_row] = (stored + sign[end] * dt * 3.0 * now.q[mine] / delta)[:, None] * by_x
+                out[:, row, :first_row] = (stored + sign[end] * dt * cubic * now.q[mine] / delta)[:, None] * by_x
             out[now.held[ends[:, end]], row, :] = 0.0
         of_fluid = first + self.first[ends]
         nodes = np.column_stack([self.at[self.of][mine], of_fluid]) if first_row else of_fluid
         return Pieces(self.channels[self.of][mine], nodes, out)
+
+    def _turbulent_pieces(self, step: Step, now: Balance, u: np.ndarray, first: int, mine: slice) -> Pieces:
+        """Of turbulent flow by the pressures in a channel, beside those of its conductance: this goes with the size of
+        the gradient to the power -3/7, so with the flows F into its nodes and the heads h along its links, -3/7 F F^T /
+        sum(q h)."""
+        assert now.slow is not None
+        links = LINKS[self.dim]
+        ends, q = self.ends[mine].reshape(-1, links, 2), now.q[mine].reshape(-1, links)
+        state = now.state
+        conduct, weight = (now.table[mine, k].reshape(-1, links) for k in (kernels.CONDUCT, kernels.WEIGHT))
+        p, e = state[:, kernels.P][ends], state[:, kernels.E][ends]
+        head = (p[..., 0] - p[..., 1]) + (e[..., 0] - e[..., 1]) * weight
+        nodes = ends[:, 0] if links == 1 else ends[:, [1, 2, 0], 0]
+        side = (ends[:, None, :, 1] == nodes[:, :, None]).astype(float) - (ends[:, None, :, 0] == nodes[:, :, None])
+        # Of full channels the same twice: what is half full flows slower by the same gradient.
+        into, full = ((side * flow[:, None]).sum(axis=2) for flow in (q, conduct * head))
+        power = np.maximum((conduct * head * head).sum(axis=1), 1e-300)
+        fast = now.slow[mine].reshape(-1, links)[:, 0] < 1.0
+        rate = np.where(fast, -3.0 / 7.0 * step.dt, 0.0) / power
+        values = (rate[:, None] * into)[:, :, None] * (full * self._rises(u, now)[0][nodes])[:, None, :]
+        values[now.held[nodes]] = 0.0
+        k, dim = nodes.shape[1], self.dim
+        out = np.zeros((len(nodes), k * dim, k * dim))
+        out[:, ::dim, ::dim] = values
+        return Pieces(self.channels[mine], first + self.first[nodes], out)
 
     def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, variable: np.ndarray) -> Pieces:
         """Of the forces on faces by variables at their ends: kernels.loads. p_u (n,): derivatives of pressures by them;

@@ -31,6 +31,9 @@ W, V, GIVEN, LEAKED, REMOVED, INFLOW = range(6)
 NODE = 6
 STEEPEST = 1.125
 """Largest f(s) / s of `part`."""
+TURBULENT = (96.0 / 0.3164) ** (4.0 / 3.0)
+"""Reynolds number, of twice the aperture, from which flow is turbulent: there 96 / Re of plates is what Blasius' 0.3164
+Re^-1/4 is, 2039."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -71,6 +74,38 @@ def geometry_threaded(threads, one, other, law, laws, x, viscosity, out):
     """The same on several threads."""
     for t in prange(threads):
         _geometry(t, threads, one, other, law, laws, x, viscosity, out)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def slowness(links, ends, channels, density, state, out):
+    """Flow over that of the cubic law, out (m,), 1 where it is laminar, by the heads at the ends of links (m, 2).
+
+    Darcy and Weisbach: the head falls by f rho v^2 / (4 delta), f = 96 / Re, from `TURBULENT` on Blasius' (1913). With
+    the Reynolds number R that the cubic law would give, 96 R = f Re^2, so Re / R = (TURBULENT / R)^(3/7). links: of
+    each channel, network.LINKS; in space the size of the gradient is that of the triangle. density [kg/m3]: of the
+    fluid; that of a slurry follows from its weight, viscosities from conductances.
+    """
+    for first in range(0, len(ends), links):
+        delta = channels[first, APERTURE]
+        power = pairs = weight = 0.0
+        for c in range(first, first + links):
+            a, b = ends[c, 0], ends[c, 1]
+            head = (state[a, P] - state[b, P]) + (state[a, E] - state[b, E]) * channels[c, WEIGHT]
+            power += channels[c, CONDUCT] * head * head
+            pairs += channels[c, CONDUCT] * channels[first + (c - first + 1) % links, CONDUCT]
+            weight += channels[c, WEIGHT] / links
+        if links == 1:
+            size = 2.0 * channels[first, HALF] / delta  # L
+            over = channels[first, CONDUCT] * size  # delta^3 / (12 mu)
+        else:
+            # Cotangents of a triangle: the sum of their products by pairs is 1, that of cot h^2 is 2 A |grad h|^2.
+            size = 6.0 * channels[first, HALF] / delta  # A
+            over = 2.0 * math.sqrt(max(pairs, 0.0))
+        q = math.sqrt(max(over * power / size, 0.0))
+        reynolds = 2.0 * density * weight * q * over * 12.0 / (delta * delta * delta)
+        factor = (TURBULENT / reynolds) ** (3.0 / 7.0) if reynolds > TURBULENT else 1.0
+        for c in range(first, first + links):
+            out[c] = factor
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -839,12 +839,30 @@ class Flow(SurfaceLoad):
         if self.cycles % LOOK == 0:
             self._check()
 
+    def slowness(self, ends: np.ndarray, table: np.ndarray, state: np.ndarray) -> np.ndarray | None:
+        """Flow (m,) over that of the cubic law in links with these ends (m, 2) and table, by the state of nodes; None:
+        it is laminar at any Reynolds number. Not collective."""
+        if not self.fluid("turbulence") > 0.0:
+            return None
+        out = np.empty(len(ends))
+        kernels.slowness(LINKS[self.blocks.dim], ends, table, self.fluid("fluid_density"), state, out)
+        return out
+
+    def _flowing_table(self) -> np.ndarray:
+        """The table of links, where flow is turbulent with the conductances of this moment. Not collective."""
+        slow = self.slowness(self._ends, self._table, self.state)
+        if slow is None:
+            return self._table
+        table = self._table.copy()
+        table[:, kernels.CONDUCT] *= slow
+        return table
+
     def _find_flows(self, dt: float) -> None:
-        threads = self.blocks.threads
+        threads, table = self.blocks.threads, self._flowing_table()
         kernel = kernels.flows if threads == 1 else kernels.flows_threaded
         kernel(
             threads, self._ends, self._law, self._law_table, self._since, self._leaks, self.time, self.time + dt,
-            self._table, self.state, self._q, self._lost_fluid,
+            table, self.state, self._q, self._lost_fluid,
         )  # fmt: skip
 
     def _sub_step(self, condition: np.ndarray) -> None:
@@ -854,8 +872,8 @@ class Flow(SurfaceLoad):
         if blocks.threads == 1:
             into, gone = self._sums
             kernels.sub_step(
-                self._ends, self._law, self._law_table, self._since, self._leaks, before, after, self._table, self._q,
-                self._lost_fluid, into, gone, *told,
+                self._ends, self._law, self._law_table, self._since, self._leaks, before, after, self._flowing_table(),
+                self._q, self._lost_fluid, into, gone, *told,
             )  # fmt: skip
         else:
             self._find_flows(self.dt)

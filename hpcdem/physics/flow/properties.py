@@ -10,7 +10,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.properties import JOINT, Model, Property
 
-FLUID = ("fluid_density", "fluid_bulk", "viscosity")
+FLUID = ("fluid_density", "fluid_bulk", "viscosity", "turbulence")
 """Properties of the fluid: the same in all channels."""
 MATRIX = ("matrix_permeability", "matrix_porosity_compressibility", "matrix_porosity")
 """What leak-off needs."""
@@ -48,7 +48,7 @@ def _apertures(values: dict[str, Any]) -> None:
 POROUS = Model(
     "hydraulic_porous_medium",
     JOINT,
-    "channel of a fluid between two plates, laminar, of an aperture that follows the opening of the joint",
+    "channel of a fluid between two plates, of an aperture that follows the opening of the joint",
     (
         Property("fluid_density", "kg/m3", "density of the fluid", low_itself=False),
         Property("fluid_bulk", "Pa", "bulk modulus of the fluid", low_itself=False),
@@ -75,6 +75,8 @@ POROUS = Model(
                  otherwise="no limit"),
         Property("matrix_saturation", "1", "leak-off: part of the pores that was full before; below 1 a sharp front "
                  "fills the rest", 1.0, high=1.0),
+        Property("turbulence", "1", "fast flow is turbulent, with the friction of smooth walls after Blasius; else "
+                 "laminar at any Reynolds number", 0.0, high=1.0),
     ),
     _apertures,
 )  # fmt: skip

@@ -13,6 +13,7 @@ from hpcdem.physics.flow.model import Flow
 
 WATER = {
     "fluid_density": 1000.0, "fluid_bulk": 1e6, "viscosity": 1e-6, "aperature_initial": 1e-4, "aperature_minumum": 1e-5,
+    "turbulence": 1.0,
 }  # fmt: skip
 
 
