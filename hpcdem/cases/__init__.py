@@ -29,7 +29,7 @@ CASES = {
     "fault-injection": "FaultInjection", "penny-fracture": "PennyFracture",
     "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing", "cracking-ring": "CrackingRing",
     "lauwerier": "Lauwerier", "doublet": "Doublet", "proppant-slot": "ProppantSlot",
-    "proppant-closure": "ProppantClosure", "thermal-shock": "ThermalShock",
+    "proppant-bed": "ProppantBed", "proppant-closure": "ProppantClosure", "thermal-shock": "ThermalShock",
 }  # fmt: skip
 """Names on the command line, and the classes; a class stands in the module of its name, with _ for -."""
 __all__ = ["CASES", "find", *CASES.values()]
