@@ -106,6 +106,20 @@ def test_transfer_to_an_environment_follows_its_series() -> None:
         assert found["relative"] < 1e-12 and found["given"] < 0.0
 
 
+def test_an_environment_follows_its_table() -> None:
+    """A thin block that conducts well in air that gets warmer by a K/s: a (t - (1 - exp(-k t)) / k), k = h / (rho c
+    times the thickness)."""
+    mesh = rectangle(2, 1, 0.02, 0.01)
+    sim, heat = standing(mesh, conductivity=400.0)
+    k = 50.0 / (float(sim.element_rows.column("density")[1]) * GRANITE["capacity"] * 0.02)
+    sim.table("air", [(0.0, 0.0), (1e4, 100.0)])
+    heat.expose(faces_at(mesh, 0.02), environment="air", transfer=50.0)
+    time = 1.5 / k
+    until(sim, time)
+    assert temperatures(sim) == pytest.approx(0.01 * (time - (1.0 - math.exp(-k * time)) / k), rel=5e-3)
+    assert heat.account()["relative"] < 1e-12
+
+
 def test_a_flux_is_what_is_given() -> None:
     """12 W/m2 through 0.1 m for 1000 s, and a table of it."""
     mesh = rectangle(10, 1, 1.0, 0.1)

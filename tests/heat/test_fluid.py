@@ -244,6 +244,19 @@ def test_implicit_second_order_stays_between(dt: float) -> None:
     implicit.close()
 
 
+def test_the_temperature_of_what_comes_in_follows_its_table() -> None:
+    """Warmer by 0.1 K a second: so it is farther down later, by x / v, but for half a node at the entrance."""
+    sim, flow, heat, _ = flowing_line(50, 2.0, 0.01, {"transfer_coeficient": 0.0, "conductivity": 0.0})
+    sim.table("boiler", [(0.0, 0.0), (1e3, 100.0)])
+    heat.prescribe_fluid(at(sim, 0.0, 0.0), "boiler")
+    step(sim, 400.0, 200)
+    x = sim.mesh.points[flow.network.nodes, 0]
+    near = x < 1.0
+    assert of_nodes(flow)[near] == pytest.approx(0.1 * (400.0 - x[near] / 0.01), abs=0.4)
+    heat.remove_conditions(None)
+    sim.remove_table("boiler")
+
+
 def test_filling_a_dry_fracture_brings_its_heat() -> None:
     """Water of 40 K runs into dry channels, explicit flow and heat on one clock: what is in them has come in at 40 K,
     to the last digit, though nodes fill and flows change."""

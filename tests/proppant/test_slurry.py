@@ -31,7 +31,7 @@ def flowing(
     return sim, flow, proppant
 
 
-def bring(sim: Blocks, proppant: Proppant, c: float, kind: str = CONCENTRATION) -> None:
+def bring(sim: Blocks, proppant: Proppant, c: float | str, kind: str = CONCENTRATION) -> None:
     proppant.prescribe(nodes_up(sim)[:1], kind, c)
 
 
@@ -48,6 +48,18 @@ def test_a_front_goes_with_the_slurry() -> None:
         assert now.max() <= 0.01 + 1e-9
         found = proppant.account()
         assert found["came"] == pytest.approx(0.01 * FAST * time, rel=1e-9) and found["relative"] < 1e-12
+
+
+def test_what_comes_in_follows_its_table() -> None:
+    """Concentration and rate that grow with time: what came is their integral, by steps that take the end of each."""
+    for kind, flux in ((CONCENTRATION, FAST), (RATE, 1.0)):
+        sim, flow, proppant = flowing()
+        top = 0.02 if kind == CONCENTRATION else 1e-6
+        sim.table("more", [(0.0, 0.0), (200.0, top)])
+        bring(sim, proppant, "more", kind)
+        over(sim, 200.0, 50)
+        found = proppant.account()
+        assert found["came"] == pytest.approx(flux * 0.5 * top * 200.0, rel=0.03) and found["relative"] < 1e-12
 
 
 def test_explicit_cycles_carry_it_as_far() -> None:

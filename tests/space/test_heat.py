@@ -13,9 +13,11 @@ from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import TEMPERATURE, Over
+from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat import kernels_space, reference
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
+from tests.flow.support import WATER
 from tests.heat import exact
 from tests.heat.support import GRANITE, temperatures, until
 from tests.space.support import ROCK, body, box, faces_on, hexes, nodes_on
@@ -466,6 +468,14 @@ def test_hexahedra_have_no_heat() -> None:
     sim = body(hexes((1, 1, 1), (1.0, 1.0, 1.0)))
     with pytest.raises(CommandError, match="hexahedra have no heat"):
         Heat.of(sim).assign(None, GRANITE)
+
+
+def test_fluid_has_no_heat() -> None:
+    mesh = box((2, 2, 2), (1.0, 1.0, 1.0))
+    sim, heat = standing(mesh)
+    Flow.of(sim).assign(None, WATER)
+    with pytest.raises(CommandError, match="fluid in three dimensions has no heat"):
+        heat.of_fluid()
 
 
 def test_obtuse_tetrahedra_are_told() -> None:
