@@ -257,6 +257,22 @@ def test_the_temperature_of_what_comes_in_follows_its_table() -> None:
     sim.remove_table("boiler")
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("conductivity", 500.0), ("capacity", 2100.0), ("transfer_coeficient", 100.0), ("second_order", 1.0)],
+)
+def test_each_property_alone_changes_the_heat(name: str, value: float) -> None:
+    """Of water that runs between blocks at 0 degrees."""
+
+    def warmed(**changed: float) -> np.ndarray:
+        sim, flow, heat, _ = flowing_line(20, 0.4, 0.01, changed)
+        heat.prescribe_fluid(at(sim, 0.0, 0.0), 50.0)
+        step(sim, 20.0, 20)
+        return of_nodes(flow)
+
+    assert np.abs(warmed() - warmed(**{name: value})).max() > 0.2
+
+
 def test_filling_a_dry_fracture_brings_its_heat() -> None:
     """Water of 40 K runs into dry channels, explicit flow and heat on one clock: what is in them has come in at 40 K,
     to the last digit, though nodes fill and flows change."""
