@@ -14,7 +14,7 @@ from tests.cases.ready import results
 
 THICK = {
     "regime": "viscosity", "energy": 10.0, "rate": 1e-2, "viscosity": 0.1, "confinement": 50e6, "aperture": 3e-6,
-    "size": 0.15, "reach": 2.7, "far": 11.0, "steps_at_most": 200.0,
+    "size": 0.12, "reach": 2.7, "far": 11.0, "steps_at_most": 200.0,
 }  # fmt: skip
 
 

@@ -286,7 +286,7 @@ class Writer:
         self.joint = {
             "cohesion": u.stress(6e4 * weak), "tensile-strength": u.stress(2e4 * weak), "gf1": u.toughness(0.05 * weak),
             "gf2": u.toughness(0.2 * weak), "friction": 35.0, "penalty-normal": u.stress(2e9),
-            "penalty-shear": u.stress(1e9), "penalty-overlay": u.stress(3e9),
+            "penalty-shear": u.stress(1.25e9), "penalty-overlay": u.stress(3e9),
         }  # fmt: skip
         self.static = self.kind == BLOCKS and draw.random() < 0.25
         if self.kind != COUPLED:
