@@ -11,6 +11,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes, connectivity, convergence, diagnostics, overlaps
 from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.pairs import Kinds
 from hpcdem.physics.fdem.pairs_space import AllPairs, ContactSpace, Surface, face_areas
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tetrahedra import FACES
@@ -101,7 +102,7 @@ def test_a_block_moved_over_a_plate_with_other_elements(potential: str, ripple: 
     sim.close_model()
     moved, start = sim.number >= len(plate.cells), sim.x.copy()
     sim.rebuild_state.skin = 2.5
-    pairs = ContactSpace(sim, sim.local.shapes, sim.local.kinds, *ContactSpace.remembered(sim))
+    pairs = ContactSpace(sim, *ContactSpace.remembered(sim))
 
     def force(way: np.ndarray) -> np.ndarray:
         sim.x[:] = start
@@ -232,7 +233,7 @@ def test_whose_friction_it_is(lies: str) -> None:
 
 def sim_kinds(sim: Blocks):
     sim.close_model()
-    return sim.local.kinds
+    return Kinds.of(sim)
 
 
 def brute_force(sim: Blocks, skin: float) -> set[tuple[int, int]]:

@@ -205,7 +205,7 @@ def _move_as_one(sim: Blocks, back: np.ndarray, corner: np.ndarray, v: np.ndarra
     """Corners that have become one node by elements that came back get one velocity: that of those that were there
     (m,) together keeps their momentum, v (m, 2) [m/s], mass (m,) [kg/m]."""
     node = sim.node.reshape(-1)
-    shared = np.zeros(len(sim.node_sizes), bool)
+    shared = np.zeros(len(sim.shared_nodes), bool)
     shared[sim.node[back][sim.node[back] >= 0]] = True
     use = shared[node[corner]]
     total = np.bincount(node[corner][use], mass[use], minlength=len(shared))

@@ -581,13 +581,14 @@ class Local:
         number = sim.number[own]
         cells, node = mesh.cells[number], sim.node[number]
         real = node >= 0
-        self.special[real] |= (sim.node_sizes[node[real]] > 1) | (sim.point_row[cells[real]] > 0)
+        self.special[real] |= sim.shared_nodes[node[real]] | (sim.point_row[cells[real]] > 0)
         if self.dim == 2:  # quads
             self.special[cells[:, 3] >= 0] = True
         self.special &= real
         self.some_special = bool(self.special.any())
         nothing = np.empty(0, np.int64)
-        args = sim.number, sim.n_left, sim.n_own, self.special, sim.node, sim.member_begin, sim.unused
+        scratch = np.full(len(sim.shared_nodes), -1, np.int64)
+        args = sim.number, sim.n_left, sim.n_own, self.special, sim.node, sim.member_begin, scratch
         n = build.special_nodes(*args, nothing, nothing, nothing)
         self.node_lead, self._start, self._one = (np.empty(n, np.int64) for _ in range(3))
         if n:
@@ -712,7 +713,9 @@ class Local:
     def _set_masses(self) -> None:
         """Masses of the corners that the motion sees, and the time step. Collective."""
         sim, o = self.sim, self.sim.options
-        self.mass = self.true_mass.copy()
+        # One table as long as nothing is added to the masses: only static runs and mass scaling do.
+        true = o.dynamic and o.mechanical and o.mass_scaling == 0.0
+        self.mass = self.true_mass if true else self.true_mass.copy()
         if not o.dynamic or not o.mechanical:
             self._make_static_masses()
             sim.clock.dt = 1.0

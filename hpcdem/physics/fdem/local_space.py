@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE
 from hpcdem.physics.fdem.laws_space import LawsSpace
 from hpcdem.physics.fdem.local import ALPHA, Evaluation, element_table
 from hpcdem.physics.fdem.pairs import Surfaces
-from hpcdem.physics.fdem.pairs_space import ContactSpace, ShapesSpace
+from hpcdem.physics.fdem.pairs_space import ContactSpace, ShapesSpace, face_areas
 from hpcdem.physics.fdem.tetrahedra import FACES
 from hpcdem.physics.fdem.user_functions import Placed
 
@@ -42,17 +41,12 @@ class LocalSpace(LawsSpace):
         self._make_memories()
         self._make_joints()
         self._put_histories()
-        self.pairs: Any = ContactSpace(sim, self.shapes, self.kinds, *ContactSpace.remembered(sim))
+        self.pairs: Any = ContactSpace(sim, *ContactSpace.remembered(sim))
         self.relaxing_corner = np.empty(0, np.int64)  # nothing dies down in space
         self._make_loads()
         self._make_nodes()
         self._set_masses()
         self._bind()
-
-    @cached_property
-    def shapes(self) -> Any:
-        """What contact needs to know of the elements held here, by storage row."""
-        return ShapesSpace(self.sim, self.sim.number)
 
     def _make_constants(self) -> None:
         sim, mesh = self.sim, self.sim.the_mesh()
@@ -82,16 +76,22 @@ class LocalSpace(LawsSpace):
         self.slots = 4 * self.count
         padded = self.slots + 12  # lanes are filled four tetrahedra at a time
         self.slot_face, self.slot_link = np.zeros(padded, np.int64), np.zeros((padded, 3), np.int32)
-        self.slot_size, self.slot_state = np.ones(padded), np.zeros(padded, np.uint8)
-        self.slot_law, self.slot_kind, self.follow = (np.full(padded, fill, np.int32) for fill in (0, 0, -1))
+        some = bool((sim.joint_row > 0).any())
+        # Of tables of zeros that nobody has written to nothing is in the memory: that is so in bodies without joints.
+        self.slot_size, self.slot_state = np.zeros(padded), np.zeros(padded, np.uint8)
+        self.slot_law, self.slot_kind, self.follow = (np.zeros(padded, np.int32) for _ in range(3))
+        if some:
+            self.slot_size[self.slots :], self.follow[:] = 1.0, -1
         self.head = np.full(4 * -(-self.count // tets.BLOCK), -1, np.int32)
         self.slot_history = np.zeros((padded, HISTORY))
         self.first_slot = 4 * np.arange(sim.n_own)
-        lost = joints_space.links(
-            sim.number, self.rows[: self.count], mesh.points, mesh.cells, sim.where, sim.partner, sim.closed_faces(),
-            sim.joint_row, self.slot_face, self.slot_link, self.slot_size, self.slot_law, self.slot_kind,
-            self.slot_state,
-        )  # fmt: skip
+        lost = -1
+        if some:
+            lost = joints_space.links(
+                sim.number, self.rows[: self.count], mesh.points, mesh.cells, sim.where, sim.partner,
+                sim.closed_faces(), sim.joint_row, self.slot_face, self.slot_link, self.slot_size, self.slot_law,
+                self.slot_kind, self.slot_state,
+            )  # fmt: skip
         self._agree_on_lost(int(lost), "the joint of face")
         self.jointed = bool(self.slot_state.any())
         self._make_joint_laws()
@@ -164,33 +164,36 @@ class LocalSpace(LawsSpace):
         """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: of its joints,
         k = P sqrt(A) / 3 with the largest P, and what the contact of its free faces can have, k = P A (1 / h + 1 /
         h_other) / 3 per face, h_other: the smallest of all; rho c_p A / 3 of quiet faces."""
-        sim, own = self.sim, self.sim.owned
+        sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
         springs, dashpots = np.zeros((sim.n_own, 4)), np.zeros((sim.n_own, 4))
         faces = (4 * sim.number[own][:, None] + np.arange(4)).reshape(-1)
         quiet = sim.quiet_faces()[faces].reshape(-1, 4)
         if quiet.any():
             impedance = self._impedances(sim.number[own])[0][:, None] / 3.0
-            each = np.where(quiet, impedance * self.shapes.area[own], 0.0)
+            each = np.where(quiet, impedance * face_areas(mesh.points, mesh.cells[sim.number[own]]), 0.0)
             for k in range(4):
                 dashpots[:, FACES[k]] += each[:, k, None]
         names = ("penalty_normal", "penalty_overlay", "penalty_shear")
         penalty = np.max([sim.joint_rows.column(name) for name in names], axis=0)[sim.joint_row[faces]]
         tied = sim.closed_faces()[faces] & (sim.joint_row[faces] > 0)
-        each = np.where(tied, penalty / self.slot_size[: self.slots] / 3.0, 0.0).reshape(-1, 4)
+        each = np.zeros(len(faces))
+        each[tied] = penalty[tied] / self.slot_size[: self.slots][tied] / 3.0
+        each = each.reshape(-1, 4)
         if not sim.options.collision:
             for k in range(4):
                 springs[:, FACES[k]] += each[:, k, None]
             sim.surface_loads.springs(sim, springs)
             sim.surface_loads.dashpots(sim, dashpots)
             return springs, dashpots
-        length = self.shapes.double_area[own]
-        surfaces = Surfaces(sim, self.shapes, faces, np.repeat(np.arange(own.start, own.stop), 4))
+        shapes = ShapesSpace(sim, sim.number[own])
+        length = shapes.double_area
+        surfaces = Surfaces(sim, shapes, faces, np.repeat(np.arange(sim.n_own), 4))
         silent = np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal)
         ratio = surfaces.ratio.max(initial=0.0)
         found = np.array([float(np.max(1.0 / length, initial=0.0)), float(silent.any()), ratio])
         highest, some, ratio = sim.comm.max_into(found).tolist()
         most = surfaces.slope * surfaces.most_penalty(some == 0.0).reshape(-1, 4)
-        contact = most * self.shapes.area[own] / 3.0 * (1.0 / length[:, None] + highest)
+        contact = most * shapes.area / 3.0 * (1.0 / length[:, None] + highest)
         may_touch = ~sim.closed_faces()[faces]
         if sim.options.dynamic:
             may_touch |= tied  # once they break
@@ -472,7 +475,7 @@ class LocalSpace(LawsSpace):
         if len(owner):
             more = ContactSpace.named(sim.number[sim.owned][owner], rows)
             known = tuple(np.concatenate(parts) for parts in zip(known, more))
-        self.pairs = ContactSpace(sim, self.shapes, self.kinds, *known)
+        self.pairs = ContactSpace(sim, *known)
         self._bind()
         if sim.masses_change():
             if sim.budget is not None:

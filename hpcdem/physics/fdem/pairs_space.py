@@ -133,9 +133,7 @@ class ContactSpace:
     (m, 21) [N], history (m, 5): by pairs, see contact_space.py.
     """
 
-    def __init__(
-        self, sim: State, shapes: ShapesSpace, kinds: Kinds, face: np.ndarray, target: np.ndarray, values: np.ndarray
-    ) -> None:
+    def __init__(self, sim: State, face: np.ndarray, target: np.ndarray, values: np.ndarray) -> None:
         """face, target (k,), values (k, 5): what pairs remember."""
         self.threads = sim.threads
         self.face, rows = np.empty(0, np.int64), np.empty(0, np.int64)
@@ -144,7 +142,7 @@ class ContactSpace:
             self.face = surface.faces[sim.where[surface.faces // 4] >= 0]
             rows = np.flatnonzero(surface.first[sim.number] >= 0)
         self._place(sim, rows)
-        self._make_list(sim, shapes, kinds)
+        self._make_list(sim)
         self._put_histories(len(sim.alive), face, target, values)
         self._make_entries(sim)
 
@@ -165,7 +163,7 @@ class ContactSpace:
             sim.x, skin, Surface.of(sim).clusters, sim.partner, sim.closed_faces(),
         )  # fmt: skip
 
-    def _make_list(self, sim: State, shapes: ShapesSpace, kinds: Kinds) -> None:
+    def _make_list(self, sim: State) -> None:
         """Pairs that may touch, and their properties."""
         self.first, self.second = first, second = self._near(sim, sim.rebuild_state.skin)
         m = len(first)
@@ -180,11 +178,12 @@ class ContactSpace:
         if sim.options.potential != MUNJIZA:
             self.length = surface.length[self.element]
         dynamic = sim.options.dynamic
-        faces = Surfaces(sim, shapes, self.face, self.face_row)
-        targets = Surfaces(sim, shapes, surface.first[self.element], self.row)
+        shapes = ShapesSpace(sim, self.element)  # an element with a free face is a target too
+        faces = Surfaces(sim, shapes, self.face, np.searchsorted(self.row, self.face_row))
+        targets = Surfaces(sim, shapes, surface.first[self.element], np.arange(len(self.row)))
         shared, overlay = shared_faces(sim, self.face[first] // 4, self.element[second])
         self.law = faces.of_pairs(first, targets, second, shared, overlay)
-        varied = np.flatnonzero(surface.several(kinds)[self.element[second]])
+        varied = np.flatnonzero(surface.several(Kinds.of(sim))[self.element[second]])
         if len(varied):
             self._vary(sim, surface, shapes, faces, varied, shared, overlay)
         if not dynamic:
@@ -209,7 +208,7 @@ class ContactSpace:
         ends = np.cumsum(counts)
         at = np.repeat(begin[:-1][of_pair] - (ends - counts), counts) + np.arange(int(counts.sum()))
         pair = np.repeat(varied, counts)
-        touched = Surfaces(sim, shapes, face[at], self.row[known[which[at]]])
+        touched = Surfaces(sim, shapes, face[at], known[which[at]])
         found = faces.of_pairs(self.first[pair], touched, np.arange(len(at)), shared[pair], overlay[pair])
         self.choices = np.hstack([parts[at], found])
         self.choice_begin = np.append(0, ends)

@@ -623,14 +623,15 @@ class Blocks(State):
         node, lead = mesh.corner_clusters(self.partner, apart)
         node[~self.alive] = -1
         self.node = node
-        self.node_sizes = np.bincount(node[node >= 0], minlength=len(lead))
+        sizes = np.bincount(node[node >= 0], minlength=len(lead))
+        self.shared_nodes = sizes > 1
         self.member_begin = np.zeros(len(lead) + 1, np.int64)
-        self.member = np.empty(int(self.node_sizes[self.node_sizes > 1].sum()), np.int64)
-        build.cluster_members(node, self.node_sizes, self.member_begin, self.member)
+        self.member = np.empty(int(sizes[self.shared_nodes].sum()), np.int64)
+        if len(self.member):  # else zeros that nobody has written to: nothing of them is in the memory
+            build.cluster_members(node, sizes, self.member_begin, self.member)
         cells = mesh.cells[self.alive]
         self.point_corners = np.bincount(cells[cells >= 0], minlength=len(mesh.points))
         self.where = np.full(len(mesh.cells), -1, np.int64)
-        self.unused = np.full(len(lead), -1, np.int64)
         self._topology_stale = False
 
     def _middles(self) -> tuple[np.ndarray, float]:

@@ -95,15 +95,13 @@ class State(ModelDefinition, Model):
     """Along which diagonal quads are cut for contact, see `pairs.cut_corner`."""
     node: np.ndarray
     """(4 ne,) which corners move as one node; -1: none."""
-    node_sizes: np.ndarray
-    """Corners of each node."""
+    shared_nodes: np.ndarray
+    """Which nodes have several corners, bool."""
     member_begin: np.ndarray
     """Where the corners of each node of several begin in `member`."""
     member: np.ndarray
     point_corners: np.ndarray
     """(np,) corners of elements that are there at each point of the mesh."""
-    unused: np.ndarray
-    """Scratch of the tables, one word per node, -1 between calls."""
     origin: np.ndarray
     """Positions of the owned elements when the storage was made."""
     listed: np.ndarray
