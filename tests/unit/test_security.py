@@ -56,6 +56,8 @@ KNOWN = {
     ("runtime/doctor/software.py", "importlib.import_module"),
     # libgomp.so.1, by that name, where the system finds it.
     ("runtime/launch.py", "ctypes.CDLL"),
+    # This process itself, for a function of the C library that is in it.
+    ("core/heap.py", "ctypes.CDLL"),
     # Written, not read.
     ("page/maker.py", "zipfile.ZipFile"),
     # This Python with a module of this package; requests reach it as JSON in a pipe.

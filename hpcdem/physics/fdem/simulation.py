@@ -22,6 +22,7 @@ import numpy as np
 
 from hpcdem.core.cells import columns, keys
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
+from hpcdem.core.heap import give_back
 from hpcdem.core.memory import aligned
 from hpcdem.core.rebuild import LONGEST_WAIT
 from hpcdem.decomp import strips
@@ -283,6 +284,7 @@ class Blocks(State):
         self.surface_loads.check_start()
         if self.untouched and self.options.mechanical:
             overlaps.check(self, self.local)
+            give_back()
 
     def _check_parts(self) -> None:
         """CommandError for what was said of parts of the calculation that are not there."""
@@ -555,8 +557,9 @@ class Blocks(State):
                 self.prepare_kernels(load.kernel_kind + ("-space" if self.dim == 3 else ""))
         user_laws.begin(self)
         user_laws.compile_for_quads(self)
+        stale = self._topology_stale
         with self.timers("neighbour"):
-            if self._topology_stale:
+            if stale:
                 self.renew_topology()
             if self.rebuild_state.dt == 0.0:
                 self._warn_of_snap_back()
@@ -579,6 +582,8 @@ class Blocks(State):
                 self._note_time()
             self.rebuilds += 1
         self.surface_loads.storage_rebuilt()
+        if stale:
+            give_back()
 
     def _check_ready(self) -> None:
         """CommandError unless every element has a model."""
