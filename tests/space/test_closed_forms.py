@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 from hpcdem.physics.fdem import diagnostics, equilibrium
 from hpcdem.physics.fdem.mesh import Mesh
@@ -28,6 +29,27 @@ def rayleigh_speed() -> float:
         return (1.0 + b) ** 2 - 4.0 * math.sqrt(a * b)
 
     return float(brentq(gap, 0.5 * math.sqrt(cs2), 0.999 * math.sqrt(cs2)))
+
+
+@pytest.mark.parametrize("strained", [False, True])
+def test_a_body_is_turned_all_round(strained: bool) -> None:
+    """By 360 degrees about (1, 2, 3): no stress comes, and one that is there turns with it."""
+    mesh = box((3, 2, 2), (0.3, 0.2, 0.2), 5)
+    sim = body(mesh)
+    sim.close_model()
+    strain = np.array([[1.0, 2.0, 0.0], [0.0, -1.0, 3.0], [2.0, 0.0, 1.0]]) * 1e-4 * strained
+    place = mesh.points[mesh.cells[sim.number[sim.owned]]]
+
+    def stress(turn: np.ndarray) -> np.ndarray:
+        sim.x[sim.owned].reshape(-1, 4, 4)[:, :, :3] = place @ (turn @ (np.eye(3) + strain)).T
+        xx, yy, xy, zz, xz, yz = sim.local.stresses(energies=False)[0].T
+        return np.moveaxis(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), -1, 0)
+
+    before = stress(np.eye(3))
+    assert (np.abs(before).max() > 5e6) == strained
+    for angle in range(0, 375, 15):
+        turn = Rotation.from_rotvec(np.radians(angle) * np.array([1.0, 2.0, 3.0]) / math.sqrt(14.0)).as_matrix()
+        assert np.abs(stress(turn) - turn @ before @ turn.T).max() < 1e-9 * 50e9, angle
 
 
 def test_a_rayleigh_wave() -> None:
