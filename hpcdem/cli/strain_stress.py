@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,4 +66,5 @@ def load_kernels(comm: SerialComm) -> None:
     from hpcdem.runtime.progress import Log
     from hpcdem.session import prepare
 
-    prepare(comm, Log(1), ["shared"], 1)  # of which nobody need hear
+    # For as many threads as a run here would have: it uses the same folder. Of which nobody need hear.
+    prepare(comm, Log(1), ["shared"], int(os.environ.get("NUMBA_NUM_THREADS", "1")))

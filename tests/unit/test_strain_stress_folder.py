@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from hpcdem.cli.strain_stress import load_kernels
 from hpcdem.cli.strain_stress import strain_stress as command
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
@@ -99,6 +100,16 @@ def test_strain_adds_up_from_the_first_frame(frames: list[Frame], tmp_path: Path
     p = increments[2].particles
     np.testing.assert_allclose([p["fxx"][7], p["fxy"][7]], [0.0, -1.0], atol=1e-11)
     assert np.abs(p["distortional"]).max() < 1e-11
+
+
+@pytest.mark.parametrize("threads", ["1", "3"])
+def test_kernels_of_as_many_threads_as_a_run_has(monkeypatch: pytest.MonkeyPatch, threads: str) -> None:
+    """Both share a folder of kernels, which must be complete for either."""
+    asked = []
+    monkeypatch.setattr("hpcdem.session.prepare", lambda comm, log, kinds, *count: asked.append((kinds, count)))
+    monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
+    load_kernels(SerialComm())
+    assert asked == [(["shared"], (int(threads),))]
 
 
 def test_sections_say_what_they_hold(frames: list[Frame], tmp_path: Path) -> None:
