@@ -14,6 +14,7 @@ from hpcdem.physics.fdem import diagnostics, equilibrium
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.pre.mesh import fill, solids
+from tests.cases.brazilian import exact as brazilian
 from tests.space.support import DENSITY, LAME, SHEAR, body, box, nodes_on
 from tests.space.test_solutions import octant, vector
 
@@ -209,6 +210,35 @@ def test_a_cavity_in_a_body_that_is_pulled(pull: str, gmsh: object) -> None:
         near = np.abs(r - place) < 0.05 * place
         assert rr[near].mean() == pytest.approx((1.0 - r[near] ** -3).mean(), abs=0.02), place
         assert tt[near].mean() == pytest.approx((1.0 + 0.5 * r[near] ** -3).mean(), abs=0.02), place
+
+
+def test_a_disc_that_is_pressed_between_two_lines(gmsh: object) -> None:
+    """A Brazilian test of 50 x 25 mm, an eighth, pressed along 6 % of its radius: 2 P / (pi D t) and -6 P / (pi D t)
+    in the middle, on average over the thickness and over a circle (exact.py). 9 500 tetrahedra; with half as many
+    along an edge (1 900) the tension is 5 % short."""
+    radius, thick = 0.025, 0.025
+    disc = solids.made("cylinder", (0, 0, -0.5 * thick), (0, 0, 0.5 * thick), radius)
+    cube = solids.made("box", (0, 0, 0), (1.0, 1.0, 1.0))
+    found = fill.filled(fill.Wishes([disc], 0.0014, regions=[("eighth", [cube])]), "rest")
+    used, numbers = np.unique(found.cells[found.groups["eighth"]], return_inverse=True)
+    mesh = Mesh.of(found.points[used], numbers.reshape(-1, 4))
+    sim = body(mesh, dynamic=False)
+    x, y, _ = mesh.points.T
+    for axis, name in enumerate("xyz"):
+        sim.velocity_condition(np.flatnonzero(np.abs(mesh.points[:, axis]) < 1e-9), **{f"v{name}": 0.0})
+    pressed = np.flatnonzero((np.hypot(x, y) > radius - 1e-6) & (x < 0.06 * radius))
+    sim.velocity_condition(pressed, vy=-1e-6)
+    equilibrium.solve_elastic(sim)
+    force = -4.0 * diagnostics.values(sim, "reaction_y", pressed).sum()
+    at = mesh.centroids()
+    near = np.hypot(at[:, 0], at[:, 1]) < 0.15 * radius
+    unit = 2.0 * force / (math.pi * 2.0 * radius * thick)
+    xx, yy, zz = (
+        np.average(diagnostics.values(sim, f"stress_{c}")[near], weights=mesh.areas()[near]) / unit
+        for c in ("xx", "yy", "zz")
+    )
+    across, along = brazilian.mean_in_the_middle(0.15)
+    assert (xx, yy) == (pytest.approx(across, rel=0.03), pytest.approx(along, rel=0.03)) and abs(zz) < 0.03
 
 
 def goodier(r: np.ndarray | float) -> np.ndarray | float:
