@@ -211,6 +211,7 @@ def written(folder: Path, text: str) -> Path:
     return folder / "clay.py"
 
 
+@pytest.mark.slow
 def test_the_time_step_follows_the_stiffness(tmp_path):
     """A bound that is four times as high halves the time step; a number stands for a function."""
     found = []
@@ -334,6 +335,7 @@ def law(e11, e22, e12, evol, most, bulk, shear, gain):
 """
 
 
+@pytest.mark.slow
 def test_groups_with_laws_of_two_files(tmp_path, monkeypatch):
     """Each group has the law, properties and states of its file, in triangles and quads, across a checkpoint; one with
     the arithmetic of the built-in one gives its bits. What is missing or wrong is named by its file."""

@@ -42,6 +42,7 @@ def memory(sim):
     return hist.memory[0, 1:].tolist() if len(hist.rows) else None
 
 
+@pytest.mark.slow
 def test_a_heap_with_the_linear_law_has_the_bits_of_the_built_in_one(tmp_path):
     """Wherever discs lie, slide and part; with one thread and with three."""
     found = []
@@ -94,7 +95,7 @@ def bits(sim):
     return sim.particles.hot[sim.particles.n_left :][: len(order)][order][:, :6].tobytes()
 
 
-@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("threads", [1, pytest.param(3, marks=pytest.mark.slow)])
 def test_two_laws_with_the_arithmetic_of_the_built_in_one_have_its_bits(tmp_path, threads):
     """Of two files, and where they meet the built-in one, or one of them."""
     shutil.copy(HERE / "pairs.py", tmp_path / "own.py")

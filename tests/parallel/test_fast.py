@@ -208,7 +208,7 @@ def test_a_disc_that_leaves_the_box_is_deleted_at_the_next_look(tmp_path: Path) 
     """Although lists are hardly ever built: they are when a fast particle has left the BOX."""
     sim = bed(tmp_path, (1800.0, -200.0, 0.0, -41.0))
     walls.box(sim, -2000.0, 6000.0, -1000.0, 5000.0)
-    properties.prop(sim, only(1000), kn=1e6, ks=1e6, shear=0.0)
+    properties.prop(sim, only(1000), kn=1e6, ks=1e6)
     cycles.cycle(sim, 800 * 25 // 41 + 70)
     assert sim.lost == 1 and 1000 not in sim.particles["gid"]
 
