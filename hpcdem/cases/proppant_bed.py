@@ -100,6 +100,7 @@ pcdc node boundary hydra-c-f-b pressure 1e5 range group 'outlet' set 'ends'
 PUMPED = """
 import math
 import numpy as np
+from hpcdem.physics.proppant import settling
 # Huang et al. (ARMA 21-1248) computed the bed and found it as Chun et al. (J. Petrol. Sci. Eng. 184, 2020) measured it;
 # what is above it is measured. Both as in the documentation of GEOS, as parts of the slot.
 measured = [(10, 0.074), (12.5, 0.075), (16, 0.075), (17.5, 0.073), (20, 0.068), (23.5, 0.063), (25.4, 0.063),
@@ -130,10 +131,8 @@ fed, lost = concentration * rate * time / (limit * length * height * aperture), 
 known = [(t, part) for t, part in beside if t <= time]
 at = np.interp([t for t, _ in known], [one[0] for one in bed], [one[1] for one in bed])
 difference = max((abs(float(a) - part) for a, (_, part) in zip(at, known)), default=math.nan)
-speed, weight = 0.0, (grain_density - 1000.0) * 9.81 * grain_size
-for _ in range(200):                             # Schiller & Naumann 1933, or Stokes
-    re = 1000.0 * speed * grain_size / viscosity
-    speed = weight * grain_size / 18 / viscosity / (1.0 if stokes else 1 + 0.15 * re**0.687)
+fall = settling.stokes if stokes else settling.terminal
+speed = fall(grain_size, grain_density, 1000.0, viscosity, 9.81)
 
 pcdc chart create 'proppant-bed' x-label 'time (s)' y-label 'part of the slot (1)'
 pcdc chart add 'proppant-bed' values [[(0, 0), (time, fed)]] label 'all that came, as bed'

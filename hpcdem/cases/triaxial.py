@@ -15,8 +15,8 @@ from hpcdem.cases.rock import CRACKS, ELASTIC, JOINTS, SURFACES, WAVES, Rock, in
 class Strength:
     """peak [Pa], peak_strain: greatest stress along z, and its strain; criterion [Pa]: strength after Mohr and Coulomb
     under the least pressure p, 2 c sqrt(N) + N p; curve: (strain, stress along z [Pa]) pairs, compression positive;
-    tension, mixed, shear: broken joints by mode; energy_error: closing error of the
-    energy budget over its largest flow."""
+    tension, mixed, shear: broken joints by mode; energy_error: closing error of the energy budget
+    over its largest flow."""
 
     peak: float
     peak_strain: float

@@ -284,7 +284,7 @@ class Blocks(State):
         self.surface_loads.check_start()
         if self.untouched and self.options.mechanical:
             overlaps.check(self, self.local)
-            give_back()
+            give_back()  # it looks at all elements, not only at those of the surface
 
     def _check_parts(self) -> None:
         """CommandError for what was said of parts of the calculation that are not there."""
