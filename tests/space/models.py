@@ -150,6 +150,34 @@ def hexes_that_flow(sim: Blocks) -> None:
     diagnostics.account_energy(sim)
 
 
+def hexes_that_glow(sim: Blocks) -> None:
+    """The same with heat: they expand, get softer and weaker, touch and pass heat on; the air is warm."""
+    hexes_that_flow(sim)
+    mesh = sim.mesh
+    sim.table("softer", [(20.0, 1e8), (320.0, 8e7)])
+    sim.element_property(np.flatnonzero(mesh.centroids()[:, 0] > 2.1), {"young": Over("softer", TEMPERATURE)})
+    sim.table("crumbling", [(20.0, 1e4), (320.0, 2e3)])
+    sim.element_property(np.flatnonzero(sim.yielding()), {"tensile": Over("crumbling", TEMPERATURE)})
+    heat = Heat.of(sim)
+    heat.assign(None, ROCK_OF_HEAT)
+    heat.initial(None, 20.0)
+    sim.table("oven", [(0.0, 20.0), (3e3, 320.0), (1e4, 120.0)])
+    heat.prescribe(np.flatnonzero((np.abs(mesh.points - (1.6, 0.15, 0.15)) < (0.5, 1.0, 1.0)).all(axis=1))[::3], "oven")
+    heat.expose(None, environment=40.0, transfer=20.0)
+    heat.expose(np.flatnonzero(sim.face_exists())[::7], flux=400.0)
+    sim.heat_clock(dt=10.0)
+    sim.flow_clock(every=2)
+
+
+def glow_in_hexes(sim: Blocks) -> None:
+    """What happens to it."""
+    dig_hexes_that_flow(sim)
+    if sim.clock.step == 620:
+        Heat.of(sim).adjust(np.arange(24), {"capacity": 700.0})
+        Heat.of(sim).initial(np.flatnonzero(sim.node_exists())[5:9], 90.0)
+        sim.heat_clock(steps=2)
+
+
 def dig_hexes_that_flow(sim: Blocks) -> None:
     """The same; some forget that they have yielded or crept, or become elastic."""
     dig_hexes(sim)
@@ -391,6 +419,21 @@ def hot(sim: Blocks, notes: dict[str, Any]) -> Found:
     return found | {"heat_clock": np.array([heat.time, heat.dt, heat.sub_steps, heat.cycles])}
 
 
+def hot_hexes(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """The same of hexahedra."""
+    heat = Heat.of(sim)
+    found = flow_and_creep(sim, notes) | {f"heat_{name}": np.array(value) for name, value in heat.account().items()}
+    found |= {name: diagnostics.values(sim, name) for name in ("temperature", "mean_temperature")}
+    return found | {"heat_clock": np.array([heat.time, heat.dt, heat.sub_steps, heat.cycles])}
+
+
+def they_glow(found: Found) -> None:
+    they_flow_and_creep(found)
+    t = found["temperature"]
+    assert np.nanmax(t) > 100.0 and (t > 21.0).sum() > 60 and found["heat_relative"] < 1e-12
+    assert found["heat_removed"] > 0.0 and found["heat_given"] > 0.0
+
+
 def it_glows(found: Found) -> None:
     it_shatters(found)
     t = found["temperature"]
@@ -442,6 +485,9 @@ MODELS = {
     "hexahedra": Model(blocks_of_hexes, touching, it_hits, dig_hexes, steps=900, middle=401, come=10),
     "hexahedra that flow": Model(
         hexes_that_flow, flow_and_creep, they_flow_and_creep, dig_hexes_that_flow, steps=900, middle=401, come=10
+    ),
+    "hexahedra that glow": Model(
+        hexes_that_glow, hot_hexes, they_glow, glow_in_hexes, steps=900, middle=401, come=10, slow=True
     ),
     "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),
 }

@@ -1,15 +1,18 @@
-"""Heat in tetrahedra: the arithmetic, conditions, contacts, cracks, thermal stress in each law."""
+"""Heat in tetrahedra and hexahedra: the arithmetic, conditions, contacts, cracks, thermal stress in each law."""
 
 from __future__ import annotations
 
 import logging
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from hpcdem.commands.fdem.project import joined
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_state
+from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem.hexahedra import OVERLAYS
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import TEMPERATURE, Over
@@ -36,6 +39,9 @@ def standing(mesh: Mesh, **changes_: float) -> tuple[Blocks, Heat]:
     heat.assign(None, {**GRANITE, **changes_})
     sim.parts(mechanical=False)
     return sim, heat
+
+
+BOTH = pytest.mark.parametrize("of", [box, hexes])
 
 
 def put(heat: Heat, values: np.ndarray) -> None:
@@ -65,6 +71,29 @@ def test_conduction_is_what_the_plain_loop_does() -> None:
     assert np.abs(wanted - start).max() > 0.5
 
 
+def test_conduction_in_hexahedra_is_the_mean_of_that_in_both_overlays() -> None:
+    """Of any shape, beside tetrahedra of the plain loop."""
+    one, other = hexes((3, 2, 2), (1.2, 0.8, 0.9), shaken=0.2), box((2, 1, 1), (0.4, 0.3, 0.3))
+    mesh = joined(one, Mesh.of(other.points + (2.0, 0.0, 0.0), other.cells))
+    sim, heat = standing(mesh, conductivity_across=0.7, conductivity_angle=35.0, conductivity_dip=50.0)
+    sim.heat_clock(dt=100.0)
+    start = np.random.default_rng(4).uniform(0.0, 100.0, len(mesh.points))
+    put(heat, start)
+    heat.prescribe(np.array([3, 9]), 50.0)
+    parts = mesh.hexes[:, :8][:, OVERLAYS].reshape(-1, 4)
+    every = np.concatenate([parts, mesh.cells[mesh.hex_of() < 0]])
+    half = np.append(np.full(len(parts), 0.5), np.ones(len(every) - len(parts)))
+    strike, dip = math.radians(35.0), math.radians(50.0)
+    normal = np.array([-math.sin(strike) * math.sin(dip), math.cos(strike) * math.sin(dip), math.cos(dip)])
+    k = 2.5 * np.eye(3) + (0.7 - 2.5) * np.outer(normal, normal)
+    wanted = reference.sub_step(
+        mesh.points, every, half[:, None, None] * k, half * DENSITY * 1000.0, start, 100.0, {3: 50.0, 9: 50.0}
+    )
+    sim.step()
+    assert temperatures(sim) == pytest.approx(wanted, rel=1e-12)
+    assert np.abs(wanted - start).max() > 0.5
+
+
 def test_upright_planes_are_those_of_two_dimensions() -> None:
     """With the dip of 90 degrees that is not said; along z heat flows as along the planes."""
     for angle, wanted in ((0.0, (2.5, 0.7, 2.5)), (90.0, (0.7, 2.5, 2.5))):
@@ -76,8 +105,9 @@ def test_upright_planes_are_those_of_two_dimensions() -> None:
         heat.adjust(None, {"friction_heat": 0.5})
 
 
-def test_a_linear_field_stays() -> None:
-    mesh = box((4, 3, 3), (1.0, 0.8, 0.9), split=5, shaken=0.2)
+@BOTH
+def test_a_linear_field_stays(of: Any) -> None:
+    mesh = of((4, 3, 3), (1.0, 0.8, 0.9), shaken=0.2)
     sim, heat = standing(mesh)
     wanted = 20.0 + mesh.points @ (30.0, -10.0, 25.0)
     put(heat, wanted)
@@ -88,10 +118,64 @@ def test_a_linear_field_stays() -> None:
     assert np.abs(temperatures(sim) - wanted).max() < 1e-11
 
 
-def test_a_slab_follows_its_series_with_order_two() -> None:
+def partly_hexes(cells: tuple[int, int, int], size: tuple[float, float, float], shaken: float = 0.0) -> Mesh:
+    """Hexahedra below, tetrahedra on them."""
+    made = hexes(cells, size, shaken)
+    low = hexes(cells, size).points[made.hexes[:, :8]].mean(axis=1)[:, 2] < 0.5 * size[2]
+    return Mesh.of(made.points, made.cells, layers=made.layers, hexes=made.hexes[low])
+
+
+def test_hexahedra_beside_tetrahedra() -> None:
+    """Tetrahedra have one of both ways to cut the sides between: a linear field is one within 4 %. Steps of nine
+    tenths of the stability limit that is told are stable, those above the largest eigenvalue's are not."""
+    mesh = partly_hexes((3, 3, 4), (1.0, 0.8, 0.9), shaken=0.2)
+    assert 0 < len(mesh.hexes) * 6 < len(mesh.cells)
+    sim, heat = standing(mesh)
+    heat.prescribe(nodes_on(mesh, "bottom"), 0.0)
+    heat.prescribe(nodes_on(mesh, "top"), 90.0)
+    run = Implicit(sim)
+    run.steady()
+    run.close()
+    before = temperatures(sim)
+    assert np.abs(before - 100.0 * mesh.points[:, 2]).max() < 3.6
+    sim.step()
+    assert np.abs(temperatures(sim) - before).max() < 1e-9
+    sim, heat = standing(mesh)
+    limit = heat_limit(sim, heat)
+    assert 1.0 <= limit / heat.limit() < 1.5
+    rough = np.random.default_rng(2).uniform(-1.0, 1.0, len(mesh.points))
+    put(heat, rough)
+    sim.heat_clock(dt=0.9 * heat.limit())
+    for _ in range(200):
+        sim.step()
+    assert np.abs(temperatures(sim)).max() < 0.5
+    put(heat, rough)
+    sim.heat_clock(dt=1.1 * limit)
+    for _ in range(200):
+        sim.step()
+    assert np.abs(temperatures(sim)).max() > 10.0
+
+
+def heat_limit(sim: Blocks, heat: Heat) -> float:
+    """2 over the largest eigenvalue of all that conducts over its capacity [s]."""
+    sim.close_model()
+    run = Implicit(sim)
+    n = len(heat.leads)
+    k, c = np.zeros((n, n)), np.zeros(n)
+    for piece in run._pieces(math.inf):
+        ends = piece.node
+        for m in range(len(ends)):
+            k[np.ix_(ends[m], ends[m])] += piece.stiffness[m, ::2, ::2]
+    np.add.at(c, heat.node.reshape(-1)[4 * sim.number[:, None] + np.arange(4)], heat._corner_capacity)
+    root = 1.0 / np.sqrt(c)
+    return 2.0 / float(np.linalg.eigvalsh(root[:, None] * k * root)[-1])
+
+
+@BOTH
+def test_a_slab_follows_its_series_with_order_two(of: Any) -> None:
     time, errors = 0.15 / DIFFUSIVITY, []
     for n in (8, 16, 32):
-        mesh = box((n, 1, 1), (1.0, 1.0 / n, 1.0 / n))
+        mesh = of((n, 1, 1), (1.0, 1.0 / n, 1.0 / n))
         sim, heat = standing(mesh)
         heat.prescribe(nodes_on(mesh, "left"), 100.0)
         until(sim, time)
@@ -102,9 +186,10 @@ def test_a_slab_follows_its_series_with_order_two() -> None:
     assert errors[-1] < 1e-3 and (orders > 1.8).all(), (errors, orders)
 
 
-def test_transfer_and_flux_through_faces() -> None:
+@BOTH
+def test_transfer_and_flux_through_faces(of: Any) -> None:
     """Biot number 2 against the series; 12 W/m2 through 0.02 m2 by a table that rises to twice of it."""
-    time, mesh = 0.3 / DIFFUSIVITY, box((40, 1, 1), (1.0, 0.025, 0.025))
+    time, mesh = 0.3 / DIFFUSIVITY, of((40, 1, 1), (1.0, 0.025, 0.025))
     h = 2.0 * GRANITE["conductivity"]
     sim, heat = standing(mesh, transfer_coeficient=h)
     heat.initial(None, 80.0)
@@ -113,7 +198,7 @@ def test_transfer_and_flux_through_faces() -> None:
     wanted = 20.0 + 60.0 * exact.convective_slab(mesh.points[:, 0], time, 1.0, DIFFUSIVITY, 2.0)
     assert np.abs(temperatures(sim) - wanted).max() < 0.06
     assert heat.account()["relative"] < 1e-12
-    mesh = box((4, 2, 2), (1.0, 0.2, 0.1))
+    mesh = of((4, 2, 2), (1.0, 0.2, 0.1))
     sim, heat = standing(mesh)
     sim.table("sun", [(0.0, 0.0), (1000.0, 24.0)])
     heat.expose(faces_on(mesh, "right"), flux="sun")
@@ -124,8 +209,9 @@ def test_transfer_and_flux_through_faces() -> None:
     assert heat.account()["stored"] == pytest.approx(heat.account()["given"], rel=1e-12)
 
 
-def test_an_implicit_step_is_backward_euler_and_steady_states_are_found_at_once() -> None:
-    mesh = box((6, 2, 2), (1.2, 0.4, 0.5), shaken=0.2)
+@BOTH
+def test_an_implicit_step_is_backward_euler_and_steady_states_are_found_at_once(of: Any) -> None:
+    mesh = of((6, 2, 2), (1.2, 0.4, 0.5), shaken=0.2)
     sim, heat = standing(mesh, conductivity_across=1.0, conductivity_dip=30.0)
     sim.table("ramp", [(0.0, 10.0), (1e6, 90.0)])
     left = nodes_on(mesh, "left")
@@ -151,10 +237,10 @@ def test_an_implicit_step_is_backward_euler_and_steady_states_are_found_at_once(
     assert temperatures(sim) == pytest.approx(100.0 - 30.0 * mesh.points[:, 0] / 1.2, rel=1e-9)
 
 
-@pytest.mark.parametrize("jointed", [False, True])
-def test_blocks_are_in_equilibrium_at_the_end_of_implicit_steps(jointed: bool) -> None:
+@pytest.mark.parametrize("of, jointed", [(box, False), (box, True), (hexes, False)])
+def test_blocks_are_in_equilibrium_at_the_end_of_implicit_steps(of: Any, jointed: bool) -> None:
     """Between walls along x, free across: stress follows the temperature; joints are 100 E stiff."""
-    mesh = box((4, 2, 2), (1.2, 0.8, 0.9))
+    mesh = of((4, 2, 2), (1.2, 0.8, 0.9))
     sim = body(mesh, dynamic=False)
     if jointed:
         edges = mesh.edges()
@@ -198,10 +284,9 @@ def test_kernel_of_touching_faces() -> None:
             corners.append(mesh.points[mesh.face_points(np.array([faces[-1]]))[0]])
         assert face == faces[0]
         args = (
-            np.array(faces[:1]),
-            np.array(faces[1:]),
-            np.array([0]),
-            np.array([1]),
+            meshes[0].face_corners(np.array(faces[:1])),
+            4 + meshes[1].face_corners(np.array(faces[1:])),
+            np.ones(1),
             x,
             np.array([2.0, 2.0]),
             4e-3,
@@ -230,22 +315,20 @@ def test_kernel_of_touching_faces() -> None:
 GAP = 1e-5
 
 
-def two_boxes(**changes_: float) -> tuple[Blocks, Heat, Mesh]:
+def two_boxes(of: Any = box, **changes_: float) -> tuple[Blocks, Heat, Mesh]:
     """One above the other, ten micrometres apart, faces do not match."""
-    low, high = box((2, 2, 2), (1.0, 1.0, 1.0)), box((3, 3, 2), (1.0, 1.0, 1.0), split=5)
-    mesh = Mesh.of(
-        np.concatenate([low.points, high.points + (0.0, 0.0, 1.0 + GAP)]),
-        np.concatenate([low.cells, high.cells + len(low.points)]),
-    )
+    low, high = of((2, 2, 2), (1.0, 1.0, 1.0)), box((3, 3, 2), (1.0, 1.0, 1.0), split=5)
+    mesh = joined(low, Mesh.of(high.points + (0.0, 0.0, 1.0 + GAP), high.cells))
     sim, heat = standing(mesh, **changes_)
     sim.option(collision=True)
     return sim, heat, mesh
 
 
-def test_bodies_that_touch_pass_heat_on() -> None:
+@BOTH
+def test_bodies_that_touch_pass_heat_on(of: Any) -> None:
     """Resistances in series: 1 m, 1 / h of contact, 1 m; explicit steps keep the account."""
     h = 4.0
-    sim, heat, mesh = two_boxes(transfer_coeficient=h)
+    sim, heat, mesh = two_boxes(of, transfer_coeficient=h)
     below = np.arange(len(mesh.points)) < 27
     z = mesh.points[:, 2] - np.where(below, 0.0, GAP)
     top = np.flatnonzero(np.abs(z - 2.0) < 1e-9)
@@ -301,10 +384,10 @@ LAWS = {
 }  # fmt: skip
 
 
-def heated(law: str, held: str, warmer: float = 50.0, dynamic: bool = False) -> tuple[Blocks, Mesh]:
+def heated(law: str, held: str, warmer: float = 50.0, dynamic: bool = False, of: Any = box) -> tuple[Blocks, Mesh]:
     """A block on rollers, warmed all over while it stands still; held: axes along which its other ends are held too."""
     name, values = LAWS[law]
-    mesh = box((3, 2, 2), (1.2, 0.8, 0.9), shaken=0.2)
+    mesh = of((3, 2, 2), (1.2, 0.8, 0.9), shaken=0.2)
     sim = Blocks()
     sim.take_mesh(mesh)
     changes.element_model(sim, None, name, values)
@@ -326,10 +409,10 @@ def heated(law: str, held: str, warmer: float = 50.0, dynamic: bool = False) -> 
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("held", ["", "x", "xy", "xyz"])
-def test_thermal_stress(law: str, held: str) -> None:
+@pytest.mark.parametrize("of, held", [*((box, held) for held in ("", "x", "xy", "xyz")), (hexes, ""), (hexes, "x")])
+def test_thermal_stress(law: str, of: Any, held: str) -> None:
     """Free: alpha T, no stress. Held along one axis -E alpha T, two -E alpha T / (1 - nu), three ... / (1 - 2 nu)."""
-    sim, mesh = heated(law, held)
+    sim, mesh = heated(law, held, of=of)
     convergence.solve(sim, ratio=1e-7)
     level = -YOUNG * ALPHA * 50.0
     wanted = {"": 0.0, "x": level, "xy": level / (1.0 - POISSON), "xyz": level / (1.0 - 2.0 * POISSON)}[held]
@@ -341,12 +424,25 @@ def test_thermal_stress(law: str, held: str) -> None:
         assert move == pytest.approx(1.2 * ALPHA * 50.0, rel=2e-3)
 
 
-def test_thermal_stress_makes_rock_yield() -> None:
+@pytest.mark.parametrize("of, held", [(hexes, ""), (hexes, "x"), (hexes, "xyz"), (partly_hexes, "")])
+def test_thermal_stress_of_hexahedra_at_once(of: Any, held: str) -> None:
+    """By the static solve: nothing without walls, -E alpha T between two of them."""
+    sim, _ = heated("elastic", held, of=of)
+    equilibrium.solve_elastic(sim)
+    level = -YOUNG * ALPHA * 50.0
+    wanted = {"": 0.0, "x": level, "xyz": level / (1.0 - 2.0 * POISSON)}[held]
+    for axis in "xyz":
+        found = diagnostics.values(sim, f"stress_{axis}{axis}")
+        assert found == pytest.approx(wanted if axis in held else 0.0, rel=1e-10, abs=1e-10 * abs(level)), axis
+
+
+@BOTH
+def test_thermal_stress_makes_rock_yield(of: Any) -> None:
     """Tresca between walls: held along x and y, free along z, the difference is twice the cohesion. It is warmed bit
     by bit: relaxation swings, and what has flowed by that does not come back."""
     LAWS["soft"] = "mech_mohr_coulomb", {**ROCK, "friction": 0.0, "cohesion": 5e6, "tensile": 1e12}
     try:
-        sim, _ = heated("soft", "xy", warmer=0.0)
+        sim, _ = heated("soft", "xy", warmer=0.0, of=of)
     finally:
         del LAWS["soft"]
     heat = Heat.of(sim)
@@ -363,10 +459,11 @@ def test_thermal_stress_makes_rock_yield() -> None:
     assert (diagnostics.values(sim, "plastic_shear_strain") > 1e-4).all()
 
 
-def test_stress_and_stored_energy_of_a_held_block() -> None:
+@BOTH
+def test_stress_and_stored_energy_of_a_held_block(of: Any) -> None:
     """-3 K alpha T at once, before anything moves, and (3 K alpha T)^2 V / 2 K; from the temperature of `initial` on;
     the coefficient alone changes it."""
-    sim, mesh = heated("elastic", "xyz")
+    sim, mesh = heated("elastic", "xyz", of=of)
     heat, bulk = Heat.of(sim), YOUNG / (3.0 * (1.0 - 2.0 * POISSON))
     hot = diagnostics.values(sim, "stress_zz")
     assert hot == pytest.approx(-3.0 * bulk * ALPHA * 50.0, rel=1e-12)
@@ -376,21 +473,25 @@ def test_stress_and_stored_energy_of_a_held_block() -> None:
     assert diagnostics.values(sim, "stress_xx") == pytest.approx(2.0 * hot, rel=1e-12)
     heat.initial(nodes_on(mesh, "left"), 65.0)
     beside = np.isin(mesh.cells, nodes_on(mesh, "left")).any(axis=1)
+    beside[mesh.hexes[:, 8:] + np.arange(6)] = np.isin(mesh.hexes[:, :8], nodes_on(mesh, "left")).any(axis=1)[:, None]
     found = diagnostics.values(sim, "stress_yy")
     assert np.abs(found[beside]).max() < 1e-4 and found[~beside] == pytest.approx(2.0 * hot[~beside], rel=1e-12)
 
 
+WARM = [("young", (40e9, 60e9), "rock"), ("cohesion", (1e5, 3e5), "soil"), ("tensile", (2e4, 1e5), "soil")]
+
+
 @pytest.mark.parametrize(
-    ("name", "at", "of"),
-    [("young", (40e9, 60e9), "rock"), ("cohesion", (1e5, 3e5), "soil"), ("tensile", (2e4, 1e5), "soil"),
-     ("tensile_strength", (1e5, 3e5), "joint"), ("gf1", (1.0, 5.0), "joint")],
+    ("shape", "name", "at", "of"),
+    [*((shape, *one) for shape in (box, hexes) for one in WARM), (box, "tensile_strength", (1e5, 3e5), "joint"),
+     (box, "gf1", (1.0, 5.0), "joint")],
 )  # fmt: skip
-def test_properties_by_temperature(name: str, at: tuple[float, float], of: str) -> None:
+def test_properties_by_temperature(shape: Any, name: str, at: tuple[float, float], of: str) -> None:
     """At the temperature between two points of the table: every bit of the run with the constant of that temperature,
     and others than with the table's ends."""
 
     def run(value: float | Over) -> np.ndarray:
-        mesh = box((4, 2, 2), (1.0, 0.5, 0.5), shaken=0.1)
+        mesh = shape((4, 2, 2), (1.0, 0.5, 0.5), shaken=0.1)
         sim = Blocks()
         sim.take_mesh(mesh)
         sim.table("by_heat", [(0.0, at[0]), (400.0, at[1])])
@@ -423,11 +524,12 @@ def test_properties_by_temperature(name: str, at: tuple[float, float], of: str) 
     assert np.abs(found - run(at[1])).max() > 1e-6
 
 
+@BOTH
 @pytest.mark.parametrize("law", ["elastic", "creeping", "soft"])
-def test_a_restart_knows_heat_and_its_stress(law: str, tmp_path) -> None:
+def test_a_restart_knows_heat_and_its_stress(law: str, of: Any, tmp_path) -> None:
     LAWS["soft"] = "mech_mohr_coulomb", {**ROCK, "friction": 0.0, "cohesion": 5e6, "tensile": 1e12}
     try:
-        sim, mesh = heated(law, "x", dynamic=True)
+        sim, mesh = heated(law, "x", dynamic=True, of=of)
     finally:
         del LAWS["soft"]
     sim.parts(thermal=True)
@@ -462,12 +564,6 @@ class Log:
 
     def info(self, text: str) -> None:
         logging.info(text)
-
-
-def test_hexahedra_have_no_heat() -> None:
-    sim = body(hexes((1, 1, 1), (1.0, 1.0, 1.0)))
-    with pytest.raises(CommandError, match="hexahedra have no heat"):
-        Heat.of(sim).assign(None, GRANITE)
 
 
 def test_fluid_has_no_heat() -> None:

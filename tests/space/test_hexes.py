@@ -13,11 +13,9 @@ from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow.model import Flow
-from hpcdem.physics.heat.model import Heat
 from hpcdem.pre.mesh.imported import import_mesh
 from tests.cases.solids import exact
 from tests.flow.support import WATER
-from tests.heat.support import GRANITE
 from tests.space.support import LAME, ROCK, SHEAR, body, box, faces_on, hexes, nodes_on
 from tests.space.test_equilibrium import SOIL, STRAIN, STRESSES, boundary, farthest, slopes_by_difference
 
@@ -295,9 +293,6 @@ def test_what_hexes_cannot_do_is_refused():
     changes.element_model(sim, np.arange(6), "mech_iso_elastic", {**ROCK, "young": 1e9})
     with pytest.raises(CommandError, match="no joint here that could be a channel"):
         Flow.of(sim).assign(None, WATER)
-    heated = body(hexes((1, 1, 1), (1.0, 1.0, 1.0)))
-    with pytest.raises(CommandError, match="hexahedra have no heat"):
-        Heat.of(heated).assign(None, GRANITE)
     with pytest.raises(CommandError, match="are one hexahedron"):
         changes.element_model(sim, np.arange(7), "mech_iso_elastic", ROCK)
 

@@ -16,6 +16,7 @@ import numpy as np
 from hpcdem.physics.fdem.properties import Rows, temperature_table
 
 if TYPE_CHECKING:
+    from hpcdem.physics.fdem.mesh import Mesh
     from hpcdem.physics.fdem.state import State
 
 TEMPERATURE, UNSTRESSED = "temperature", "unstressed"
@@ -23,12 +24,22 @@ TEMPERATURE, UNSTRESSED = "temperature", "unstressed"
 
 
 def means(sim: State) -> np.ndarray:
-    """(n_own,) mean temperatures [K] of the owned elements; the model is closed."""
-    t = sim.cold[TEMPERATURE]
+    """(n_own,) mean temperatures [K] of the owned elements, parts of a hexahedron have that of all of it; the model is
+    closed."""
+    mesh, t = sim.the_mesh(), sim.cold[TEMPERATURE]
+    found = of_corners(mesh, sim.number[sim.owned], t)
+    if len(mesh.hexes):
+        hexes = sim.hex_rows()
+        found[hexes.rows] = hexes.means(t)[:, None]
+    return found
+
+
+def of_corners(mesh: Mesh, number: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Means (n,) of these elements (n,) with temperatures t (n, 3 or 4) of their corners."""
     total = (t[:, 0] + t[:, 1]) + t[:, 2]
     if t.shape[1] == 3:
         return total / 3.0
-    return np.where(sim.the_mesh().cells[sim.number[sim.owned], 3] >= 0, (total + t[:, 3]) / 4.0, total / 3.0)
+    return np.where(mesh.cells[number, 3] >= 0, (total + t[:, 3]) / 4.0, total / 3.0)
 
 
 def values(sim: State, rows: Rows, name: str, row: np.ndarray, t: np.ndarray) -> np.ndarray:

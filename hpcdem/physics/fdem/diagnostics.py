@@ -11,7 +11,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import PER_METRE
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import connectivity, user_laws
+from hpcdem.physics.fdem import by_temperature, connectivity, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
 from hpcdem.physics.fdem.kernels import plasticity, tets
@@ -277,8 +277,11 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
             v2 = (_corners(v, real) ** 2).sum(axis=2)
             columns["kinetic_energy"] = 0.5 * np.where(real, local.mass[own][some] * v2, 0.0).sum(axis=1)
     if "mean_temperature" in wanted:
-        t, n = corner_temperatures(sim)[some], connectivity.corner_counts(mesh.cells[number])
-        columns["mean_temperature"] = _mean(t, np.arange(4) < n[:, None], n)
+        if len(mesh.hexes) and by_temperature.TEMPERATURE in sim.cold:
+            columns["mean_temperature"] = by_temperature.means(sim)[some]
+        else:
+            t, n = corner_temperatures(sim)[some], connectivity.corner_counts(mesh.cells[number])
+            columns["mean_temperature"] = _mean(t, np.arange(4) < n[:, None], n)
     if any(name.startswith("plastic") for name in wanted):
         columns |= _plastic_columns(sim, some)
     if any(name.startswith(("creep", "kelvin_strain")) for name in wanted):

@@ -78,6 +78,29 @@ def corner_volumes(points: np.ndarray, hexes: np.ndarray) -> np.ndarray:
     return out
 
 
+class Rows:
+    """Hexahedra (n, 9) of a mesh whose tetrahedra stand in rows (n, 6) of a table of elements: what stands at their
+    corners is where `corners` (n, 8) say, 4 row + k."""
+
+    def __init__(self, points: np.ndarray, cells: np.ndarray, hexes: np.ndarray, rows: np.ndarray) -> None:
+        self.hexes, self.rows = hexes, rows
+        first, self.parts = corner_parts(points, cells, hexes)
+        self.corners = 4 * np.take_along_axis(rows, first // 4, axis=1) + first % 4
+
+    def means(self, t: np.ndarray) -> np.ndarray:
+        """Means by volume (n,) of values at corners (rows, 4)."""
+        return (self.parts * t[self.rows]).sum(axis=2).sum(axis=1)
+
+
+def corner_parts(points: np.ndarray, cells: np.ndarray, hexes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The first corners (n, 8) of `places`, and (n, 6, 4) the parts of the volume that belong to them; to the other
+    corners of the six tetrahedra belongs nothing."""
+    first, _ = places(cells, hexes)
+    of, parts = corner_volumes(points, hexes), np.zeros((len(hexes), 4 * PARTS))
+    np.put_along_axis(parts, first, of / of.sum(axis=1, keepdims=True), axis=1)
+    return first, parts.reshape(-1, PARTS, 4)
+
+
 def places(cells: np.ndarray, hexes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where the corners of hexahedra are: (n, 8) the first corner (4 tetrahedron + k, of the six) at each of them, and
     (n, 24) which corner of the hexahedron each corner of its tetrahedra is."""

@@ -70,8 +70,6 @@ class Hexes:
         self._make_constants(models[:, 0], mass)
         self.model = models[:, 0]
         self.remember = "plastic" in sim.cold or "creep" in sim.cold
-        if sim.stress0 is not None and n:
-            self.h[:n, :6] = sim.initial_stresses(self.number)
 
     def _make_constants(self, model: np.ndarray, mass: np.ndarray) -> None:
         """parts (blocks, 10, 10, 32), h (count + 3, 20): see `hexes.forces`."""
@@ -132,6 +130,11 @@ class Hexes:
         of = np.moveaxis(self.parts[:, :, hexes.SHARE], 1, 2).reshape(-1, hexes.PARTS)[: self.count]
         volume = np.repeat(self.h[: self.count, hexes.H_VOLUME : hexes.H_VOLUME + 2], hexes.PARTS // 2, axis=1) * of
         return volume / volume.sum(axis=1, keepdims=True)
+
+    def volumes_over_parts(self) -> np.ndarray:
+        """Volume (count,) of each, the mean of its overlays, over that of the six elements that store it."""
+        volume = self.h[: self.count, hexes.H_VOLUME : hexes.H_VOLUME + 2].mean(axis=1)
+        return volume / self.sim.areas[self.number[:, None] + np.arange(PARTS)].sum(axis=1)
 
     def part_of_volume(self) -> np.ndarray:
         """Part of the volume that each of the six elements has that store one (count, 6)."""

@@ -70,11 +70,14 @@ class LawsSpace(Local):
         self.heated = False
         self.warms = any(bool(one.any()) for one in self.sim.warms())
         self.stiff = self.c.copy() if self.warms else self.c
+        self.stiff_hexes = self.hexes.h.copy() if self.warms and self.hexes is not None else np.empty((0, hexes.HEX))
         self.initial_part: np.ndarray | None = None
         self._stress_said = self._stress
 
     def _moduli(self) -> Iterable[tuple[np.ndarray, np.ndarray, list[int], np.ndarray]]:
         yield self.c, self.stiff, [tets.LAMBDA, tets.TWO_MU], np.arange(self.count)
+        if (own := self.hexes) is not None:
+            yield own.h, self.stiff_hexes, [hexes.H_LAMBDA, hexes.H_TWO_MU], own.begin
 
     def _scale_initial(self, ratio: np.ndarray) -> None:
         self._stress = self._stress_said * ratio[:, None]
@@ -93,9 +96,10 @@ class LawsSpace(Local):
         self.s0[: self.count, :6] = self._stress
         if heat is not None:
             self.s0[: self.count, NORMAL] += heat[:, None]
-        if len(self.quad_s0):
-            assert self.hexes is not None
-            self.quad_s0[:, :, :6] = self.hexes.h[:, None, :6]
+        if (own := self.hexes) is not None:
+            own.h[: own.count, :6] = self.s0[own.begin, :6]
+            if len(self.quad_s0):
+                self.quad_s0[:, :, :6] = own.h[:, None, :6]
         self._relieve()
         return heat is not None
 

@@ -392,11 +392,18 @@ class LocalSpace(LawsSpace):
         tets.stresses(x, np.arange(n, dtype=np.int32), self.c[at], s0[at], small, 0, stress, energy)
         if energies:
             energy += self.remembered_energy(plastic, crept)[at]
-            if self.heated:
-                energy += self._energy_of_heat()[at]
         if self.hexes is not None:
             self.hexes.spread(stress, energy, at, quad_s0, self.hexes_store(plastic, crept))
+        if energies and self.heated:
+            energy += self._energy_of_heat()[at]
         return stress, energy
+
+    def _energy_of_heat(self) -> np.ndarray:
+        """As in the plane; the volume of a hexahedron is the mean of its overlays."""
+        energy = super()._energy_of_heat()
+        if (own := self.hexes) is not None:
+            energy[own.rows - self.sim.n_left] *= own.volumes_over_parts()[:, None]
+        return energy
 
     def stored_in_joints(self) -> np.ndarray:
         """As in the plane (n_own,) [J]."""

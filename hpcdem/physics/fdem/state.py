@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcdem.core.rebuild import RebuildState
+from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.definition import ModelDefinition, Relaxation
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep, creep_tets, plastic_tets, plasticity
@@ -138,6 +139,7 @@ class State(ModelDefinition, Model):
         self.untouched = True
         """Nothing has moved since there is this mesh."""
         self._told_step = 0.0
+        self._hex_rows: tuple[np.ndarray, hexahedra.Rows] | None = None
         self._empty()
 
     def _empty(self) -> None:
@@ -180,6 +182,16 @@ class State(ModelDefinition, Model):
     def owned(self) -> slice:
         """Storage rows of the owned elements."""
         return slice(self.n_left, self.n_left + self.n_own) if self.closed else slice(0, len(self.number))
+
+    def hex_rows(self) -> hexahedra.Rows:
+        """The hexahedra of this rank, by rows of owned elements; the model is closed. Not to be changed."""
+        if self._hex_rows is None or self._hex_rows[0] is not self.number:  # new storage has a new one
+            mesh = self.the_mesh()
+            start = self.where[mesh.hexes[:, 8]] - self.n_left
+            mine = mesh.hexes[(start >= 0) & (start < self.n_own)]
+            rows = self.where[mine[:, 8, None] + np.arange(hexahedra.PARTS)] - self.n_left
+            self._hex_rows = self.number, hexahedra.Rows(mesh.points, mesh.cells, mine, rows)
+        return self._hex_rows[1]
 
     def masses_change(self) -> bool:
         """Masses or the time step will be others with the next lists."""

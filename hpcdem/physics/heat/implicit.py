@@ -21,6 +21,7 @@ from hpcdem.physics.fdem import connectivity, equilibrium
 from hpcdem.physics.fdem.linear import Direct, Petsc, Pieces, Unknowns
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.heat import kernels
+from hpcdem.physics.heat.hexes import Hexes
 from hpcdem.physics.heat.implicit_fluid import Fluid
 from hpcdem.physics.heat.model import CAPACITY, GIVEN, Heat
 
@@ -251,6 +252,8 @@ class Implicit:
                 stiffness[:, 2 * c, 2 * c] += capacity[at, c] / dt
             order = np.argsort(number[at])
             found.append(Pieces(number[at][order], heat.node[number[at]][:, :k][order], stiffness[order]))
+        if heat.hexes is not None:
+            found.append(self._hex_pieces(heat.hexes))
         at, ends, transfer = heat.transfers()
         key = np.repeat(at, ends.shape[1])
         faces = np.zeros((len(key), 2, 2))
@@ -258,6 +261,15 @@ class Implicit:
         found.append(Pieces(key, heat.node.reshape(-1)[ends.reshape(-1)][:, None], faces))
         found.append(self._contact_pieces())
         return found
+
+    def _hex_pieces(self, hexes: Hexes) -> Pieces:
+        """Of the hexahedra of this rank; their heat capacity is that of their parts."""
+        sim, heat = self.sim, self.heat
+        mine = (hexes.rows[:, 0] >= sim.owned.start) & (hexes.rows[:, 0] < sim.owned.stop)
+        stiffness = np.zeros((int(mine.sum()), 16, 16))
+        stiffness[:, ::2, ::2] = hexes.matrices(mine)
+        corners = hexes.corners[mine]
+        return Pieces(hexes.number[mine], heat.node[sim.number[corners // 4], corners % 4], stiffness)
 
     def _contact_pieces(self) -> Pieces:
         """Of faces that touch, the first of which belongs to this rank, by the numbers of its element."""

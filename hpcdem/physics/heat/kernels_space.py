@@ -1,5 +1,6 @@
-"""What heat in tetrahedra has of its own: conductances, and where faces touch. All other loops are those of kernels.py,
-for which a tetrahedron is a row with four corners. Source: Fourier's law with linear tetrahedra (manual, 7.6.1).
+"""What heat in space has of its own: conductances of tetrahedra, conduction in hexahedra, and where faces touch. All
+other loops are those of kernels.py, for which a tetrahedron is a row with four corners. Source: Fourier's law with
+linear tetrahedra (manual, 7.6.1).
 """
 
 from __future__ import annotations
@@ -7,13 +8,18 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
-from hpcdem.physics.fdem.tetrahedra import FACES
+from hpcdem.physics.fdem.hexahedra import OVERLAYS
 from hpcdem.physics.heat.kernels import PAIRS
 
 MOST = 10
 """Corners of a triangle that is cut five times, with room."""
+_ENDS = np.sort(OVERLAYS[:, PAIRS], axis=2)
+HEX_PAIRS = np.unique(_ENDS.reshape(-1, 2), axis=0)
+"""Pairs of corners of a hexahedron between which heat flows (24, 2)."""
+OVERLAY_PAIRS = np.array([[int(np.flatnonzero((HEX_PAIRS == ends).all(axis=1))[0]) for ends in of] for of in _ENDS])
+"""Which of them those of each of its tetrahedra are (10, 6)."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -44,6 +50,35 @@ def conductances(number, points, cells, k, out):
             flow += one[1] * (xy * two[0] + (yy * two[1] + yz * two[2]))
             flow += one[2] * (xz * two[0] + (yz * two[1] + zz * two[2]))
             out[i, pair] = -flow / (6.0 * det)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _conduct_hexes(part, threads, corners, g, t, q):
+    n, heat = len(corners), np.empty(8)
+    for i in range(n * part // threads, n * (part + 1) // threads):
+        heat[:] = 0.0
+        for p in range(len(HEX_PAIRS)):
+            a, b = HEX_PAIRS[p, 0], HEX_PAIRS[p, 1]
+            flow = g[i, p] * (t[corners[i, b]] - t[corners[i, a]])
+            heat[a] += flow
+            heat[b] -= flow
+        for k in range(8):
+            q[corners[i, k]] = heat[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def conduct_hexes(threads, *args):
+    """Heat that flows to the corners of hexahedra by conduction in them, stored in q (flat); t: flat; corners (n, 8):
+    where theirs are; g (n, 24) [W/K]: between HEX_PAIRS."""
+    for part in range(threads):
+        _conduct_hexes(part, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def conduct_hexes_threaded(threads, corners, g, t, q):
+    """The same on several threads."""
+    for part in prange(threads):
+        _conduct_hexes(part, threads, corners, g, t, q)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -116,30 +151,32 @@ def _seen(one, two, near, deep, polygon, other, onto):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def touching(face, other, row, other_row, x, h, near, deep, corner, weight, pass_on):
+def touching(first, second, share, x, h, near, deep, corner, weight, pass_on):
     """Where faces touch: how many places, and as many rows of the rest as there are; see `kernels.touching`.
 
-    face, other (m,): pairs of free faces of elements in the storage rows row, other_row (m,); x (n, 16); h (rows,)
-    [W/(m2 K)]. The part of a face that sees the other one is a polygon; triangles from the mean of its corners to its
-    sides pass a third of their heat on at each of their corners, at the mean that of the means of all: so linear
-    temperatures give the exact heat. corner (n, 6) in t, flat, of four columns, weight (n, 6), pass_on (n,) [W/K].
+    first, second (m, 3): corners of pairs of triangles, 4 row + k of storage; share (m,): which part of their heat
+    counts; x (n, 16); h (rows,) [W/(m2 K)]. The part of a face that sees the other one is a polygon; triangles from the
+    mean of its corners to its sides pass a third of their heat on at each of their corners, at the mean that of the
+    means of all: so linear temperatures give the exact heat. corner (n, 6) in t, flat, of four columns, weight (n, 6),
+    pass_on (n,) [W/K].
     """
     n = 0
     one, two, onto = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     polygon, scratch = np.empty((MOST, 2)), np.empty((MOST, 2))
-    for p in range(len(face)):
-        i, j = row[p], other_row[p]
+    x = x.reshape(x.size)
+    for p in range(len(first)):
+        mine, theirs = first[p], second[p]
+        i, j = mine[0] // 4, theirs[0] // 4
         if h[i] <= 0.0 or h[j] <= 0.0:
             continue
-        mine, theirs = FACES[face[p] % 4], FACES[other[p] % 4]
         for k in range(3):
             for axis in range(3):
-                one[k, axis], two[k, axis] = x[i, 4 * mine[k] + axis], x[j, 4 * theirs[k] + axis]
+                one[k, axis], two[k, axis] = x[4 * mine[k] + axis], x[4 * theirs[k] + axis]
         many, area = _seen(one, two, near, deep, polygon, scratch, onto)
         if many < 3:
             continue
         if n + many <= len(pass_on):
-            third = 2.0 * h[i] * h[j] / (h[i] + h[j]) * area / 3.0
+            third = share[p] * (2.0 * h[i] * h[j] / (h[i] + h[j]) * area / 3.0)
             middle_u = middle_v = whole = 0.0
             for m in range(many):
                 middle_u, middle_v = middle_u + polygon[m, 0] / many, middle_v + polygon[m, 1] / many
@@ -159,7 +196,7 @@ def touching(face, other, row, other_row, x, h, near, deep, corner, weight, pass
                 s = onto[0, 0] + (onto[0, 1] * u + onto[0, 2] * v)
                 t = onto[1, 0] + (onto[1, 1] * u + onto[1, 2] * v)
                 for k in range(3):
-                    corner[n + m, k], corner[n + m, 3 + k] = 4 * i + mine[k], 4 * j + theirs[k]
+                    corner[n + m, k], corner[n + m, 3 + k] = mine[k], theirs[k]
                 weight[n + m, 0], weight[n + m, 1], weight[n + m, 2] = 1.0 - (u + v), u, v
                 weight[n + m, 3], weight[n + m, 4], weight[n + m, 5] = -(1.0 - (s + t)), -s, -t
         n += many

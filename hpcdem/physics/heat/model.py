@@ -18,7 +18,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import build, by_temperature, said, user_laws
+from hpcdem.physics.fdem import build, by_temperature, hexahedra, said, user_laws
 from hpcdem.physics.fdem.kernels.elements import FORCE
 from hpcdem.physics.fdem.mesh import sizes as sizes_of
 from hpcdem.physics.fdem.pairs_space import Surface
@@ -29,6 +29,7 @@ from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat import friction, kernels, kernels_space
 from hpcdem.physics.heat.fluid import FluidHeat
+from hpcdem.physics.heat.hexes import Hexes, conductances, facing, with_other_cuts
 from hpcdem.physics.heat.properties import ISO_HEAT
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ class Heat(SurfaceLoad):
         self._found_for: tuple[float, ...] = ()
         self._passes = False
         self._pairs_of: Any = None
-        self._facing = np.empty((0, 2), np.int64)
+        self._facing = np.empty((2, 0, 3), np.int64), np.empty(0)
         self._touch = np.empty((0, 4), np.int64), np.empty((0, 4)), np.empty(0)
         self._rubs = False
         self._power: np.ndarray | None = None
@@ -135,8 +136,6 @@ class Heat(SurfaceLoad):
         """Elements (None: all) have this thermal model; at the temperature that they have now they are free of thermal
         stress."""
         at = self.blocks.numbers_of_elements(elements)
-        if len(self.blocks.the_mesh().hexes) and (self.blocks.the_mesh().hex_of()[at] >= 0).any():
-            raise CommandError("hexahedra have no heat in this version: thermal-iso-heat is for tetrahedra")
         self._put(at, self.blocks.complete(ELEMENT, at, ISO_HEAT, {}, given))
         self._take_unstressed(at)
 
@@ -185,16 +184,34 @@ class Heat(SurfaceLoad):
             cold[UNSTRESSED] = np.zeros((n, 1))
 
     def _take_unstressed(self, elements: np.ndarray) -> None:
-        """These elements are free of thermal stress as they are; the model is open. Not collective."""
-        blocks = self.blocks
-        mine = np.flatnonzero(np.isin(blocks.number, elements))
-        blocks.cold[UNSTRESSED][mine, 0] = self._means(blocks.number[mine], blocks.cold[TEMPERATURE][mine])
+        """These elements, and hexahedra that they are parts of, are free of thermal stress as they are; the model is
+        open. Collective."""
+        blocks, mesh = self.blocks, self.blocks.the_mesh()
+        number, t = blocks.number, blocks.cold[TEMPERATURE]
+        found = by_temperature.of_corners(mesh, number, t)
+        chosen = np.isin(number, elements)
+        if len(mesh.hexes):
+            of = mesh.hex_of()
+            some = np.zeros(len(mesh.hexes) + 1, bool)  # the last one: of no hexahedron
+            some[of[elements]] = True
+            some[-1] = False
+            mine = np.flatnonzero(some[of[number]])
+            found[mine] = self._means_of_parts(number[mine], t[mine])
+            chosen[mine] = True
+        blocks.cold[UNSTRESSED][chosen, 0] = found[chosen]
 
-    def _means(self, number: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Mean temperatures (n,) of elements with these temperatures of corners, as kernels.thermal_stress has them."""
-        quad, out = self.blocks.the_mesh().cells[number, 3] >= 0, np.empty(len(t))
-        kernels.thermal_stress(quad, t, np.full(len(t), -1.0), np.zeros(len(t)), out)
-        return out
+    def _means_of_parts(self, number: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Means (n,) of the hexahedra that these elements are parts of, which may be shared out among ranks, as
+        `hexahedra.Rows` has them; t (n, 4): temperatures of their corners. Collective."""
+        mesh, comm = self.blocks.the_mesh(), self.blocks.comm
+        which, at = np.unique(mesh.hex_of()[number], return_inverse=True)
+        hexes = mesh.hexes[which]
+        _, parts = hexahedra.corner_parts(mesh.points, mesh.cells, hexes)
+        own = (parts[at, number - hexes[at, 8]] * t).sum(axis=1)
+        pieces = [(number, own)] if comm.size == 1 else comm.allgather((number, own))
+        every, first = np.unique(np.concatenate([piece[0] for piece in pieces]), return_index=True)
+        means = np.concatenate([piece[1] for piece in pieces])[first].reshape(-1, hexahedra.PARTS).sum(axis=1)
+        return means[np.searchsorted(every[:: hexahedra.PARTS], hexes[at, 8])]
 
     def initial(self, nodes: np.ndarray | None, temperature: float) -> None:
         """Nodes (None: all) have this temperature now, and the fluid at them; elements around them are free of thermal
@@ -327,8 +344,7 @@ class Heat(SurfaceLoad):
 
     def element_temperatures(self) -> np.ndarray:
         """(n_own,) means of the corners [K]; the model is closed. Not collective."""
-        own = self.blocks.owned
-        return self._means(self.blocks.number[own], self.blocks.cold[TEMPERATURE])
+        return by_temperature.means(self.blocks)
 
     # ---- thermal stress ------------------------------------------------------------------------------------------
 
@@ -344,6 +360,10 @@ class Heat(SurfaceLoad):
         kernels.thermal_stress(
             self._quad, blocks.cold[TEMPERATURE], self._stiffness, blocks.cold[UNSTRESSED].reshape(-1), out
         )  # fmt: skip
+        if len(blocks.the_mesh().hexes):
+            hexes = blocks.hex_rows()
+            at, mean = hexes.rows, hexes.means(blocks.cold[TEMPERATURE])
+            out[at] = self._stiffness[at] * (blocks.cold[UNSTRESSED][at, 0] - mean[:, None])
         part = by_temperature.part_of_young(blocks)
         return out if part is None else out * part
 
@@ -431,6 +451,10 @@ class Heat(SurfaceLoad):
         make = kernels_space.conductances if blocks.dim == 3 else kernels.conductances
         make(number, mesh.points, mesh.cells, self._conductivities(row), self._g)
         self._q = np.zeros_like(self.t)
+        self.hexes: Hexes | None = None
+        if len(hexes := blocks.the_mesh().hexes):
+            self.hexes = Hexes(blocks, self._conductivities(self.row[hexes[:, 8]]))
+            self._g[self.hexes.rows] = 0.0
 
     def _conductivities(self, row: np.ndarray) -> np.ndarray:
         """Of elements with these rows (n,), [W/(m K)]: xx, yy, xy (n, 3), in space xx, yy, xy, zz, xz, yz (n, 6)."""
@@ -455,25 +479,35 @@ class Heat(SurfaceLoad):
     def _tell_obtuse(self) -> None:
         """Where flat angles make heat flow from cold to warm: the temperatures of explicit steps may leave the range of
         those around them. Rank 0 alone."""
-        blocks, cells = self.blocks, self.blocks.the_mesh().cells
+        blocks = self.blocks
         if self._told_obtuse or blocks.log is None or blocks.dim == 2:
             return
         self._told_obtuse = True
-        every = np.flatnonzero(blocks.alive & (self.row > 0))
+        mesh = blocks.the_mesh()
+        heated = blocks.alive & (self.row > 0)
+        every = np.flatnonzero(heated & (mesh.hex_of() < 0))
         g = np.empty((len(every), 6))
-        mesh = blocks.reference
         kernels_space.conductances(every, mesh.points, mesh.cells, self._conductivities(self.row[every]), g)
-        ends = np.sort(self.node[every][:, kernels.PAIRS], axis=2).reshape(-1, 2)
+        hexes = mesh.hexes[heated[mesh.hexes[:, 8]]]
+        of_hexes = conductances(mesh.points, hexes, self._conductivities(self.row[hexes[:, 8]]))
+        corners = 4 * hexes[:, 8:] + hexahedra.places(mesh.cells, hexes)[0]
+        ends = np.concatenate([
+            self.node[every][:, kernels.PAIRS].reshape(-1, 2),
+            self.node.reshape(-1)[corners][:, kernels_space.HEX_PAIRS].reshape(-1, 2),
+        ])  # fmt: skip
+        ends.sort(axis=1)
         key, at = np.unique(ends[:, 0] * len(self.leads) + ends[:, 1], return_inverse=True)
-        total = np.bincount(at.reshape(-1), g.reshape(-1), len(key))
-        size = np.bincount(at.reshape(-1), np.abs(g).reshape(-1), len(key))
+        along = np.append(g, of_hexes)
+        total = np.bincount(at.reshape(-1), along, len(key))
+        size = np.bincount(at.reshape(-1), np.abs(along), len(key))
         against = total < -1e-12 * size
         if against.any():
             blocks.log.warn_once(
                 "obtuse tetrahedra",
                 f"along {int(against.sum())} of {len(key)} edges heat is conducted from the colder to the warmer end, "
-                f"as angles between faces are obtuse (in {int((g < 0.0).any(axis=1).sum())} of {len(cells)} "
-                "tetrahedra): near steep fronts temperatures may leave the range of those around them",
+                f"as angles between faces are obtuse (in {int((g < 0.0).any(axis=1).sum())} of {len(every)} tetrahedra"
+                + (f" and {int((of_hexes < 0.0).any(axis=1).sum())} of {len(hexes)} hexahedra" if len(hexes) else "")
+                + "): near steep fronts temperatures may leave the range of those around them",
             )
 
     def _make_nodes(self) -> None:
@@ -530,12 +564,13 @@ class Heat(SurfaceLoad):
 
     @property
     def conductances(self) -> np.ndarray:
-        """Of the elements held here, see `kernels.conductances`. Not to be changed. Not collective."""
+        """Of the elements held here, see `kernels.conductances`; parts of hexahedra have none, see `hexes`. Not to be
+        changed. Not collective."""
         return self._g
 
     def transfers(self, everywhere: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Exposed faces (m,), ascending, their corners (m, 2 or 3), element * 4 + k, and what each passes on to one of
-        them per degree [W/(m K)]: of this rank's elements, or of all. Not collective."""
+        """Exposed faces (m,), their corners (m, 2 or 3), element * 4 + k, and what each passes on to one of them per
+        degree [W/(m K)]: of this rank's elements, or of all. Not collective."""
         at, ends, half = self._exposed()
         if not everywhere:
             row = self.blocks.where[at // 4]
@@ -545,20 +580,24 @@ class Heat(SurfaceLoad):
         own = np.array([math.nan if one.transfer is None else one.transfer for one in self.faces])[self.face[at]]
         there = np.array([one.environment is not None for one in self.faces])[self.face[at]]
         transfer = half * np.where(there, np.where(np.isnan(own), h, own), 0.0)
-        return at, 4 * (at // 4)[:, None] + ends, transfer
+        return at, ends, transfer
 
     def _exposed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Free faces with a condition, of all ranks: numbers (m,), their corners (m, 2), in space (m, 3), and the part
-        of the face of each: half the length [m], in space a third of the area [m2]."""
+        """Free faces with a condition, of all ranks: numbers (m,), their corners (m, 2), in space (m, 3), element * 4 +
+        k, and the part of the face of each: half the length [m], in space a third of the area [m2]. Those of hexahedra
+        come twice, as both ways to cut their sides have it."""
         blocks = self.blocks
         at = np.flatnonzero((self.face > 0) & blocks.face_exists() & ~blocks.closed_faces())
-        return at, *self._parts_of(at)
+        return self._parts_of(at)
 
-    def _parts_of(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The second and third of these of any faces (m,)."""
+    def _parts_of(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same of any faces."""
         mesh = self.blocks.the_mesh()
-        ends = mesh.face_corners(faces) % 4
-        return ends, sizes_of(self.blocks.reference.points[mesh.face_points(faces)]) / ends.shape[1]
+        if len(mesh.hexes):
+            ends, area, of = with_other_cuts(mesh, faces)
+            return faces[of], ends, area / 3.0
+        ends = mesh.face_corners(faces)
+        return faces, ends, sizes_of(self.blocks.reference.points[mesh.face_points(faces)]) / ends.shape[1]
 
     def _make_faces(self) -> None:
         """Exposed faces of the elements held here, by their numbers."""
@@ -567,7 +606,7 @@ class Heat(SurfaceLoad):
         held = blocks.where[at // 4] >= 0
         at, ends, self._half = at[held], ends[held], half[held]
         e = at // 4
-        self._face_corner = blocks.where[e][:, None] * self.t.shape[1] + ends
+        self._face_corner = blocks.where[ends // 4] * self.t.shape[1] + ends % 4
         # One row for each condition and coefficient of the element.
         h = self.column("transfer_coeficient")[self.row[e]]
         pairs, which = np.unique(np.column_stack([self.face[at].astype(float), h]), axis=0, return_inverse=True)
@@ -608,20 +647,21 @@ class Heat(SurfaceLoad):
         )  # fmt: skip
 
     def _touching_in_space(self) -> int:
-        """The same for tetrahedra: every free face with those of its targets, each pair of faces once."""
+        """The same in space: every free face with those of its targets, each pair of faces once."""
         blocks, pairs = self.blocks, self.blocks.local.pairs
         if self._pairs_of is not pairs:
             self._pairs_of = pairs
+            faces = Surface.of(blocks).faces
             free = np.zeros(self.face.size, bool)
-            free[Surface.of(blocks).faces] = True
+            free[faces] = True
             face = np.repeat(pairs.face[pairs.first], 4)
             other = (4 * pairs.element[pairs.second][:, None] + np.arange(4)).reshape(-1)
-            both = np.sort(np.column_stack([face, other])[free[other]], axis=1)
-            self._facing = np.unique(both, axis=0).reshape(-1, 2)
-        face, other = self._facing.T.copy()
+            both = np.column_stack([face, other])[free[other]]
+            corners, share = facing(blocks.the_mesh(), faces, both)
+            self._facing = 4 * blocks.where[corners // 4] + corners % 4, share
         edge, h = float(blocks.mean_edge), self._transfers[blocks.number]
-        rows = blocks.where[face // 4], blocks.where[other // 4]
-        return kernels_space.touching(face, other, *rows, blocks.x, h, NEAR * edge, DEEP * edge, *self._touch)
+        (first, second), share = self._facing
+        return kernels_space.touching(first, second, share, blocks.x, h, NEAR * edge, DEEP * edge, *self._touch)
 
     @property
     def contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -654,6 +694,8 @@ class Heat(SurfaceLoad):
         for pair, (a, b) in enumerate(kernels.PAIRS[: g.shape[1]]):
             corner[:, a] += each[:, pair]
             corner[:, b] += each[:, pair]
+        if self.hexes is not None:
+            self.hexes.add_sizes(corner.reshape(-1))
         h = self._faces_at(self.time)[:, kernels.TRANSFER][self._face_row]
         np.add.at(
             corner.reshape(-1), self._face_corner.reshape(-1), np.repeat(self._half * h, self._face_corner.shape[1])
@@ -674,10 +716,10 @@ class Heat(SurfaceLoad):
         most = h[blocks.alive].max()
         at = np.flatnonzero(blocks.face_exists() & ~blocks.closed_faces() & np.repeat(h > 0.0, 4))
         at = at[blocks.where[at // 4] >= 0]
-        ends, part = self._parts_of(at)
+        at, ends, part = self._parts_of(at)
         each = 2.0 * part * h[at // 4] * most / (h[at // 4] + most)
         for end in ends.T:
-            np.add.at(corner, (blocks.where[at // 4], end), each)
+            np.add.at(corner, (blocks.where[end // 4], end % 4), each)
 
     def limit(self) -> float:
         """The stability limit of a sub-step [s]."""
@@ -908,6 +950,8 @@ class Heat(SurfaceLoad):
         where heat comes from surfaces or fluid."""
         threads = self.blocks.threads
         (kernels.conduct if threads == 1 else kernels.conduct_threaded)(threads, self.t, self._g, self._q)
+        if self.hexes is not None:
+            self.hexes.conduct(self.t.reshape(-1), self._q.reshape(-1))
         if len(self._face_row):
             t, q, given = (part.reshape(-1) for part in (self.t, self._q, self.blocks.cold[GIVEN]))
             kernels.through_faces(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from hpcdem.halo.comm import SerialComm
@@ -9,7 +11,7 @@ from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.warm_up import ROCK
-from hpcdem.physics.heat import friction, kernels
+from hpcdem.physics.heat import friction, kernels, kernels_space
 from hpcdem.physics.heat.model import Heat
 
 GRANITE = {"conductivity": 2.7, "capacity": 1000.0, "expansion_coeficient": 1e-5, "transfer_coeficient": 5.0}
@@ -27,9 +29,11 @@ def warm_up(threads: int = 1) -> None:
 
 
 def in_space(threads: int = 1) -> None:
-    """The same between two tetrahedra."""
+    """The same between two tetrahedra, and conduction in a hexahedron."""
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
     _heated(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
+    kernel: Any = kernels_space.conduct_hexes if threads == 1 else kernels_space.conduct_hexes_threaded
+    kernel(threads, np.arange(8).reshape(1, 8), np.ones((1, len(kernels_space.HEX_PAIRS))), np.zeros(24), np.zeros(24))
 
 
 def _heated(mesh: Mesh, threads: int) -> Blocks:
