@@ -6,12 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.physics.fdem.groups import FLOW_NODE
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.fluid import FluidHeat
 from hpcdem.physics.heat.model import Heat
 from tests.blocks.support import ROCK, model
 
 GRANITE = {"conductivity": 2.5, "capacity": 1000.0}
+WATER = {"conductivity": 0.6, "capacity": 4200.0, "transfer_coeficient": 200.0}
+RHO_C = 1000.0 * 4200.0
+"""Of the water."""
 DIFFUSIVITY = GRANITE["conductivity"] / (ROCK["density"] * GRANITE["capacity"])
 
 
@@ -22,6 +28,28 @@ def standing(mesh: Mesh, **changes: float) -> tuple[Blocks, Heat]:
     heat.assign(None, {**GRANITE, **changes})
     sim.parts(mechanical=False)
     return sim, heat
+
+
+def with_heat(sim: Blocks, water: dict[str, float], **rock: float) -> tuple[Heat, FluidHeat]:
+    """Rock and water of channels that are there have heat."""
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, **rock})
+    fluid = heat.of_fluid()
+    fluid.assign(None, {**WATER, **water})
+    return heat, fluid
+
+
+def of_nodes(flow: Flow, name: str = "temperature") -> np.ndarray:
+    """Of all flow nodes."""
+    return flow.values(FLOW_NODE, name)
+
+
+def step(sim: Blocks, time: float, count: int) -> None:
+    """So many steps of heat beside water that flows on as it does now."""
+    sim.parts(hydraulic=False)
+    sim.heat_clock(dt=time / count)
+    for _ in range(count):
+        sim.step()
 
 
 def until(sim: Blocks, time: float) -> None:

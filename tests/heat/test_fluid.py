@@ -9,13 +9,10 @@ import pytest
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes
-from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
-from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.groups import CHANNEL
 from hpcdem.physics.flow import kernels as flowing
 from hpcdem.physics.flow.coupled import Coupled
-from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat import kernels
-from hpcdem.physics.heat.fluid import FluidHeat
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.heat.reference import fluid_step
@@ -23,18 +20,7 @@ from tests.blocks.support import rectangle, shaken
 from tests.flow.support import at, hold, line
 from tests.flow.support import standing as standing_flow
 from tests.heat import exact
-from tests.heat.support import GRANITE, temperatures
-
-WATER = {"conductivity": 0.6, "capacity": 4200.0, "transfer_coeficient": 200.0}
-RHO_C = 1000.0 * 4200.0
-
-
-def with_heat(sim: Blocks, water: dict[str, float], **rock: float) -> tuple[Heat, FluidHeat]:
-    heat = Heat.of(sim)
-    heat.assign(None, {**GRANITE, **rock})
-    fluid = heat.of_fluid()
-    fluid.assign(None, {**WATER, **water})
-    return heat, fluid
+from tests.heat.support import GRANITE, RHO_C, WATER, of_nodes, step, temperatures, with_heat
 
 
 def flowing_line(n: int, length: float, speed: float, water: dict[str, float], aperture: float = 1e-3, **rock: float):
@@ -48,17 +34,6 @@ def flowing_line(n: int, length: float, speed: float, water: dict[str, float], a
         run.steady()
     heat, fluid = with_heat(sim, water, **rock)
     return sim, flow, heat, fluid
-
-
-def of_nodes(flow: Flow, name: str = "temperature") -> np.ndarray:
-    return flow.values(FLOW_NODE, name)
-
-
-def step(sim: Blocks, time: float, count: int) -> None:
-    sim.parts(hydraulic=False)
-    sim.heat_clock(dt=time / count)
-    for _ in range(count):
-        sim.step()
 
 
 @pytest.mark.parametrize("second", [0.0, 1.0])

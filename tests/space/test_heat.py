@@ -16,11 +16,9 @@ from hpcdem.physics.fdem.hexahedra import OVERLAYS
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import TEMPERATURE, Over
-from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat import kernels_space, reference
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
-from tests.flow.support import WATER
 from tests.heat import exact
 from tests.heat.support import GRANITE, temperatures, until
 from tests.space.support import ROCK, body, box, faces_on, hexes, nodes_on
@@ -564,14 +562,6 @@ class Log:
 
     def info(self, text: str) -> None:
         logging.info(text)
-
-
-def test_fluid_has_no_heat() -> None:
-    mesh = box((2, 2, 2), (1.0, 1.0, 1.0))
-    sim, heat = standing(mesh)
-    Flow.of(sim).assign(None, WATER)
-    with pytest.raises(CommandError, match="fluid in three dimensions has no heat"):
-        heat.of_fluid()
 
 
 def test_obtuse_tetrahedra_are_told() -> None:

@@ -20,7 +20,7 @@ from hpcdem.physics.fdem.connectivity import nearest_point
 from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids, Range
 from hpcdem.physics.flow.model import Flow
 
-IN_SPACE = tuple(name for name in UNITS[MODEL] if name not in ("disc_work", "liner_work", "heat_in_fluid"))
+IN_SPACE = tuple(name for name in UNITS[MODEL] if name not in ("disc_work", "liner_work"))
 """What a history of a model in three dimensions can follow."""
 FLUSH = 500
 """Records that wait at most before they go to the file."""

@@ -331,7 +331,7 @@ TEMPERATURE = Model(
 FLUID_TEMPERATURE = Model(
     "therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of the fluid at flow nodes, as of what is injected "
     "there; times of tables are those of heat.",
-    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),),
+    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),), dims=BOTH,
 )  # fmt: skip
 PROPPANT_CONDITION = Model(
     "hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that comes in at flow nodes, of wells too, one of these; "
@@ -397,7 +397,7 @@ FLUID_HEAT = Model(
     tuple(replace(o, values=(BOOL,), unit="", default="off") if o.name == "second-order" else o for o in declared(
         FLUID_HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "sec{ond}-o{rder}",
         also={"transfer-coeficient": _COEFFICIENTS["transfer-coeficient"]})),
-    of=FLUID_HEAT_PROPERTIES,
+    of=FLUID_HEAT_PROPERTIES, dims=BOTH,
 )  # fmt: skip
 _GRAINS = tuple(
     replace(o, values=(BOOL,), unit="", default="off") if o.name == "proppant-stokes" else o for o in declared(

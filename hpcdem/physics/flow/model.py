@@ -446,7 +446,22 @@ class Flow(SurfaceLoad):
         numbers = self.numbers(kind) if numbers is None else numbers
         found = np.full(int(max(numbers.max(initial=-1), mine["number"].max(initial=-1))) + 1, math.nan)
         found[mine["number"]] = mine[name]
-        bits, nothing = found[numbers].view(np.int64), np.array([math.nan]).view(np.int64)[0]
+        return self._on_all_ranks(found[numbers])
+
+    def link_flows(self) -> np.ndarray:
+        """What flows at this moment along the links (l,) of all channels [m2/s], on all ranks."""
+        blocks, links = self.blocks, LINKS[self.blocks.dim]
+        blocks.close_model()
+        self._find_flows(0.0)
+        row = blocks.where[self._channels // 4]
+        mine = (row >= blocks.owned.start) & (row < blocks.owned.stop)
+        found = np.full((len(self.network.channels), links), math.nan)
+        found[np.searchsorted(self.network.channels, self._channels[mine])] = self._q.reshape(-1, links)[mine]
+        return self._on_all_ranks(found.reshape(-1))
+
+    def _on_all_ranks(self, values: np.ndarray) -> np.ndarray:
+        """Values (n,), NaN but on one rank at most: to the last bit."""
+        bits, nothing = values.view(np.int64), np.array([math.nan]).view(np.int64)[0]
         return (self.blocks.comm.sum_into(bits - nothing) + nothing).view(np.float64)
 
     def account(self) -> dict[str, float]:
@@ -627,7 +642,8 @@ class Flow(SurfaceLoad):
         self._bind_loads(loaded, local)
         self._sides, self._law, lost = self._sides_of(self._channels)
         self._law_table = self.laws()
-        self._table = np.empty((len(ends), kernels.CHANNEL))
+        self._table, self._flowing = (np.empty((len(ends), kernels.CHANNEL)) for _ in range(2))
+        self._slow = np.empty(len(ends))
         self.carried = None if self.carried is None else np.empty(0)
         self._leaked_before = np.empty(0)
         self.find_geometry()
@@ -839,23 +855,25 @@ class Flow(SurfaceLoad):
         if self.cycles % LOOK == 0:
             self._check()
 
-    def slowness(self, ends: np.ndarray, table: np.ndarray, state: np.ndarray) -> np.ndarray | None:
-        """Flow (m,) over that of the cubic law in links with these ends (m, 2) and table, by the state of nodes; None:
-        it is laminar at any Reynolds number. Not collective."""
+    def slowness(
+        self, ends: np.ndarray, table: np.ndarray, state: np.ndarray, out: np.ndarray | None = None
+    ) -> np.ndarray | None:
+        """Flow (m,) over that of the cubic law in links with these ends (m, 2) and table, by the state of nodes, in
+        `out` if it is given; None: it is laminar at any Reynolds number. Not collective."""
         if not self.fluid("turbulence") > 0.0:
             return None
-        out = np.empty(len(ends))
+        out = np.empty(len(ends)) if out is None else out
         kernels.slowness(LINKS[self.blocks.dim], ends, table, self.fluid("fluid_density"), state, out)
         return out
 
     def _flowing_table(self) -> np.ndarray:
         """The table of links, where flow is turbulent with the conductances of this moment. Not collective."""
-        slow = self.slowness(self._ends, self._table, self.state)
+        slow = self.slowness(self._ends, self._table, self.state, self._slow)
         if slow is None:
             return self._table
-        table = self._table.copy()
-        table[:, kernels.CONDUCT] *= slow
-        return table
+        np.copyto(self._flowing, self._table)
+        self._flowing[:, kernels.CONDUCT] *= slow
+        return self._flowing
 
     def _find_flows(self, dt: float) -> None:
         threads, table = self.blocks.threads, self._flowing_table()

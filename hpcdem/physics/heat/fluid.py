@@ -4,12 +4,18 @@ A flow node holds the heat rho C W T, W: its fluid at the density without pressu
 into another one. Fluid that comes or goes otherwise (conditions, wells, leak-off) has the temperature of its node. The
 fluid has sub-steps of its own, as short as flow needs them; meanwhile the rock stays as it is and gets the sum of what
 the walls took. Owners of nodes and their neighbours are those of the flow.
+
+In space a channel is three links, as in the flow. Nodes own their parts of a triangle up to its medians, so a link
+carries what crosses the piece of median between its ends (physics/proppant/kernels_space.py), conducts by the cotangent
+of the angle opposite it, and passes a sixth of the triangle's heat on to each wall at each end: every corner gets a
+third. Areas and volumes are those of the whole triangle: m3 for m2, J for J/m, W/K for W/(m K).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import reduce
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -18,11 +24,10 @@ from hpcdem.core.errors import CommandError
 from hpcdem.halo.copies import Copies, moved
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import said
-from hpcdem.physics.fdem.connectivity import corner_counts, face_points
 from hpcdem.physics.fdem.properties import JOINT
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow import kernels as flowing
-from hpcdem.physics.flow.network import at_nodes
+from hpcdem.physics.flow.network import LINKS, at_nodes, links_of
 from hpcdem.physics.heat import kernels
 from hpcdem.physics.heat.properties import FLUID_HEAT
 
@@ -43,6 +48,10 @@ SAFETY = 0.9
 """Part of the stability limit that a sub-step may be."""
 MANY = 100_000
 """Sub-steps in one of the rock that are too many to be meant."""
+FACING = {2: [1, 0], 3: [0, 2, 1]}
+"""By dimensions of space: which corner of the other face faces each of the lower one."""
+LEAST = 1e-3
+"""Part of its length that a link leads along the flow at least."""
 ALIKE = ("conductivity", "capacity", "second_order")
 """Properties of the fluid: the same in all channels."""
 _NAMES = tuple(one.name for one in FLUID_HEAT.properties)
@@ -72,6 +81,7 @@ class FluidHeat:
         self.sub_steps = 0
         self.rate = 0.0
         self._copies: Copies | None = None
+        self._told_obtuse = False
         self._new = np.empty(0, np.int64)
         flow.carried = np.empty(0)
         flow.more["temperature"] = lambda: self.state[: len(self.number), kernels.T]
@@ -153,12 +163,11 @@ class FluidHeat:
         self._forget(~network.there[self.number])
         if not self.on:
             return
-        cells, own, points, mine = blocks.the_mesh().cells, blocks.owned, len(network.there), flow.number
-        faces = np.column_stack([network.channels, blocks.partner[network.channels]])
-        at = blocks.where[faces // 4]
+        own, points, mine = blocks.owned, len(network.there), flow.number
+        at = blocks.where[np.column_stack([network.channels, blocks.partner[network.channels]]) // 4]
         beside = ((at >= own.start) & (at < own.stop)).any(axis=1)
-        here = np.isin(network.ends, mine).any(axis=1) | beside
-        self.channels, ends, faces, at = network.channels[here], network.ends[here], faces[here], at[here]
+        here = np.isin(network.corners, mine).any(axis=1) | beside
+        self.channels, ends = network.channels[here], links_of(network.corners[here])
         n, wanted = len(self.number), np.setdiff1d(ends, mine)
         had = np.column_stack([self.state[:n, kernels.T], self.given, self.had, np.ones(n)])
         rows, owner = moved(comm, points, self.number, had, mine, wanted)
@@ -174,16 +183,37 @@ class FluidHeat:
         local = np.full(points, -1, np.int64)
         local[mine], local[wanted] = np.arange(len(mine)), len(mine) + np.arange(len(wanted))
         self._ends = np.ascontiguousarray(local[ends])
+        self._points = ends
         self._begin, self._channel, self._side = at_nodes(self._ends, len(mine))
-        one, other = (np.column_stack([f % 4, (f % 4 + 1) % corner_counts(cells[f // 4])]) for f in faces.T)
-        corner = np.column_stack([one[:, 0], other[:, 1], one[:, 1], other[:, 0]])
-        row = at[:, [0, 1, 0, 1]]
-        self._walls = np.ascontiguousarray(np.where(row >= 0, row * self.heat.t.shape[1] + corner, -1))
-        self._length = self.lengths(self.channels)
-        self._exchange = 0.5 * self._length * self.transfers(self.channels)
+        corner = self.walls(self.channels)
+        row = blocks.where[corner // 4]
+        self._walls = np.ascontiguousarray(np.where(row >= 0, row * self.heat.t.shape[1] + corner % 4, -1))
+        self._sides, self._way, part_of_wall = self.shapes(self.channels)
+        self._exchange = part_of_wall * np.repeat(self.transfers(self.channels), self.links)
+        self._length = reduce(np.hypot, self._sides.T)
         self.wall_heat = np.zeros((len(ends), 4))
-        self._place = flow.places_of(self.channels)
+        place = flow.places_of(self.channels)[:, None]
+        self._place = np.where(place >= 0, self.links * place + np.arange(self.links), -1).reshape(-1)
         self._held = self.held[mine].astype(np.int64) - 1
+        self._tell_obtuse()
+
+    def _tell_obtuse(self) -> None:
+        """Where flat triangles conduct from cold to warm, as flat tetrahedra do (model.py). Rank 0 alone."""
+        log, network = self.blocks.log, self.flow.network
+        if self._told_obtuse or log is None or self.links == 1 or self.constant("conductivity") == 0.0:
+            return
+        self._told_obtuse = True
+        ends = np.sort(network.ends, axis=1)
+        _, at = np.unique(ends[:, 0] * len(network.there) + ends[:, 1], return_inverse=True)
+        each = 1.0 / self.shapes(network.channels)[1]
+        total, size = (np.bincount(at.reshape(-1), one) for one in (each, np.abs(each)))
+        against = int((total < -1e-12 * size).sum())
+        if against:
+            log.warn_once(
+                "obtuse channels",
+                f"along {against} of {len(total)} edges fluid conducts heat from the colder to the warmer end, as "
+                "angles of triangles are obtuse: where little flows temperatures may leave the range of those around them",
+            )
 
     def _forget(self, gone: np.ndarray) -> None:
         """The heat of nodes (n,) bool that are no longer there is gone with them."""
@@ -217,11 +247,45 @@ class FluidHeat:
         h = np.array([0.0, *(row[_NAMES.index("transfer_coeficient")] for row in self.rows)])
         return h[self.row[channels]]
 
-    def lengths(self, channels: np.ndarray) -> np.ndarray:
-        """Of channels (m,) in the mesh [m]. Not collective."""
-        mesh = self.blocks.reference
-        way = np.diff(mesh.points[face_points(mesh.cells, channels)], axis=1)[:, 0]
-        return np.hypot(way[:, 0], way[:, 1])
+    @property
+    def links(self) -> int:
+        """Of each channel."""
+        return LINKS[self.blocks.dim]
+
+    def walls(self, channels: np.ndarray) -> np.ndarray:
+        """Corners (l, 4), element * 4 + k, beside the links of channels (m,): at each end on the lower face and on the
+        other one. Not collective."""
+        mesh = self.blocks.the_mesh()
+        other = mesh.face_corners(self.blocks.partner[channels])[:, FACING[self.blocks.dim]]
+        sides = links_of(mesh.face_corners(channels)), links_of(other)
+        return np.stack(sides, axis=2).reshape(-1, 4)
+
+    def shapes(self, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the links (l,) of channels (m,) in the mesh: from end to end (l, dim) [m]; length over width of what
+        conducts along them [m, in space 1], below 0 opposite an obtuse angle; part of a wall at each end [m, in space
+        m2]. Not collective."""
+        at = self.blocks.reference.points[self.blocks.the_mesh().face_points(channels)]
+        sides = at[:, links_of(np.arange(self.blocks.dim)[None])]
+        sides = (sides[:, :, 1] - sides[:, :, 0]).reshape(-1, self.blocks.dim)
+        length = reduce(np.hypot, sides.T)
+        if self.blocks.dim == 2:
+            return sides, length, 0.5 * length
+        double = np.linalg.norm(np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]), axis=1)
+        one, other = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
+        with np.errstate(divide="ignore"):
+            way = 2.0 * double[:, None] / (one * other).sum(axis=2)
+        return sides, way.reshape(-1), np.repeat(double / 12.0, 3)
+
+    def lengths(self, sides: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """How far links (l,) lead along what flows in their channels [m], not quite 0; sides (l, dim): from end to end
+        [m]. Not collective."""
+        length = reduce(np.hypot, sides.T)
+        if self.links == 1:
+            return length
+        flow = np.repeat((sides * q[:, None]).reshape(-1, 3, 3).sum(axis=1), 3, axis=0)
+        size = np.linalg.norm(flow, axis=1)
+        along = np.abs((sides * flow).sum(axis=1)) / np.where(size > 0.0, size, 1.0)
+        return np.maximum(np.where(size > 0.0, along, length), LEAST * length)
 
     def put(self, nodes: np.ndarray, t: np.ndarray, brought: np.ndarray) -> None:
         """Nodes (n,) have these temperatures, after an implicit step in which so much heat [J/m] came from outside."""
@@ -254,8 +318,8 @@ class FluidHeat:
         flow, n = self.flow, len(self.number)
         known = np.maximum(self._place, 0)
         there = self._place >= 0
-        q, aperture = flow.mean_flows(), flow.apertures()
-        self._q = np.where(there, q[known], 0.0) if len(q) else np.zeros(len(known))
+        q, aperture = flow.mean_flows(), np.repeat(flow.apertures(), self.links)
+        q = np.where(there, q[known], 0.0) if len(q) else np.zeros(len(known))
         delta = np.where(there, aperture[known], 0.0) if len(q) else np.zeros(len(known))
         w0, w, room = self.had, flow.nodes[:, flowing.W], flow.nodes[:, flowing.V]
         least = np.minimum(w0, w)
@@ -263,11 +327,24 @@ class FluidHeat:
         wet = np.minimum(np.divide(least, room, out=np.zeros(n), where=room > 0.0), 1.0)
         self.state[:n, kernels.S], self.state[:n, kernels.X], self.state[:n, kernels.FULL] = wet, part(wet), w0
         self._refresh()
-        ends = self._ends
-        wet = np.minimum(self.state[ends[:, 0], kernels.S], self.state[ends[:, 1], kernels.S])
-        self._conduct = self.constant("conductivity") * delta * wet / self._length
+        self._q, wet = self.crossing(q, self.state[self._ends, kernels.S], self._points)
+        self._conduct = self.constant("conductivity") * delta * wet / self._way
         self._second = self.constant("second_order") > 0.0
+        if self._second and self.links > 1:
+            self._length = self.lengths(self._sides, self._q)
         self.rate = self._least_rate(w0, w, least)
+
+    def crossing(self, q: np.ndarray, s: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What links (l,) carry of these flows, and the least saturation of their channels; s (l, 2): of their ends,
+        points (l, 2): these. In a full triangle it is what crosses the medians; the less a corner holds, the less of
+        what only goes around, as that would have to pass through it. Between held nodes, which have inflow at the same
+        place, nothing is carried: a front begins at them. Not collective."""
+        least = np.minimum(s[:, 0], s[:, 1])
+        if self.links > 1:
+            least = np.repeat(least.reshape(-1, self.links).min(axis=1), self.links)
+            q = q - part(least) * np.repeat(q.reshape(-1, self.links).mean(axis=1), self.links)
+            q[(self.held[points] > 0).all(axis=1)] = 0.0
+        return q, least
 
     def _least_rate(self, w0: np.ndarray, w: np.ndarray, least: np.ndarray) -> float:
         """Sub-steps of this cycle over its length [1/s] that keep temperatures between those around them: what flows
@@ -286,8 +363,9 @@ class FluidHeat:
                          where=most > 0.0)  # fmt: skip
         drained = ~there & (w > 0.0)  # filled just now: what has come in is all that is there
         rate[drained] = np.maximum(passes[drained] / (w + self._leaked)[drained] - 1.0 / period, 0.0)
+        conduct = np.maximum(self._conduct, 0.0)
         for end in range(2):
-            passed = np.bincount(ends[:, end], self._conduct, total)[: len(w)]
+            passed = np.bincount(ends[:, end], conduct, total)[: len(w)]
             rate += np.divide(passed, self.rho_c * least, out=np.zeros(len(w)), where=there)
         return float(self.blocks.comm.max_into(np.array([rate.max(initial=0.0)]))[0])
 
@@ -313,7 +391,7 @@ class FluidHeat:
         w1 = self.flow.nodes[:, flowing.W]
         short = dt / count
         self.wall_heat[:] = 0.0
-        face, fresh = np.empty(len(self.channels)), np.empty(n)
+        face, fresh = np.empty(len(self._ends)), np.empty(n)
         lost = short / self._period * self._leaked if self._period > 0.0 else self._leaked
         for k in range(count):
             share = min(1.0, (self._passed + (k + 1) * short) / self._period) if self._period > 0.0 else 1.0

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.physics.fdem.connectivity import corner_counts
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
 from hpcdem.physics.fdem.linear import Pieces
 from hpcdem.physics.flow.network import at_nodes
@@ -48,23 +47,20 @@ class Fluid:
         fluid = heat.flowing
         if fluid is None:
             return None
-        flow, network, sim = fluid.flow, fluid.flow.network, heat.blocks
+        flow, network = fluid.flow, fluid.flow.network
         row_of = np.full(len(network.there), -1, np.int64)
         row_of[network.nodes] = np.arange(len(network.nodes))
         ends = row_of[network.ends]
-        q, aperture = (flow.values(CHANNEL, name) for name in ("flow_rate", "aperture"))
+        aperture = np.repeat(flow.values(CHANNEL, "aperture"), fluid.links)
         w, s, t = (flow.values(FLOW_NODE, name) for name in ("fluid", "saturation", "temperature"))
-        wet = s[ends].min(axis=1)
-        length = fluid.lengths(network.channels)
-        exchange = 0.5 * length[:, None] * fluid.transfers(network.channels)[:, None] * part(s)[ends]
-        cells, lower = sim.the_mesh().cells, network.channels
-        (a, b), (p, r) = (
-            (heat.node[f // 4, f % 4], heat.node[f // 4, (f % 4 + 1) % corner_counts(cells[f // 4])])
-            for f in (lower, sim.partner[lower])
-        )
+        q, wet = fluid.crossing(flow.link_flows(), s[ends], network.ends)
+        sides, way, part_of_wall = fluid.shapes(network.channels)
+        transfers = np.repeat(fluid.transfers(network.channels), fluid.links)
+        exchange = part_of_wall[:, None] * transfers[:, None] * part(s)[ends]
         return Fluid(
-            fluid, ends, length, q, fluid.constant("conductivity") * aperture * wet / length, exchange,
-            np.column_stack([a, r, b, p]), fluid.held[network.nodes].astype(np.int64) - 1, fluid.rho_c * w, t,
+            fluid, ends, fluid.lengths(sides, q), q, fluid.constant("conductivity") * aperture * wet / way, exchange,
+            heat.node.reshape(-1)[fluid.walls(network.channels)], fluid.held[network.nodes].astype(np.int64) - 1,
+            fluid.rho_c * w, t,
         )  # fmt: skip
 
     def made_for(self) -> tuple[bytes, ...]:
@@ -130,7 +126,7 @@ class Fluid:
         node = np.column_stack([first + ends, self.walls[mine]])
         nodes = np.arange(len(self.t))[mine]
         own = (self.capacity / dt)[mine, None, None]
-        return [Pieces(self.of.flow.network.channels[mine], node, _first_of_two(out)),
+        return [Pieces(np.repeat(self.of.flow.network.channels, self.of.links)[mine], node, _first_of_two(out)),
                 Pieces(nodes, first + nodes[:, None], _first_of_two(own))]  # fmt: skip
 
     def take(self, dt: float, t: np.ndarray, got: np.ndarray) -> None:

@@ -154,8 +154,6 @@ class Heat(SurfaceLoad):
             flow = Flow.there(self.blocks)
             if flow is None:
                 raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
-            if self.blocks.dim == 3:
-                raise CommandError("fluid in three dimensions has no heat in this version: thermal-fluid is for two")
             self._need_model()
             self.fluid = FluidHeat(self, flow)
         return self.fluid

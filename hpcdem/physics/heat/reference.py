@@ -104,3 +104,32 @@ def fluid_step(
     for node, value in held.items():
         after[node] = value
     return after, float((passes * (after - rock)).sum())
+
+
+def fluid_step_in_space(
+    points: np.ndarray, corners: np.ndarray, p: np.ndarray, aperture: np.ndarray, viscosity: float, w: np.ndarray,
+    t: np.ndarray, rock: np.ndarray, dt: float, rho_c: float, k: float, h: float, held: dict[int, float],
+) -> tuple[np.ndarray, float]:  # fmt: skip
+    """The same, of first order, of full triangles with these corners (m, 3), rows of the nodes at points (n, 3), of
+    pressure p (n,) [Pa] and fluid w (n,) [m3]: what crosses the median between each two of them; [W] for [W/m]."""
+    heat, passes = np.zeros(len(points)), np.zeros(len(points))
+    for at, delta in zip(corners, aperture.tolist()):
+        x = points[at]
+        normal = np.cross(x[1] - x[0], x[2] - x[0])
+        double = np.linalg.norm(normal)
+        normal /= double
+        slopes = np.array([np.cross(normal, x[(i + 2) % 3] - x[(i + 1) % 3]) / double for i in range(3)])
+        velocity, warmer = -(delta**2) / (12.0 * viscosity) * (p[at] @ slopes), t[at] @ slopes
+        for i in range(3):
+            heat[at[i]] -= k * delta * 0.5 * double * slopes[i] @ warmer
+            passes[at[i]] += 2.0 * h * double / 6.0
+            j = (i + 1) % 3
+            median = x.mean(axis=0) - 0.5 * (x[i] + x[j])
+            across = np.cross(median, normal)
+            rate = delta * velocity @ across * np.sign(across @ (x[j] - x[i]))
+            up, down = (at[i], at[j]) if rate > 0.0 else (at[j], at[i])
+            heat[down] += rho_c * abs(rate) * (t[up] - t[down])
+    after = t + dt * (heat + passes * (rock - t)) / (rho_c * w + dt * passes)
+    for node, value in held.items():
+        after[node] = value
+    return after, float((passes * (after - rock)).sum())
