@@ -9,10 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.core.errors import ScriptError
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
-from hpcdem.lang.pcdc import parser
-from hpcdem.lang.pcdc.table import PCDC
 from tests.conftest import mpi_command, run
 
 SCRIPT = """
@@ -42,18 +39,6 @@ pcdc model step 150
 pcdc model save 'half.sav'
 pcdc model step 150
 """
-
-
-@pytest.mark.parametrize(
-    ("line", "says"),
-    [
-        ("face-joint c-model thermal-fluid property conductivity 0.6", "two dimensions"),
-        ("node boundary therm-f-b-c temperature 20", "two dimensions"),
-    ],
-)
-def test_what_is_not_there_in_space_is_refused_by_name(line: str, says: str) -> None:
-    with pytest.raises(ScriptError, match=says):
-        parser.parse(line, "wet.sc", 1, "", PCDC, dim=3)
 
 
 @pytest.fixture(scope="module")

@@ -46,7 +46,7 @@ def test_what_is_there_in_three_dimensions_is_listed():
         assert (f"| `{command.name}` |" in listed) == (3 in command.dims), command.name
         options = [o for o in command.options if o.dims == (2,)] if 3 in command.dims else []
         assert all(f"`{option.name}`" in listed for option in options)
-    assert "`thermal-iso-heat`" in listed and "`thermal-fluid`" not in listed
+    assert "`thermal-fluid`" in listed and "`free-field`" not in listed
 
 
 def test_tables_have_five_columns():

@@ -212,7 +212,7 @@ class FluidHeat:
             log.warn_once(
                 "obtuse channels",
                 f"along {against} of {len(total)} edges fluid conducts heat from the colder to the warmer end, as "
-                "angles of triangles are obtuse: where little flows temperatures may leave the range of those around them",
+                "angles of triangles are obtuse: where little flows, temperatures may leave the range of those around",
             )
 
     def _forget(self, gone: np.ndarray) -> None:
