@@ -253,14 +253,14 @@ TEXTS = {
     "--groups or --colors, or some spread over the bed\nlayers     areas of colours and groups\ncracks     broken "
     "bonds or joints, by mode and time, and damage\nfragments  of blocks: number, areas, distribution of sizes\n"
     "emission   of blocks: joints that broke as acoustic events: rate, magnitudes, b-value\nfluid      of blocks: "
-    "wet length, volume, largest pressure, aperture and velocity; each channel of the last frame\nregions    of "
+    "wet length or area, volume, largest pressure, aperture and velocity; each channel of the last\nregions    of "
     "blocks in space: volume, extent, mean stress and strain of groups and of a --box\ndisplacement  of blocks in "
     "space: how far their surface has moved":
     "测量 DIR 中的帧,得到表(CSV)和图:\n\n\b\nsurface    地表剖面\nwedge      楔体的顶、趾、高、宽、坡角和锥角\n"
     "faults     应变带:位置、长度、倾角、倾向\nwallforce  墙上的力随其行程的变化,以及功\ntracks     颗粒轨迹"
     ":--ids、--near、--groups 或 --colors 的全部,或地层中分布的若干个\nlayers     各颜色和组的面积\ncracks     断开"
     "的胶结或节理,按方式和时间,以及损伤\nfragments  块体:碎块的数目、面积、尺寸分布\nemission   块体:节理破坏作为声"
-    "发射事件:速率、震级、b 值\nfluid      块体:湿润长度、体积、最大压力、开度和流速;最后一帧的各通道\nregions    "
+    "发射事件:速率、震级、b 值\nfluid      块体:湿润长度或面积、体积、最大压力、开度和流速;最后一帧的各通道\nregions    "
     "三维块体:各组及 --box 的体积、范围、平均应力和应变\ndisplacement  三维块体:表面的位移",
     "Without WHAT all that the folder allows. Also under mpiexec or srun: ranks share the frames.":
     "不给 WHAT 时测量目录所允许的全部。也可在 mpiexec 或 srun 下运行,各进程分担各帧。",

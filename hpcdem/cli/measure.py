@@ -129,7 +129,7 @@ def measure(**options: Any) -> None:
     cracks     broken bonds or joints, by mode and time, and damage
     fragments  of blocks: number, areas, distribution of sizes
     emission   of blocks: joints that broke as acoustic events: rate, magnitudes, b-value
-    fluid      of blocks: wet length, volume, largest pressure, aperture and velocity; each channel of the last frame
+    fluid      of blocks: wet length or area, volume, largest pressure, aperture and velocity; each channel of the last
     regions    of blocks in space: volume, extent, mean stress and strain of groups and of a --box
     displacement  of blocks in space: how far their surface has moved
     """

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels, reference
@@ -425,6 +425,34 @@ def test_fluid_that_is_pumped_into_a_joint_opens_it() -> None:
     assert given == pytest.approx(0.06 * (1e-4 + 4e-5), rel=1e-9)
     assert 0.06 * (1e-4 + o) * (1.0 + p / 2.2e9) == pytest.approx(given, rel=1e-6)
     assert flow.account()["relative"] < 1e-12
+
+
+def test_implicit_steps_go_on_from_a_file(tmp_path) -> None:
+    """In the middle of what is pumped into the joint, which opens: the same bits; and not beside blocks in motion."""
+
+    def on(one: Blocks, end: float) -> None:
+        with Coupled(one, 0.5) as run_:
+            while Flow.of(one).time < end * (1.0 - 1e-12):
+                run_.advance(end)
+
+    sim, flow = _pushed(aperature_initial=1e-4, shear_dilation=10.0)
+    flow.prescribe(flow.numbers("flow-node")[:4], kernels.RATE, 1e-7)
+    on(sim, 2.0)
+    saved_state.save(sim, tmp_path / "a.sav")
+    other = Blocks()
+    saved_state.restore(other, tmp_path / "a.sav")
+    found = []
+    for one in (sim, other):
+        on(one, 4.0)
+        of = Flow.of(one)
+        water = [of.values("flow-node", name) for name in ("pressure", "fluid", "inflow")]
+        rock = [diagnostics.values(one, name) for name in ("position_z", "stress_zz")]
+        found.append(np.concatenate([*water, of.values("flow-channel", "aperture"), *rock]))
+    assert np.array_equal(*found) and Flow.of(other).values("flow-channel", "aperture").max() > 1.05e-4
+    assert Flow.of(other).account()["relative"] < 1e-12
+    other.option(dynamic=True)
+    with pytest.raises(CommandError, match="dynamic off comes first, or mechanical"):
+        Coupled(other, 0.5)
 
 
 def _cracked(**stress: float) -> tuple[Blocks, Flow, np.ndarray]:

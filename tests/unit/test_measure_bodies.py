@@ -13,7 +13,7 @@ from hpcdem.cli.measure import measure, work
 from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
-from hpcdem.post.measure import bodies
+from hpcdem.post.measure import block_figures, bodies
 from tests.conftest import Launcher
 from tests.view import frames
 
@@ -33,6 +33,13 @@ class Silent:
     def info(self, text: str) -> None: ...
 
     warn = info
+
+
+@pytest.fixture
+def wet(folder: Path) -> Path:
+    """The same with fluid in the crack."""
+    frames.write_body(folder, 10, grown=GROWN, broken=True, wet=True)
+    return folder
 
 
 def run(folder: Path, *words: str) -> None:
@@ -128,11 +135,43 @@ def test_groups_places_and_steps(folder: Path):
         assert (folder / "measure" / f"{name}.png").stat().st_size > 10_000, name
 
 
+def test_fluid_between_tetrahedra(wet: Path):
+    """The crack is 4 x 2.7 m, half of it full of a millimetre of fluid, the other half to a quarter."""
+    run(wet, "fluid")
+    row = table(wet, "fluid")[-1]
+    numbers = {name: float(value) for name, value in row.items()}
+    assert (numbers["channels"], numbers["wet"]) == (24.0, 12.0)
+    assert numbers["wet_area[m2]"] == numbers["open_wet_area[m2]"] == pytest.approx(5.4)
+    assert numbers["volume[m3]"] == pytest.approx(5.4e-3 * 1.25)
+    assert [numbers[f"{name}"] for name in ("pressure[Pa]", "aperture[m]", "velocity[m/s]")] == [2e6, 1e-3, 0.2]
+    last = table(wet, "fluid_last")
+    assert len(last) == 24 and sum(float(one["area[m2]"]) for one in last) == pytest.approx(10.8)
+    assert {round(float(one["z[m]"]), 9) for one in last} == {1.1} and {one["state"] for one in last} == {"3"}
+    assert (wet / "measure" / "fluid.png").stat().st_size > 10_000
+    run(wet, "fluid", "--format=none", "--groups=roof,base")
+    assert table(wet, "fluid")[-1]["channels"] == "24"
+    with pytest.raises(HpcdemError, match="have no channels"):  # the crack lies between both
+        run(wet, "fluid", "--groups=roof")
+
+
+def test_the_plane_of_a_fracture():
+    """A square that dips by 30 degrees to the east strikes north; a network in space has no plane."""
+    c, s = np.cos(np.pi / 6.0), np.sin(np.pi / 6.0)
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    points = np.stack([c * square[:, 0], square[:, 1], -s * square[:, 0]], axis=1)
+    flat, names = block_figures._in_its_plane(points[[[0, 1, 2], [0, 2, 3]]])
+    assert flat is not None and names == ("along strike", "up dip")
+    assert np.ptp(flat.reshape(-1, 2), axis=0) == pytest.approx([1.0, 1.0])
+    flat, names = block_figures._in_its_plane(points[[[0, 1, 2], [0, 2, 3]]] * (0.0, 1.0, 1.0))
+    assert flat is not None and names == ("y", "z")
+    assert block_figures._in_its_plane(np.random.default_rng(1).uniform(size=(9, 3, 3)))[0] is None
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["cracks"], "cracks is for two dimensions; body_0000000010.vtkhdf has three"),
-        (["emission"], "emission is for two dimensions"), (["fluid"], "fluid is for two dimensions"),
+        (["emission"], "emission is for two dimensions"), (["fluid"], "have no channels"),
         (["wedge"], "holds no frames"), (["--groups=floor"], "no element is of group floor; there is base, roof"),
         (["regions", "--box=9,9,9,10,10,10"], "--box: no element"), (["--box=1,0,0,0,1,1"], "--box: the least x"),
         (["fragments", "--box=0,0,0,1,1,1"], "--box goes with regions"),
@@ -152,7 +191,8 @@ def test_words_of_space_are_refused_in_the_plane(tmp_path: Path, words: list[str
 
 
 @pytest.mark.mpi
-def test_the_same_files_on_three_ranks(launch: Launcher, folder: Path):
+def test_the_same_files_on_three_ranks(launch: Launcher, wet: Path):
+    folder = wet
     run(folder, "--format=none")
     done = launch(3, "measure", folder, "--format=none", "-o", folder / "other", cwd=folder)
     assert done.returncode == 0, done.stderr

@@ -116,11 +116,13 @@ SIZE = (4.0, 3.0, 2.0)
 """Of the body [m]."""
 
 
-def body(step: int = 5, cells: tuple[int, int, int] = (4, 3, 2), grown: float = 0.1, broken: bool = False) -> MeshFrame:
+def body(
+    step: int = 5, cells: tuple[int, int, int] = (4, 3, 2), grown: float = 0.1, broken: bool = False, wet: bool = False
+) -> MeshFrame:
     """A box of SIZE of tetrahedra, six to a brick, whose upper end is `grown` times its height higher, and as much
     thinner along y: u = grown (0, -y, z). Its stress is uniaxial, stress_zz of element k -1e6 (k + 1); group "base"
     below half of the height, else "roof". broken: joints on all inner faces, broken in shear where the roof lies on
-    the base, else intact."""
+    the base, else intact; wet: the first are channels of 1 mm, full where x < 2, elsewhere to a quarter."""
     mesh = structured_space.box(tuple(np.linspace(0.0, s, n + 1) for s, n in zip(SIZE, cells, strict=True)), 6)
     count = len(mesh.cells)
     place = mesh.points[mesh.cells].reshape(-1, 3)
@@ -144,6 +146,11 @@ def body(step: int = 5, cells: tuple[int, int, int] = (4, 3, 2), grown: float = 
         corner_of = dict(zip(CORNERS, tetrahedra.face_corners(lower).T, strict=True))
         joints = {"number": lower, **corner_of, "state": np.where(apart, 3.0, 1.0),
                   "mode": np.where(apart, 2.0, 0.0)}  # fmt: skip
+        if wet:
+            near = mesh.points[mesh.face_points(lower)].mean(axis=1)[:, 0] < 2.0
+            full = {"aperture": 1e-3, "saturation": np.where(near, 1.0, 0.25), "fluid_velocity": 0.2,
+                    "fluid_pressure": np.where(near, 2e6, 0.0), "flow_rate": 2e-4}  # fmt: skip
+            joints |= {name: np.where(apart, value, np.nan) for name, value in full.items()}
     tables = (Table(columns, 0, len(columns["number"])) for columns in (corners, elements, joints))
     return MeshFrame(step, 1e-3 * step, 1e-6, *tables, {"group_rock": ["base", "roof"]})
 

@@ -308,17 +308,35 @@ def displacement(parts: Sequence[Part]) -> Any:
 
 
 def fluid(parts: Sequence[Part], state: MeshState) -> Any:
-    """Wet length, and largest pressure and aperture over time; below, the pressure in the last frame."""
+    """Wet length, in space area, and largest pressure and aperture over time; below, the pressure in the last frame: in
+    the plane on all channels, in space on those of a fracture that is flat, seen at a right angle."""
     from hpcdem.post import fluid as pictures
 
+    if state.points.shape[1] == 3:
+        return _fluid_in_space(parts, state)
     sheet = _Maps(state, [3.8, 3.8], [GAP, LOWER_GAP], 1, right=1.6)
-    a, b = sheet.panels
+    _fluid_curves(sheet.panels, parts, 1)
+    shown = pictures.PICTURES["pressure"]
+    span = shown.range(state)
+    drawn = blocks.coloured(sheet.maps[0], state, "pressure", span, sheet.scale)
+    _fluid_bar(sheet.figure, drawn, sheet.bar(), f"{shown.title} ({blocks.unit_of(shown, span)[1]})")
+    _letters([*sheet.panels, sheet.maps[0]])
+    return sheet.figure
+
+
+def _fluid_curves(panels: Sequence[Any], parts: Sequence[Part], power: int) -> None:
+    """power: of the metre in what is wet."""
+    from hpcdem.post import fluid as pictures
+
+    a, b = panels
     at, axis = when(parts)
     some = [one.fluid for one in parts if one.fluid is not None]
-    size, unit = length_unit(max(max(f.length for f in some), 1e-12))
-    a.plot(at, [f.length / size for f in some], _marks(len(at)), ms=2.5, lw=1.2, color=LINES[0], label="wet")
-    a.plot(at, [f.open_length / size for f in some], "--", lw=1.0, color=INK, label="of it open")
-    label(a, None, f"length of channels ({unit})")
+    size, unit = length_unit(max(max(f.size for f in some), 1e-12) ** (1.0 / power))
+    size = size**power
+    what = f"length of channels ({unit})" if power == 1 else f"area of channels ({unit}²)"
+    a.plot(at, [f.size / size for f in some], _marks(len(at)), ms=2.5, lw=1.2, color=LINES[0], label="wet")
+    a.plot(at, [f.open_size / size for f in some], "--", lw=1.0, color=INK, label="of it open")
+    label(a, None, what)
     key(a, loc="upper left")
     pressure, kind = _in_unit([f.pressure for f in some], pictures.PRESSURES)
     b.plot(at, pressure, _marks(len(at)), ms=2.5, lw=1.2, color=INK)
@@ -333,15 +351,76 @@ def fluid(parts: Sequence[Part], state: MeshState) -> Any:
         ax.set_xlim(*_ends(at))
     for ax in (a, b, other):
         ax.set_ylim(bottom=0.0)
-    shown = pictures.PICTURES["pressure"]
-    span = shown.range(state)
-    drawn = blocks.coloured(sheet.maps[0], state, "pressure", span, sheet.scale)
-    bar = sheet.figure.colorbar(drawn, cax=sheet.bar())
-    bar.set_label(f"{shown.title} ({blocks.unit_of(shown, span)[1]})", fontsize=plots.FONT)
+
+
+def _fluid_bar(figure: Any, drawn: Any, axes: Any, title: str) -> None:
+    bar = figure.colorbar(drawn, cax=axes)
+    bar.set_label(title, fontsize=plots.FONT)
     bar.ax.tick_params(labelsize=plots.FONT - 1.0, width=0.5, length=2.5)
     bar.outline.set_linewidth(0.5)
-    _letters([a, b, sheet.maps[0]])
-    return sheet.figure
+
+
+FLAT = 0.05
+"""Part of its extent by which a fracture may leave its mean plane to be drawn in it."""
+
+
+def _fluid_in_space(parts: Sequence[Part], state: MeshState) -> Any:
+    from matplotlib.collections import PolyCollection
+
+    from hpcdem.post import fluid as pictures
+
+    shown = pictures.PICTURES["pressure"]
+    rows = np.flatnonzero(np.isfinite(state.of_joints["aperture"]))
+    corners = state.points[state.joints[rows, :3]]
+    flat, names = _in_its_plane(corners)
+    if flat is None:
+        figure, panels = page([3.8, 3.8], [GAP], 1.6)
+        _fluid_curves(panels, parts, 2)
+        _letters(panels)
+        return figure
+    low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
+    bar = 1.7
+    width = min(plots.PAGE_WIDTH - LEFT - bar - RIGHT, MAP_HEIGHT * (high - low)[0] / (high - low)[1])
+    height = width * (high - low)[1] / (high - low)[0]
+    figure, (a, b, seen) = page([3.8, 3.8, height], [GAP, LOWER_GAP], 1.6)
+    _fluid_curves((a, b), parts, 2)
+    box, (w, h) = seen.get_position(), 2.54 * figure.get_size_inches()
+    left = box.x0 + max(0.0, 0.5 * (box.width - (width + bar) / w))
+    seen.set_position((left, box.y0, width / w, height / h))
+    pressure, span = shown.values(state)[rows], shown.range(state)
+    size, unit = blocks.unit_of(shown, span)
+    wet = np.isfinite(pressure)
+    seen.add_collection(PolyCollection(flat[~wet], facecolors=pictures.DRY, edgecolors="face", linewidths=0.2))
+    drawn = PolyCollection(flat[wet], array=pressure[wet] / size, cmap=shown.colours, linewidths=0.5, edgecolors="face")
+    drawn.set_clim(span[0] / size, max(span[1], span[0] + 1e-12) / size)
+    seen.add_collection(drawn)
+    seen.set_xlim(low[0], high[0])
+    seen.set_ylim(low[1], high[1])
+    label(seen, f"{names[0]} (m)", f"{names[1]} (m)")
+    seen.tick_params(labelsize=plots.FONT - 1.0, width=0.6, length=3.0)
+    place = (left + (width + 0.3) / w, box.y0, 0.3 / w, height / h)
+    _fluid_bar(figure, drawn, figure.add_axes(place), f"{shown.title} ({unit})")
+    _letters([a, b, seen])
+    return figure
+
+
+def _in_its_plane(corners: np.ndarray) -> tuple[np.ndarray | None, tuple[str, str]]:
+    """Triangles (n, 3, 3) in their mean plane (n, 3, 2), and what both axes are: two coordinates, or along strike and
+    up dip; None if they are not in a plane."""
+    points = corners.reshape(-1, 3)
+    middle = points.mean(axis=0)
+    _, way, axes = np.linalg.svd(points - middle, full_matrices=False)
+    normal = axes[2] * (np.sign(axes[2, 2]) or 1.0)
+    if way[2] > FLAT * way[1]:
+        return None, ("", "")
+    along = np.abs(normal)
+    if along.max() > 1.0 - 1e-9:
+        one, other = (k for k in range(3) if k != int(along.argmax()))
+        return corners[:, :, [one, other]], ("xyz"[one], "xyz"[other])
+    strike = np.array([-normal[1], normal[0], 0.0]) / np.hypot(normal[0], normal[1])
+    up = np.cross(normal, strike)
+    up *= np.sign(up[2])
+    return np.stack([(corners - middle) @ strike, (corners - middle) @ up], axis=2), ("along strike", "up dip")
 
 
 def _in_unit(values: Sequence[float], units: Sequence[tuple[float, str]]) -> tuple[list[float], str]:

@@ -20,6 +20,8 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.frames import FrameFile, list_mesh_frames
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
+from hpcdem.physics.fdem import tetrahedra
+from hpcdem.physics.fdem.mesh import sizes
 from hpcdem.post.blocks import BROKEN, FREE, YIELDED
 from hpcdem.post.fluid import WET
 from hpcdem.post.measure import bodies, emission
@@ -27,7 +29,7 @@ from hpcdem.post.measure.bodies import Region, Surface
 from hpcdem.post.measure.emission import BIN, MODES, Curve, Events, Fit
 from hpcdem.post.measure.kinds import NAN, Sheet
 from hpcdem.post.measure.scene import Request
-from hpcdem.post.view.moment import neighbours
+from hpcdem.post.view.moment import faces_of_joints, neighbours
 
 INTACT = 1.0
 SHARES = 0.2, 0.5, 0.8
@@ -82,13 +84,13 @@ class Cracks:
 @dataclass(frozen=True)
 class Fluid:
     """Fluid in the channels of a frame: how many there are, how many are wet (saturation from one half on); lengths of
-    wet ones, and of wet ones whose joint is broken or was open from the beginning [m]; volume of fluid as it is
-    [m3/m]; largest pressure [Pa], aperture [m] and velocity [m/s]."""
+    wet ones, and of wet ones whose joint is broken or was open from the beginning [m], in space areas [m2]; volume of
+    fluid as it is [m3/m], in space [m3]; largest pressure [Pa], aperture [m] and velocity [m/s]."""
 
     channels: int
     wet: int
-    length: float
-    open_length: float
+    size: float
+    open_size: float
     volume: float
     pressure: float
     aperture: float
@@ -130,11 +132,11 @@ def part(state: MeshState, request: Request, what: Sequence[str]) -> Part:
     """Joints, and fragments if they are asked for, of a frame."""
     wanted = chosen(state, request)
     pieces = fragments(state, wanted) if "fragments" in what else None
+    fluid = fluid_of(state, wanted) if "fluid" in what else None
     if state.points.shape[1] == 3:
         found = bodies.regions(state, request, wanted) if "regions" in what else None
         moved = bodies.surface(state, wanted) if "displacement" in what else None
-        return Part(state.step, state.time, None, pieces, None, found, moved)
-    fluid = fluid_of(state, wanted) if "fluid" in what else None
+        return Part(state.step, state.time, None, pieces, fluid, found, moved)
     return Part(state.step, state.time, cracks(state, wanted), pieces, fluid)
 
 
@@ -191,19 +193,19 @@ def fluid_of(state: MeshState, wanted: np.ndarray) -> Fluid:
     if not len(rows):
         return Fluid(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     j = {name: values[rows] for name, values in state.of_joints.items()}
-    length = _lengths(state)[rows]
+    size = _sizes(state, rows)
     wet = j["saturation"] >= WET
     gone = wet & ((j["state"] == BROKEN) | (j["state"] == FREE))
-    volume = math.fsum((j["saturation"] * j["aperture"] * length).tolist())
+    volume = math.fsum((j["saturation"] * j["aperture"] * size).tolist())
     return Fluid(
-        len(rows), int(wet.sum()), math.fsum(length[wet].tolist()), math.fsum(length[gone].tolist()), volume,
+        len(rows), int(wet.sum()), math.fsum(size[wet].tolist()), math.fsum(size[gone].tolist()), volume,
         float(j["fluid_pressure"].max()), float(j["aperture"].max()), float(np.abs(j["fluid_velocity"]).max()),
     )  # fmt: skip
 
 
-def _lengths(state: MeshState) -> np.ndarray:
-    """(nj,) of joints as they are [m]."""
-    return np.hypot(*np.diff(state.points[state.joints], axis=1)[:, 0].T)
+def _sizes(state: MeshState, rows: np.ndarray) -> np.ndarray:
+    """(n,) lengths of channels as they are [m], in space areas [m2]."""
+    return sizes(state.points[state.joints[rows, : state.points.shape[1]]])
 
 
 def _pairs(state: MeshState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -232,6 +234,10 @@ def _within(count: np.ndarray) -> np.ndarray:
 
 def sides(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
     """Rows of the elements on both sides of each joint (nj,), the lower first; -1: it was taken out."""
+    if state.points.shape[1] == 3:
+        lower = faces_of_joints(state)
+        other = tetrahedra.face_partners(state.of_points["node"][state.cells].astype(np.int64))[lower]
+        return lower // 4, np.where(other >= 0, other // 4, -1)
     first, second, face = _pairs(state)
     number = state.of_joints["number"].astype(np.int64)
     lower = np.searchsorted(state.of_elements["number"], number // 4)
@@ -349,18 +355,19 @@ OF_CHANNELS = {
 
 def fluid_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) -> list[Sheet]:
     """Over time, and each channel of a frame, the last one."""
-    head = (
-        *HEAD, "channels", "wet", "wet_length[m]", "open_wet_length[m]", "volume[m3/m]", "pressure[Pa]", "aperture[m]",
-        "velocity[m/s]",
-    )  # fmt: skip
+    dim = state.points.shape[1]
+    size, volume = ("length[m]", "volume[m3/m]") if dim == 2 else ("area[m2]", "volume[m3]")
+    most = "pressure[Pa]", "aperture[m]", "velocity[m/s]"
+    head = *HEAD, "channels", "wet", f"wet_{size}", f"open_wet_{size}", volume, *most
     some = [(one, one.fluid) for one in parts if one.fluid is not None]
     rows = ((one.step, one.time, *astuple(fluid)) for one, fluid in some)
     at = channels(state, wanted)
-    j, middle = state.of_joints, state.points[state.joints[at]].mean(axis=1)
+    j, middle = state.of_joints, state.points[state.joints[at, :dim]].mean(axis=1)
     there = {name: column for name, column in OF_CHANNELS.items() if column in j}
-    columns = (j["number"][at].astype(np.int64), *middle.T, _lengths(state)[at], *(j[c][at] for c in there.values()))
+    columns = (j["number"][at].astype(np.int64), *middle.T, _sizes(state, at), *(j[c][at] for c in there.values()))
     each = zip(*(c.tolist() for c in columns), strict=True)
-    return [Sheet("fluid", head, rows), Sheet("fluid_last", ("joint", "x[m]", "y[m]", "length[m]", *there), each)]
+    of_each = "joint", *(f"{axis}[m]" for axis in "xyz"[:dim]), size, *there
+    return [Sheet("fluid", head, rows), Sheet("fluid_last", of_each, each)]
 
 
 @dataclass(frozen=True)

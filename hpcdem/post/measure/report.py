@@ -179,7 +179,8 @@ def _of_blocks(request: Request) -> list[str]:
             raise UsageError("--colors: blocks have groups, no colours")
         if request.box is not None and request.what and "regions" not in request.what:
             raise UsageError("--box goes with regions")
-        return [kind for kind in SOLID_KINDS if kind in request.what or not request.what]
+        wet = request.what or fluid.there(blocks.read(frames[-1], request))
+        return [kind for kind in SOLID_KINDS if kind in request.what or (not request.what and (wet or kind != "fluid"))]
     there = dict.fromkeys(("cracks", "fragments", "fluid"), bool(frames))
     there |= dict.fromkeys(("regions", "displacement"), False)
     if frames and "fluid" not in request.what:
