@@ -369,6 +369,13 @@ def _creep_hexes() -> WarmUp:
     return warm_up.creeping_hexahedra, (creep_hexes,)
 
 
+def _joints_hexes() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import joints_hexes
+
+    return warm_up.jointed_hexahedra, (joints_hexes,)
+
+
 def _space() -> WarmUp:
     from hpcdem.physics.fdem import tetrahedra, warm_up
     from hpcdem.physics.fdem.kernels import contact_space, detect_space, space, tets
@@ -410,6 +417,7 @@ KINDS = {
     "hexes": Kernels(_hexes, after=_TANGENT_SPACE),
     "yielding-hexes": Kernels(_yielding_hexes, after=(*_TANGENT_SPACE, "hexes")),
     "creep-hexes": Kernels(_creep_hexes, after=(*_TANGENT_SPACE, "hexes", "creep-space")),
+    "joints-hexes": Kernels(_joints_hexes, after=(*_TANGENT_SPACE, "hexes")),
     "pictures": Kernels(_pictures),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the

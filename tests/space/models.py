@@ -284,6 +284,45 @@ def dig_beam(sim: Blocks) -> None:
         changes.reset_joint_state(sim, holds[:20])
 
 
+def shattering_hexes(sim: Blocks) -> None:
+    """The same of hexahedra; half of the beam is of tetrahedra that hang on them by joints, and some of it yields."""
+    cells, size = (14, 2, 1), (2.8, 0.4, 0.2)
+    beam, split = hexes(cells, size, 0.1), box(cells, size)
+    of_tets = np.flatnonzero(split.centroids()[:, 0] > 2.0)
+    own = beam.hexes[beam.points[beam.hexes[:, :8]].mean(axis=1)[:, 0] < 2.0, :8]
+    mesh = Mesh.of_hexes(beam.points, own, more=split.cells[of_tets])
+    stones = hexes((2, 2, 1), (0.24, 0.22, 0.14), 0.1), hexes((2, 1, 2), (0.2, 0.13, 0.2))
+    for k in range(5):
+        stone, away = stones[k % 2], (0.13 + 0.5 * k, 0.05 + 0.03 * (k % 4), 0.205 + 0.005 * k)
+        mesh = joined(mesh, Mesh.of(stone.points + np.array(away), stone.cells, layers={}, hexes=stone.hexes))
+    sim.take_mesh(mesh)
+    n = len(beam.points)
+    rock = {**ROCK, "young": 2e8, "damp_factor": 0.05, "friction": 25.0}
+    changes.element_model(sim, None, "mech_iso_elastic", rock)
+    x = mesh.centroids()[:, 0]
+    soil = {**rock, "friction": 30.0, "dilation": 5.0, "cohesion": 2e5, "tensile": 1e5}
+    changes.element_model(sim, np.flatnonzero((x < 0.6) & (mesh.cells.max(axis=1) < n)), "mech_mohr_coulomb", soil)
+    joints = sim.numbers_of_joints(None)
+    law = {
+        "friction": 30.0, "cohesion": 4e6, "tensile_strength": 8e5, "gf1": 25.0, "gf2": 100.0, "penalty_normal": 4e9,
+    }  # fmt: skip
+    sim.joint_model(joints[joints % 7 > 0], "classic_intrinsic_cohesive_interface", law)
+    sim.joint_property(joints[joints % 7 == 1], {"tensile_strength": 4e5, "penalty_overlay": 6e9, "penalty_shear": 2e9})
+    changes.crack(sim, joints[joints % 35 == 7])
+    sim.velocity_condition(np.flatnonzero(mesh.points[:n, 2] < 1e-9)[::2], vx=0.0, vy=0.0, vz=0.0)
+    sim.gravity(4.0, 0.0, -9.81)
+    changes.set_velocity(sim, np.arange(n, len(mesh.points)), 30.0, 0.5, -9.0)
+    diagnostics.account_energy(sim)
+
+
+def dig_beam_of_hexes(sim: Blocks) -> None:
+    """A piece of the beam is taken out, damage is forgotten at one end."""
+    if sim.clock.step == 600:
+        changes.null(sim, np.arange(6))
+        holds = np.flatnonzero((sim.joint_row > 0) & sim.joint_exists() & ~sim.open)
+        changes.reset_joint_state(sim, holds[:20])
+
+
 ROCK_OF_HEAT = {
     "conductivity": 2.5, "capacity": 1000.0, "conductivity_across": 1.0, "conductivity_angle": 20.0,
     "conductivity_dip": 40.0, "expansion_coeficient": 1e-4, "transfer_coeficient": 400.0,
@@ -411,6 +450,10 @@ def it_shatters(found: Found) -> None:
     assert len(found["contact_face"]) > 20 and (found["event_mode"] > 1.9).any() and (found["event_mode"] < 1.1).any()
 
 
+def hexes_shatter(found: Found) -> None:
+    it_shatters(found)
+
+
 def hot(sim: Blocks, notes: dict[str, Any]) -> Found:
     """The same, with heat."""
     found, heat = in_pieces(sim, notes), Heat.of(sim)
@@ -478,6 +521,9 @@ MODELS = {
     "salt bar": Model(creeping, crept, it_creeps, creep_more, steps=1000, middle=401),
     "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
     "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10),
+    "hexahedra that shatter": Model(
+        shattering_hexes, in_pieces, hexes_shatter, dig_beam_of_hexes, steps=900, middle=501, come=10
+    ),
     "glowing": Model(glowing, hot, it_glows, glow_on, steps=900, middle=501, come=1, slow=True),
     "soil that gets warm": Model(
         warm_soil, warm_and_flowing, it_is_warm, dig_soil, steps=1000, middle=401, come=10, slow=True

@@ -288,11 +288,16 @@ def test_dug_out_as_a_whole():
 
 def test_what_hexes_cannot_do_is_refused():
     sim = body(hexes((2, 1, 1), (1.0, 0.5, 0.5)))
-    with pytest.raises(CommandError, match="no joints between hexahedra"):
-        sim.joint_model(None, "classic_intrinsic_cohesive_interface", {"tensile_strength": 1e6})
-    changes.element_model(sim, np.arange(6), "mech_iso_elastic", {**ROCK, "young": 1e9})
+    inside = np.flatnonzero((sim.partner > np.arange(len(sim.partner))) & ~sim.joint_exists())
+    assert len(inside) == 2 * 6
+    with pytest.raises(CommandError, match="there is no joint"):
+        sim.joint_model(inside[:1], "classic_intrinsic_cohesive_interface", {"tensile_strength": 1e6})
+    with pytest.raises(HpcdemError, match="a crack through a hexahedron"):
+        cracked = sim.mesh.face_points(inside[:1])
+        meshes.check(Mesh.of(sim.mesh.points, sim.mesh.cells, cracks=cracked, hexes=sim.mesh.hexes))
+    alone = body(hexes((1, 1, 1), (1.0, 1.0, 1.0)))
     with pytest.raises(CommandError, match="no joint here that could be a channel"):
-        Flow.of(sim).assign(None, WATER)
+        Flow.of(alone).assign(None, WATER)
     with pytest.raises(CommandError, match="are one hexahedron"):
         changes.element_model(sim, np.arange(7), "mech_iso_elastic", ROCK)
 

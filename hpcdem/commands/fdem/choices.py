@@ -45,7 +45,7 @@ def places(project: Project, kind: str) -> np.ndarray:
     """(n, 2), in space (n, 3) [m] where the objects of a kind that are there are now: their middle."""
     objects = _Objects(project, kind)
     objects.now = True
-    return objects.places().mean(axis=1)
+    return objects.places()[:, :3].mean(axis=1)
 
 
 def _why(objects: _Objects, where: g.Range) -> str:
@@ -97,6 +97,7 @@ class _Objects:
             self.edges = edges = project.edges()
             if kind == g.JOINT:
                 sides = edges.faces[edges.inner]
+                sides = sides[~mesh.inside_hexes(sides[:, 0])]
                 self.sides = sides[there[sides // 4].all(axis=1)]
                 if some is not None:
                     self.sides = self.sides[np.isin(self.sides[:, 0], some)]
@@ -105,6 +106,24 @@ class _Objects:
                 faces = np.sort(edges.faces[edges.faces >= 0])
                 self.numbers = faces[there[faces // 4]]
             self.ends = mesh.face_points(self.numbers)
+            self.corners = mesh.face_corners(self.numbers)
+            if kind == g.JOINT and len(mesh.hexes):
+                self._whole_sides()
+
+    def _whole_sides(self) -> None:
+        """Joints between hexahedra are where the whole side is, so that both halves are chosen together: a fourth point,
+        of joints beside tetrahedra one of the three again."""
+        partner = np.full(self.mesh.cells.size, -1)
+        inner = self.edges.faces[self.edges.inner]
+        partner[inner] = inner[:, ::-1]
+        other = self.mesh.quads(self.numbers, partner)[:, 0]
+        fourth = self.corners[:, 0].copy()
+        at = np.flatnonzero(other >= 0)
+        points = self.mesh.face_points(other[at])
+        lone = ~(points[:, :, None] == self.ends[at][:, None]).any(axis=2)
+        fourth[at] = self.mesh.face_corners(other[at])[lone]
+        self.corners = np.column_stack([self.corners, fourth])
+        self.ends = self.mesh.cells.reshape(-1)[self.corners]
 
     def all_of(self, where: g.Range) -> np.ndarray:
         """(n,) bool: which of them all terms hold for."""
@@ -135,7 +154,7 @@ class _Objects:
             own = np.arange(4 * len(self.numbers)).reshape(-1, 4)
             cells = np.where(mesh.cells[self.numbers] >= 0, own, -1)
             return centres(corners.reshape(-1, 4, mesh.dim)[self.numbers].reshape(-1, mesh.dim), cells)[:, None]
-        return corners[mesh.face_corners(self.numbers)]
+        return corners[self.corners]
 
     def mask(self, term: g.Term) -> np.ndarray:
         """(n,) bool: which of them a term holds for."""

@@ -94,11 +94,13 @@ def _nearest(project: Project, kind: str, at: tuple[float, ...]) -> int:
         of = tetrahedra if mesh.dim == 3 else connectivity
         return of.nearest_element(xy, mesh.cells, at, np.flatnonzero(project.alive))
     edges = project.edges()
-    middles = xy[edges.points[edges.inner]].mean(axis=1)
+    inner = np.flatnonzero(edges.inner)
+    inner = inner[~mesh.inside_hexes(edges.faces[inner, 0])]
+    middles = xy[edges.points[inner]].mean(axis=1)
     there = np.flatnonzero(~np.isnan(middles[:, 0]))
     if not len(there):
         raise CommandError("the mesh has no joints: there is no edge between two elements")
-    return int(edges.faces[edges.inner, 0][nearest_point(middles, at, there)])
+    return int(edges.faces[inner, 0][nearest_point(middles, at, there)])
 
 
 def delete(project: Project, name: str) -> None:

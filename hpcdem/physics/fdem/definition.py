@@ -271,9 +271,7 @@ class ModelDefinition:
         face = np.arange(len(self.partner))
         inner = (self.partner > face) & self.alive[face // 4]
         inner[inner] &= self.alive[self.partner[inner] // 4]
-        if len(self._mesh().hexes):
-            of_hexes = self._mesh().hex_of() >= 0  # there are no joints between these yet
-            inner[inner] &= ~(of_hexes[face[inner] // 4] | of_hexes[self.partner[inner] // 4])
+        inner[inner] = ~self._mesh().inside_hexes(face[inner])
         return inner
 
     def face_exists(self) -> np.ndarray:
@@ -415,8 +413,6 @@ class ModelDefinition:
 
         Joints that are broken stay broken. None: all inner edges."""
         at = self.numbers_of_joints(joints)
-        if not len(at) and len(self._mesh().hexes):
-            raise CommandError("there are no joints between hexahedra in this version: tetrahedra have them")
         self._assign(self.joint_rows, self._both_sides(at), at, JOINT, name, properties, True)
 
     def joint_property(self, joints: Numbers, properties: Mapping[str, Value]) -> None:

@@ -753,10 +753,10 @@ def tangent(
     """Stiffness of the owned elements and joints at the present positions, and how many joints are behind their peak,
     see `of_joints`. flows: less what the flow of elements takes from it. Collective, as its parts are."""
     joints, past = of_joints(sim, softening)
-    return ([*of_elements(sim, flows), joints] if matrices else []), past
+    return ([*of_elements(sim, flows), *joints] if matrices else []), past
 
 
-def of_joints(sim: Blocks, softening: bool = False) -> tuple[Pieces, int]:
+def of_joints(sim: Blocks, softening: bool = False) -> tuple[list[Pieces], int]:
     """Stiffness of the owned joints at the present positions, and how many are behind their peak; with softening, those
     that pass it now."""
     slots = _lower_slots(sim)
@@ -784,7 +784,7 @@ def of_joints(sim: Blocks, softening: bool = False) -> tuple[Pieces, int]:
         e, k = f // 4, f % 4
         after = np.where(k + 1 < np.where(cells[e, 3] >= 0, 4, 3), k + 1, 0)
         ends += [sim.node[e, k], sim.node[e, after]]
-    return Pieces(face, np.column_stack(ends), joints), past
+    return [Pieces(face, np.column_stack(ends), joints)], past
 
 
 def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:

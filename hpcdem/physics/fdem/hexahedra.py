@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hpcdem.physics.fdem import tetrahedra
+
 PARTS = 6
 """Tetrahedra of a hexahedron in the mesh."""
 FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
@@ -107,6 +109,26 @@ def places(cells: np.ndarray, hexes: np.ndarray) -> tuple[np.ndarray, np.ndarray
     own = cells[hexes[:, 8, None] + np.arange(PARTS)].reshape(len(hexes), 4 * PARTS)
     same = own[:, None, :] == hexes[:, :8, None]
     return np.argmax(same, axis=2), np.argmax(same, axis=1)
+
+
+def halves(cells: np.ndarray, hexes: np.ndarray) -> np.ndarray:
+    """(n, 6, 2) faces of the mesh (element * 4 + k) that the sides of hexahedra are cut into, by `FACES`."""
+    _, of = places(cells, hexes)
+    inside = 4 * np.arange(PARTS)[:, None, None] + tetrahedra.FACES
+    side = _SIDE_OF[tuple(np.moveaxis(of[:, inside.reshape(-1, 3)], 2, 0))]
+    order = np.argsort(side, axis=1, kind="stable")[:, -2 * len(FACES) :]  # inner faces come first
+    return (4 * hexes[:, 8, None] + order).reshape(-1, len(FACES), 2)
+
+
+def _sides() -> np.ndarray:
+    """(8, 8, 8): the side that has these three corners, -1: none."""
+    out = np.full((8, 8, 8), -1)
+    for number, side in enumerate(FACES):
+        out[np.ix_(side, side, side)] = number
+    return out
+
+
+_SIDE_OF = _sides()
 
 
 def _other_cuts() -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from hpcdem.physics.fdem.definition import TRACTIONS
 from hpcdem.physics.fdem.hexes import Hexes, place_masses
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
+from hpcdem.physics.fdem.joints_hexes import Faces, HexJoints
 from hpcdem.physics.fdem.kernels import elements, energy_space, joints_space, space, tets
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE
@@ -92,9 +93,24 @@ class LocalSpace(LawsSpace):
                 sim.closed_faces(), sim.joint_row, self.slot_face, self.slot_link, self.slot_size, self.slot_law,
                 self.slot_kind, self.slot_state,
             )  # fmt: skip
+        self.sides: HexJoints | None = None
+        if self.hexes is not None and some:
+            sim.prepare_kernels("joints-hexes")
+            self.sides = HexJoints(self)
+            lost = max(int(lost), self.sides.lost)
         self._agree_on_lost(int(lost), "the joint of face")
-        self.jointed = bool(self.slot_state.any())
+        self.jointed = bool(self._of_tetrahedra(self.slot_state).any())
         self._make_joint_laws()
+        if self.sides is not None:
+            self.slot_law[self.sides.slot] = 0
+
+    def _of_tetrahedra(self, state: np.ndarray) -> np.ndarray:
+        """State of slots, those on sides of hexahedra left out."""
+        if self.sides is None:
+            return state
+        out = state.copy()
+        out[self.sides.slot] = NONE
+        return out
 
     def _put_histories(self) -> None:
         histories = self.sim.histories
@@ -107,7 +123,7 @@ class LocalSpace(LawsSpace):
         self._relink()
 
     def _relink(self) -> None:
-        joints_space.relink(self.slot_state, self.slots, tets.BLOCK, self.head, self.follow)
+        joints_space.relink(self._of_tetrahedra(self.slot_state), self.slots, tets.BLOCK, self.head, self.follow)
 
     def _make_loads(self) -> None:
         sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
@@ -178,10 +194,12 @@ class LocalSpace(LawsSpace):
         tied = sim.closed_faces()[faces] & (sim.joint_row[faces] > 0)
         each = np.zeros(len(faces))
         each[tied] = penalty[tied] / self.slot_size[: self.slots][tied] / 3.0
-        each = each.reshape(-1, 4)
+        each = np.repeat(each.reshape(-1, 4, 1), 3, axis=2)
+        if self.sides is not None:
+            each.reshape(-1, 3)[self.sides.slot[self.sides.quad]] *= self.sides.shares()
         if not sim.options.collision:
             for k in range(4):
-                springs[:, FACES[k]] += each[:, k, None]
+                springs[:, FACES[k]] += each[:, k]
             sim.surface_loads.springs(sim, springs)
             sim.surface_loads.dashpots(sim, dashpots)
             return springs, dashpots
@@ -201,9 +219,8 @@ class LocalSpace(LawsSpace):
         # A third of 2 xi sqrt(k m) A, with k A = 3 `contact` and m A no more than three corners of the element have.
         drag = 2.0 * ratio * np.sqrt(contact * self.true_mass[own].max(axis=1, initial=0.0)[:, None])
         for k in range(4):
-            for c in FACES[k]:
-                springs[:, c] += np.maximum(each[:, k], contact[:, k])
-                dashpots[:, c] += drag[:, k]
+            springs[:, FACES[k]] += np.maximum(each[:, k], contact[:, k, None])
+            dashpots[:, FACES[k]] += drag[:, k, None]
         sim.surface_loads.springs(sim, springs)
         sim.surface_loads.dashpots(sim, dashpots)
         return springs, dashpots
@@ -262,24 +279,24 @@ class LocalSpace(LawsSpace):
     def _fill(self, force: np.ndarray, of_joints: np.ndarray, keep: bool) -> None:
         o = self.sim.options
         self.obey()
-        self._element_forces(force, self.sim.v, (o.gx, o.gy, o.gz), self.jointed, of_joints, keep)
+        self._element_forces(force, self.sim.v, (o.gx, o.gy, o.gz), True, of_joints, keep)
         if self.hexes is None:
             self.pairs.add_to(force)
         else:
             self.hexes.add_contact(self.pairs, force)
 
     def _element_forces(
-        self, force: np.ndarray, v: np.ndarray, gravity: tuple[float, float, float], jointed: bool,
+        self, force: np.ndarray, v: np.ndarray, gravity: tuple[float, float, float], joints: bool,
         of_joints: np.ndarray, keep: bool,
     ) -> None:  # fmt: skip
-        """Forces of elements and their joints with the velocities v (n, 16)."""
+        """Forces of elements and, if they are wanted, of their joints with the velocities v (n, 16)."""
         sim, o = self.sim, self.sim.options
         stressed = sim.stress0 is not None or self.plastic or self.creeps or self.heated
         hexes = self.hexes
         some = 0 if hexes is not None and 6 * hexes.count == self.count else self.count
         self._forces(
             sim.threads, some, self.rows, sim.x, v, self.c, self.s0, stressed, not o.large_strain, force,
-            *gravity, o.mass_damping, o.stiffness_damping, jointed, self.slot_size, self.slot_link,
+            *gravity, o.mass_damping, o.stiffness_damping, joints and self.jointed, self.slot_size, self.slot_link,
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
             self.joint_table, self.joint_beyond, keep, of_joints, sim.clock.step, self.tally,
         )  # fmt: skip
@@ -287,6 +304,10 @@ class LocalSpace(LawsSpace):
             if some:
                 force[hexes.rows.reshape(-1)] = 0.0  # the forces of their tetrahedra
             hexes.forces(force, v, gravity, self.quad_s0)
+            if self.sides is not None and joints:
+                if keep:
+                    of_joints[hexes.rows.reshape(-1)] = 0.0
+                self.sides.forces(force, v, keep, of_joints)
 
     def open_joints(self) -> None:
         """See `Local.open_joints`."""
@@ -409,10 +430,16 @@ class LocalSpace(LawsSpace):
         """As in the plane (n_own,) [J]."""
         sim = self.sim
         out = np.zeros(sim.n_own)
+        laws = self.joint_table, self.joint_beyond
         energy_space.stored_in_joints(
-            self.slots, self.slot_face, self.slot_link, self.slot_size, self.slot_kind, self.slot_state,
-            self.slot_history, sim.where, sim.x, self.joint_table, self.joint_beyond, sim.n_left, out,
+            self.slots, self.slot_face, self.slot_link, self.slot_size, self.slot_kind,
+            self._of_tetrahedra(self.slot_state), self.slot_history, sim.where, sim.x, *laws, sim.n_left, out,
         )  # fmt: skip
+        if self.sides is not None:
+            of_sides = np.zeros(len(self.sides.slot))
+            _, *joints = self.sides.moved(np.arange(len(of_sides)))
+            energy_space.stored_in_joints(len(of_sides), *joints, *laws, 0, of_sides)
+            np.add.at(out, self.sides.slot // 4, of_sides)
         return out
 
     def book(
@@ -440,13 +467,25 @@ class LocalSpace(LawsSpace):
 
     def _edges(self, slots: np.ndarray) -> np.ndarray:
         """See `joints_space.faces_now`; behind no forces, which the plane has."""
-        sim = self.sim
         out = np.zeros((len(slots), 13))
-        joints_space.faces_now(
-            slots, self.slot_face, self.slot_link, self.slot_size, self.slot_kind, self.slot_state, self.slot_history,
-            sim.where, sim.x, self.joint_table, self.joint_beyond, out,
-        )  # fmt: skip
+        for which, joints in self.triangles(slots):
+            found = np.zeros((len(which), 13))
+            joints_space.faces_now(*joints, self.joint_table, self.joint_beyond, found)
+            out[which] = found
         return out
+
+    def triangles(self, slots: np.ndarray) -> list[tuple[np.ndarray, Faces]]:
+        """Joints (n,) as those of triangles: which of them, and what they are; those on sides of hexahedra come last."""
+        sim, which = self.sim, np.arange(len(slots))
+        tables = self.slot_face, self.slot_link, self.slot_size, self.slot_kind, self.slot_state, self.slot_history
+        if self.sides is None:
+            return [(which, Faces(slots, *tables, sim.where, sim.x))]
+        on_side = np.isin(slots, self.sides.slot)
+        of_sides = np.searchsorted(self.sides.slot, slots[on_side])
+        return [
+            (which[~on_side], Faces(slots[~on_side], *tables, sim.where, sim.x)),
+            (which[on_side], self.sides.moved(of_sides)),
+        ]
 
     def joint_means(self, slots: np.ndarray) -> np.ndarray:
         """Mean opening, size of the mean slip [m], mean normal stress and size of the mean shear stress [Pa] (n, 4)."""

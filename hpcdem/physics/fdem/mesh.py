@@ -8,6 +8,7 @@ calls an edge is a face with three points. `hpcdem.pre.mesh` makes meshes.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -96,6 +97,46 @@ class Mesh:
         out = np.full(len(self.cells), -1, np.int64)
         out[self.hexes[:, 8, None] + np.arange(hexahedra.PARTS)] = np.arange(len(self.hexes))[:, None]
         return out
+
+    def inside_hexes(self, faces: np.ndarray) -> np.ndarray:
+        """(n,) bool: of these faces (n,) those within a hexahedron, between two of its six elements."""
+        if not len(self.hexes):
+            return np.zeros(len(faces), bool)
+        of = self.hex_of()[faces // 4]
+        return (of >= 0) & (self._other_half[faces] < 0)
+
+    @cached_property
+    def _other_half(self) -> np.ndarray:
+        """(4 ne,) i8: of half a side of a hexahedron the face that is the other half, -1 of other faces."""
+        out = np.full(4 * len(self.cells), -1, np.int64)
+        halves = hexahedra.halves(self.cells, self.hexes).reshape(-1, 2)
+        out[halves] = halves[:, ::-1]
+        return out
+
+    def quads(self, faces: np.ndarray, partner: np.ndarray) -> np.ndarray:
+        """(n, 2) i8: of these faces (n,) that are half the side of one hexahedron and of another one the other half
+        and its partner, -1 of others."""
+        out = np.full((len(faces), 2), -1, np.int64)
+        if not len(self.hexes):
+            return out
+        over = partner[faces]
+        other = self._other_half[faces]
+        beyond = np.where(over >= 0, self._other_half[over], -1)
+        at = np.flatnonzero((other >= 0) & (beyond >= 0))
+        at = at[partner[other[at]] == beyond[at]]
+        out[at] = np.column_stack([other[at], beyond[at]])
+        return out
+
+    def joint_lengths(self, faces: np.ndarray, partner: np.ndarray) -> np.ndarray:
+        """(n,) h [m] of the law of joints on these faces: the length of the edge; in space the root of the area of the
+        face, between hexahedra of the whole side."""
+        size = self.face_sizes(faces)
+        if self.dim == 2:
+            return size
+        other = self.quads(faces, partner)[:, 0]
+        at = other >= 0
+        size[at] += self.face_sizes(other[at])
+        return np.sqrt(size)
 
     @property
     def dim(self) -> int:
@@ -356,10 +397,9 @@ def _bad_names(mesh: Mesh) -> str | None:
     rows = mesh.find_edges(edges, mesh.cracks)
     outside = np.flatnonzero((rows < 0) | ~edges.inner[rows])
     if len(mesh.hexes) and len(rows):
-        of = mesh.hex_of() >= 0
-        bad = np.flatnonzero((rows >= 0) & of[edges.faces[rows] // 4].any(axis=1))
+        bad = np.flatnonzero((rows >= 0) & mesh.inside_hexes(edges.faces[rows, 0]))
         if len(bad):
-            return f"a crack through or beside hexahedra at {_at(mesh, int(mesh.cracks[bad[0], 0]))}: tetrahedra crack"
+            return f"a crack through a hexahedron at {_at(mesh, int(mesh.cracks[bad[0], 0]))}: only its sides crack"
     if len(outside):
         points = mesh.cracks[outside[0]].tolist()
         return (

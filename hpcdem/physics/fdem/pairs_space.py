@@ -307,8 +307,8 @@ class AllPairs(ContactSpace):
 
 
 def shared_faces(sim: State, e: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Square root of the area (m,) [m] of the face that elements e and f have in common in the mesh, 0 without one, and
-    the overlay penalty [Pa] of the joint that was there, NaN without one."""
+    """Length (m,) [m] of a joint on the face that elements e and f have in common in the mesh, 0 without one, and the
+    overlay penalty [Pa] of the joint that was there, NaN without one."""
     mesh = sim.the_mesh()
     out, penalty = np.zeros(len(e)), np.full(len(e), np.nan)
     overlay = np.array(sim.joint_rows.column("penalty_overlay", np.nan))
@@ -316,6 +316,6 @@ def shared_faces(sim: State, e: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, 
     for k in range(4):
         over = sim.partner[4 * e + k]
         at = np.flatnonzero((over >= 0) & (over // 4 == f))
-        out[at] = np.sqrt(mesh.face_sizes(4 * e[at] + k))
+        out[at] = mesh.joint_lengths(4 * e[at] + k, sim.partner)
         penalty[at] = overlay[sim.joint_row[4 * e[at] + k]]
     return out, penalty

@@ -763,8 +763,7 @@ class Blocks(State):
         mesh = self.the_mesh()
         faces = np.flatnonzero(self.closed_faces() & (self.joint_row > 0))
         longest = np.zeros(len(self.joint_rows))
-        size = mesh.face_sizes(faces)
-        np.maximum.at(longest, self.joint_row[faces], np.sqrt(size) if self.dim == 3 else size)
+        np.maximum.at(longest, self.joint_row[faces], mesh.joint_lengths(faces, self.partner))
         for strength, penalty, energy in (
             ("tensile_strength", "penalty_normal", "gf1"), ("cohesion", "penalty_shear", "gf2"),
         ):  # fmt: skip

@@ -6,6 +6,7 @@ from typing import cast
 
 import numpy as np
 
+from hpcdem.physics.fdem.joints_hexes import Faces
 from hpcdem.physics.fdem.kernels import plastic_hexes, tet_stiffness, tets
 from hpcdem.physics.fdem.kernels.joints import YIELDED
 from hpcdem.physics.fdem.linear import Pieces
@@ -14,25 +15,41 @@ from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.simulation import Blocks
 
 
-def of_joints(sim: Blocks, slots: np.ndarray, softening: bool) -> tuple[Pieces, int]:
+def of_joints(sim: Blocks, slots: np.ndarray, softening: bool) -> tuple[list[Pieces], int]:
     """See `equilibrium.of_joints`; slots: of the owned joints, each once."""
     sim.prepare_kernels("tangent-space")
-    local, mesh = cast(LocalSpace, sim.local), sim.the_mesh()
-    joints, left = np.empty((len(slots), 18, 18)), np.empty(len(slots))
-    of = local.slot_face, local.slot_link, local.slot_size, local.slot_kind
-    tet_stiffness.intact_joints(slots, *of, local.slot_state, sim.where, sim.x, local.joint_table, joints, left)
+    local = cast(LocalSpace, sim.local)
+    found, past = [], 0
+    for which, joints in local.triangles(slots):
+        made, behind = _stiffness(local, joints, softening)
+        past += behind
+        corners = sim.the_mesh().face_corners
+        face = local.slot_face[slots[which]]
+        ends = np.column_stack([corners(faces) for faces in (face, sim.partner[face])])
+        if len(found) == 1:
+            assert local.sides is not None
+            of = np.searchsorted(local.sides.slot, slots[which])
+            way, ends = local.sides.ways(of), local.sides.corners(of)
+            made = np.einsum("nai,nab,nbj->nij", way, made, way, optimize=True)
+        found.append(Pieces(face, sim.node.reshape(-1)[ends], made))
+    return found, past
+
+
+def _stiffness(local: LocalSpace, joints: Faces, softening: bool) -> tuple[np.ndarray, int]:
+    """K (n, 18, 18) of joints of triangles, and how many of them are behind their peak, see `of_joints`."""
+    slots, face, link, size, kind, state, history, where, x = joints
+    found, left = np.empty((len(slots), 18, 18)), np.empty(len(slots))
+    of = face, link, size, kind
+    tet_stiffness.intact_joints(slots, *of, state, where, x, local.joint_table, found, left)
     behind = left < 0.0
-    past = int((behind & ~(softening & (local.slot_state[slots] >= YIELDED))).sum())
+    past = int((behind & ~(softening & (state[slots] >= YIELDED))).sum())
     if softening:
         soft = np.empty((int(behind.sum()), 18, 18))
         tet_stiffness.yielded_joints(
-            slots[behind], *of, local.slot_history, sim.where, sim.x, local.joint_table, local.joint_beyond, soft
+            slots[behind], *of, history, where, x, local.joint_table, local.joint_beyond, soft
         )
-        joints[behind] = soft
-    face = local.slot_face[slots]
-    node = sim.node.reshape(-1)
-    ends = [node[mesh.face_corners(faces)] for faces in (face, sim.partner[face])]
-    return Pieces(face, np.column_stack(ends), joints), past
+        found[behind] = soft
+    return found, past
 
 
 def of_elements(sim: Blocks, flows: bool) -> list[Pieces]:

@@ -227,6 +227,21 @@ def creeping_hexahedra(threads: int = 1) -> None:
     creep.finish(sim, 1.0)
 
 
+def jointed_hexahedra(threads: int = 1) -> None:
+    """Those of joints between hexahedra, which are torn apart; and their tangent."""
+    points = [(x, y, z) for z in (0.0, 1.0, 2.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(Mesh.of_hexes(points, [range(8), range(4, 12)]))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
+    changes.set_velocity(sim, [8, 9], 1.0, 1.0, 1.0)
+    diagnostics.account_energy(sim)
+    convergence.advance(sim, 2)
+    diagnostics.energies(sim)
+    diagnostics.values(sim, "normal_stress")
+    equilibrium.tangent(sim, softening=True)
+
+
 def in_space(threads: int = 1) -> None:
     """Those of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
     sim = _in_space(threads, "mech_iso_elastic", {})

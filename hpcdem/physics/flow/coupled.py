@@ -418,8 +418,8 @@ class Coupled:
         if isinstance(self.solver, Condensed):
             if not self.solver.ready:
                 self.solver.eliminate(equilibrium.of_elements(self.sim))
-            return [joints, *of_fluid]
-        return [*equilibrium.of_elements(self.sim), joints, *of_fluid]
+            return [*joints, *of_fluid]
+        return [*equilibrium.of_elements(self.sim), *joints, *of_fluid]
 
     def _lacking(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
         """What forces and fluid lack, over what contributes; the right-hand side (nn + nf, dim); the fluid."""

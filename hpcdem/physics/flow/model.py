@@ -185,7 +185,7 @@ class Flow(SurfaceLoad):
         is dry."""
         at = self.blocks.numbers_of_joints(joints)
         if not len(at):
-            raise CommandError("there is no joint here that could be a channel; between hexahedra there are none")
+            raise CommandError("there is no joint here that could be a channel")
         self._put(at, self.blocks.complete(JOINT, at, POROUS, {}, given))
 
     def adjust(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:

@@ -236,6 +236,21 @@ def face_now(x, own, link, per_h, law, beyond, history, part, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def breaks(history, part):
+    """Whether a joint has no strength left at two of its three points; then it has none, and a mode."""
+    gone = 0
+    for g in range(3):
+        gone += history[DAMAGE + g] >= 1.0
+    if gone < 2:
+        return False
+    both = part[0] + part[1]
+    history[MODE] = 1.0 + (part[1] / both if both > 0.0 else 0.0)
+    for g in range(3):
+        history[DAMAGE + g] = 1.0
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _slow_joints(
     b, k, n, first, rows, x, c, link, law, kind, state, history, head, follow, table, beyond, kinetic, step, lanes,
     room, tally,
@@ -265,18 +280,10 @@ def _slow_joints(
         )
         for m in range(9):
             lanes[J + U(m) * _NEXT + U(e)] = out[m]
-        if state[slot] == YIELDED:
-            gone = 0
-            for g in range(3):
-                gone += remembered[DAMAGE + g] >= 1.0
-            if gone >= 2:
-                both = part[0] + part[1]
-                remembered[MODE] = 1.0 + (part[1] / both if both > 0.0 else 0.0)
-                for g in range(3):
-                    remembered[DAMAGE + g] = 1.0
-                state[slot] = BROKEN
-                remembered[STEP], remembered[KINETIC] = step, _kinetic(e, kinetic, lanes)
-                tally[NEW_BROKEN] += 1
+        if state[slot] == YIELDED and breaks(remembered, part):
+            state[slot] = BROKEN
+            remembered[STEP], remembered[KINETIC] = step, _kinetic(e, kinetic, lanes)
+            tally[NEW_BROKEN] += 1
         slot = follow[slot]
 
 

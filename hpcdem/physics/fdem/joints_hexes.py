@@ -1,0 +1,151 @@
+"""The tables of the joints on sides of hexahedra that a rank holds; part of `LocalSpace`, see kernels/joints_hexes.py."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hpcdem.physics.fdem import mesh as meshes
+from hpcdem.physics.fdem.kernels import joints_hexes
+from hpcdem.physics.fdem.kernels.joints import NONE
+from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.local_space import LocalSpace
+
+
+
+class Faces(NamedTuple):
+    """What the kernels ask of joints (n,): slot, and by slots face, link, 1 / h [1/m], row of the law, state, history;
+    storage rows by element, and positions."""
+
+    slots: np.ndarray
+    face: np.ndarray
+    link: np.ndarray
+    size: np.ndarray
+    kind: np.ndarray
+    state: np.ndarray
+    history: np.ndarray
+    where: np.ndarray
+    x: np.ndarray
+
+
+DIAGONAL, LONE = 5.0 / 36.0, -1.0 / 36.0
+"""e of the corners of half a side: of those on the diagonal, and of the one that only this half has."""
+OPPOSITE = np.array([0, 2, 1])
+"""Which of the corners p, q, r of the other side are opposite a, b, c."""
+
+
+class HexJoints:
+    """slot (m,): joints on sides of hexahedra, the two halves of a side by themselves, in the order of storage; begin,
+    at, weights: see `joints_hexes.forces`; quad (m,) bool: there is one hexahedron on the other side, and the other half
+    of the side is a joint too. Others are joints as those of tetrahedra."""
+
+    def __init__(self, local: LocalSpace) -> None:
+        assert local.hexes is not None
+        self.local = local
+        sim, mesh, hexes = local.sim, local.sim.the_mesh(), local.hexes
+        of = hexes.numbers()
+        slot = np.flatnonzero(local.slot_state[: local.slots] != NONE)
+        self.slot = slot = slot[of[slot // 4] >= 0]
+        face, m = local.slot_face[slot], len(slot)
+        self.hexahedron = of[slot // 4]
+        self.begin = np.concatenate([[0], np.cumsum(np.bincount(self.hexahedron, minlength=hexes.count))])
+        self.at, self.weights = np.zeros((m + 3, joints_hexes.CORNERS), np.int32), np.zeros((m + 3, joints_hexes.WEIGHTS))
+        corner = hexes.corner_of[slot // 4 + sim.n_left]
+        self.at[:m, :3] = np.take_along_axis(corner, FACES[slot % 4], axis=1)
+        self.at[:m, 4:7] = local.slot_link[slot][:, OPPOSITE]
+        self.at[:m, [3, 7]] = self.at[:m, [0, 4]]
+        pair = mesh.quads(face, sim.partner)
+        self.quad = (pair[:, 0] >= 0) & (sim.joint_row[pair[:, 0]] > 0)
+        q = np.flatnonzero(self.quad)
+        near, beyond = pair[q].T
+        fourth, place = _other_corner(mesh, near, face[q])
+        _, there = _other_corner(mesh, beyond, face[q])
+        self.at[q, 3] = hexes.corner_of[sim.where[near // 4], place % 4]
+        row = sim.where[beyond // 4]
+        self.lost = int(face[q][row < 0].max(initial=-1))
+        self.at[q, 7] = ROW * row + STRIDE * (there % 4)
+        lone = (mesh.face_corners(face[q]) == _other_corner(mesh, face[q], near)[1][:, None]).argmax(axis=1)
+        self._make_weights(q, mesh.face_points(face[q]), lone, fourth)
+        local.slot_size[slot] = 1.0 / mesh.joint_lengths(face, sim.partner)
+        self.weights[:m, joints_hexes.PER_LENGTH] = local.slot_size[slot]
+
+    def _make_weights(self, q: np.ndarray, points: np.ndarray, lone: np.ndarray, fourth: np.ndarray) -> None:
+        """g and e of the halves q (k,) with these points (k, 3), `lone` (k,) of which is the one that the other half
+        does not have; fourth (k,): the one that only that has."""
+        self.lone, rows = lone, np.arange(len(q))
+        first, last = (lone + 1) % 3, (lone + 2) % 3
+        one, zero, two = points[rows, lone], points[rows, first], points[rows, last]
+        a = [self._areas(*of) for of in ((fourth, zero, one), (zero, one, two), (one, two, fourth), (two, fourth, zero))]
+        g, e = np.empty((len(q), 4)), np.full((len(q), 3), DIAGONAL)
+        g[rows, lone], g[:, 3] = -2.0 * a[3] / (a[1] + a[3]), -2.0 * a[1] / (a[1] + a[3])
+        g[rows, first], g[rows, last] = 2.0 * a[2] / (a[0] + a[2]), 2.0 * a[0] / (a[0] + a[2])
+        e[rows, lone] = LONE
+        self.weights[q, :4], self.weights[q, 4:7] = g, e
+
+    def _areas(self, *points: np.ndarray) -> np.ndarray:
+        """(k,) of triangles with these points (k,) each [m2]; the same bits in any order of them."""
+        return meshes.sizes(self.local.sim.the_mesh().points[np.sort(np.column_stack(points), axis=1)])
+
+    def shares(self) -> np.ndarray:
+        """(k, 3): of the joints `quad` the part of the stiffness P h / 3 that corners a, b, c have: what a uniform
+        traction gives to them."""
+        g = self.weights[: len(self.slot)][self.quad, :3]
+        out = (2.0 - 0.5 * g) / 4.0
+        rows = np.arange(len(g))
+        out[rows, self.lone] = (2.0 + 0.5 * g[rows, self.lone]) / 2.0
+        return out
+
+    def forces(self, force: np.ndarray, v: np.ndarray, keep: bool, of_joints: np.ndarray) -> None:
+        """Add those on the corners (n, 16) [N], with keep to of_joints (n, 16) too; histories move on."""
+        local, sim, hexes = self.local, self.local.sim, self.local.hexes
+        assert hexes is not None
+        kernel: Any = joints_hexes.forces if sim.threads == 1 else joints_hexes.forces_threaded
+        kernel(
+            sim.threads, self.begin, self.slot, self.hexahedron, self.at, self.weights, hexes.place, hexes.h, sim.x, v,
+            local.slot_kind, local.slot_state, local.slot_history, local.joint_table, local.joint_beyond, keep,
+            of_joints, force, sim.clock.step, local.tally,
+        )  # fmt: skip
+
+    def moved(self, which: np.ndarray) -> Faces:
+        """Some of them (n,), numbered anew, as the joints of triangles that they are once their corners are moved: the
+        first faces of elements in rows 0 .. n - 1, the corners opposite in those behind."""
+        local, n = self.local, len(which)
+        at = local.sim.x.reshape(-1)[self.at[which][:, :, None] + np.arange(3)]
+        near, far = at[:, :4], at[:, 4:]
+        g, e = self.weights[which, :4, None], self.weights[which, 4:7, None]
+        u = g * (far - near)
+        way = e * (0.5 * ((u[:, 0] + (u[:, 1] + u[:, 2])) + u[:, 3]))[:, None]
+        x = np.zeros((2 * n, 4, STRIDE))
+        x[:n, FACES[0], :3] = near[:, :3] + way
+        x[n:, :3, :3] = (far[:, :3] - way)[:, OPPOSITE]
+        link = ROW * (n + np.arange(n))[:, None] + STRIDE * np.arange(3)
+        slots = self.slot[which]
+        return Faces(
+            np.arange(n), 4 * np.arange(n), link.astype(np.int32), local.slot_size[slots], local.slot_kind[slots],
+            local.slot_state[slots], local.slot_history[slots], np.arange(2 * n), x.reshape(2 * n, ROW),
+        )  # fmt: skip
+
+    def ways(self, which: np.ndarray) -> np.ndarray:
+        """(n, 18, 24): how the corners a, b, c, p, q, r of `moved` move with a, b, c, d of the side and the four
+        opposite to them."""
+        g, e = self.weights[which, :4], self.weights[which, 4:7]
+        shift = 0.5 * e[:, :, None] * g[:, None, :]
+        one = np.eye(3, 4) - shift
+        near, far = np.concatenate([one, shift], axis=2), np.concatenate([shift, one], axis=2)
+        both = np.concatenate([near, far[:, OPPOSITE]], axis=1)
+        return np.einsum("nij,kl->nikjl", both, np.eye(3)).reshape(len(which), 18, 24)
+
+    def corners(self, which: np.ndarray) -> np.ndarray:
+        """(n, 8): of the same the corners, element * 4 + k."""
+        row, word = np.divmod(self.at[which], ROW)
+        return 4 * self.local.sim.number[row] + word // STRIDE
+
+
+def _other_corner(mesh: meshes.Mesh, faces: np.ndarray, than: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Point (k,) and corner (k,) of each of these faces (k,) that the other ones (k,) do not have."""
+    corners, points = mesh.face_corners(faces), mesh.face_points(faces)
+    alone = ~(points[:, :, None] == mesh.face_points(than)[:, None]).any(axis=2)
+    return points[alone], corners[alone]
