@@ -451,7 +451,10 @@ def it_shatters(found: Found) -> None:
 
 
 def hexes_shatter(found: Found) -> None:
-    it_shatters(found)
+    counts = np.bincount(found["state"][np.isfinite(found["state"])].astype(int), minlength=4)
+    assert counts[1:].min() > 20
+    assert found["energy_relative"] < 1e-3 and found["energy_joints_lost"] > 0.0 < found["energy_plastic_lost"]
+    assert len(found["contact_face"]) > 20 and (found["event_mode"] > 1.9).any() and (found["event_mode"] < 1.1).any()
 
 
 def hot(sim: Blocks, notes: dict[str, Any]) -> Found:
