@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem import convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.kernels import joints
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.space.support import ROCK, body, box, faces_on, hexes, nodes_on
-from tests.space.test_equilibrium import slopes_by_difference
+from tests.space.test_equilibrium import farthest, slopes_by_difference
 from tests.space.test_joints import AREA, INTERFACE, PEAK_OPENING, PEAK_SLIP, SOFTENING, TURN, VALUES
 
 SIDE = math.sqrt(AREA)
@@ -81,8 +81,7 @@ def test_strength_and_fracture_energy(way, peak, strength, energy):
 @pytest.mark.parametrize("warp", [0.0, 0.1])
 @pytest.mark.parametrize("size", [3e-8, 3e-7, 2e-5])
 def test_both_sides_are_opposite_bit_for_bit(size, warp):
-    """Corners of the other side moved each by itself, before the peak and behind it, also of a warped side; nothing
-    turns a free pair or sets it in motion."""
+    """Corners of the other side moved each by itself, before the peak and behind it, also of a warped side."""
     rng = np.random.default_rng(5)
     quad = QUAD + SIDE * rng.uniform(-0.2, 0.2, (4, 2))
     states = set()
@@ -207,3 +206,52 @@ def test_the_time_step_is_below_the_stability_limit(factor):
     limit = 2.0 / math.sqrt(np.linalg.eigvalsh(per[:, None] * k * per)[-1])
     bound = diagnostics.critical_time_step(sim) / sim.options.safety
     assert 0.3 * limit < bound <= limit
+
+
+def leaning() -> Blocks:
+    """A jointed column that leans, of warped hexahedra over tetrahedra that hang on them by joints."""
+    made, split = hexes((2, 2, 4), (0.4, 0.4, 0.8), 0.1), box((2, 2, 4), (0.4, 0.4, 0.8))
+    own = made.hexes[made.points[made.hexes[:, :8]].mean(axis=1)[:, 2] > 0.2, :8]
+    more = split.cells[split.centroids()[:, 2] < 0.2]
+    mesh = Mesh.of_hexes(made.points, own, made.layers, more)
+    sim = body(mesh, dynamic=False)
+    sim.joint_model(None, INTERFACE, {**STRONG, "penalty_normal": 5.0 * ROCK["young"]})
+    sim.velocity_condition(nodes_on(mesh, "bottom"), vx=0.0, vy=0.0, vz=0.0)
+    sim.stress_condition(faces_on(mesh, "top"), zz=-8e5, xz=3e5, yz=1e5)
+    sim.initial_stress(None, xx=-3e5, gradient={"zz": (0.0, 1e5, 2e5)})
+    sim.gravity(0.0, 0.0, -9.81)
+    return sim
+
+
+def test_the_same_as_relaxation_then_at_rest_in_motion():
+    """With the corners where hexahedra and tetrahedra meet; of joints opening, slip and stresses too."""
+    sim, slow = leaning(), leaning()
+    assert equilibrium.solve_elastic(sim).ratio < 1e-9
+    assert convergence.solve(slow, ratio=1e-9, cycles=60000).reason == "ratio"
+    assert farthest(sim, slow) < 1e-6
+    assert farthest(sim, slow, ("opening", "slip", "normal_stress", "shear_stress")) < 1e-5
+    sim.option(dynamic=True)
+    convergence.advance(sim, 50)
+    assert max(np.abs(diagnostics.values(sim, f"velocity_{a}")).max() for a in "xyz") < 1e-9
+
+
+def test_a_pulled_bar_breaks_in_the_middle_with_mode_1():
+    """Its strength is that of the joints; both halves of each side are events, with place, area and mode."""
+    mesh = hexes((2, 2, 4), (0.2, 0.2, 0.4))
+    sim = body(mesh)
+    joints_there = sim.numbers_of_joints(None)
+    middle = joints_there[(np.abs(mesh.points[mesh.face_points(joints_there)][:, :, 2] - 0.2) < 1e-9).all(axis=1)]
+    sim.joint_model(middle, INTERFACE, {**VALUES, "gf1": 5.0})
+    top, bottom = nodes_on(mesh, "top"), nodes_on(mesh, "bottom")
+    sim.velocity_condition(bottom, vx=0.0, vy=0.0, vz=0.0)
+    sim.velocity_condition(top, vz=0.02)
+    most = 0.0
+    for _ in range(60):
+        convergence.advance(sim, 25)
+        most = max(most, diagnostics.total(sim, "reaction_z", top))
+        if diagnostics.joint_counts(sim)[2] == 8:
+            break
+    assert most == pytest.approx(2e6 * 0.04, rel=0.05)
+    found = diagnostics.events(sim)
+    assert len(found["joint"]) == 8 and (found["mode"] < 1.01).all() and np.allclose(found["z"], 0.2)
+    assert found["joint_area"].sum() == pytest.approx(0.04) and (found["peak_step"] < found["step"]).all()

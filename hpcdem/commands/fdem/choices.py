@@ -111,8 +111,8 @@ class _Objects:
                 self._whole_sides()
 
     def _whole_sides(self) -> None:
-        """Joints between hexahedra are where the whole side is, so that both halves are chosen together: a fourth point,
-        of joints beside tetrahedra one of the three again."""
+        """Joints between hexahedra are where the whole side is, so that both halves are chosen together: they have a
+        fourth point, which is one of the three again where there are tetrahedra."""
         partner = np.full(self.mesh.cells.size, -1)
         inner = self.edges.faces[self.edges.inner]
         partner[inner] = inner[:, ::-1]

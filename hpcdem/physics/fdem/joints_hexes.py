@@ -1,4 +1,4 @@
-"""The tables of the joints on sides of hexahedra that a rank holds; part of `LocalSpace`, see kernels/joints_hexes.py."""
+"""The tables of the joints on sides of hexahedra that a rank holds, part of `LocalSpace`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local_space import LocalSpace
-
 
 
 class Faces(NamedTuple):
@@ -39,8 +38,8 @@ OPPOSITE = np.array([0, 2, 1])
 
 class HexJoints:
     """slot (m,): joints on sides of hexahedra, the two halves of a side by themselves, in the order of storage; begin,
-    at, weights: see `joints_hexes.forces`; quad (m,) bool: there is one hexahedron on the other side, and the other half
-    of the side is a joint too. Others are joints as those of tetrahedra."""
+    at, weights: see `joints_hexes.forces`; quad (m,) bool: there is one hexahedron on the other side, and the other
+    half of the side is a joint too. Others are joints as those of tetrahedra."""
 
     def __init__(self, local: LocalSpace) -> None:
         assert local.hexes is not None
@@ -52,7 +51,8 @@ class HexJoints:
         face, m = local.slot_face[slot], len(slot)
         self.hexahedron = of[slot // 4]
         self.begin = np.concatenate([[0], np.cumsum(np.bincount(self.hexahedron, minlength=hexes.count))])
-        self.at, self.weights = np.zeros((m + 3, joints_hexes.CORNERS), np.int32), np.zeros((m + 3, joints_hexes.WEIGHTS))
+        self.at = np.zeros((m + 3, joints_hexes.CORNERS), np.int32)
+        self.weights = np.zeros((m + 3, joints_hexes.WEIGHTS))
         corner = hexes.corner_of[slot // 4 + sim.n_left]
         self.at[:m, :3] = np.take_along_axis(corner, FACES[slot % 4], axis=1)
         self.at[:m, 4:7] = local.slot_link[slot][:, OPPOSITE]
@@ -78,7 +78,8 @@ class HexJoints:
         self.lone, rows = lone, np.arange(len(q))
         first, last = (lone + 1) % 3, (lone + 2) % 3
         one, zero, two = points[rows, lone], points[rows, first], points[rows, last]
-        a = [self._areas(*of) for of in ((fourth, zero, one), (zero, one, two), (one, two, fourth), (two, fourth, zero))]
+        around = (fourth, zero, one, two, fourth, zero)
+        a = [self._areas(*around[i : i + 3]) for i in range(4)]
         g, e = np.empty((len(q), 4)), np.full((len(q), 3), DIAGONAL)
         g[rows, lone], g[:, 3] = -2.0 * a[3] / (a[1] + a[3]), -2.0 * a[1] / (a[1] + a[3])
         g[rows, first], g[rows, last] = 2.0 * a[2] / (a[0] + a[2]), 2.0 * a[0] / (a[0] + a[2])

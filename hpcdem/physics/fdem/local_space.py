@@ -437,8 +437,8 @@ class LocalSpace(LawsSpace):
         )  # fmt: skip
         if self.sides is not None:
             of_sides = np.zeros(len(self.sides.slot))
-            _, *joints = self.sides.moved(np.arange(len(of_sides)))
-            energy_space.stored_in_joints(len(of_sides), *joints, *laws, 0, of_sides)
+            joints = self.sides.moved(np.arange(len(of_sides)))
+            energy_space.stored_in_joints(len(of_sides), *joints[1:], *laws, 0, of_sides)
             np.add.at(out, self.sides.slot // 4, of_sides)
         return out
 
@@ -475,7 +475,7 @@ class LocalSpace(LawsSpace):
         return out
 
     def triangles(self, slots: np.ndarray) -> list[tuple[np.ndarray, Faces]]:
-        """Joints (n,) as those of triangles: which of them, and what they are; those on sides of hexahedra come last."""
+        """Joints (n,) as those of triangles: which of them, and what they are; last those on sides of hexahedra."""
         sim, which = self.sim, np.arange(len(slots))
         tables = self.slot_face, self.slot_link, self.slot_size, self.slot_kind, self.slot_state, self.slot_history
         if self.sides is None:

@@ -19,7 +19,8 @@ def of_joints(sim: Blocks, slots: np.ndarray, softening: bool) -> tuple[list[Pie
     """See `equilibrium.of_joints`; slots: of the owned joints, each once."""
     sim.prepare_kernels("tangent-space")
     local = cast(LocalSpace, sim.local)
-    found, past = [], 0
+    found: list[Pieces] = []
+    past = 0
     for which, joints in local.triangles(slots):
         made, behind = _stiffness(local, joints, softening)
         past += behind
@@ -45,9 +46,7 @@ def _stiffness(local: LocalSpace, joints: Faces, softening: bool) -> tuple[np.nd
     past = int((behind & ~(softening & (state[slots] >= YIELDED))).sum())
     if softening:
         soft = np.empty((int(behind.sum()), 18, 18))
-        tet_stiffness.yielded_joints(
-            slots[behind], *of, history, where, x, local.joint_table, local.joint_beyond, soft
-        )
+        tet_stiffness.yielded_joints(slots[behind], *of, history, where, x, local.joint_table, local.joint_beyond, soft)
         found[behind] = soft
     return found, past
 

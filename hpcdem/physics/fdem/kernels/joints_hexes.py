@@ -27,7 +27,7 @@ from hpcdem.physics.fdem.kernels import joints_space
 from hpcdem.physics.fdem.kernels.elements import NEW_BROKEN, NEW_YIELDED
 from hpcdem.physics.fdem.kernels.hexes import H_MASS
 from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, KINETIC, PEAK_KINETIC, PEAK_STEP, STEP, YIELDED
-from hpcdem.physics.fdem.kernels.joints_space import J, LAW, LEFT, PER_H, P
+from hpcdem.physics.fdem.kernels.joints_space import LAW, LEFT, PER_H, J, P
 from hpcdem.physics.fdem.tetrahedra import FACES, STRIDE
 
 BLOCK = 32
@@ -58,9 +58,15 @@ def _gather(n, first, at, weights, law, x, table, lanes):
         k = np.int64(e)
         rows = U(law[k]) * _8, U(law[k + 1]) * _8, U(law[k + 2]) * _8, U(law[k + 3]) * _8
         four_columns(lanes, LAW + e, table, rows)
-        four_columns(
-            lanes, LAW + _4 * _NEXT + e, table, (rows[0] + _4, rows[1] + _4, rows[2] + _4, rows[3] + _4)
-        )
+        four_columns(lanes, LAW + _4 * _NEXT + e, table, (rows[0] + _4, rows[1] + _4, rows[2] + _4, rows[3] + _4))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _weights(e, lanes):
+    return (
+        lanes[W + e], lanes[W + _NEXT + e], lanes[W + U(2) * _NEXT + e], lanes[W + U(3) * _NEXT + e],
+        lanes[W + _4 * _NEXT + e], lanes[W + U(5) * _NEXT + e], lanes[W + U(6) * _NEXT + e],
+    )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -77,8 +83,7 @@ def _move(n, lanes):
             a, b, c = lanes[near + e], lanes[near + _4 * _NEXT + e], lanes[near + _8 * _NEXT + e]
             p, r, q = lanes[far + e], lanes[far + _4 * _NEXT + e], lanes[far + _8 * _NEXT + e]
             d, s = lanes[near + U(12) * _NEXT + e], lanes[far + U(12) * _NEXT + e]
-            ga, gb, gc, gd = lanes[W + e], lanes[W + _NEXT + e], lanes[W + U(2) * _NEXT + e], lanes[W + U(3) * _NEXT + e]
-            ea, eb, ec = lanes[W + _4 * _NEXT + e], lanes[W + U(5) * _NEXT + e], lanes[W + U(6) * _NEXT + e]
+            ga, gb, gc, gd, ea, eb, ec = _weights(e, lanes)
             w = _half_w(a, b, c, d, p, r, q, s, ga, gb, gc, gd)
             to = axis * _NEXT + e
             lanes[A + to], lanes[B + to], lanes[C + to] = a + ea * w, b + eb * w, c + ec * w
@@ -94,8 +99,7 @@ def _share(n, lanes):
         for e in range(U(n)):
             at = J + axis * _NEXT + e
             fa, fb, fc = lanes[at], lanes[at + U(3) * _NEXT], lanes[at + U(6) * _NEXT]
-            ga, gb, gc, gd = lanes[W + e], lanes[W + _NEXT + e], lanes[W + U(2) * _NEXT + e], lanes[W + U(3) * _NEXT + e]
-            ea, eb, ec = lanes[W + _4 * _NEXT + e], lanes[W + U(5) * _NEXT + e], lanes[W + U(6) * _NEXT + e]
+            ga, gb, gc, gd, ea, eb, ec = _weights(e, lanes)
             back = ea * fa + (eb * fb + ec * fc)
             lanes[at], lanes[at + U(3) * _NEXT], lanes[at + U(6) * _NEXT] = (
                 fa - ga * back, fb - gb * back, fc - gc * back,
@@ -150,9 +154,8 @@ def _forces(
     of_joints, force, step, tally,
 ):  # fmt: skip
     lanes = np.zeros(joints_space.LANES * np.int64(_NEXT))
-    x, v, force, of_joints = x.reshape(x.size), v.reshape(v.size), force.reshape(force.size), of_joints.reshape(
-        of_joints.size
-    )
+    x, v, force = x.reshape(x.size), v.reshape(v.size), force.reshape(force.size)
+    of_joints = of_joints.reshape(of_joints.size)
     flat_weights, flat_table = weights.reshape(weights.size), table.reshape(table.size)
     law = np.zeros(BLOCK + 3, np.int32)
     room = np.array([0, 4, 8]), np.array([12, 16, 20], np.int32), np.empty(22), np.empty(2), np.empty(24)
@@ -173,8 +176,8 @@ def _forces(
         joints_space._loop_0(n, lanes)
         if behind or joints_space._any_past_peak(n, lanes) < 0:
             _slow(
-                n, first, slot, hexahedron, weights, place, h, v, kind, state, history, table, beyond, step, lanes, room,
-                tally[t],
+                n, first, slot, hexahedron, weights, place, h, v, kind, state, history, table, beyond, step, lanes,
+                room, tally[t],
             )  # fmt: skip
         _share(n, lanes)
         for e in range(n):
