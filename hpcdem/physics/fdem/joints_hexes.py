@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.kernels import joints_hexes
 from hpcdem.physics.fdem.kernels.joints import NONE
 from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
@@ -30,8 +29,6 @@ class Faces(NamedTuple):
     x: np.ndarray
 
 
-DIAGONAL, LONE = 5.0 / 36.0, -1.0 / 36.0
-"""e of the corners of half a side: of those on the diagonal, and of the one that only this half has."""
 OPPOSITE = np.array([0, 2, 1])
 """Which of the corners p, q, r of the other side are opposite a, b, c."""
 
@@ -60,44 +57,21 @@ class HexJoints:
         pair = mesh.quads(face, sim.partner)
         self.quad = (pair[:, 0] >= 0) & (sim.joint_row[pair[:, 0]] > 0)
         q = np.flatnonzero(self.quad)
-        near, beyond = pair[q].T
-        fourth, place = _other_corner(mesh, near, face[q])
-        _, there = _other_corner(mesh, beyond, face[q])
-        self.at[q, 3] = hexes.corner_of[sim.where[near // 4], place % 4]
-        row = sim.where[beyond // 4]
+        _, near, g, e = mesh.on_sides(face[q])
+        _, over, *_ = mesh.on_sides(sim.partner[face[q]])
+        self.weights[q, :4], self.weights[q, 4:7] = g, e
+        self.at[q, 3] = hexes.corner_of[sim.where[near // 4], near % 4]
+        row = sim.where[over // 4]
         self.lost = int(face[q][row < 0].max(initial=-1))
-        self.at[q, 7] = ROW * row + STRIDE * (there % 4)
-        lone = (mesh.face_corners(face[q]) == _other_corner(mesh, face[q], near)[1][:, None]).argmax(axis=1)
-        self._make_weights(q, mesh.face_points(face[q]), lone, fourth)
+        self.at[q, 7] = ROW * row + STRIDE * (over % 4)
         local.slot_size[slot] = 1.0 / mesh.joint_lengths(face, sim.partner)
         self.weights[:m, joints_hexes.PER_LENGTH] = local.slot_size[slot]
-
-    def _make_weights(self, q: np.ndarray, points: np.ndarray, lone: np.ndarray, fourth: np.ndarray) -> None:
-        """g and e of the halves q (k,) with these points (k, 3), `lone` (k,) of which is the one that the other half
-        does not have; fourth (k,): the one that only that has."""
-        self.lone, rows = lone, np.arange(len(q))
-        first, last = (lone + 1) % 3, (lone + 2) % 3
-        one, zero, two = points[rows, lone], points[rows, first], points[rows, last]
-        around = (fourth, zero, one, two, fourth, zero)
-        a = [self._areas(*around[i : i + 3]) for i in range(4)]
-        g, e = np.empty((len(q), 4)), np.full((len(q), 3), DIAGONAL)
-        g[rows, lone], g[:, 3] = -2.0 * a[3] / (a[1] + a[3]), -2.0 * a[1] / (a[1] + a[3])
-        g[rows, first], g[rows, last] = 2.0 * a[2] / (a[0] + a[2]), 2.0 * a[0] / (a[0] + a[2])
-        e[rows, lone] = LONE
-        self.weights[q, :4], self.weights[q, 4:7] = g, e
-
-    def _areas(self, *points: np.ndarray) -> np.ndarray:
-        """(k,) of triangles with these points (k,) each [m2]; the same bits in any order of them."""
-        return meshes.sizes(self.local.sim.the_mesh().points[np.sort(np.column_stack(points), axis=1)])
 
     def shares(self) -> np.ndarray:
         """(k, 3): of the joints `quad` the part of the stiffness P h / 3 that corners a, b, c have: what a uniform
         traction gives to them."""
         g = self.weights[: len(self.slot)][self.quad, :3]
-        out = (2.0 - 0.5 * g) / 4.0
-        rows = np.arange(len(g))
-        out[rows, self.lone] = (2.0 + 0.5 * g[rows, self.lone]) / 2.0
-        return out
+        return np.where(g < 0.0, (2.0 + 0.5 * g) / 2.0, (2.0 - 0.5 * g) / 4.0)
 
     def forces(self, force: np.ndarray, v: np.ndarray, keep: bool, of_joints: np.ndarray) -> None:
         """Add those on the corners (n, 16) [N], with keep to of_joints (n, 16) too; histories move on."""
@@ -143,10 +117,3 @@ class HexJoints:
         """(n, 8): of the same the corners, element * 4 + k."""
         row, word = np.divmod(self.at[which], ROW)
         return 4 * self.local.sim.number[row] + word // STRIDE
-
-
-def _other_corner(mesh: meshes.Mesh, faces: np.ndarray, than: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Point (k,) and corner (k,) of each of these faces (k,) that the other ones (k,) do not have."""
-    corners, points = mesh.face_corners(faces), mesh.face_points(faces)
-    alone = ~(points[:, :, None] == mesh.face_points(than)[:, None]).any(axis=2)
-    return points[alone], corners[alone]

@@ -127,6 +127,27 @@ class Mesh:
         out[at] = np.column_stack([other[at], beyond[at]])
         return out
 
+    def on_sides(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Which of these faces (n,) are half a side of a hexahedron (k,), the corner (k,), element * 4 + k, that only
+        the other half has, and how corners share what is bilinear: g (k, 4) of the three and this one, e (k, 3), see
+        kernels/joints_hexes.py. The same bits from both sides of a face."""
+        at = np.empty(0, np.int64) if not len(self.hexes) else np.flatnonzero(self._other_half[faces] >= 0)
+        if not len(at):
+            return at, at, np.empty((0, 4)), np.empty((0, 3))
+        half, other = faces[at], self._other_half[faces[at]]
+        points, beyond = self.face_points(half), self.face_points(other)
+        same = points[:, :, None] == beyond[:, None]
+        lone, rows = np.argmin(same.any(axis=2), axis=1), np.arange(len(at))
+        fourth = np.argmin(same.any(axis=1), axis=1)
+        around = np.column_stack([beyond[rows, fourth], *(points[rows, (lone + k) % 3] for k in (2, 0, 1))])
+        a = [sizes(self.points[np.sort(np.roll(around, -k, axis=1)[:, :3], axis=1)]) for k in range(4)]
+        one, other_cut = 2.0 / (a[1] + a[3]), 2.0 / (a[0] + a[2])
+        g, e = np.empty((len(at), 4)), np.full((len(at), 3), hexahedra.DIAGONAL)
+        g[rows, lone], g[:, 3] = -a[3] * one, -a[1] * one
+        g[rows, (lone + 2) % 3], g[rows, (lone + 1) % 3] = a[2] * other_cut, a[0] * other_cut
+        e[rows, lone] = hexahedra.LONE
+        return at, self.face_corners(other)[rows, fourth], g, e
+
     def joint_lengths(self, faces: np.ndarray, partner: np.ndarray) -> np.ndarray:
         """(n,) h [m] of the law of joints on these faces: the length of the edge; in space the root of the area of the
         face, between hexahedra of the whole side."""

@@ -123,6 +123,8 @@ class Fluid:
         faces = flow.wet() if flow.pushes else np.empty(0, np.int64)
         self.face_key = faces
         self.face_at, self.face_node = self._corners(faces), row_of[blocks.the_mesh().face_points(faces)]
+        half, fourth, *weights = blocks.the_mesh().on_sides(faces)
+        self.on_sides = half, blocks.node.reshape(-1)[fourth], *weights
         self.condition = flow.condition[self.numbers]
         self.held_rows = row_of[flow.held]
         leads = blocks.local.leads[self.numbers]
@@ -349,13 +351,13 @@ class Fluid:
         own = [Pieces(one.key[mine], one.node[mine], one.stiffness[mine]) for one in self._own_pieces(now, u, first)]
         made = [
             self._channel_pieces(step, now, u, x, first, mine), *own,
-            self._face_pieces(self._rises(u, now)[0], x, first + self.first),
+            *self._face_pieces(self._rises(u, now)[0], x, first + self.first),
         ]  # fmt: skip
         if now.slow is not None:
             made.append(self._turbulent_pieces(step, now, u, first, mine))
         if now.packs is not None:
             packs = first + self.n + np.arange(self.n)
-            made += [*self._pack_pieces(now, x, packs, mine), self._face_pieces(np.ones(self.n), x, packs)]
+            made += [*self._pack_pieces(now, x, packs, mine), *self._face_pieces(np.ones(self.n), x, packs)]
         return made
 
     def _pack_pieces(self, now: Balance, x: np.ndarray, packs: np.ndarray, mine: slice) -> list[Pieces]:
@@ -469,23 +471,38 @@ class Fluid:
         out[:, ::dim, ::dim] = values
         return Pieces(self.channels[mine], first + self.first[nodes], out)
 
-    def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, variable: np.ndarray) -> Pieces:
-        """Of the forces on faces by variables at their ends: kernels.loads. p_u (n,): derivatives of pressures by them;
-        variable (n,): their "nodes"."""
-        k = len(self.face_key)
-        p_u = p_u[self.face_node]
+    def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, variable: np.ndarray) -> list[Pieces]:
+        """Of the forces on faces by variables at their ends: kernels.loads, and in space those on sides of hexahedra.
+        p_u (n,): derivatives of pressures by them; variable (n,): their "nodes"."""
         at, dim = x[self.face_at], self.dim
         way = at[:, 1:] - at[:, :1]
         if dim == 2:
             normal = np.column_stack([way[:, 0, 1], -way[:, 0, 0]]) / 6.0
         else:
             normal = np.cross(way[:, 0], way[:, 1]) / 24.0
-        out = np.zeros((k, 2 * dim * dim, 2 * dim * dim))
-        for end in range(dim):
+        weight = (1.0 + np.eye(dim)) * p_u[self.face_node][:, None]
+        if dim == 2:
+            return [self._pushed(slice(None), weight, normal, self.face_at, variable)]
+        half, fourth, g, e = self.on_sides
+        rest = np.delete(np.arange(len(at)), half)
+        share = np.concatenate([weight[half], np.zeros((len(half), 1, dim))], axis=1)
+        share -= g[:, :, None] * (e[:, :, None] * weight[half]).sum(axis=1)[:, None]
+        ends = np.column_stack([self.face_at[half], fourth])
+        return [
+            self._pushed(rest, weight[rest], normal[rest], self.face_at[rest], variable),
+            self._pushed(half, share, normal[half], ends, variable),
+        ]
+
+    def _pushed(
+        self, of: slice | np.ndarray, weight: np.ndarray, normal: np.ndarray, ends: np.ndarray, variable: np.ndarray
+    ) -> Pieces:
+        """Of some faces (k,): weight (k, ends, dim) of each variable on each end, ends (k, ends): their nodes."""
+        (k, m, dim), key = weight.shape, self.face_key[of]
+        out = np.zeros((k, (m + dim) * dim, (m + dim) * dim))
+        for end in range(m):
             for by in range(dim):
-                weight = (2.0 if end == by else 1.0) * p_u[:, by]
-                out[:, dim * end : dim * end + dim, dim * (dim + by)] = weight[:, None] * normal
-        return Pieces(self.face_key, np.column_stack([self.face_at, variable[self.face_node]]), out)
+                out[:, dim * end : dim * end + dim, dim * (m + by)] = weight[:, end, by, None] * normal
+        return Pieces(key, np.column_stack([ends, variable[self.face_node[of]]]), out)
 
     # ---- the end of a step ---------------------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ links, each of a third of its area, see network.py.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit, prange
 
 from hpcdem.physics.fdem.kernels import joints_space
@@ -84,3 +85,25 @@ def loads(corner, nodes, x, state, column, applied):
             applied[at] -= push * nx
             applied[at + 1] -= push * ny
             applied[at + 2] -= push * nz
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def loads_on_sides(corner, nodes, g, e, x, state, column, applied):
+    """`loads` on halves of sides of hexahedra, whose opening is bilinear (fdem/kernels/joints_hexes.py): corner (k, 4),
+    the last one that which only the other half has; nodes (k, 3); g (k, 4), e (k, 3)."""
+    x, applied, push = x.reshape(x.size), applied.reshape(applied.size), np.empty(3)
+    for m in range(len(corner)):
+        a, b, c = corner[m, 0], corner[m, 1], corner[m, 2]
+        ux, uy, uz = x[b] - x[a], x[b + 1] - x[a + 1], x[b + 2] - x[a + 2]
+        wx, wy, wz = x[c] - x[a], x[c + 1] - x[a + 1], x[c + 2] - x[a + 2]
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx  # 2 A n, outward
+        total = state[nodes[m, 0], column] + (state[nodes[m, 1], column] + state[nodes[m, 2], column])
+        back = 0.0
+        for k in range(3):
+            push[k] = (total + state[nodes[m, k], column]) / 24.0
+            back += e[m, k] * push[k]
+        for k in range(4):
+            at, share = corner[m, k], -g[m, k] * back + (push[k] if k < 3 else 0.0)
+            applied[at] -= share * nx
+            applied[at + 1] -= share * ny
+            applied[at + 2] -= share * nz

@@ -509,8 +509,9 @@ class Flow(SurfaceLoad):
     def corners(self, blocks: Any) -> np.ndarray:
         out = np.zeros((blocks.n_own, 4), bool)
         if self.pushes:
-            corner = blocks.the_mesh().face_corners(self.wet())
-            out[blocks.where[corner // 4] - blocks.n_left, corner % 4] = True
+            mesh, faces = blocks.the_mesh(), self.wet()
+            for corner in (mesh.face_corners(faces), mesh.on_sides(faces)[1]):
+                out[blocks.where[corner // 4] - blocks.n_left, corner % 4] = True
         return out
 
     def springs(self, blocks: Any) -> np.ndarray | None:
@@ -727,6 +728,12 @@ class Flow(SurfaceLoad):
         self._push_edge = np.ascontiguousarray((row * blocks.x.shape[1] + of.stride * k)[:, 0])
         self._push_corner = of.force_width * row + of.stride * k
         self._push_node = local[loaded]
+        if blocks.dim == 3:
+            at, fourth, *weights = blocks.the_mesh().on_sides(faces)
+            last = of.force_width * blocks.where[fourth // 4] + of.stride * (fourth % 4)
+            self._on_sides = np.column_stack([self._push_corner[at], last]), self._push_node[at], *weights
+            rest = np.delete(np.arange(len(faces)), at)
+            self._push_corner, self._push_node = self._push_corner[rest], self._push_node[rest]
 
     def note_leaks(self, broken: np.ndarray | None = None) -> None:
         """Leak-off begins where a joint is open, or among these that broke, and has it. Not collective."""
@@ -986,6 +993,8 @@ class Flow(SurfaceLoad):
             kernels.loads(self._push_edge, *at)
         else:
             kernels_space.loads(*at)
+            corner, nodes, g, e = self._on_sides
+            kernels_space.loads_on_sides(corner, nodes, g, e, *at[2:])
 
     def balanced(self) -> None:
         """Pressures and saturations are those of before: fluid that this takes is given, what has no room left goes."""
