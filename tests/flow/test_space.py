@@ -460,10 +460,10 @@ def test_implicit_steps_go_on_from_a_file(tmp_path) -> None:
         Coupled(other, 0.5)
 
 
-def _cracked(**stress: float) -> tuple[Blocks, Flow, np.ndarray]:
+def _cracked(made: Callable[..., Mesh] = box, **stress: float) -> tuple[Blocks, Flow, np.ndarray]:
     """Rock under stress with a crack all along z = 0.1 full of fluid, held below and above, and the joints of the crack
     away from both ends."""
-    mesh = box((6, 2, 2), (0.6, 0.2, 0.2))
+    mesh = made((6, 2, 2), (0.6, 0.2, 0.2))
     sim = body(mesh, dynamic=False, young=1e9)
     sim.option(large_strain=False, collision=True)
     joints = on_plane(mesh, 2, 0.1)
@@ -490,10 +490,11 @@ def _held_at(sim: Blocks, flow: Flow, pressure: float, middle: np.ndarray) -> np
     return found[middle, 2:]
 
 
-def test_faces_of_a_crack_press_on_each_other() -> None:
+@pytest.mark.parametrize("made", [box, hexes])
+def test_faces_of_a_crack_press_on_each_other(made: Callable[..., Mesh]) -> None:
     """It is carried, command after command; with pressure in the crack its faces press by the rest, and part where the
     pressure is larger."""
-    sim, flow, middle = _cracked(zz=-1e6)
+    sim, flow, middle = _cracked(made, zz=-1e6)
     sim.velocity_condition(None, vx=0.0)
     for pressure in (0.0, 4e5, 4e5, 1.5e6):
         normal, shear = _held_at(sim, flow, pressure, middle).T
@@ -504,10 +505,10 @@ def test_faces_of_a_crack_press_on_each_other() -> None:
     assert not sim.event_rows and not (sim.broken > 0).any()
 
 
-@pytest.mark.parametrize("friction", [0.0, 30.0])
-def test_faces_of_a_crack_rub(friction: float) -> None:
+@pytest.mark.parametrize(("friction", "made"), [(0.0, box), (30.0, box), (30.0, hexes)])
+def test_faces_of_a_crack_rub(friction: float, made: Callable[..., Mesh]) -> None:
     """No more shear than friction holds, and as much where they slip; pressure of the fluid takes it away."""
-    sim, flow, middle = _cracked(zz=-1e6, xz=8e5)
+    sim, flow, middle = _cracked(made, zz=-1e6, xz=8e5)
     sim.joint_property(flow.network.channels, {"friction": friction})
     for pressure in (0.0, 5e5):
         normal, shear = _held_at(sim, flow, pressure, middle).T
