@@ -235,14 +235,13 @@ def test_an_implicit_step_is_backward_euler_and_steady_states_are_found_at_once(
     assert temperatures(sim) == pytest.approx(100.0 - 30.0 * mesh.points[:, 0] / 1.2, rel=1e-9)
 
 
-@pytest.mark.parametrize("of, jointed", [(box, False), (box, True), (hexes, False)])
+@pytest.mark.parametrize("of, jointed", [(box, False), (box, True), (hexes, False), (hexes, True)])
 def test_blocks_are_in_equilibrium_at_the_end_of_implicit_steps(of: Any, jointed: bool) -> None:
     """Between walls along x, free across: stress follows the temperature; joints are 100 E stiff."""
     mesh = of((4, 2, 2), (1.2, 0.8, 0.9))
     sim = body(mesh, dynamic=False)
     if jointed:
-        edges = mesh.edges()
-        sim.joint_model(edges.faces[edges.inner, 0], INTERFACE, {**JOINT, "penalty_normal": 100.0 * YOUNG})
+        sim.joint_model(None, INTERFACE, {**JOINT, "penalty_normal": 100.0 * YOUNG})
     for axis, low in (("x", "left"), ("y", "front"), ("z", "bottom")):
         sim.velocity_condition(nodes_on(mesh, low), **{f"v{axis}": 0.0})
     sim.velocity_condition(nodes_on(mesh, "right"), vx=0.0)
@@ -348,11 +347,11 @@ def test_bodies_that_touch_pass_heat_on(of: Any) -> None:
         Implicit(apart).steady()
 
 
-def test_heat_crosses_joints_until_they_break() -> None:
-    mesh = box((4, 1, 1), (2.0, 0.5, 0.5))
+@BOTH
+def test_heat_crosses_joints_until_they_break(of: Any) -> None:
+    mesh = of((4, 1, 1), (2.0, 0.5, 0.5))
     sim, heat = standing(mesh)
-    edges = mesh.edges()
-    joints = edges.faces[edges.inner, 0]
+    joints = sim.numbers_of_joints(None)
     sim.joint_model(joints, INTERFACE, JOINT)
     heat.prescribe(nodes_on(mesh, "left"), 100.0)
     heat.prescribe(nodes_on(mesh, "right"), 0.0)
@@ -482,7 +481,7 @@ WARM = [("young", (40e9, 60e9), "rock"), ("cohesion", (1e5, 3e5), "soil"), ("ten
 @pytest.mark.parametrize(
     ("shape", "name", "at", "of"),
     [*((shape, *one) for shape in (box, hexes) for one in WARM), (box, "tensile_strength", (1e5, 3e5), "joint"),
-     (box, "gf1", (1.0, 5.0), "joint")],
+     (box, "gf1", (1.0, 5.0), "joint"), (hexes, "tensile_strength", (1e5, 3e5), "joint")],
 )  # fmt: skip
 def test_properties_by_temperature(shape: Any, name: str, at: tuple[float, float], of: str) -> None:
     """At the temperature between two points of the table: every bit of the run with the constant of that temperature,
@@ -499,9 +498,8 @@ def test_properties_by_temperature(shape: Any, name: str, at: tuple[float, float
         else:
             changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, **({name: value} if of == "rock" else {})})
         if of == "joint":
-            edges = mesh.edges()
             law = {**JOINT, "tensile_strength": 2e5, "cohesion": 1e6, "gf1": 2.0, "gf2": 10.0, name: value}
-            sim.joint_model(edges.faces[edges.inner, 0], INTERFACE, law)
+            sim.joint_model(None, INTERFACE, law)
         heat = Heat.of(sim)
         heat.assign(None, GRANITE)
         heat.initial(None, 100.0)
