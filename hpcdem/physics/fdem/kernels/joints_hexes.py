@@ -107,6 +107,24 @@ def _share(n, lanes):
             lanes[NEAR + axis * _NEXT + e] = -gd * back
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _add_one(to, k, force, lanes):
+    force[to] += lanes[k]
+    force[to + U(1)] += lanes[k + _NEXT]
+    force[to + U(2)] += lanes[k + U(2) * _NEXT]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add(n, first, at, force, lanes):
+    """Forces of n halves to those of their corners, one half after the other."""
+    for e in range(U(n)):
+        i = U(first) + e
+        _add_one(U(at[i, U(0)]), J + e, force, lanes)
+        _add_one(U(at[i, U(1)]), J + U(3) * _NEXT + e, force, lanes)
+        _add_one(U(at[i, U(2)]), J + U(6) * _NEXT + e, force, lanes)
+        _add_one(U(at[i, U(3)]), NEAR + e, force, lanes)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _kinetic(i, place, h, v):
     """Kinetic energy [J] of a hexahedron at the half step before."""
@@ -180,15 +198,9 @@ def _forces(
                 room, tally[t],
             )  # fmt: skip
         _share(n, lanes)
-        for e in range(n):
-            for m in range(4):
-                to = at[first + e, m]
-                for axis in range(3):
-                    k = U(axis) * _NEXT + U(e)
-                    f = lanes[NEAR + k] if m == 3 else lanes[J + U(3 * m) * _NEXT + k]
-                    force[to + axis] += f
-                    if keep:
-                        of_joints[to + axis] += f
+        _add(n, first, at, force, lanes)
+        if keep:
+            _add(n, first, at, of_joints, lanes)
         first += n
 
 
