@@ -11,7 +11,7 @@ from hpcdem.physics.fdem.kernels.joints import NONE
 from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.local_space import LocalSpace
+    from hpcdem.physics.fdem.laws_space import LawsSpace
 
 
 class Faces(NamedTuple):
@@ -38,7 +38,7 @@ class HexJoints:
     at, weights: see `joints_hexes.forces`; quad (m,) bool: there is one hexahedron on the other side, and the other
     half of the side is a joint too. Others are joints as those of tetrahedra."""
 
-    def __init__(self, local: LocalSpace) -> None:
+    def __init__(self, local: LawsSpace) -> None:
         assert local.hexes is not None
         self.local = local
         sim, mesh, hexes = local.sim, local.sim.the_mesh(), local.hexes

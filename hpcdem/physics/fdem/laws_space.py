@@ -23,6 +23,8 @@ class LawsSpace(Local):
 
     rows: np.ndarray
     hexes: Hexes | None
+    slot_link: np.ndarray
+    slot_size: np.ndarray
     _stress: np.ndarray
     """Initial stress (n_own, 6) [Pa]."""
 
