@@ -285,7 +285,8 @@ def dig_beam(sim: Blocks) -> None:
 
 
 def shattering_hexes(sim: Blocks) -> None:
-    """The same of hexahedra; half of the beam is of tetrahedra that hang on them by joints, and some of it yields."""
+    """The same of hexahedra; a part of the beam is of tetrahedra that hang on them by joints, some of it yields, some
+    creeps."""
     cells, size = (14, 2, 1), (2.8, 0.4, 0.2)
     beam, split = hexes(cells, size, 0.1), box(cells, size)
     of_tets = np.flatnonzero(split.centroids()[:, 0] > 2.0)
@@ -302,6 +303,11 @@ def shattering_hexes(sim: Blocks) -> None:
     x = mesh.centroids()[:, 0]
     soil = {**rock, "friction": 30.0, "dilation": 5.0, "cohesion": 2e5, "tensile": 1e5}
     changes.element_model(sim, np.flatnonzero((x < 0.6) & (mesh.cells.max(axis=1) < n)), "mech_mohr_coulomb", soil)
+    soft = {**rock, "maxwell_viscosity": 4e6, "kelvin_shear": 1e8, "kelvin_viscosity": 1e5}
+    changes.element_model(
+        sim, np.flatnonzero((x > 1.2) & (x < 1.8) & (mesh.cells.max(axis=1) < n)), "mech_burgers", soft
+    )
+    creep.switch(sim, True)
     joints = sim.numbers_of_joints(None)
     law = {
         "friction": 30.0, "cohesion": 4e6, "tensile_strength": 8e5, "gf1": 25.0, "gf2": 100.0, "penalty_normal": 4e9,
@@ -450,10 +456,15 @@ def it_shatters(found: Found) -> None:
     assert len(found["contact_face"]) > 20 and (found["event_mode"] > 1.9).any() and (found["event_mode"] < 1.1).any()
 
 
+def in_pieces_that_creep(sim: Blocks, notes: dict[str, Any]) -> Found:
+    return {**in_pieces(sim, notes), **crept(sim, notes)}
+
+
 def hexes_shatter(found: Found) -> None:
     counts = np.bincount(found["state"][np.isfinite(found["state"])].astype(int), minlength=4)
     assert counts[1:].min() > 20
     assert found["energy_relative"] < 1e-3 and found["energy_joints_lost"] > 0.0 < found["energy_plastic_lost"]
+    assert (found["creep_work"] > 0.0).sum() > 30 and found["energy_creep_lost"] > 0.0
     assert len(found["contact_face"]) > 20 and (found["event_mode"] > 1.9).any() and (found["event_mode"] < 1.1).any()
 
 
@@ -525,7 +536,7 @@ MODELS = {
     "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
     "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10),
     "hexahedra that shatter": Model(
-        shattering_hexes, in_pieces, hexes_shatter, dig_beam_of_hexes, steps=900, middle=501, come=10
+        shattering_hexes, in_pieces_that_creep, hexes_shatter, dig_beam_of_hexes, steps=900, middle=501, come=10
     ),
     "glowing": Model(glowing, hot, it_glows, glow_on, steps=900, middle=501, come=1, slow=True),
     "soil that gets warm": Model(
