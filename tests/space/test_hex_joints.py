@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.physics.fdem import convergence, diagnostics, equilibrium
-from hpcdem.physics.fdem.kernels import joints
+from hpcdem.physics.fdem.kernels import joints, laws
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.space.support import ROCK, body, box, faces_on, hexes, nodes_on
@@ -255,3 +255,31 @@ def test_a_pulled_bar_breaks_in_the_middle_with_mode_1():
     found = diagnostics.events(sim)
     assert len(found["joint"]) == 8 and (found["mode"] < 1.01).all() and np.allclose(found["z"], 0.2)
     assert found["joint_area"].sum() == pytest.approx(0.04) and (found["peak_step"] < found["step"]).all()
+
+
+@pytest.mark.parametrize("size", [3e-8, 3e-7, 2e-5])
+def test_forces_are_those_of_the_plain_reference(size):
+    """Two times three points of a side, with bilinear shape functions of its four corners on the plane of each half."""
+    rng = np.random.default_rng(8)
+    halves, corner = (((0, 1, 2), (0, 2, 3))), np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    for _ in range(8):
+        pair, ways = Pair(), rng.uniform(-size, size, (4, 3))
+        mine, _ = pair.put(*ways)
+        table, beyond = pair.local.joint_table[1], pair.local.joint_beyond[1]
+        expected, middle = np.zeros((4, 3)), np.column_stack([QUAD, np.zeros(4)]) + 0.5 * ways
+        for half in halves:
+            twice = np.cross(middle[half[1]] - middle[half[0]], middle[half[2]] - middle[half[0]])
+            normal, area = twice / np.linalg.norm(twice), 0.5 * np.linalg.norm(twice)
+            for point in half:
+                at = corner[list(half)].sum(axis=0) / 6.0 + corner[point] / 2.0
+                shape = np.prod(np.where(corner == 1.0, at, 1.0 - at), axis=1)
+                jump = shape @ ways
+                slip = jump - (jump @ normal) * normal
+                more = [beyond[k] for k in (joints.PER_O_T, joints.PER_S_T, joints.PER_KOP, joints.PER_HALF_SHEAR)]
+                law = [table[k] for k in (joints.KOP, joints.TENSILE, joints.OVERLAY, joints.TAN_PHI, joints.COHESION)]
+                size_of_slip = float(np.linalg.norm(slip))
+                sigma, tau = laws.yielded_point(
+                    float(jump @ normal), size_of_slip, SIDE, 1.0 / SIDE, *law, *more, 0.0, 0.0, 0.0
+                )[:2]
+                expected += area / 3.0 * np.outer(shape, sigma * normal + tau * slip / size_of_slip)
+        assert np.allclose(mine, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
