@@ -72,3 +72,16 @@ def test_what_is_inside_a_hexahedron_is_no_joint(tmp_path: Path) -> None:
     assert len(inside) == 12 * 16
     with pytest.raises(HpcdemError, match="there is no face-joint"):
         run(tmp_path, SCRIPT.replace("range x 0.1 0.1", f"range id {inside[0]}"))
+
+
+def test_a_disc_is_followed_by_whole_sides(tmp_path: Path) -> None:
+    """Both halves of a side become cracks, none of its hexahedra is cut."""
+    text = SCRIPT[: SCRIPT.index("pcdc geometry")].replace("0.4,0.2,0.2", "0.4,0.4,0.4").replace("4 2 2", "6 6 6")
+    disc = "pcdc geometry create disc (0.21,0.2,0.19) (0.3,0.2,1) 0.13 as-layer 'd'\n"
+    mesh = run(tmp_path, text + disc + "pcdc mesh intersect layer 'd' follow\n").project.whole_mesh()
+    edges = mesh.edges()
+    faces = edges.faces[mesh.find_edges(edges, mesh.cracks)]
+    _, fourth, *_ = mesh.on_sides(faces[:, 0])
+    assert len(faces) > 20 and len(fourth) == len(faces) and not mesh.inside_hexes(faces[:, 0]).any()
+    sides = {tuple(sorted({*row, p})) for row, p in zip(mesh.cracks.tolist(), mesh.cells.reshape(-1)[fourth].tolist())}
+    assert 2 * len(sides) == len(faces)
