@@ -5,8 +5,8 @@ python equilibrium_worker.py RUN...
 RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
 SOLVER-pumped: a joint that fluid opens by implicit steps, in one go and from a file in mid-injection, -propped: slurry,
 or SOLVER-cooled: a jointed bar that cools, SOLVER-rinsed: rock that water cools, or SOLVER-solid, SOLVER-crushed,
-SOLVER-burst: tetrahedra, with joints that break, that yield and are dug out, whose joints fluid opens; one after the
-other. Files are RUN.npz.
+SOLVER-burst: tetrahedra, with joints that break, that yield and are dug out, whose joints fluid opens, SOLVER-sides,
+SOLVER-seam: the first and the last of hexahedra; one after the other. Files are RUN.npz.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from tests.blocks.support import JOINT, ROCK, near, rectangle, shaken
 from tests.flow.support import WATER
 from tests.heat.support import GRANITE
 from tests.parallel.model import communicator
-from tests.space.support import box
+from tests.space.support import box, hexes
 
 SAND = {"proppant_density": 2650.0, "proppant_size": 1e-6, "proppant_concentration_limit": 0.6}
 
@@ -228,9 +228,10 @@ def rinsed(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
-def solid(sim: Blocks, solver: str, out: str) -> None:
+def solid(sim: Blocks, solver: str, out: str, of_hexes: bool = False) -> None:
     """A bar with joints in its right half, held along oblique ways, pulled until some break."""
-    mesh = box((12, 2, 2), (2.4, 0.4, 0.3), 5, shaken=0.2)
+    cells, size = (12, 2, 2), (2.4, 0.4, 0.3)
+    mesh = hexes(cells, size, 0.2) if of_hexes else box(cells, size, 5, shaken=0.2)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     face = mesh.points[mesh.face_points(np.arange(4 * len(mesh.cells)))][:, :, 0]
@@ -255,9 +256,13 @@ def solid(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
-def burst(sim: Blocks, solver: str, out: str) -> None:
+def sides(sim: Blocks, solver: str, out: str) -> None:
+    solid(sim, solver, out, True)
+
+
+def burst(sim: Blocks, solver: str, out: str, of_hexes: bool = False) -> None:
     """A plane of joints between tetrahedra that a well opens, then shuts in; where they broke they press and rub."""
-    mesh = box((12, 2, 4), (1.2, 0.2, 0.4), 6)
+    mesh = (hexes if of_hexes else box)((12, 2, 4), (1.2, 0.2, 0.4))
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     joints = sim.numbers_of_joints(None)
@@ -287,6 +292,10 @@ def burst(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
+def seam(sim: Blocks, solver: str, out: str) -> None:
+    burst(sim, solver, out, True)
+
+
 def crushed(sim: Blocks, solver: str, out: str) -> None:
     """A bar of rock that yields under a stamp; a part is dug out."""
     mesh = box((12, 3, 3), (2.4, 0.6, 0.6), 5, shaken=0.2)
@@ -313,7 +322,7 @@ def crushed(sim: Blocks, solver: str, out: str) -> None:
 
 KINDS = {
     "": excavation, "yields": stamp, "pumped": pumped, "propped": propped, "cooled": cooled, "rinsed": rinsed,
-    "solid": solid, "crushed": crushed, "burst": burst,
+    "solid": solid, "crushed": crushed, "burst": burst, "sides": sides, "seam": seam,
 }  # fmt: skip
 
 if __name__ == "__main__":

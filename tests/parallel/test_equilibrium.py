@@ -16,7 +16,7 @@ WORKER = Path(__file__).with_name("equilibrium_worker.py")
 
 pytestmark = pytest.mark.ranks
 SLOW = pytest.mark.slow
-KINDS = ("", "-yields", "-pumped", "-propped", "-cooled", "-rinsed", "-solid", "-crushed", "-burst")
+KINDS = ("", "-yields", "-pumped", "-propped", "-cooled", "-rinsed", "-solid", "-crushed", "-burst", "-sides", "-seam")
 Found = dict[str, np.ndarray]
 
 
@@ -104,13 +104,15 @@ def test_cold_water_cools_the_rock(runs):
 
 
 def test_tetrahedra_break_and_yield(runs):
-    solid, crushed = runs(1, "direct-solid"), runs(1, "direct-crushed")
-    assert solid["ratios"].max() < 1e-8 and solid["joints"][1:].sum() > 3
+    crushed = runs(1, "direct-crushed")
+    for solid in (runs(1, "direct-solid"), runs(1, "direct-sides")):
+        assert solid["ratios"].max() < 1e-8 and solid["joints"][1:].sum() > 3
     assert crushed["ratios"].max() < 1e-8 and np.nanmax(crushed["plastic_shear_strain"]) > 1e-3
 
 
-def test_fluid_opens_joints_of_tetrahedra(runs):
-    found = runs(1, "direct-burst")
+@pytest.mark.parametrize("kind", ["burst", "seam"])
+def test_fluid_opens_joints_of_tetrahedra_and_hexahedra(runs, kind):
+    found = runs(1, f"direct-{kind}")
     assert found["joints"][1:].sum() > 5 and found["pressure"].max() > 1e6 and found["saturation"].min() < 0.5
     pressure, rate, injected, stage = found["wells"]
     assert pressure > 1e5 and (rate, stage) == (0.0, 2.0) and injected == pytest.approx(1e-5 * 0.43, rel=1e-12)
@@ -149,7 +151,13 @@ CRUSHED = ("stress_xx", "displacement_x", "displacement_z", "plastic_shear_strai
         ("-solid", SOLID),
         *(
             pytest.param(*one, marks=SLOW)
-            for one in (("-yields", PLASTIC), ("-propped", PROPPED), ("-crushed", CRUSHED), ("-burst", BURST))
+            for one in (
+                ("-yields", PLASTIC),
+                ("-propped", PROPPED),
+                ("-crushed", CRUSHED),
+                ("-burst", BURST),
+                ("-sides", SOLID),
+            )
         ),
     ],
 )
