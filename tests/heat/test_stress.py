@@ -8,6 +8,7 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, creep, diagnostics, equilibrium, saved_state, user_laws
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tables import TEMPERATURE, Over
 from hpcdem.physics.heat.model import Heat
 from tests.blocks.support import ROCK, rectangle, shaken
 from tests.blocks.test_user_laws import LAWS as USERS
@@ -173,10 +174,32 @@ def test_laws_of_users_know_no_temperature() -> None:
     changes.element_model(sim, None, user_laws.load(sim, USERS, "rock.py:elastic").name, ROCK)
     heat = Heat.of(sim)
     heat.assign(None, {**GRANITE, "expansion_coeficient": ALPHA})
-    with pytest.raises(CommandError, match="knows no temperature"):
+    with pytest.raises(CommandError, match="knows no strain e33 of heat"):
         sim.step()
     heat.adjust(None, {"expansion_coeficient": 0.0})
     sim.step()
+
+
+def test_beside_laws_of_users_moduli_may_follow_temperatures() -> None:
+    """A cycle of heat changes nothing of the stress that elements with a law are told to have."""
+    sim = Blocks()
+    sim.take_mesh(rectangle(2, 2, 1.0, 1.0))
+    sim.table("softer", [(0.0, ROCK["young"]), (100.0, 0.5 * ROCK["young"])])
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": Over("softer", TEMPERATURE)})
+    changes.element_model(sim, np.arange(4), user_laws.load(sim, USERS, "rock.py:elastic").name, ROCK)
+    heat = Heat.of(sim)
+    heat.assign(None, GRANITE)
+    sim.velocity_condition(None, vx=0.0, vy=0.0)
+    sim.open_model()
+    sim.x[:, ::2] += 1e-4 * sim.x[:, 1::2]
+    sim.close_model()
+    before = diagnostics.values(sim, "stress_xy")
+    heat.prescribe(None, 100.0)
+    sim.heat_clock(dt=1.0)
+    sim.step()
+    after = diagnostics.values(sim, "stress_xy")
+    assert np.array_equal(after[:4], before[:4]) and before.min() > 1e5
+    assert after[4:] == pytest.approx(0.5 * before[4:], rel=1e-9)
 
 
 @pytest.mark.parametrize("capacity", [800.0, 1e-4])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hpcdem.commands.fdem.project import joined
-from hpcdem.physics.fdem import changes, creep, diagnostics
+from hpcdem.physics.fdem import changes, creep, diagnostics, user_laws
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
@@ -176,6 +177,47 @@ def glow_in_hexes(sim: Blocks) -> None:
         Heat.of(sim).adjust(np.arange(24), {"capacity": 700.0})
         Heat.of(sim).initial(np.flatnonzero(sim.node_exists())[5:9], 90.0)
         sim.heat_clock(steps=2)
+
+
+LAWS = Path(__file__).with_name("laws") / "rock.py"
+
+
+def load_laws(sim: Blocks) -> None:
+    """Laws of the user, before they are assigned or restored."""
+    user_laws.load(sim, LAWS, "rock.py:mises")
+
+
+def hexes_that_obey(sim: Blocks) -> None:
+    """Of the same a part has a law of the user, as some of the tetrahedra do; it is warm here and there."""
+    blocks_of_hexes(sim)
+    sim.rayleigh(0.02, 60.0, part="mass")
+    mesh = sim.mesh
+    mises = user_laws.load(sim, LAWS, "rock.py:mises").name
+    x, of_hexes = mesh.centroids()[:, 0], mesh.hex_of() >= 0
+    soft = {**ROCK, "young": 1e8, "damp_factor": 0.02}
+    changes.element_model(sim, np.flatnonzero((x > 0.8) & (x < 2.1) | ~of_hexes), mises, {**soft, "limit": 1.5e4})
+    heat = Heat.of(sim)
+    heat.assign(None, {**ROCK_OF_HEAT, "transfer_coeficient": 0.0})
+    heat.initial(None, 20.0)
+    heat.prescribe(np.flatnonzero(np.abs(mesh.points[:, 0] - 1.6) < 0.3)[::3], 150.0)
+    sim.heat_clock(dt=20.0)
+
+
+def obey_more(sim: Blocks) -> None:
+    """What happens to it."""
+    dig_hexes(sim)
+    if sim.clock.step == 300:
+        changes.reset_state(sim, np.arange(96, 144))
+
+
+def obeying(sim: Blocks, notes: dict[str, Any]) -> Found:
+    names = ("law_p11", "law_p23", "law_work", "temperature")
+    return touching(sim, notes) | {name: diagnostics.values(sim, name) for name in names}
+
+
+def they_obey(found: Found) -> None:
+    assert (found["law_work"] > 0.0).sum() > 100 and np.nanmax(found["temperature"]) == 150.0
+    assert np.isnan(found["strain_energy"]).any() and np.nanmax(found["displacement_x"]) > 0.5
 
 
 def dig_hexes_that_flow(sim: Blocks) -> None:
@@ -548,6 +590,9 @@ MODELS = {
     ),
     "hexahedra that glow": Model(
         hexes_that_glow, hot_hexes, they_glow, glow_in_hexes, steps=900, middle=401, come=10, slow=True
+    ),
+    "hexahedra that obey": Model(
+        hexes_that_obey, obeying, they_obey, obey_more, prepare=load_laws, steps=600, middle=401, come=10, slow=True
     ),
     "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),
 }

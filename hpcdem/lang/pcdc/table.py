@@ -240,7 +240,7 @@ USER = Model(
     "user", "", "A law in a Python file of the user, see docs/user_laws.md.",
     (*declared(properties.USER, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "d{amp}-f{actor}",
                "fri{ction}", "pen{alty}"), _PARAMETER),
-    one_of=_PAIRS, of=properties.USER, leading=(_LAW,),
+    one_of=_PAIRS, of=properties.USER, leading=(_LAW,), dims=BOTH,
 )  # fmt: skip
 BURGERS = Model(
     "mech{anical}-bur{gers}", "3",
@@ -592,7 +592,7 @@ _OF_SOLIDS = (
     *(o for o in _properties(MOHR_COULOMB) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *(o for o in _properties(BURGERS) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *_properties(ISO_HEAT),
-    replace(_PARAMETER, dims=PLANE),
+    _PARAMETER,
 )  # fmt: skip
 
 _MODEL = (
@@ -921,7 +921,7 @@ _OBJECTS = (
             dims=BOTH),
     Command("el{ement} law", "Reads, checks and compiles a law of a Python file without giving it to elements: for a "
             "script that begins with model restore. A checkpoint does not name files that are executed.",
-            ("pcdc element law 'clay.py:clay'",), (_LAW,)),
+            ("pcdc element law 'clay.py:clay'",), (_LAW,), dims=BOTH),
     Command("el{ement} prop{erty}", "Changes properties; the others stay.",
             ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
              "pcdc element property conductivity 3.5 range group 'salt'",
@@ -1115,7 +1115,7 @@ _RECORDS = (
             (Option("id", (ZERO_OR_MORE,), "the object of this number"),
              Option("near{est}", (VECTOR,), "the object nearest to this point", "m"),
              Option("val{ue}", (_RECORDED,), "what is recorded, see below", required=True), _EVERY,
-             Option("var{iable}", (STRING,), "with law-state: which state variable of laws of the user", dims=PLANE),
+             Option("var{iable}", (STRING,), "with law-state: which state variable of laws of the user"),
              Option("well", (STRING,), "with object well: its name"),
              *(Option(how, (), "of the objects of range, or of all")
                for how in ("sum", "mean", "min{imum}", "max{imum}"))),

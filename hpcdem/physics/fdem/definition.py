@@ -26,8 +26,8 @@ from hpcdem.physics.fdem.properties import (
     FACE,
     JOINT,
     MECH_BURGERS,
-    MECH_ISO_ELASTIC,
     MECH_MOHR_COULOMB,
+    MODELS,
     Model,
     Rows,
     softening_rows,
@@ -356,8 +356,11 @@ class ModelDefinition:
 
     def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a model (model.blocks.properties) with all its properties to elements."""
-        if name not in (MECH_ISO_ELASTIC.name, MECH_MOHR_COULOMB.name, MECH_BURGERS.name):
-            self.refuse_in_space(f"model {name} of elements")
+        model = MODELS.get(name)
+        if model is not None and self.dim not in model.dims:
+            raise CommandError(
+                f"{model.doc} is not for {self.dim} dimensions: element_law(dim={self.dim}) declares one that is"
+            )
         at = self.numbers_of_elements(elements)
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)

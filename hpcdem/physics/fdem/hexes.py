@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import hexahedra
+from hpcdem.physics.fdem import hexahedra, user_laws
 from hpcdem.physics.fdem.hexahedra import OVERLAYS, PARTS
 from hpcdem.physics.fdem.kernels import hexes, space, tets
 from hpcdem.physics.fdem.local import element_table
@@ -38,8 +38,8 @@ class Hexes:
     """count: hexahedra of this rank; rows (count, 6): storage rows of their tetrahedra; begin (count,): which owned
     element the first of these is; of (count, 24): corner of the hexahedron at each corner of these; place: see
     `hexes.forces`; corner_of (n, 4): of all rows of storage, the place in x and force of the corner that has the forces
-    of each corner; model (count,): row of their models; remember: some may yield or creep, each tetrahedron has a
-    stress without strain of its own."""
+    of each corner; model (count,): row of their models; remember: some may yield, creep or obey a law of the
+    user, each tetrahedron has a stress without strain of its own."""
 
     def __init__(self, sim: State, true_mass: np.ndarray) -> None:
         self.sim = sim
@@ -69,7 +69,7 @@ class Hexes:
         mass = true_mass[self.place[:n] // tets.ROW, self.place[:n] % tets.ROW // tets.STRIDE]
         self._make_constants(models[:, 0], mass)
         self.model = models[:, 0]
-        self.remember = "plastic" in sim.cold or "creep" in sim.cold
+        self.remember = not {"plastic", "creep", user_laws.COLUMN}.isdisjoint(sim.cold)
 
     def _make_constants(self, model: np.ndarray, mass: np.ndarray) -> None:
         """parts (blocks, 10, 10, 32), h (count + 3, 20): see `hexes.forces`."""
@@ -188,14 +188,15 @@ class Hexes:
             self.at_corners(dashpots), o.mass_damping, o.stiffness_damping, o.safety, target, mass,
         )  # fmt: skip
 
-    def static_masses(self, springs: np.ndarray, alpha: float, mass: np.ndarray) -> None:
-        """Fictitious masses by the largest row of the stiffness in the mesh, see `space.static_masses`."""
+    def static_masses(self, h: np.ndarray, springs: np.ndarray, alpha: float, mass: np.ndarray) -> None:
+        """Fictitious masses by the largest row of the stiffness in the mesh, with these constants, see
+        `space.static_masses`."""
         x = np.zeros_like(self.sim.x)
         flat = x.reshape(-1)
         for axis in range(3):
             flat[self.place[: self.count] + axis] = self.sim.the_mesh().points[self.nodes, axis]
         k = np.empty((self.count, 24, 24))
-        h = self.h.copy()
+        h = h.copy()
         h[:, :6] = 0.0
         hexes.stiffness(self.count, self.place, x, self.parts, h, False, np.zeros((0, 10, 8)), True, k)
         rows = np.abs(k).sum(axis=2).reshape(self.count, 8, 3).max(axis=2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -181,6 +181,7 @@ class Local:
     """
 
     dim, force_width, stride = 2, elements.FORCE, 2
+    without_moduli: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]] = ()
 
     def __init__(self, sim: State) -> None:
         self.sim = sim
@@ -276,6 +277,7 @@ class Local:
         if part is not None:
             for table, full, columns, rows in self._moduli():
                 table[: len(rows), columns] = full[: len(rows), columns] * part[rows, None]
+            self._clear_moduli()
         if sim.stress0 is not None:
             said = sim.stress0_row[sim.number[sim.owned]]
             before = by_temperature.part_of_young(sim, said, sim.cold[by_temperature.UNSTRESSED][:, 0])
@@ -290,6 +292,11 @@ class Local:
             for column, name in ((strength.COHESION, "cohesion"), (strength.TENSILE, "tensile")):
                 self.strength.values[:, column] = by_temperature.values(sim, sim.element_rows, name, of, t)
             self._renew_strength()
+
+    def _clear_moduli(self) -> None:
+        """Elements with a law of the user have no moduli in the tables of forces."""
+        for table, at, columns in self.without_moduli:
+            table[np.ix_(at, columns)] = 0.0
 
     def _moduli(self) -> Iterable[tuple[np.ndarray, np.ndarray, list[int], np.ndarray]]:
         """Tables of elements: as they are, with their largest moduli, columns of these, and the how-manieth owned
@@ -422,8 +429,9 @@ class Local:
         ):  # fmt: skip
             at = np.flatnonzero(number)
             stiff[np.ix_(at, columns)] *= (bound[row[at]] / modulus[row[at]])[:, None]
-            table[np.ix_(at, columns)] = 0.0
+            self.without_moduli = *self.without_moduli, (table, at, columns)
             s0[at] = base[at]  # what such an element has flowed or crept, with another model, is not of the law
+        self._clear_moduli()
         blocks = np.arange(self.count) // elements.BLOCK
         for k, law in enumerate(user_laws.of_rows(rows)):
             triangles, quads = (number == 1 + k for number in numbers)

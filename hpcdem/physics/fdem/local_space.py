@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.physics.fdem import user_laws
 from hpcdem.physics.fdem.definition import TRACTIONS
 from hpcdem.physics.fdem.hexes import Hexes, place_masses
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
@@ -37,7 +38,6 @@ class LocalSpace(LawsSpace):
         self.rows = np.concatenate([rows, np.repeat(rows[-1:], 3)]).astype(np.int32)
         self.tally = np.zeros((sim.threads, elements.TALLY), np.int64)
         self.passes = 0
-        self.laws: list = []
         self._make_constants()
         self._make_memories()
         self._make_joints()
@@ -235,20 +235,20 @@ class LocalSpace(LawsSpace):
         return found if self.hexes is None else min(found, self.hexes.time_step(*springs, target, mass))
 
     def _tetrahedra(self) -> tuple[np.ndarray, np.ndarray]:
-        """Storage rows and constants of the elements that are no parts of hexahedra."""
+        """Storage rows and constants, with the largest moduli, of the elements that are no parts of hexahedra."""
         rows = self.rows[: self.count]
         if self.hexes is None:
-            return rows, self.c
+            return rows, self.stiff
         alone = np.ones(self.count, bool)
         alone[self.hexes.rows - self.sim.n_left] = False
-        return rows[alone], self.c[: self.count][alone]
+        return rows[alone], self.stiff[: self.count][alone]
 
     def _make_static_masses(self) -> None:
         springs = self.springs()[0]
         rows, c = self._tetrahedra()
         space.static_masses(c, rows, self.sim.n_left, springs, ALPHA, self.mass)
         if self.hexes is not None:
-            self.hexes.static_masses(springs, ALPHA, self.mass)
+            self.hexes.static_masses(self.stiff_hexes, springs, ALPHA, self.mass)
 
     def _set_kicks(self, dt: float) -> None:
         mass = self.mass[self.sim.owned]
@@ -291,7 +291,7 @@ class LocalSpace(LawsSpace):
     ) -> None:  # fmt: skip
         """Forces of elements and, if they are wanted, of their joints with the velocities v (n, 16)."""
         sim, o = self.sim, self.sim.options
-        stressed = sim.stress0 is not None or self.plastic or self.creeps or self.heated
+        stressed = sim.stress0 is not None or self.plastic or self.creeps or self.heated or self.lawful
         hexes = self.hexes
         some = 0 if hexes is not None and 6 * hexes.count == self.count else self.count
         self._forces(
@@ -313,11 +313,11 @@ class LocalSpace(LawsSpace):
         """See `Local.open_joints`."""
         scratch, of_joints = (np.zeros((len(self.sim.number), tets.ROW)) for _ in range(2))
         self.pairs.pushed[:] = 0.0
-        yields, self.yields = self.yields, False
+        (yields, self.yields), (laws, self.laws) = (self.yields, False), (self.laws, [])
         try:
             self._fill(scratch, of_joints, False)
         finally:
-            self.yields = yields
+            self.yields, self.laws = yields, laws
 
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""
@@ -417,6 +417,8 @@ class LocalSpace(LawsSpace):
             self.hexes.spread(stress, energy, at, quad_s0, self.hexes_store(plastic, crept))
         if energies and self.heated:
             energy += self._energy_of_heat()[at]
+        if energies and self.lawful:  # what such a law stores is not known
+            energy[user_laws.numbers(sim)[sim.number[at + sim.n_left]] > 0] = np.nan
         return stress, energy
 
     def _energy_of_heat(self) -> np.ndarray:

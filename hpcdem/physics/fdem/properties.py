@@ -74,6 +74,7 @@ class Model:
     derive: Callable[[dict[str, Any]], None] = lambda values: None
     called: Mapping[str, str] = field(default_factory=dict)
     """Its own names of properties that other models call otherwise."""
+    dims: tuple[int, ...] = (2, 3)
 
     def has(self, name: str) -> bool:
         """Whether it has a property of this name."""

@@ -13,14 +13,18 @@
 A law is compiled by numba. It takes numbers by these names and returns the stress [Pa] that belongs to them, tension
 positive, and then its state variables in the order in which they were declared:
 
-- e11, e22, e12: strain U - 1 in the frame that turns with the element (with small strains: that of the plane); evol:
+- e11, e22, e12: strain U - 1 in the frame that turns with the element (with small strains: that of the mesh); evol:
   its volume strain, e11 + e22, in a quad that of the overlay, which the built-in laws take;
 - its state variables, as they are after the step before;
 - what it needs of the properties that every solid has (density, damp_factor, young, poisson_ratio, shear, bulk,
   friction, penalty) and of its own;
 - i11, i22, i12, i33: initial stress [Pa], which is added to what the law returns; dt: time step [s], 0 in static runs.
 
-It is called once per step and element, of a quad for each of its four triangles. The time step follows from
+A law of space, @element_law(dim=3), takes e11, e22, e12, e33, e13, e23, of i11 to i23 what it needs, and returns s11,
+s22, s12, s33, s13, s23; evol is e11 + e22 + e33. Its strain is that without thermal expansion.
+
+It is called once per step and element, of a quad for each of its four triangles, of a hexahedron for each of its ten
+tetrahedra. The time step follows from
 `stiffness`: a number [Pa], or a function of properties, that the slope of the law is never above; without it
 lambda + 2 mu of the moduli.
 
@@ -65,11 +69,16 @@ if TYPE_CHECKING:
 
 BOUND = "stiffness bound"
 """The property of a law's elements that the time step follows; a name that no law can declare."""
-STRAIN, VOLUME, INITIAL, STEP = ("e11", "e22", "e12"), "evol", ("i11", "i22", "i12", "i33"), "dt"
-STRESS = ("s11", "s22", "s12", "s33")
+VOLUME, STEP = "evol", "dt"
+STRAIN = {2: ("e11", "e22", "e12"), 3: ("e11", "e22", "e12", "e33", "e13", "e23")}
+INITIAL = {2: ("i11", "i22", "i12", "i33"), 3: ("i11", "i22", "i12", "i33", "i13", "i23")}
+STRESS = {2: ("s11", "s22", "s12", "s33"), 3: ("s11", "s22", "s12", "s33", "s13", "s23")}
+"""By dimensions, as `NORMAL`: places of normal components."""
+NORMAL = {2: (0, 1), 3: (0, 1, 3)}
 COLUMN = "law"
 """Of `State.cold`: 1 + the place of the element's law in `of_rows`, then its state variables; where there are quads,
-those of each of their four triangles, triangles have the first."""
+those of each of their four triangles, triangles have the first; where there are hexahedra those of two of their ten
+tetrahedra, see plastic_hexes.py."""
 OWN = "own"
 """Of the tables of properties, see kernels/user_laws.py."""
 STEP_OF_STRAIN = 1e-9
@@ -80,14 +89,17 @@ OF_LAW = "law_"
 """How state variables are called as quantities."""
 
 
+@dataclass(frozen=True)
 class _Declared(Declared):
-    """A law of elements."""
+    """A law of elements; dim: dimensions that it is for."""
+
+    dim: int = 2
 
 
 @dataclass(frozen=True)
 class UserLaw(Model):
     """A law of a file. title: FILE:FUNCTION; columns: of the table of properties; loops: compiled, see
-    kernels/user_laws.py."""
+    kernels/user_laws.py, in space kernels/user_laws_space.py."""
 
     title: str = ""
     states: tuple[StateVariable, ...] = ()
@@ -105,11 +117,12 @@ def element_law(
     properties: Sequence[Property] = (),
     state: Sequence[StateVariable] = (),
     stiffness: float | Callable[..., float] | None = None,
+    dim: int = 2,
 ) -> Callable[[Callable[..., Any]], Declared]:
     """Declares a function as law of elements: properties of its own, state variables, and what its slope is never above
-    [Pa], a number or a function of properties (by their names)."""
+    [Pa], a number or a function of properties (by their names); dim: 2 or 3, dimensions that it is for."""
     return lambda function: _Declared(
-        getattr(function, "py_func", function), tuple(properties), tuple(state), stiffness
+        getattr(function, "py_func", function), tuple(properties), tuple(state), stiffness, dim
     )
 
 
@@ -130,8 +143,10 @@ def load(sim: State, path: Path, law: str) -> UserLaw:
 def _made(text: str, path: str, name: str, function: str) -> UserLaw:
     """The law of a text. Wrong."""
     declared = law_of(text, path, name, function, _Declared, "element_law")
-    base = [p.name for p in USER.properties]
-    arguments = checked(declared, Property, base, (*STRAIN, VOLUME, *INITIAL, STEP), STRAIN)
+    if declared.dim not in STRAIN:
+        raise Wrong(declared.line, f"dim of a law is 2 or 3, got {declared.dim!r}")
+    base, strain = [p.name for p in USER.properties], STRAIN[declared.dim]
+    arguments = checked(declared, Property, base, (*strain, VOLUME, *INITIAL[declared.dim], STEP), strain)
     return _compiled(declared, name, path, tuple(arguments), declared.line)
 
 
@@ -140,9 +155,13 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     from numba.core.errors import NumbaError
 
     kernel = njit(error_model="numpy", nogil=True)(declared.function)
-    from hpcdem.physics.fdem.kernels import user_laws as kernels
+    kernels: Any
+    if declared.dim == 3:
+        from hpcdem.physics.fdem.kernels import user_laws_space as kernels
+    else:
+        from hpcdem.physics.fdem.kernels import user_laws as kernels
 
-    wanted = [*STRESS, *(s.name for s in declared.state)]
+    wanted = [*STRESS[declared.dim], *(s.name for s in declared.state)]
     columns = [p.name for p in (*USER.properties, *declared.properties) if p.name in names] + [OWN]
     columns += [OWN] * (-len(columns) % 4)
     states = [s.name for s in declared.state]
@@ -150,13 +169,14 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     loops = kernels.loops(kernel, names, states, columns)
     values, place = made_of(kernel, path), None
     if values is not None:
-        place = kept.folder(name, values, repr((names, states, columns)))
+        place = kept.folder(name, values, repr((names, states, columns, declared.dim)))
         for what, made in {"evaluate": evaluate, **loops._asdict()}.items():
             kept.keep(made, place, what)
     if place is None or not kept.knows(place, "evaluate"):  # what is kept has passed this
         check_what_returns(kernel, len(names), wanted, path, line)
     try:
-        evaluate(np.zeros((0, len(columns))), np.zeros(3), np.zeros(len(states)), np.zeros((0, len(wanted))))
+        rest = np.zeros(len(STRAIN[declared.dim])), np.zeros(len(states))
+        evaluate(np.zeros((0, len(columns))), *rest, np.zeros((0, len(wanted))))
     except NumbaError as error:
         raise Wrong(line, numba_message(error)) from None
     title, _, _ = name.partition(MARK)
@@ -170,7 +190,7 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
 
     return UserLaw(
         name, ELEMENT, f"the law of {title}", (*USER.properties, *declared.properties, bound), derive, title=title,
-        states=declared.state, columns=tuple(columns), loops=loops,
+        dims=(declared.dim,), states=declared.state, columns=tuple(columns), loops=loops,
     )  # fmt: skip
 
 
@@ -185,12 +205,13 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
     bound = modulus if said is None else said
     table = np.ascontiguousarray(np.array([full.get(name, np.ones(n)) for name in columns]).T)
     begin = np.array([state.initial for state in declared.state])
-    width = len(STRESS) + len(begin)
-    what = (*STRESS, *(state.name for state in declared.state))
+    stress, strain = STRESS[declared.dim], STRAIN[declared.dim]
+    width = len(stress) + len(begin)
+    what = (*stress, *(state.name for state in declared.state))
 
-    def at(k: int, strain: float) -> np.ndarray:
-        out, e = np.empty((n, width)), np.zeros(3)
-        e[k] = strain
+    def at(k: int, size: float) -> np.ndarray:
+        out, e = np.empty((n, width)), np.zeros(len(strain))
+        e[k] = size
         evaluate(table, e, begin, out)
         return out
 
@@ -200,14 +221,14 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
         i, k = np.argwhere(wrong)[0]
         told = ", ".join(f"{name} {full[name][i]:g}" for name in columns if name != OWN)
         raise CommandError(f"{law}: {what[k]} is {rest[i, k]:g} at zero strain with {told}")
-    for k in range(2):
+    for k in NORMAL[declared.dim]:
         for way in (STEP_OF_STRAIN, -STEP_OF_STRAIN):
             slope = (at(k, way)[:, k] - rest[:, k]) / way
             steep = ~(slope <= bound * (1.0 + 1e-6) + 1e-12 * np.abs(rest[:, k]) / STEP_OF_STRAIN)
             if steep.any():
                 i = int(np.flatnonzero(steep)[0])
                 raise CommandError(
-                    f"{law}: d{what[k]}/d{STRAIN[k]} is {slope[i]:g} Pa at zero strain, above its stiffness "
+                    f"{law}: d{what[k]}/d{strain[k]} is {slope[i]:g} Pa at zero strain, above its stiffness "
                     f"{bound[i]:g} Pa, by which the time step is found: stiffness= of element_law says more"
                 )
     values[BOUND] = bound.reshape(shape) if shape else float(bound[0])
@@ -215,7 +236,12 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
 
 def _compile(law: UserLaw, blocks: State, quads: bool = False) -> None:
     """The loops over triangles, or quads, with arguments of the types that they will have: those of a tiny model of the
-    class and the threads of `blocks`."""
+    class and the threads of `blocks`. A law of space has all of its loops at once."""
+    if law.dims == (3,):
+        from hpcdem.physics.fdem.kernels import user_laws_space
+
+        user_laws_space.try_loops(law.loops, len(law.states), blocks.threads)
+        return
     from hpcdem.physics.fdem.mesh import Mesh  # brings kernels
 
     sim: Any = type(blocks)(SerialComm(), blocks.threads)

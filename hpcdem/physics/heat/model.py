@@ -809,10 +809,10 @@ class Heat(SurfaceLoad):
         if self.fluid is not None:
             self.fluid.check()
         self._check_friction()
-        if self.expands and user_laws.in_use(blocks):
+        if blocks.dim == 2 and self.expands and user_laws.in_use(blocks):
             raise CommandError(
-                f"{user_laws.some(blocks)} has a law of the user, which knows no temperature: expansion-coeficient "
-                "must be 0 with it"
+                f"{user_laws.some(blocks)} has a law of the user, which in two dimensions knows no strain e33 of heat: "
+                "expansion-coeficient must be 0 with it"
             )
 
     def _check_friction(self) -> None:
