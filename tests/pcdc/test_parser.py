@@ -254,10 +254,9 @@ REFUSED_IN_SPACE = [
     ("mesh structured (0,0,0) (1,1,1) cells 2 2", "the line ends where a whole number above 0 for 'cells' is expected"),
     ("mesh structured (0,0,0) (1,1,1) cells 2 2 2 type tri", "type tri: in three dimensions it is tet or hex"),
     ("geometry create circle (0,0) 1 as-layer 'c'", "'geometry create circle' is for two dimensions in this version"),
-    ("face-joint c-model thermal-fluid property conductivity 1", "'thermal-fluid' is for two dimensions"),
-    ("element c-model user 'a.py:a' property density 1", "'user' is for two dimensions"),
-    ("element law 'a.py:a'", "'element law' is for two dimensions"),
-    ("element property parameter 'a' 3", "'parameter' is for two dimensions"),
+    ("liner create range x 0 1", "'liner create' is for two dimensions"),
+    ("element c-model null relax 0.1 s", "'relax' is for two dimensions"),
+    ("element property friction-heat 1", "'friction-heat' is for two dimensions"),
 ]  # fmt: skip
 
 
