@@ -38,7 +38,7 @@ UNUSED_DAYS = 60
 
 KERNELS = {
     "shared": 33, "": 100, "energy": 17, "clumps": 14, "blocks": 195, "coupled": 17, "bolts": 12, "liners": 11,
-    "flow": 20, "flow-space": 7, "proppant": 12, "proppant-space": 3, "heat": 22, "heat-space": 7, "yielding": 45,
+    "flow": 20, "flow-space": 7, "proppant": 12, "proppant-space": 3, "heat": 22, "heat-space": 8, "yielding": 45,
     "creep": 32, "tangent": 10, "plastic-tangent": 6, "space": 76, "yielding-space": 20, "creep-space": 19,
     "tangent-space": 12, "hexes": 27, "yielding-hexes": 16, "creep-hexes": 10, "joints-hexes": 12, "pictures": 5,
     "restitution": 4,

@@ -256,7 +256,6 @@ REFUSED_IN_SPACE = [
     ("geometry create circle (0,0) 1 as-layer 'c'", "'geometry create circle' is for two dimensions in this version"),
     ("liner create range x 0 1", "'liner create' is for two dimensions"),
     ("element c-model null relax 0.1 s", "'relax' is for two dimensions"),
-    ("element property friction-heat 1", "'friction-heat' is for two dimensions"),
 ]  # fmt: skip
 
 

@@ -152,7 +152,7 @@ def hexes_that_flow(sim: Blocks) -> None:
 
 
 def hexes_that_glow(sim: Blocks) -> None:
-    """The same with heat: they expand, get softer and weaker, touch and pass heat on; the air is warm."""
+    """The same with heat: they expand, get softer and weaker, touch, rub and pass heat on; the air is warm."""
     hexes_that_flow(sim)
     mesh = sim.mesh
     sim.table("softer", [(20.0, 1e8), (320.0, 8e7)])
@@ -160,7 +160,7 @@ def hexes_that_glow(sim: Blocks) -> None:
     sim.table("crumbling", [(20.0, 1e4), (320.0, 2e3)])
     sim.element_property(np.flatnonzero(sim.yielding()), {"tensile": Over("crumbling", TEMPERATURE)})
     heat = Heat.of(sim)
-    heat.assign(None, ROCK_OF_HEAT)
+    heat.assign(None, {**ROCK_OF_HEAT, "friction_heat": 0.5})
     heat.initial(None, 20.0)
     sim.table("oven", [(0.0, 20.0), (3e3, 320.0), (1e4, 120.0)])
     heat.prescribe(np.flatnonzero((np.abs(mesh.points - (1.6, 0.15, 0.15)) < (0.5, 1.0, 1.0)).all(axis=1))[::3], "oven")
@@ -387,7 +387,7 @@ def glowing(sim: Blocks) -> None:
     joints = np.flatnonzero((sim.joint_row > 0) & sim.joint_exists())
     sim.joint_property(joints[joints % 3 == 0], {"tensile_strength": Over("weaker", TEMPERATURE)})
     heat = Heat.of(sim)
-    heat.assign(None, ROCK_OF_HEAT)
+    heat.assign(None, {**ROCK_OF_HEAT, "friction_heat": 0.5})
     heat.initial(None, 20.0)
     sim.table("oven", [(0.0, 20.0), (3e3, 320.0), (1e4, 120.0)])
     heat.prescribe(

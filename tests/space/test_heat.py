@@ -99,8 +99,6 @@ def test_upright_planes_are_those_of_two_dimensions() -> None:
         sim.close_model()
         found = heat._conductivities(heat.row[:1])[0]
         assert found[[0, 1, 3]] == pytest.approx(wanted, rel=1e-14) and np.abs(found[[2, 4, 5]]).max() < 1e-15
-    with pytest.raises(CommandError, match="in three dimensions there is no friction_heat"):
-        heat.adjust(None, {"friction_heat": 0.5})
 
 
 @BOTH

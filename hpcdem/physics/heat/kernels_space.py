@@ -1,6 +1,6 @@
-"""What heat in space has of its own: conductances of tetrahedra, conduction in hexahedra, and where faces touch. All
-other loops are those of kernels.py, for which a tetrahedron is a row with four corners. Source: Fourier's law with
-linear tetrahedra (manual, 7.6.1).
+"""What heat in space has of its own: conductances of tetrahedra, conduction in hexahedra, friction, and where faces
+touch. All other loops are those of kernels.py, for which a tetrahedron is a row with four corners. Source: Fourier's
+law with linear tetrahedra (manual, 7.6.1).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.physics.fdem.hexahedra import OVERLAYS
+from hpcdem.physics.fdem.tetrahedra import FACES
 from hpcdem.physics.heat.kernels import PAIRS
 
 MOST = 10
@@ -79,6 +80,43 @@ def conduct_hexes_threaded(threads, corners, g, t, q):
     """The same on several threads."""
     for part in prange(threads):
         _conduct_hexes(part, threads, corners, g, t, q)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def rub(first, second, face, face_row, row, touching, v, force, history, effusivity, part, dt, out):
+    """Heat of friction, see `friction.rub`: add that (rows, 4) [J] of a step dt [s] to the corners of the elements held
+    here.
+
+    first, second (m,): pairs of contactors and targets; face (contactors,): theirs; face_row, row: storage rows of
+    both; touching (m,), force (m, 21) [N], history (m, 5) [N]: see `ContactSpace`, of this step. By the parts of the
+    force that corners take, the heat is shared out, and the speed of sliding is that of both walls.
+    """
+    mine, theirs = np.empty(3), np.empty(4)
+    for p in range(len(first)):
+        hx, hy, hz = history[p, 0], history[p, 1], history[p, 2]
+        if touching[p] == 0 or (hx == 0.0 and hy == 0.0 and hz == 0.0):
+            continue
+        i, j, corners = face_row[first[p]], row[second[p]], FACES[face[first[p]] % 4]
+        fx = force[p, 0] + (force[p, 3] + force[p, 6])
+        fy = force[p, 1] + (force[p, 4] + force[p, 7])
+        fz = force[p, 2] + (force[p, 5] + force[p, 8])
+        size = fx * fx + (fy * fy + fz * fz)
+        vx = vy = vz = 0.0
+        for k in range(3):
+            mine[k] = (force[p, 3 * k] * fx + (force[p, 3 * k + 1] * fy + force[p, 3 * k + 2] * fz)) / size
+            at = 4 * corners[k]
+            vx, vy, vz = vx + mine[k] * v[i, at], vy + mine[k] * v[i, at + 1], vz + mine[k] * v[i, at + 2]
+        for k in range(4):
+            at = 9 + 3 * k
+            theirs[k] = -(force[p, at] * fx + (force[p, at + 1] * fy + force[p, at + 2] * fz)) / size
+            at = 4 * k
+            vx, vy, vz = vx - theirs[k] * v[j, at], vy - theirs[k] * v[j, at + 1], vz - theirs[k] * v[j, at + 2]
+        heat = -dt * (hx * vx + (hy * vy + hz * vz))
+        share = effusivity[i] / (effusivity[i] + effusivity[j])
+        for k in range(3):
+            out[i, corners[k]] += mine[k] * (part[i] * share * heat)
+        for k in range(4):
+            out[j, k] += theirs[k] * (part[j] * (1.0 - share) * heat)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

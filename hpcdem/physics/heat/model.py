@@ -919,14 +919,21 @@ class Heat(SurfaceLoad):
 
     def _rub(self) -> None:
         """Surfaces have slid for a step."""
-        blocks, pairs = self.blocks, self.blocks.local.pairs
+        blocks = self.blocks
+        pairs: Any = blocks.local.pairs
         if len(pairs):
             out = np.zeros(self.t.shape)
-            friction.rub(
-                pairs.first, pairs.second, pairs.start, pairs.row, pairs.quad, blocks.x, blocks.v,
-                pairs.history, self._effusivity, self.column("friction_heat")[self.row[blocks.number]], blocks.clock.dt,
-                out,
-            )  # fmt: skip
+            how = self._effusivity, self.column("friction_heat")[self.row[blocks.number]], blocks.clock.dt, out
+            if blocks.dim == 3:
+                kernels_space.rub(
+                    pairs.first, pairs.second, pairs.face, pairs.face_row, pairs.row, pairs.touching, blocks.v,
+                    pairs.out, pairs.history, *how,
+                )  # fmt: skip
+            else:
+                friction.rub(
+                    pairs.first, pairs.second, pairs.start, pairs.row, pairs.quad, blocks.x, blocks.v, pairs.history,
+                    *how,
+                )  # fmt: skip
             blocks.cold[RUBBED] += out[blocks.owned]
 
     def _take_friction(self) -> None:

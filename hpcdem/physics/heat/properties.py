@@ -23,7 +23,7 @@ ISO_HEAT = Model(
         Property("conductivity_angle", "degrees", "direction of conductivity from x, counter-clockwise, in space the "
                  "strike of the planes along which it is; it turns with the element", 0.0, low=-math.inf),
         Property("friction_heat", "1", "how much of its share of the work of friction an element takes as heat where "
-                 "its faces slide on others", 0.0, high=1.0, dims=(2,)),
+                 "its faces slide on others", 0.0, high=1.0),
         Property("conductivity_dip", "degrees", "dip of these planes", 90.0, low=-math.inf, dims=(3,)),
     ),
 )  # fmt: skip

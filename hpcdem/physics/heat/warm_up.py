@@ -33,6 +33,11 @@ def in_space(threads: int = 1) -> None:
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
     _heated(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
     kernel: Any = kernels_space.conduct_hexes if threads == 1 else kernels_space.conduct_hexes_threaded
+    pairs, one = np.zeros(1, np.int64), np.ones(1)
+    kernels_space.rub(
+        pairs, pairs, pairs, pairs, pairs, np.zeros(1, np.uint8), np.zeros((1, 16)), np.zeros((1, 21)),
+        np.zeros((1, 5)), one, one, 1.0, np.zeros((1, 4)),
+    )  # fmt: skip
     kernel(threads, np.arange(8).reshape(1, 8), np.ones((1, len(kernels_space.HEX_PAIRS))), np.zeros(24), np.zeros(24))
 
 
