@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from hpcdem.physics.fdem.tables import TEMPERATURE, Over
 from hpcdem.physics.heat.model import Heat
 from tests.blocks.support import model, rectangle
 from tests.heat.support import GRANITE
+from tests.pcdc.test_plastic import run
+from tests.pcdc.test_whole import history, tables
 from tests.space.support import ROCK, body, box, hexes, nodes_on
 from tests.space.test_yielding import COMPONENTS, SOIL, deform
 
@@ -192,6 +195,31 @@ def test_a_restart_knows_what_a_law_remembers(of: Any, tmp_path: Path) -> None:
         assert np.array_equal(diagnostics.values(sim, name), diagnostics.values(other, name)), name
     assert diagnostics.values(sim, "law_work").max() > 0.0
     assert np.isnan(diagnostics.values(sim, "strain_energy")).all()
+
+
+def test_states_stand_in_frames_and_histories(tmp_path: Path) -> None:
+    """Of a script with warm hexahedra."""
+    shutil.copy(LAWS, tmp_path)
+    text = """
+pcdc model new dim 3
+pcdc mesh structured (0,0,0) (1,1,1) cells 2 2 2 type hex
+pcdc element c-model user 'rock.py:mises' property den 2000 young 1e9 poisson-ratio 0.2 parameter 'limit' 1e4
+pcdc element property parameter 'limit' 2e4 range x 0 0.5
+pcdc element c-model therm-iso-h property conductivity 3 capacity 1000 expansion-coeficient 1e-5
+pcdc node initial temperature 20
+pcdc node boundary therm-s-b-c temperature 40 range x 0 0
+pcdc node boundary mech-vel-b-c velocity-x 5 range z 1 1
+pcdc history create 'most' element value law-state variable 'work' maximum every 20
+pcdc model step 100
+pcdc output vtk 'f'
+"""
+    pcdc = run(tmp_path, text).namespace["pcdc"]
+    frame = tables(tmp_path / "data" / "f_0000000100.vtkhdf")
+    for name in ("law_p13", "law_work", "mean_temperature"):
+        values = np.frombuffer(frame[f"VTKHDF/CellData/{name}"])[:48]
+        assert np.array_equal(values, pcdc.values("element", name)) and values.any(), name
+    most = history(tmp_path, "most")[:, 2]
+    assert most[-1] == pcdc.values("element", "law_work").max() > 0.0 and (np.diff(most) >= 0.0).all()
 
 
 @BOTH
