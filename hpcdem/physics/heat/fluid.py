@@ -318,7 +318,9 @@ class FluidHeat:
         flow, n = self.flow, len(self.number)
         known = np.maximum(self._place, 0)
         there = self._place >= 0
-        q, aperture = flow.mean_flows(), np.repeat(flow.apertures(), self.links)
+        q, aperture = flow.mean_flows(), flow.apertures()
+        if self.links > 1:
+            aperture = np.repeat(aperture, self.links)
         q = np.where(there, q[known], 0.0) if len(q) else np.zeros(len(known))
         delta = np.where(there, aperture[known], 0.0) if len(q) else np.zeros(len(known))
         w0, w, room = self.had, flow.nodes[:, flowing.W], flow.nodes[:, flowing.V]
@@ -327,19 +329,21 @@ class FluidHeat:
         wet = np.minimum(np.divide(least, room, out=np.zeros(n), where=room > 0.0), 1.0)
         self.state[:n, kernels.S], self.state[:n, kernels.X], self.state[:n, kernels.FULL] = wet, part(wet), w0
         self._refresh()
-        self._q, wet = self.crossing(q, self.state[self._ends, kernels.S], self._points)
+        self._q, wet = self.crossing(q, self.state[:, kernels.S], self._ends, self._points)
         self._conduct = self.constant("conductivity") * delta * wet / self._way
         self._second = self.constant("second_order") > 0.0
         if self._second and self.links > 1:
             self._length = self.lengths(self._sides, self._q)
         self.rate = self._least_rate(w0, w, least)
 
-    def crossing(self, q: np.ndarray, s: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What links (l,) carry of these flows, and the least saturation of their channels; s (l, 2): of their ends,
-        points (l, 2): these. In a full triangle it is what crosses the medians; the less a corner holds, the less of
-        what only goes around, as that would have to pass through it. Between held nodes, which have inflow at the same
-        place, nothing is carried: a front begins at them. Not collective."""
-        least = np.minimum(s[:, 0], s[:, 1])
+    def crossing(
+        self, q: np.ndarray, s: np.ndarray, ends: np.ndarray, points: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What links (l,) carry of these flows, and the least saturation of their channels; s (n,): of nodes, ends
+        (l, 2): rows of them, points (l, 2): of the mesh. In a full triangle it is what crosses the medians; the less
+        a corner holds, the less of what only goes around, as that would have to pass through it. Between held nodes,
+        which have inflow at the same place, nothing is carried: a front begins at them. Not collective."""
+        least = np.minimum(s[ends[:, 0]], s[ends[:, 1]])
         if self.links > 1:
             least = np.repeat(least.reshape(-1, self.links).min(axis=1), self.links)
             q = q - part(least) * np.repeat(q.reshape(-1, self.links).mean(axis=1), self.links)
@@ -363,7 +367,7 @@ class FluidHeat:
                          where=most > 0.0)  # fmt: skip
         drained = ~there & (w > 0.0)  # filled just now: what has come in is all that is there
         rate[drained] = np.maximum(passes[drained] / (w + self._leaked)[drained] - 1.0 / period, 0.0)
-        conduct = np.maximum(self._conduct, 0.0)
+        conduct = self._conduct if self.links == 1 else np.maximum(self._conduct, 0.0)
         for end in range(2):
             passed = np.bincount(ends[:, end], conduct, total)[: len(w)]
             rate += np.divide(passed, self.rho_c * least, out=np.zeros(len(w)), where=there)

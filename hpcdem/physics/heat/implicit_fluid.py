@@ -53,7 +53,7 @@ class Fluid:
         ends = row_of[network.ends]
         aperture = np.repeat(flow.values(CHANNEL, "aperture"), fluid.links)
         w, s, t = (flow.values(FLOW_NODE, name) for name in ("fluid", "saturation", "temperature"))
-        q, wet = fluid.crossing(flow.link_flows(), s[ends], network.ends)
+        q, wet = fluid.crossing(flow.link_flows(), s, ends, network.ends)
         sides, way, part_of_wall = fluid.shapes(network.channels)
         transfers = np.repeat(fluid.transfers(network.channels), fluid.links)
         exchange = part_of_wall[:, None] * transfers[:, None] * part(s)[ends]
