@@ -1115,6 +1115,12 @@ class BlockCommands:
         return fdem.queries.fluid(self._blocks.project())
 
     @property
+    def fluid_energies(self) -> dict[str, float]:
+        """The energy of blocks and fluid in implicit steps [J/m], in space [J]: pumped, leaked, viscous, fluid, strain,
+        joints, fracture, outside; what does not add up. Collective."""
+        return fdem.queries.fluid_energies(self._blocks.project())
+
+    @property
     def proppant(self) -> dict[str, float]:
         """The account of proppant [m2]: came, stored, packed, left, removed; what does not add up. Collective."""
         return fdem.queries.proppant(self._blocks.project())

@@ -46,7 +46,9 @@ class Brazilian(Rock):
     friction: float = quantity(35.0, "degrees", "friction angle of joints and cracks", ge=0, lt=90)
     diameter: float = quantity(0.05, "m", "diameter of the disc", gt=0)
     flat: float = quantity(0.0, "degrees", "angle, seen from the centre, of its flat ends at the platens", ge=0, le=45)
-    guided: bool = choice(False, "edges of the mesh along the loaded diameter, so that the crack can run straight")
+    guided: bool = choice(
+        False, "edges (in space faces) of the mesh along the loaded diameter, so that the crack can run straight"
+    )
     joints: bool = choice(True, "joints, along which it breaks; without them it stays elastic")
     platen_friction: float = quantity(0.0, "degrees", "friction angle between platens and disc", ge=0, lt=90)
     transits: float = quantity(40.0, "1", "waves cross the disc so often per 0.1 % of shortening", ge=5)
@@ -59,20 +61,16 @@ class Brazilian(Rock):
             raise ValueError(f"size is {self.size:g}, expected at most an eighth of diameter, {self.diameter / 8:g} m")
         if self.dim == 2 and "thickness" in self.model_fields_set:
             raise ValueError("thickness: expected dim 3 beside it")
-        if self.dim == 3 and self.guided:
-            raise ValueError("guided: expected no in three dimensions")
         self.not_too_many(0.25 * math.pi * self.diameter**2, self.thickness if self.dim == 3 else None)
         return self
 
     def model(self) -> str:
-        disc = DISC if self.dim == 2 else THICK
-        text = (
-            disc.replace("MESH", GUIDED if self.guided else FREE)
-            + ELASTIC
-            + (JOINTS if self.joints else "")
-            + SURFACES
-            + STEEL
-        )
+        if self.dim == 2:
+            disc = DISC.replace("MESH", GUIDED if self.guided else FREE)
+        else:
+            disc = THICK.replace("MESH", PLANE if self.guided else "")
+            disc = disc.replace("ALONG", "embed 'guide' " if self.guided else "")
+        text = disc + ELASTIC + (JOINTS if self.joints else "") + SURFACES + STEEL
         return in_space(text) if self.dim == 3 else text
 
     def loading(self) -> str:
@@ -117,7 +115,7 @@ for i in range(2*edges + 2):
         outline.append(Vector(0.5*diameter*math.cos(angle), 0.5*diameter*math.sin(angle), 0))
 pcdc geometry create polygon [outline] as-layer 'rim'
 pcdc geometry create extrude layer 'rim' along (0,0,[thickness]) as-layer 'outline'
-pcdc mesh create from-layer 'outline' size [size] group 'rock' set 'body'
+MESHpcdc mesh create from-layer 'outline' size [size] ALONGgroup 'rock' set 'body'
 wide, thick, end = 0.4*diameter, 0.1*diameter, 0.5*diameter*math.cos(half)
 for low in (-end - thick, end):
     pcdc mesh structured ([-wide/2],[low],0) ([wide/2],[low + thick],[thickness]) \\
@@ -133,6 +131,10 @@ pcdc mesh create from-layer 'outline' size [size] irregular group 'rock' set 'bo
 GUIDED = """\
 pcdc geometry create polyline (0,[-0.49*diameter*math.cos(half)]) (0,[0.49*diameter*math.cos(half)]) as-layer 'guide'
 pcdc mesh create from-layer 'outline' size [size] embed 'guide' irregular group 'rock' set 'body'
+"""
+PLANE = """\
+high = 0.49*diameter*math.cos(half)
+pcdc geometry create polygon (0,[-high],0) (0,[high],0) (0,[high],[thickness]) (0,[-high],[thickness]) as-layer 'guide'
 """
 STEEL = """
 pcdc element property density 7850 young 200e9 poisson-ratio 0.3 range group 'platen' set 'body'

@@ -15,8 +15,8 @@ from hpcdem.cases.kgd_solutions import resolution
 class Fracture:
     """length [m]: half length, to the damage 0.2 (toughness) or to the last joint behind its peak (viscosity); opening
     [m] and pressure [Pa, above the confinement] in the middle; front [m]: of the fluid; *_error: relative, to the
-    closed form; balance: what of the fluid does not add up; curve: (time [s], length, opening, pressure) at ten times,
-    or at the end; steps: implicit ones."""
+    closed form; balance: what of the fluid does not add up; energy_error: what of the energy does not, over what was
+    pumped in; curve: (time [s], length, opening, pressure) at ten times, or at the end; steps: implicit ones."""
 
     length: float
     opening: float
@@ -26,6 +26,7 @@ class Fracture:
     opening_error: float
     pressure_error: float
     balance: float
+    energy_error: float
     steps: int
     curve: list[tuple[float, float, float, float]] = field(repr=False)
 
@@ -148,6 +149,10 @@ length_error = sum(l / exact(t).length - 1 for t, l, o, p in late) / len(late)
 opening_error = sum(o / exact(t).opening - 1 for t, l, o, p in late) / len(late)
 pressure_error = sum(p / exact(t).pressure - 1 for t, l, o, p in late) / len(late)
 balance = pcdc.fluid['relative']
+work = pcdc.fluid_energies
+energy_error = work['relative']
+print('energy of one wing: pumped in %.4g J/m, lost by flow %.4g, stored in rock and joints %.4g, fracture %.4g' % (
+    work['pumped'], work['viscous'], work['strain'] + work['joints'], work['fracture']))
 print('errors: length %+.2f %%, opening %+.2f %%, net pressure %+.2f %%; %d implicit steps' % (
     100*length_error, 100*opening_error, 100*pressure_error, steps))
 pcdc output vtk 'hydraulic-fracture'

@@ -16,7 +16,8 @@ class Penny:
     """radius [m]: of the circle with the area that is damaged by 0.2 (toughness) or behind its peak (viscosity);
     opening [m] in the middle; pressure [Pa, above the confinement] at half the radius, pressure_well: in the middle;
     *_error: relative, to the closed form, means over the last fifth of the time; balance: what of the fluid does not
-    add up; curve: (time [s], radius, opening, pressure) at twenty times; steps: implicit ones."""
+    add up; energy_error: what of the energy does not, over what was pumped in; curve: (time [s], radius, opening,
+    pressure) at twenty times; steps: implicit ones."""
 
     radius: float
     opening: float
@@ -26,6 +27,7 @@ class Penny:
     opening_error: float
     pressure_error: float
     balance: float
+    energy_error: float
     steps: int
     curve: list[tuple[float, float, float, float]] = field(repr=False)
 
@@ -150,6 +152,10 @@ radius_error = sum(r / exact(t).length - 1 for t, r, o, p in late) / len(late)
 opening_error = sum(o / exact(t).opening - 1 for t, r, o, p in late) / len(late)
 pressure_error = sum(p / exact(t).pressure - 1 for t, r, o, p in late) / len(late)
 balance = pcdc.fluid['relative']
+work = pcdc.fluid_energies
+energy_error = work['relative']
+print('energy of the sector: pumped in %.4g J, lost by flow %.4g, stored in rock and joints %.4g, fracture %.4g' % (
+    work['pumped'], work['viscous'], work['strain'] + work['joints'], work['fracture']))
 print('errors: radius %+.2f %%, opening %+.2f %%, net pressure %+.2f %%; %d implicit steps' % (
     100*radius_error, 100*opening_error, 100*pressure_error, steps))
 pcdc output vtk 'penny-fracture'

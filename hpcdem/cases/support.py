@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 from pydantic import model_validator
 
 from hpcdem.cases.base import Case, choice, quantity
+from hpcdem.cases.rock import Dimensions
 from hpcdem.cases.tunnel import MESH, OUTLINE, ROUND, STRESSED
 
 
@@ -43,7 +44,8 @@ class Support(Case):
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Supported
 
-    elements: Literal["tri", "quad"] = choice("quad", "triangles or quads")
+    dim: Dimensions = choice(2, "dimensions of space: plane strain, or a slice of bolt_spacing with one ring of bolts")
+    elements: Literal["tri", "quad"] = choice("quad", "triangles or quads; in three dimensions they are tetrahedra")
     plates: bool = choice(True, "face plates, which tie the heads of the bolts to the wall")
     radius: float = quantity(3.0, "m", "radius of the tunnel", gt=0)
     reach: float = quantity(10.0, "1", "from the centre to the sides of the model, over radius", ge=4)
@@ -93,21 +95,71 @@ class Support(Case):
             raise ValueError("stress_xx and stress_yy are both 0, expected a stress")
         if self.liner > 0.2 * self.radius:
             raise ValueError(f"liner is {self.liner:g}, expected at most a fifth of radius, {0.2 * self.radius:g} m")
+        if self.dim == 3:
+            for name in ("elements", "liner"):
+                if name in self.model_fields_set:
+                    raise ValueError(f"{name}: expected dim 2 beside it")
+            if self.size > 0.7 * self.bolt_spacing:
+                raise ValueError(f"size is {self.size:g}, expected at most 0.7 of bolt_spacing in three dimensions")
         if self.pretension > self.bolt_yield:
             raise ValueError(f"pretension is {self.pretension:g}, expected at most bolt_yield, {self.bolt_yield:g} N")
         return self
 
     def model(self) -> str:
+        if self.dim == 3:
+            return SLICE + YIELDING + HELD
         mesh = MESH.replace("KIND", "type quad" if self.elements == "quad" else "irregular")
         return OUTLINE + ROUND + mesh + YIELDING + STRESSED
 
     def loading(self) -> str:
-        return EXCAVATED.replace(" PLATE", " plate" if self.plates else "") + MEASURED
+        text = (EXCAVATED + MEASURED).replace(" PLATE", " plate" if self.plates else "")
+        if self.dim == 2:
+            text = text.replace("LINED", LINED).replace("OF_LINERS", OF_LINERS).replace("TOLD", TOLD)
+            return text.replace("FLAT", "").replace("MIDDLE", "").replace("SPACED", " spacing [bolt_spacing]")
+        for name in ("LINED", "OF_LINERS", "TOLD", "SPACED"):
+            text = text.replace(name, "")
+        text = text.replace("FLAT", ", 0)\n        middle = Vector(0, 0, 0.5*bolt_spacing").replace(
+            "MIDDLE", " + middle"
+        )
+        text = text.replace("'area'", "'volume'").replace("math.fsum(flowed)", "math.fsum(flowed) / bolt_spacing")
+        return text.replace(".png' plastic\n", ".png'\n") + PICTURE
 
 
+SLICE = """
+side = reach * radius
+
+pcdc model new dim 3
+# Corners in the middle of the sides: lines of the mesh that can be held.
+pcdc geometry create polygon ([-side],[-side],0) (0,[-side],0) ([side],[-side],0) ([side],0,0) ([side],[side],0) \\
+    (0,[side],0) ([-side],[side],0) ([-side],0,0) as-layer 'rim'
+pcdc geometry create extrude layer 'rim' along (0,0,[bolt_spacing]) as-layer 'outline'
+pcdc geometry create cylinder (0,0,0) (0,0,[bolt_spacing]) [radius] as-layer 'wall'
+pcdc mesh create from-layer 'outline' size [coarse] refine-layer 'wall' size [size] distance [0.8*side] \\
+    region 'wall' group 'core' group 'rock'
+"""
+HELD = """
+# The stress that was there before, held by the same stress on the sides.
+pcdc element initial stress-xx [stress_xx] stress-yy [stress_yy] stress-zz [poisson*(stress_xx + stress_yy)]
+near = 1e-6 * side
+for place in (-side, side):
+    pcdc element-face boundary m-s-b-c stress-xx [stress_xx] range x [place - near] [place + near]
+    pcdc element-face boundary m-s-b-c stress-yy [stress_yy] range y [place - near] [place + near]
+    pcdc node boundary mech-vel-b-c velocity-y 0 range x [place - near] [place + near] y [-near] [near]
+    pcdc node boundary mech-vel-b-c velocity-x 0 range y [place - near] [place + near] x [-near] [near]
+# Halfway between rings of bolts nothing moves across.
+for place in (0, bolt_spacing):
+    pcdc node boundary mech-vel-b-c velocity-z 0 range z [place - near] [place + near]
+"""
 YIELDING = """\
 pcdc element c-model mech-m-c property density [density] young [young] poisson-r [poisson] friction [friction] \\
     cohesion [cohesion] tensile [tensile_strength] dilation [dilation]
+"""
+LINED = """\
+    if liner:
+        pcdc liner create group 'shell' range geometry 'wall'
+        pcdc liner c-model beam property density 2400 young [liner_young] poisson-r [liner_poisson] \\
+            thickness [liner] tensile-strength [liner_tension] compressive-strength [liner_strength] \\
+            normal-stiffness [liner_bond] shear-stiffness [liner_bond]
 """
 EXCAVATED = """
 import numpy as np
@@ -136,19 +188,26 @@ for part in sorted({k / 20 for k in range(21)} | {release}):
     at_support = into()[0]
     for k in range(bolts):
         angle = math.radians(90 + around * ((k + 0.5) / bolts - 0.5))
-        way = Vector(math.cos(angle), math.sin(angle))
-        head, tail = radius * way, (radius + bolt_length) * way
+        way = Vector(math.cos(angle), math.sin(angle)FLAT)
+        head, tail = radius * wayMIDDLE, (radius + bolt_length) * wayMIDDLE
         pcdc bolt create polyline [head] [tail] length [size] PLATE group 'bolts'
     if bolts:
         pcdc bolt c-model mech-e-p property density 7850 young [bolt_young] diameter [bolt_diameter] \\
             t-y-f [bolt_yield] s-s-r-b [bond_stiffness] g-t [grout] c-r-g [bond_cohesion] c-g-b [bond_cohesion] \\
-            spacing [bolt_spacing] pre-f [pretension]
-    if liner:
-        pcdc liner create group 'shell' range geometry 'wall'
-        pcdc liner c-model beam property density 2400 young [liner_young] poisson-r [liner_poisson] \\
-            thickness [liner] tensile-strength [liner_tension] compressive-strength [liner_strength] \\
-            normal-stiffness [liner_bond] shear-stiffness [liner_bond]
-pcdc model solve ratio 1e-6
+            pre-f [pretension]SPACED
+LINEDpcdc model solve ratio 1e-6
+"""
+OF_LINERS = """\
+if liner:
+    along = pcdc.values('liner-element', 'axial-force')
+    ends = [pcdc.values('liner-element', name) for name in ('moment-first', 'moment-last')]
+    thrust, moment = float(along[np.abs(along).argmax()]), float(np.abs(ends).max())
+    hinges = int((pcdc.values('liner-element', 'liner-state').astype(int) & 8 > 0).sum())
+"""
+TOLD = """\
+if liner:
+    print('liner: largest axial force %.4g MN/m, moment %.4g kN m/m, %d elements have yielded'
+          % (thrust/1e6, moment/1e3, hinges))
 """
 MEASURED = """
 pcdc output vtk 'support'
@@ -163,21 +222,16 @@ if bolts:
     yielded, broken = int((state & 15 > 0).sum()), int((state & 16 > 0).sum())
     slipped = int((pcdc.values('bolt-node', 'bond-state').astype(int) > 0).sum())
 thrust, moment, hinges = 0.0, 0.0, 0
-if liner:
-    along = pcdc.values('liner-element', 'axial-force')
-    ends = [pcdc.values('liner-element', name) for name in ('moment-first', 'moment-last')]
-    thrust, moment = float(along[np.abs(along).argmax()]), float(np.abs(ends).max())
-    hinges = int((pcdc.values('liner-element', 'liner-state').astype(int) & 8 > 0).sum())
-print('into the tunnel: mean %.4g mm (%.4g before the support), crown %.4g mm; plastic to %.4g m'
+OF_LINERSprint('into the tunnel: mean %.4g mm (%.4g before the support), crown %.4g mm; plastic to %.4g m'
       % (1e3*convergence, 1e3*at_support, 1e3*crown, plastic_radius))
 print('bolts: largest force %.4g kN, %d elements yielded, %d broken, grout slipped at %d nodes'
       % (axial_force/1e3, yielded, broken, slipped))
-if liner:
-    print('liner: largest axial force %.4g MN/m, moment %.4g kN m/m, %d elements have yielded'
-          % (thrust/1e6, moment/1e3, hinges))
-curve.append((1e3 * convergence, 0.0))
+TOLDcurve.append((1e3 * convergence, 0.0))
 pcdc chart create 'support' x-label 'convergence (mm)' y-label 'stress at the wall over that before'
 pcdc chart add 'support' values [curve] label 'release'
 pcdc chart add 'support' values [[(1e3 * at_support, 1 - release)]] label 'support put in' style points
 pcdc chart export 'support' 'support.png' plastic
+"""
+PICTURE = """\
+pcdc output image 'support' field 'displacement' eye '1,-0.6,1.5'
 """

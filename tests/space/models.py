@@ -50,9 +50,9 @@ def swinging(sim: Blocks) -> None:
 
 
 def dig(sim: Blocks) -> None:
-    """A piece of the bar is taken out in the middle of the run."""
-    if sim.clock.step == 500:
-        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] > 2.2))
+    """A piece of the bar is taken out in the middle of the run, and lets go while a checkpoint is written."""
+    if sim.clock.step == 300:
+        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] > 2.2), relax=300.0 * sim.clock.dt)
 
 
 def yielding(sim: Blocks) -> None:

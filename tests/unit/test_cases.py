@@ -30,8 +30,7 @@ def alternatives(kind: type[Case]) -> list[Case]:
     if "dim" in kind.model_fields:
         for one in list(made):
             given = {name: getattr(one, name) for name in one._given()}
-            if "guided" not in given:  # of the plane
-                made.append(kind(dim=3, **given))
+            made.append(kind(dim=3, **given))
     return made
 
 
@@ -126,8 +125,12 @@ def test_what_is_wrong_is_named(given, said):
 def test_what_is_of_space_is_refused_in_the_plane():
     with pytest.raises(ScriptError, match="thickness: expected dim 3"):
         find("brazilian")(thickness=0.02)
-    with pytest.raises(ScriptError, match="guided: expected no in three dimensions"):
-        find("brazilian")(dim=3, guided=True)
+    with pytest.raises(ScriptError, match="elements: expected dim 2 beside it"):
+        find("support")(dim=3, elements="tri")
+    with pytest.raises(ScriptError, match="liner: expected dim 2 beside it"):
+        find("support")(dim=3, liner=0.3)
+    with pytest.raises(ScriptError, match="at most 0.7 of bolt_spacing"):
+        find("support")(dim=3, size=0.8)
     assert find("ucs")(dim="3") == find("ucs")(dim=3)
 
 

@@ -67,6 +67,14 @@ def fluid(project: Project) -> dict[str, float]:
     return found.account()
 
 
+def fluid_energies(project: Project) -> dict[str, float]:
+    """Of blocks and fluid in implicit steps [J/m], see `Flow.energies`. Collective."""
+    found = Flow.there(project.ready(use=False))
+    if found is None:
+        raise CommandError("there is no fluid: face-joint c-model hydraulic-porous-medium comes first")
+    return found.energies()
+
+
 def proppant(project: Project) -> dict[str, float]:
     """The account of proppant [m2], see `Proppant.account`. Collective."""
     found = Proppant.there(project.ready(use=False))

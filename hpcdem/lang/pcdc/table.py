@@ -216,7 +216,7 @@ NULL = Model(
     "names them brings them back, as new material where the void is then, free of stress; they hang together with what "
     "lies around them, without joints, until face-joint c-model gives them some.",
     (Option("relax", (POSITIVE,), "what they did to the others dies down over this time (static runs: so many steps)",
-            "s", "at once", dims=PLANE),), dims=BOTH,
+            "s", "at once"),), dims=BOTH,
 )  # fmt: skip
 MOHR_COULOMB = Model(
     "mech{anical}-m{ohr}-c{oulomb}", "2",

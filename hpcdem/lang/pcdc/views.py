@@ -75,6 +75,12 @@ class Model:
         return self._look(lambda: fdem.queries.fluid(self._project))
 
     @property
+    def fluid_energies(self) -> dict[str, float]:
+        """The energy of blocks and fluid in implicit steps [J/m], in space [J]: pumped, leaked, viscous, fluid, strain,
+        joints, fracture, outside, closing, relative."""
+        return self._look(lambda: fdem.queries.fluid_energies(self._project))
+
+    @property
     def proppant(self) -> dict[str, float]:
         """The account of proppant [m2]: came, stored, packed, left, removed, closing, relative."""
         return self._look(lambda: fdem.queries.proppant(self._project))

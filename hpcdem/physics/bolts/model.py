@@ -81,6 +81,7 @@ class Bolts(Structure):
 
     name: ClassVar[str] = "bolts"
     kernel_kind: ClassVar[str] = "bolts"
+    of_both: ClassVar[bool] = True
     word: ClassVar[str] = "bolt"
     parts: ClassVar[tuple[str, str]] = (BOLT_ELEMENT, BOLT_NODE)
     quantities = QUANTITIES

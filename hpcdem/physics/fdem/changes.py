@@ -42,8 +42,6 @@ def null(sim: Blocks, elements: Numbers, relax: float = 0.0) -> None:
     span = float(finite("relax", [relax])[0])
     if span < 0.0:
         raise CommandError(f"relax must not be negative, got {relax:g}")
-    if span > 0.0:
-        sim.refuse_in_space("relax of elements that are taken out")
     if len(at) == int(sim.alive.sum()):
         raise CommandError("all elements that are left would be taken out")
     dying = np.zeros(len(sim.alive), bool)
@@ -60,7 +58,7 @@ def null(sim: Blocks, elements: Numbers, relax: float = 0.0) -> None:
     sim.number, sim.x, sim.v = sim.number[stay], sim.x[stay], sim.v[stay]
     sim.cold = {name: values[stay] for name, values in sim.cold.items()}
     sim.histories = sim.histories.take(stay).without_partners(dying, sim.dim)
-    if left is not None:
+    if left is not None and len(left[0]):
         begin = sim.clock.time if sim.options.dynamic else float(sim.clock.step)
         sim.relaxations.append(Relaxation(*left, begin, span, not sim.options.dynamic))
     sim.ownership.wanted = True
@@ -220,16 +218,19 @@ def _move_as_one(sim: Blocks, back: np.ndarray, corner: np.ndarray, v: np.ndarra
 
 
 def _forces_left_behind(sim: Blocks, dying: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Corners that stay, and what dying elements do to them through common nodes and joints (n, 2) [N/m]."""
+    """Corners that stay, and what dying elements do to them through common nodes and joints (n, dim) [N/m], in space
+    [N]."""
+    if sim.dim == 3 and len(sim.the_mesh().hexes) and ((sim.joint_row > 0) & ~sim.open).any():
+        raise CommandError("relax of elements that are taken out knows no joints between hexahedra")
     seen = sim.evaluate()
-    local, mesh = sim.local, sim.the_mesh()
+    local, dim = sim.local, sim.dim
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     # Common nodes: the forces of the dying corners fall to the lowest corner that stays. Every node is looked at by
     # the owner of that corner.
-    begin, corner_at = local.node_begin, local.node_corner
+    begin, corner_at = local.pulled or (local.node_begin, local.node_corner)
     if len(corner_at):
         node = np.repeat(np.arange(len(begin) - 1), np.diff(begin))
-        row, k = corner_at // 8, corner_at % 8 // 2
+        row, k = corner_at // local.force_width, corner_at % local.force_width // local.stride
         number = sim.number[row]
         dies = dying[number]
         heir = np.full(len(begin) - 1, np.iinfo(np.int64).max)
@@ -240,25 +241,21 @@ def _forces_left_behind(sim: Blocks, dying: np.ndarray) -> tuple[np.ndarray, np.
         mine[known] = (at >= sim.owned.start) & (at < sim.owned.stop)
         use = dies & mine[node]
         flat = seen.force.reshape(-1)
-        force = np.column_stack([flat[corner_at[use]], flat[corner_at[use] + 1]])
+        force = flat[corner_at[use][:, None] + np.arange(dim)]
         parts.append((heir[node[use]], 4 * number[use] + k[use], force))
     # Joints: the forces on this side.
     slot = np.flatnonzero(local.slot_state[: local.slots] > 0)
     face = local.slot_face[slot]
     slot = slot[dying[sim.partner[face] // 4] & ~dying[face // 4]]
-    face = local.slot_face[slot]
-    forces = local.edge_forces(slot)
-    e, k = face // 4, face % 4
-    n = np.where(mesh.cells[e, 3] >= 0, 4, 3)
-    parts.append((face, face, forces[:, :2]))
-    parts.append((4 * e + (k + 1) % n, face, forces[:, 2:]))
+    corner, force = local.corner_forces(slot)
+    parts += [(corner[:, k], local.slot_face[slot], force[:, k]) for k in range(dim)]
     table = np.column_stack(
         [np.concatenate([c for c, _, _ in parts]), np.concatenate([f for _, f, _ in parts])]
     ).astype(float)
     rows = np.concatenate(sim.comm.allgather(np.hstack([table, np.concatenate([f for *_, f in parts])])))
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     corners, first = np.unique(rows[:, 0].astype(np.int64), return_index=True)
-    sums = np.add.reduceat(rows[:, 2:], first, axis=0) if len(first) else np.empty((0, 2))
+    sums = np.add.reduceat(rows[:, 2:], first, axis=0) if len(first) else np.empty((0, dim))
     return corners, sums
 
 

@@ -1060,8 +1060,8 @@ class ModelDefinition:
         self.loads = [Traction(**one) for one in state["loads"]]
         self.relaxations = [
             Relaxation(
-                np.array(one["corner"], np.int64), np.array(one["force"]).reshape(-1, 2), one["begin"], one["span"],
-                one["in_steps"],
+                np.array(one["corner"], np.int64), np.array(one["force"]).reshape(len(one["corner"]), -1),
+                one["begin"], one["span"], one["in_steps"],
             )
             for one in state["fading"]
         ]  # fmt: skip

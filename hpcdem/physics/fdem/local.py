@@ -182,6 +182,8 @@ class Local:
 
     dim, force_width, stride = 2, elements.FORCE, 2
     without_moduli: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]] = ()
+    pulled: tuple[np.ndarray, np.ndarray] | None = None
+    """In place of node_begin and node_corner: corners with forces, where some have none."""
 
     def __init__(self, sim: State) -> None:
         self.sim = sim
@@ -539,20 +541,33 @@ class Local:
         self.load_functions = Placed(sim.loads, sim.load_row[faces[i, k]].astype(np.int64), places)
         self.load_of = self.load_functions.of
         self._make_dashpots(np.flatnonzero(sim.quiet_faces()[faces[i, k]]), row, k, k2)
+        dies_down = self._make_relaxations()
+        sim.surface_loads.corners(sim, self.special)
+        self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0 or dies_down)
+
+    def _make_relaxations(self) -> bool:
+        """What elements that were taken out left behind at corners that are owned; whether there is some."""
+        sim, own = self.sim, self.sim.owned
         parts = [one for one in sim.relaxations if not sim.has_ended(one)]
         corner = np.concatenate([one.corner for one in parts] or [np.empty(0, np.int64)])
-        force = np.concatenate([one.force for one in parts] or [np.empty((0, 2))])
+        force = np.concatenate([one.force for one in parts] or [np.empty((0, self.dim))])
         each = [len(one.corner) for one in parts]
         at_row = sim.where[corner // 4]
         at = np.flatnonzero((at_row >= own.start) & (at_row < own.stop))
         self.special[at_row[at] - own.start, corner[at] % 4] = True
-        self.relaxing_corner = 8 * at_row[at] + 2 * (corner[at] % 4)
-        self.relaxing_x, self.relaxing_y = force[at, 0].copy(), force[at, 1].copy()
+        self.relaxing_corner = self.force_width * at_row[at] + self.stride * (corner[at] % 4)
+        self.relaxing_force = force[at].copy()
         self.relaxing_begin = np.repeat(np.array([one.begin for one in parts]), each)[at]
         self.relaxing_span = np.repeat(np.array([one.span for one in parts]), each)[at]
         self.relaxing_steps = np.repeat(np.array([one.in_steps for one in parts], bool), each)[at]
-        sim.surface_loads.corners(sim, self.special)
-        self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0 or len(at) > 0)
+        return len(at) > 0
+
+    def _relax(self) -> None:
+        """Add what is left of these forces now."""
+        if len(self.relaxing_corner):
+            now = np.where(self.relaxing_steps, float(self.sim.clock.step), self.sim.clock.time)
+            left = np.clip(1.0 - (now - self.relaxing_begin) / self.relaxing_span, 0.0, 1.0)
+            moving.relax(self.relaxing_corner, self.relaxing_force, left, self.applied)
 
     def _make_dashpots(self, quiet: np.ndarray, row: np.ndarray, k: np.ndarray, k2: np.ndarray) -> None:
         """Dashpots of the quiet ones among the loaded faces: row, corner k to k2."""
@@ -1020,10 +1035,7 @@ class Local:
                     self.quiet_edge, self.quiet_corner, self.quiet_place, self.quiet_p, self.quiet_s, self.quiet_of,
                     loads, sim.x, sim.v, self.applied,
                 )  # fmt: skip
-            if len(self.relaxing_corner):
-                now = np.where(self.relaxing_steps, float(clock.step), clock.time)
-                left = np.clip(1.0 - (now - self.relaxing_begin) / self.relaxing_span, 0.0, 1.0)
-                moving.relax(self.relaxing_corner, self.relaxing_x, self.relaxing_y, left, self.applied)
+            self._relax()
             sim.surface_loads.add_to(self.applied)
         if self.shared:
             sim.halo.fill(self.force)
@@ -1255,6 +1267,14 @@ class Local:
     def edge_forces(self, slots: np.ndarray) -> np.ndarray:
         """Joint forces (n, 4) [N/m] on the first and the last corner of the edges of slots."""
         return self._edges(slots)[:, :4]
+
+    def corner_forces(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (element * 4 + k) of the faces of slots (n, dim), and the joint forces on them (n, dim, dim) [N/m],
+        in space [N]."""
+        face = self.slot_face[slots]
+        n = connectivity.corner_counts(self.sim.the_mesh().cells[face // 4])
+        corners = np.column_stack([face, 4 * (face // 4) + (face % 4 + 1) % n])
+        return corners, self.edge_forces(slots).reshape(-1, 2, 2)
 
     def joint_means(self, slots: np.ndarray) -> np.ndarray:
         """Mean opening, slip [m], normal and shear stress [Pa] of joints (n, 4)."""

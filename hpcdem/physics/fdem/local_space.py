@@ -43,7 +43,6 @@ class LocalSpace(LawsSpace):
         self._make_joints()
         self._put_histories()
         self.pairs: Any = ContactSpace(sim, *ContactSpace.remembered(sim))
-        self.relaxing_corner = np.empty(0, np.int64)  # nothing dies down in space
         self._make_loads()
         self._make_nodes()
         self._set_masses()
@@ -141,8 +140,9 @@ class LocalSpace(LawsSpace):
         self.quiet_p, self.quiet_s = self._impedances(sim.number[own][i[quiet]])
         if self.hexes is not None:
             self._share_loads(i)
+        dies_down = self._make_relaxations()
         sim.surface_loads.corners(sim, self.special)
-        self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0)
+        self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0 or dies_down)
 
     def _share_loads(self, element: np.ndarray) -> None:
         """A side of a hexahedron is two triangles, and a load on it that of both ways to cut it, half each. element
@@ -158,7 +158,7 @@ class LocalSpace(LawsSpace):
 
     def _mark_special(self) -> None:
         """All forces are stored. Of hexahedra only one corner at each of their points has some."""
-        self.pulled: tuple[np.ndarray, np.ndarray] | None = None
+        self.pulled = None
         if self.hexes is not None:
             some = self.true_mass.reshape(-1)[self.node_corner // tets.STRIDE] > 0.0
             before = np.concatenate([[0], np.cumsum(some)])
@@ -335,6 +335,7 @@ class LocalSpace(LawsSpace):
                 space.dashpots(
                     self.quiet_corner, self.quiet_p, self.quiet_s, self.quiet_of, loads, sim.x, sim.v, self.applied
                 )
+            self._relax()
             sim.surface_loads.add_to(self.applied)
         if self.shared:
             sim.halo.fill(self.force)
@@ -468,10 +469,10 @@ class LocalSpace(LawsSpace):
         energy_space.kinetic(self.sim.n_left, self.sim.n_own, before, after, self.mass, out)
 
     def _edges(self, slots: np.ndarray) -> np.ndarray:
-        """See `joints_space.faces_now`; behind no forces, which the plane has."""
-        out = np.zeros((len(slots), 13))
+        """See `joints_space.faces_now`."""
+        out = np.zeros((len(slots), 22))
         for which, joints in self.triangles(slots):
-            found = np.zeros((len(which), 13))
+            found = np.zeros((len(which), 22))
             joints_space.faces_now(*joints, self.joint_table, self.joint_beyond, found)
             out[which] = found
         return out
@@ -489,6 +490,11 @@ class LocalSpace(LawsSpace):
             (which[on_side], self.sides.moved(of_sides)),
         ]
 
+    def corner_forces(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As in the plane, of tetrahedra."""
+        face = self.slot_face[slots]
+        return 4 * (face // 4)[:, None] + FACES[face % 4], self._edges(slots)[:, 13:].reshape(-1, 3, 3)
+
     def joint_means(self, slots: np.ndarray) -> np.ndarray:
         """Mean opening, size of the mean slip [m], mean normal stress and size of the mean shear stress [Pa] (n, 4)."""
         return self._edges(slots)[:, :4]
@@ -501,7 +507,7 @@ class LocalSpace(LawsSpace):
         """As in the plane: the shear force on this side, half to each of the two faces."""
         slots = np.flatnonzero(self.slot_state == BROKEN)
         found = self._edges(slots)
-        slots, shear = slots[found[:, 2] < 0.0], found[found[:, 2] < 0.0, 10:]
+        slots, shear = slots[found[:, 2] < 0.0], found[found[:, 2] < 0.0, 10:13]
         mine, other = self.slot_face[slots], self.sim.partner[self.slot_face[slots]]
         rows = np.zeros((2, len(slots), WORDS))
         rows.view(np.int64)[0, :, KEY] = 8 * (other // 4) + mine % 4

@@ -554,7 +554,7 @@ class Blocks(State):
                     self.prepare_kernels(f"{kind}-hexes")
         for load in self.surface_loads:
             if load.kernel_kind:
-                self.prepare_kernels(load.kernel_kind + ("-space" if self.dim == 3 else ""))
+                self.prepare_kernels(load.kernel_kind + ("-space" if self.dim == 3 and not load.of_both else ""))
         user_laws.begin(self)
         user_laws.compile_for_quads(self)
         stale = self._topology_stale

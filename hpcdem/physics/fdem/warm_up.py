@@ -262,6 +262,7 @@ def in_space(threads: int = 1) -> None:
     diagnostics.values(sim, "normal_stress")
     sim.rebuild()
     sim.option(dynamic=False)
+    changes.null(sim, [1], relax=2)
     convergence.advance(sim, 2)
     diagnostics.unbalanced_ratio(sim)
 

@@ -17,6 +17,7 @@ from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import equilibrium, pressed, user_laws
 from hpcdem.physics.fdem.linear import MANY, MANY_IN_SPACE, Condensed, Direct, Petsc, Pieces, Unknowns, petsc_there
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow import energy
 from hpcdem.physics.flow.costs import Cost, implicit
 from hpcdem.physics.flow.implicit import Balance, Fluid, Step, reference_pressure
 from hpcdem.physics.flow.model import Flow
@@ -137,6 +138,7 @@ class Coupled:
         flow.implicit = True
         self.fluid = Fluid(flow, reference_pressure(flow, self._stress()))
         self.solver = self._solver()
+        self._stored = (0.0, 0.0)
         if self.moves:
             self._rest = equilibrium.at_rest(sim, self.nodes)
             try:
@@ -146,6 +148,7 @@ class Coupled:
                 flow.implicit = False
                 pressed.part(sim)
                 raise
+            self._stored = energy.stored(sim)
         return self
 
     def __exit__(self, *error: Any) -> None:
@@ -324,12 +327,17 @@ class Coupled:
         found = self._newton(step, self.x, u)
         if not found.error and found.past > self.front and dt > TOGETHER * self.longest:
             found.error = f"more than {self.front} joints would pass their peak"
+        work, before = np.zeros(3), self.fluid.state_of(self.fluid.u, self.x)
         if not found.error and self.moves:
             memory, past = equilibrium.Memory.of(sim), found.past
+            work += energy.of_blocks(sim, self.fluid, self.x, found.x, before, found.fluid.state)
             while self._open_joints(found.x):
                 # Strength of all its points is gone, of those that had some left too.
-                found = self._newton(step, found.x, found.u)
-                if found.error:
+                last, found = found, self._newton(step, found.x, found.u)
+                if not found.error:
+                    states = last.fluid.state, found.fluid.state
+                    work += energy.of_blocks(sim, self.fluid, last.x, found.x, *states)
+                else:
                     sim.before_change()
                     memory.put_back(sim)
                     sim.close_model()
@@ -342,9 +350,26 @@ class Coupled:
             return found
         total = float(found.fluid.sizes.sum())
         found.storing = float(np.abs(found.fluid.fluid - step.fluid).sum()) / total if total > 0.0 else 0.0
+        volume = self.fluid.volume
         self.x = found.x
-        self.fluid.take(step, found.fluid, found.u)
+        given = self.fluid.take(step, found.fluid, found.u)
+        if self.fluid.packs is not None:
+            self.flow.energy = None  # what packs of grains take is not known
+        if passes:
+            self._book(energy.of_fluid(self.fluid, step, before, volume, found.fluid, given), *work)
         return found
+
+    def _book(self, of_fluid: dict[str, float], joints: float, pushed: float, outside: float) -> None:
+        """A step was taken, in which joints, the fluid and what else acts on the blocks did so much work."""
+        entries = self.flow.energy
+        if entries is None:
+            return
+        had, self._stored = self._stored, energy.stored(self.sim) if self.moves else (0.0, 0.0)
+        strain, given_back = (now - then for now, then in zip(self._stored, had))
+        of_blocks = {"strain": strain, "joints": given_back, "fracture": -joints - given_back}
+        of_blocks |= {"pushed": pushed, "outside": outside}
+        for name, value in (of_fluid | of_blocks).items():
+            entries[name] += value
 
     def _open_joints(self, x: np.ndarray) -> bool:
         """Joints remember these positions (nn, dim) of the nodes; whether some broke. Until the run is over they stay

@@ -506,8 +506,9 @@ class Fluid:
 
     # ---- the end of a step ---------------------------------------------------------------------------------------
 
-    def take(self, step: Step, now: Balance, u: np.ndarray) -> None:
-        """The fluid is that of this balance: what flows out of one node has flowed into another, to rounding."""
+    def take(self, step: Step, now: Balance, u: np.ndarray) -> np.ndarray:
+        """The fluid is that of this balance: what flows out of one node has flowed into another, to rounding. What
+        came in at each node (n,) [m2]."""
         flow = self.flow
         does, value = step.conditions[self.condition].T
         rate = np.where(does == kernels.RATE, value, 0.0) * step.dt
@@ -535,6 +536,7 @@ class Fluid:
         p, s = now.state[:, kernels.P], now.state[:, kernels.S]
         self.fluid, self.u = fluid, self._variables(np.where(p > 0.0, p / self.p0, s - 1.0))
         flow.time = step.after
+        return given
 
     def _note_well(self, well: Well, rows: np.ndarray, step: Step, state: np.ndarray, came: float) -> None:
         """What a well did in a step."""

@@ -25,7 +25,7 @@ from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, JOINT
 from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.tables import Value
-from hpcdem.physics.flow import kernels, kernels_space
+from hpcdem.physics.flow import energy, kernels, kernels_space
 from hpcdem.physics.flow.network import LINKS, Network, at_nodes, links_of, wet_faces
 from hpcdem.physics.flow.properties import FLUID, POROUS
 from hpcdem.physics.flow.wells import PRESSURE as HELD
@@ -137,6 +137,8 @@ class Flow(SurfaceLoad):
         self.nodes = np.empty((0, kernels.NODE))
         self.state = np.empty((0, kernels.STATE))
         self.removed = dict.fromkeys(("given", "leaked", "removed"), 0.0)
+        self.energy: dict[str, float] | None = dict.fromkeys(energy.ENTRIES, 0.0)
+        """Of implicit steps [J/m], in space [J], see `energy`; None: not known any more."""
         """Accounts of nodes that are gone [m2]."""
         self.time = blocks.clock.time
         self.cycles = self.waited = self.sub_steps = 0
@@ -477,6 +479,13 @@ class Flow(SurfaceLoad):
         found["closing"] = found["given"] - found["stored"] - found["leaked"] - found["removed"]
         found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
         return found
+
+    def energies(self) -> dict[str, float]:
+        """The energy of the fluid and the blocks in implicit steps [J/m], in space [J]: `energy.ENTRIES`, what does not
+        add up (closing), over the largest (relative). CommandError where packs of grains took some."""
+        if self.energy is None:
+            raise CommandError("no account of energy is kept where grains bear: what their packs take is not known")
+        return energy.closed(self.energy)
 
     @property
     def owned(self) -> int:
@@ -1015,6 +1024,7 @@ class Flow(SurfaceLoad):
             "cycles": self.cycles, "waited": self.waited, "sub_steps": self.sub_steps, "dt": self.dt,
             "implicit_dt": self.implicit_dt, "since_peak": self.since_peak, "passed": self.passed,
             "reshaped": self._reshaped, "found_for": self._found_for, "wells": [well.saved() for well in self.wells],
+            "energy": self.energy,
         }  # fmt: skip
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
@@ -1044,6 +1054,7 @@ class Flow(SurfaceLoad):
         made.wells = [Well.restored(one) for one in state["wells"]]
         made.conditions = [Condition(**one) for one in state["conditions"]]
         made.removed, made.time = dict(state["removed"]), state["time"]
+        made.energy = state.get("energy", made.energy)
         made.cycles, made.waited = state["cycles"], state["waited"]
         made.sub_steps, made.dt, made.implicit_dt = state["sub_steps"], state["dt"], state.get("implicit_dt", 0.0)
         made.since_peak, made.passed = state.get("since_peak", 0), state.get("passed", 0)

@@ -418,7 +418,8 @@ def longest_link(middle, slots, face, partner, where, state):
 @njit(cache=True, nogil=True, error_model="numpy")
 def faces_now(slots, face, link, sizes, kind, state, history, where, x, table, beyond, out):
     """Mean opening and slip [m], normal and shear stress [Pa] of joints, normal (3) and shear stress (3) at the points
-    near the corners of the slot's face, and the shear force on this side (3) [N], into out (n, 13); histories stay."""
+    near the corners of the slot's face, and on this side the shear force (3) and the forces on these corners (9) [N],
+    into out (n, 22); histories stay."""
     flat = x.reshape(x.size)
     own, found, part = rooms()
     remembered = np.empty(HISTORY)
@@ -451,3 +452,5 @@ def faces_now(slots, face, link, sizes, kind, state, history, where, x, table, b
         sigma, sx, sy, sz, tau = parted(tx, ty, tz, nx, ny, nz)
         out[i, 2], out[i, 3] = sigma, tau
         out[i, 10], out[i, 11], out[i, 12] = area * sx, area * sy, area * sz
+        for m in range(9):
+            out[i, 13 + m] = found[m]

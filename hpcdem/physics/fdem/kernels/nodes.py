@@ -70,12 +70,12 @@ def dashpots(edges, corners, places, along, across, row, table, x, v, applied):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def relax(corner, fx, fy, left, applied):
-    """Add forces that die down: `left` (m,) is what is left of each, 1 to 0."""
+def relax(corner, force, left, applied):
+    """Add forces (m, dim) that die down: `left` (m,) is what is left of each, 1 to 0."""
     applied = applied.reshape(applied.size)
     for m in range(len(corner)):
-        applied[corner[m]] += left[m] * fx[m]
-        applied[corner[m] + 1] += left[m] * fy[m]
+        for c in range(force.shape[1]):
+            applied[corner[m] + c] += left[m] * force[m, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
