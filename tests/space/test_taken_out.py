@@ -82,3 +82,9 @@ def test_it_takes_its_time_in_motion() -> None:
 def test_a_time_below_zero_is_refused() -> None:
     with pytest.raises(CommandError, match="relax must not be negative"):
         changes.null(standing(MESHES["tetrahedra"], False), [0], relax=-1.0)
+
+
+def test_beside_joints_between_hexahedra_it_is_refused() -> None:
+    mesh = hexes(CELLS, SIZE)
+    with pytest.raises(CommandError, match="knows no joints between hexahedra"):
+        changes.null(standing(mesh, True), hole(mesh), relax=10)

@@ -129,7 +129,7 @@ def test_what_is_of_space_is_refused_in_the_plane():
         find("support")(dim=3, elements="tri")
     with pytest.raises(ScriptError, match="liner: expected dim 2 beside it"):
         find("support")(dim=3, liner=0.3)
-    with pytest.raises(ScriptError, match="at most 0.7 of bolt_spacing"):
+    with pytest.raises(ScriptError, match=r"at most 0\.7 of bolt_spacing"):
         find("support")(dim=3, size=0.8)
     assert find("ucs")(dim="3") == find("ucs")(dim=3)
 

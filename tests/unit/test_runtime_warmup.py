@@ -14,7 +14,12 @@ from pathlib import Path
 
 import pytest
 
+from hpcdem import session
 from hpcdem.halo.comm import SerialComm
+from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.proppant.model import Proppant
 from hpcdem.runtime import compilers
 from hpcdem.runtime import kernels as kernels_
 from hpcdem.runtime.progress import Log
@@ -530,3 +535,10 @@ def test_the_key_knows_every_module_with_kernels_and_its_callers():
         "io/textnum.py",
     } <= found
     assert not {"api.py", "commands/dem/walls.py"} & found
+
+
+@pytest.mark.parametrize("load", [Bolts, Flow, Heat, Proppant])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_what_acts_on_blocks_has_kernels_of_a_known_kind(load, dim):
+    """Liners are of the plane only."""
+    assert load.kernel_kind + ("-space" if dim == 3 and not load.of_both else "") in session.KINDS

@@ -23,9 +23,9 @@ class SurfaceLoad(ABC):
     name: ClassVar[str]
     of_mesh: ClassVar[bool] = False
     kernel_kind: ClassVar[str] = ""
-    of_both: ClassVar[bool] = False
-    """Its kernels are the same in the plane and in space."""
     """Kind of the kernels that it needs besides those of blocks, see `session.KINDS`."""
+    of_both: ClassVar[bool] = False
+    """They are the same in the plane and in space."""
 
     @property
     def stays(self) -> bool:

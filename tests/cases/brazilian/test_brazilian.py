@@ -69,3 +69,15 @@ def test_elastic_disc(launch, tmp_path):
 @pytest.mark.slow
 def test_disc_splits(launch, tmp_path):
     check_split(study(launch, tmp_path, "brazilian", 7200, **AS_PUBLISHED), 0.001)
+
+
+@pytest.mark.slow
+def test_a_disc_in_space_splits_along_a_plane_of_faces(launch, tmp_path):
+    """With faces along the loaded diameter it has the strength of the joints, within 25 %; a rough path is stronger."""
+    found = {}
+    for guided in (True, False):
+        given = {"dim": 3, "size": 0.006, "transits": 12, "penalty_overlay": 10, "guided": guided}
+        found[guided] = study(launch, tmp_path / str(guided), "brazilian", 3600, **given).result
+        assert found[guided]["energy_error"] < 0.01
+    assert found[True]["strength"] == pytest.approx(TENSILE, rel=0.25)
+    assert found[False]["strength"] > 1.3 * found[True]["strength"]

@@ -27,6 +27,20 @@ def test_bolts_hold(launch, tmp_path):
     assert none.plastic_radius > usual.plastic_radius
 
 
+@pytest.mark.parametrize("yields", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_slice_in_space_is_plane_strain(launch, tmp_path, yields):
+    """One ring of bolts in a slice as wide as their spacing, beside bolts that are spread along the tunnel: closure,
+    crown and largest force of a bolt within 4 %."""
+    rock = {"size": 0.6, "coarse": 5.0, "reach": 7.0, "stages": 2000 if yields else 500}
+    if not yields:
+        rock |= {"cohesion": 20e6, "tensile_strength": 20e6}
+    plane = results(launch, tmp_path / "plane", Support(elements="tri", **rock))
+    space = results(launch, tmp_path / "space", Support(dim=3, **rock))
+    for name in ("convergence", "at_support", "crown", "axial_force", "plastic_radius"):
+        assert getattr(space, name) == pytest.approx(getattr(plane, name), rel=0.04)
+    assert (space.yielded > 10) == (plane.yielded > 10) == yields
+
+
 @pytest.mark.slow  # bolts by themselves: tests/bolts
 def test_every_option_of_the_bolts(launch, tmp_path):
     """Each of these alone changes what the tunnel does, in the way that it should."""
