@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.memory import sparse_zeros
 from hpcdem.numerics.random_field import RandomField
 from hpcdem.physics.fdem import hexahedra, properties, user_functions
 from hpcdem.physics.fdem import mesh as meshes
@@ -190,20 +191,20 @@ class ModelDefinition:
         self.alive = np.ones(elements, bool)
         """Elements that were not taken out."""
         self.element_row = np.zeros(elements, np.int32)
-        self.joint_row = np.zeros(4 * elements, np.int32)
+        self.joint_row = sparse_zeros(4 * elements, np.int32)
         """Of both faces of a joint."""
-        self.open = np.zeros(4 * elements, bool)
+        self.open = sparse_zeros(4 * elements, bool)
         """Faces that do not hold on to their partner (any more): broken, cracked, or the partner was taken out."""
-        self.broken = np.zeros(4 * elements, np.uint8)
+        self.broken = sparse_zeros(4 * elements, np.uint8)
         """By the lower face: 1 if the joint broke; more, while it is a joint again, see pressed.py."""
         self.slid: dict[int, tuple[float, ...]] = {}
         """By face what broken joints remember of their slip at three points [m], see pressed.py."""
-        self.face_row = np.zeros(4 * elements, np.int32)
+        self.face_row = sparse_zeros(4 * elements, np.int32)
         self.point_row = np.zeros(points, np.int32)
-        self.load_row = np.zeros(4 * elements, np.int32)
+        self.load_row = sparse_zeros(4 * elements, np.int32)
         self.stress0: np.ndarray | None = None
         """(elements, 4), in space (elements, 6): `COMPONENTS` [Pa] at zero strain, as it was said, if there is any."""
-        self.stress0_row = np.zeros(elements, np.int32)
+        self.stress0_row = sparse_zeros(elements, np.int32)
         """Row of the element models for whose moduli it was said; 0: the element had no model yet."""
 
     # What the simulation does when something has changed.

@@ -224,8 +224,8 @@ class Local:
         """Reference geometry, moduli, true masses, initial stress."""
         sim, mesh, count = self.sim, self.sim.reference, self.count
         models = element_table(sim.element_rows)
-        self.true_mass = np.zeros((len(sim.number), 4))
-        build.masses(sim.number, mesh.points, mesh.cells, sim.element_row, models, self.true_mass)
+        self._true_mass = np.zeros((len(sim.number), 4))
+        build.masses(sim.number, mesh.points, mesh.cells, sim.element_row, models, self._true_mass)
         self.c = np.zeros((count + 3, elements.TRIANGLE))
         self.q = np.zeros((len(self.quad_rows), elements.QUAD))
         build.constants(
@@ -733,12 +733,25 @@ class Local:
         true = exact_sum(self.true_mass[own], comm)
         return exact_sum(self.mass[own] - self.true_mass[own], comm) / true
 
+    @property
+    def true_mass(self) -> np.ndarray:
+        """Masses of the corners (n, 4) [kg/m], in space [kg]."""
+        return self._true_mass
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Those that the motion sees."""
+        return self._mass
+
+    def true_masses(self) -> bool:
+        """One table as long as nothing is added to the masses: only static runs and mass scaling do."""
+        o = self.sim.options
+        return o.dynamic and o.mechanical and o.mass_scaling == 0.0
+
     def _set_masses(self) -> None:
         """Masses of the corners that the motion sees, and the time step. Collective."""
         sim, o = self.sim, self.sim.options
-        # One table as long as nothing is added to the masses: only static runs and mass scaling do.
-        true = o.dynamic and o.mechanical and o.mass_scaling == 0.0
-        self.mass = self.true_mass if true else self.true_mass.copy()
+        self._mass = self.true_mass if self.true_masses() else self.true_mass.copy()
         if not o.dynamic or not o.mechanical:
             self._make_static_masses()
             sim.clock.dt = 1.0

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.core.memory import sparse_zeros
 from hpcdem.physics.fdem import user_laws
 from hpcdem.physics.fdem.definition import TRACTIONS
 from hpcdem.physics.fdem.hexes import Hexes, place_masses
@@ -38,6 +39,7 @@ class LocalSpace(LawsSpace):
         self.rows = np.concatenate([rows, np.repeat(rows[-1:], 3)]).astype(np.int32)
         self.tally = np.zeros((sim.threads, elements.TALLY), np.int64)
         self.passes = 0
+        self._mass = np.empty((0, 4))
         self._make_constants()
         self._make_memories()
         self._make_joints()
@@ -48,24 +50,47 @@ class LocalSpace(LawsSpace):
         self._set_masses()
         self._bind()
 
+    @property
+    def true_mass(self) -> np.ndarray:
+        """Made when they are asked for: steps have no need of them."""
+        if self.true_masses() and len(self._mass):
+            return self._mass
+        mass = self._quarters()
+        if len(self.sim.the_mesh().hexes):
+            place_masses(self.sim, mass)
+        return mass
+
+    @property
+    def mass(self) -> np.ndarray:
+        return self._mass if len(self._mass) else self.true_mass
+
+    def _quarters(self) -> np.ndarray:
+        """Of the mass of each tetrahedron (n, 4) [kg], also where six of them store a hexahedron."""
+        sim, mesh = self.sim, self.sim.the_mesh()
+        mass = np.zeros((len(sim.number), 4))
+        space.masses(sim.number, mesh.points, mesh.cells, sim.element_row, element_table(sim.element_rows), mass)
+        return mass
+
+    def _set_masses(self) -> None:
+        super()._set_masses()
+        if self.true_masses() and self.sim.budget is None:  # which needs them in each step
+            self._mass = np.empty((0, 4))
+
     def _make_constants(self) -> None:
         sim, mesh = self.sim, self.sim.the_mesh()
         models = element_table(sim.element_rows)
-        self.true_mass = np.zeros((len(sim.number), 4))
-        space.masses(sim.number, mesh.points, mesh.cells, sim.element_row, models, self.true_mass)
         self.c = np.zeros((self.count + 3, tets.TET))
         space.constants(
             sim.number, mesh.points, mesh.cells, sim.element_row, models, sim.options.dynamic, self.rows[: self.count],
-            self.true_mass, self.c,
+            self._quarters(), self.c,
         )  # fmt: skip
         self.hexes: Hexes | None = None
         if len(mesh.hexes):
             sim.prepare_kernels("hexes")
-            place_masses(sim, self.true_mass)
             self.hexes = Hexes(sim, self.true_mass)
         self.c[self.count :] = self.c[self.count - 1] if self.count else 1.0
-        self.s0 = np.zeros((self.count + 3, tets.STRESSES))
-        self._stress = np.zeros((self.count, 6))
+        self.s0 = sparse_zeros((self.count + 3, tets.STRESSES))
+        self._stress = sparse_zeros((self.count, 6))
         if sim.stress0 is not None:
             self._stress = sim.initial_stresses(sim.number[sim.owned])
         self._make_warm()
@@ -75,16 +100,14 @@ class LocalSpace(LawsSpace):
         sim, mesh = self.sim, self.sim.the_mesh()
         self.slots = 4 * self.count
         padded = self.slots + 12  # lanes are filled four tetrahedra at a time
-        self.slot_face, self.slot_link = np.zeros(padded, np.int64), np.zeros((padded, 3), np.int32)
+        self.slot_face, self.slot_link = sparse_zeros(padded, np.int32), sparse_zeros((padded, 3), np.int32)
         some = bool((sim.joint_row > 0).any())
-        # Of tables of zeros that nobody has written to nothing is in the memory: that is so in bodies without joints.
-        self.slot_size, self.slot_state = np.zeros(padded), np.zeros(padded, np.uint8)
-        self.slot_law, self.slot_kind, self.follow = (np.zeros(padded, np.int32) for _ in range(3))
+        self.slot_size, self.slot_state = sparse_zeros(padded), sparse_zeros(padded, np.uint8)
+        self.slot_law, self.slot_kind, self.follow = (sparse_zeros(padded, np.int32) for _ in range(3))
         if some:
             self.slot_size[self.slots :], self.follow[:] = 1.0, -1
         self.head = np.full(4 * -(-self.count // tets.BLOCK), -1, np.int32)
-        self.slot_history = np.zeros((padded, HISTORY))
-        self.first_slot = 4 * np.arange(sim.n_own)
+        self.slot_history = sparse_zeros((padded, HISTORY))
         lost = -1
         if some:
             lost = joints_space.links(
@@ -114,7 +137,7 @@ class LocalSpace(LawsSpace):
     def _put_histories(self) -> None:
         histories = self.sim.histories
         at = np.flatnonzero(histories.keys() < 0)
-        slot = self.first_slot[histories.owners()[at]] - 1 - histories.keys()[at]
+        slot = 4 * histories.owners()[at] - 1 - histories.keys()[at]
         there = self.slot_state[slot] != NONE  # else opened meanwhile, or its partner was taken out
         slot, rows = slot[there], histories.rows[at[there]]
         self.slot_law[slot], self.slot_state[slot] = 0, rows[:, STATE]
@@ -467,6 +490,10 @@ class LocalSpace(LawsSpace):
     def kinetic(self, before: np.ndarray, after: np.ndarray, out: np.ndarray) -> None:
         """As in the plane."""
         energy_space.kinetic(self.sim.n_left, self.sim.n_own, before, after, self.mass, out)
+
+    def slot_of(self, faces: np.ndarray) -> np.ndarray:
+        """As in the plane."""
+        return 4 * (self.sim.where[faces // 4] - self.sim.n_left) + faces % 4
 
     def _edges(self, slots: np.ndarray) -> np.ndarray:
         """See `joints_space.faces_now`."""

@@ -15,7 +15,7 @@ from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.block_physics import PHYSICS
-from hpcdem.physics.fdem import user_functions, user_laws
+from hpcdem.physics.fdem import tetrahedra, user_functions, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.histories import WORDS, Histories
 from hpcdem.physics.fdem.mesh import Mesh
@@ -94,7 +94,7 @@ def tables(sim: Blocks) -> dict[str, Table]:
     own = sim.owned
     number, x, v = sim.number[own], sim.x[own], sim.v[own]
     columns: dict[str, np.ndarray] = {"number": number.copy()}
-    places = (sim.origin, sim.listed) if sim.closed else (x, x)
+    places = (sim.origin, sim.listed) if sim.closed else (sim.places(), sim.places())
     for name, rows in (("x", x), ("v", v), *zip(("origin", "listed"), places), *sim.cold.items()):
         for c in range(rows.shape[1]):
             columns[f"{name}_{c}"] = rows[:, c].copy()
@@ -231,7 +231,11 @@ def _take_rows(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) ->
         words[:, c] = kept[f"m{c}"]
     _, number, words = sim.comm.to_ranks(holders(sim.comm, sim.number, kept["number"]), kept["number"], words)
     sim.histories = Histories.of(len(sim.number), np.searchsorted(sim.number, number), words)
-    return {name: table(name, width) for name in ("origin", "listed")}
+    n = sum(name.startswith("origin_") for name in rows)
+    places = {name: table(name, n) for name in ("origin", "listed")}
+    if n == tetrahedra.ROW:  # of versions that kept spare words
+        return {name: tetrahedra.without_spares(of) for name, of in places.items()}
+    return places
 
 
 def _close_as_it_was(sim: Blocks, state: dict[str, Any], places: dict[str, np.ndarray]) -> None:

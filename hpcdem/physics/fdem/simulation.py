@@ -29,7 +29,16 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, by_temperature, connectivity, hexahedra, overlaps, user_functions, user_laws
+from hpcdem.physics.fdem import (
+    build,
+    by_temperature,
+    connectivity,
+    hexahedra,
+    overlaps,
+    tetrahedra,
+    user_functions,
+    user_laws,
+)
 from hpcdem.physics.fdem.definition import AGAIN, COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
@@ -501,10 +510,15 @@ class Blocks(State):
             handed_over = self.local.handed_over()
             self._collect_events()
             self.local.renew_contacts(handed_over)
-            self.listed = self.x[self.owned].copy()
+            self.listed = self.places()
             self.rebuild_state.age = 0
             self._note_time()
             self.rebuilds += 1
+
+    def places(self) -> np.ndarray:
+        """Positions (n_own, w) [m] of the owned elements, in space (n_own, 12), without spare words."""
+        places = self.x[self.owned]
+        return tetrahedra.without_spares(places) if self.dim == 3 else places.copy()
 
     def _note_time(self) -> None:
         self.rebuild_state.step, self.rebuild_state.time = self.clock.step, self.clock.time
@@ -576,7 +590,7 @@ class Blocks(State):
         with self.timers("neighbour"):
             self.local = LocalSpace(self) if self.dim == 3 else Local(self)
             if not frozen:
-                self.origin = self.x[self.owned].copy()
+                self.origin = self.places()
                 self.listed = self.origin  # until lists are renewed without storage
                 self.rebuild_state.age = self.rebuild_state.stored = 0
                 self._note_time()
@@ -627,13 +641,13 @@ class Blocks(State):
         apart |= dead
         node, lead = mesh.corner_clusters(self.partner, apart)
         node[~self.alive] = -1
-        self.node = node
+        self.node = node.astype(np.int32, copy=False)
         sizes = np.bincount(node[node >= 0], minlength=len(lead))
         self.shared_nodes = sizes > 1
-        self.member_begin = np.zeros(len(lead) + 1, np.int64)
-        self.member = np.empty(int(sizes[self.shared_nodes].sum()), np.int64)
+        self.member_begin = np.zeros(len(lead) + 1, np.int32)
+        self.member = np.empty(int(sizes[self.shared_nodes].sum()), np.int32)
         if len(self.member):  # else zeros that nobody has written to: nothing of them is in the memory
-            build.cluster_members(node, sizes, self.member_begin, self.member)
+            build.cluster_members(self.node, sizes, self.member_begin, self.member)
         cells = mesh.cells[self.alive]
         self.point_corners = np.bincount(cells[cells >= 0], minlength=len(mesh.points))
         self.where = np.full(len(mesh.cells), -1, np.int64)

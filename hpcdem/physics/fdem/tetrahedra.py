@@ -20,6 +20,11 @@ ROW, STRIDE = 16, 4
 """Words of a row of positions, velocities or forces, and from one corner of it to the next."""
 
 
+def without_spares(rows: np.ndarray) -> np.ndarray:
+    """Rows (n, 16) without the spare word of each corner (n, 12)."""
+    return rows.reshape(-1, 4, STRIDE)[:, :, :3].reshape(-1, 12)
+
+
 def _turns() -> np.ndarray:
     """(4, 4, 4): the even permutation of four corners that begins with two given ones."""
     out = np.zeros((4, 4, 4), np.int64)
@@ -117,11 +122,11 @@ def _corner_roots(cells, partner, faces, apart, parent):
 
 def corner_clusters(cells: np.ndarray, partner: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nodes: sets of corners at one point that hang together through faces that are not `apart` (4 ne,) bool. Returns
-    (node (ne, 4) i8, lead (nn,) i8), see `connectivity.corner_clusters`."""
+    (node (ne, 4) i4, lead (nn,) i8), see `connectivity.corner_clusters`."""
     root = np.empty(4 * len(cells), np.int64)
     _corner_roots(cells, partner, FACES, np.asarray(apart, bool), root)
     lead = np.flatnonzero(root == np.arange(len(root)))
-    number = np.full(len(root), -1, np.int64)
+    number = np.full(len(root), -1, np.int32)
     number[lead] = np.arange(len(lead))
     return number[root].reshape(-1, 4), lead
 

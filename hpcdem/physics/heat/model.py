@@ -514,11 +514,12 @@ class Heat(SurfaceLoad):
         dead = np.repeat(~blocks.alive, 4)
         node, lead = mesh.corner_clusters(blocks.partner, blocks.open | dead)
         node[~blocks.alive] = -1
+        node = node.astype(np.int32, copy=False)
         self.node, self.leads = node, lead
         self._tell_obtuse()
         sizes = np.bincount(node[node >= 0], minlength=len(lead))
-        member_begin = np.zeros(len(lead) + 1, np.int64)
-        member = np.empty(int(sizes[sizes > 1].sum()), np.int64)
+        member_begin = np.zeros(len(lead) + 1, np.int32)
+        member = np.empty(int(sizes[sizes > 1].sum()), np.int32)
         build.cluster_members(node, sizes, member_begin, member)
         real = node[blocks.number[own]] >= 0
         nothing, scratch = np.empty(0, np.int64), np.full(len(lead), -1, np.int64)

@@ -107,14 +107,14 @@ def constants(number, points, cells, row, models, viscous, rows, mass, c):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def survey(x, v, origin, first, n_own, out):
-    """See `build.survey`."""
+    """See `build.survey`; origin (n_own, 12) without spare words."""
     path2 = speed2 = broken = inverted = 0.0
     for i in range(n_own):
         r = first + i
         for k in range(0, ROW, STRIDE):
             d2 = v2 = 0.0
             for c in range(3):
-                d2 += (x[r, k + c] - origin[i, k + c]) ** 2
+                d2 += (x[r, k + c] - origin[i, k // STRIDE * 3 + c]) ** 2
                 v2 += v[r, k + c] ** 2
             if not (d2 < np.inf and v2 < np.inf):
                 broken = 1.0
