@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hpcdem.core import cells
-from hpcdem.core.memory import LINE, aligned, take_rows
+from hpcdem.core.memory import LINE, aligned, sparse_zeros, take_rows
 
 quick = settings(max_examples=150, deadline=None, derandomize=True)
 index = st.integers(-cells.FARTHEST, cells.FARTHEST)
@@ -47,6 +49,24 @@ def test_aligned_tables_begin_on_a_cache_line():
         table = aligned((n, 8))
         assert table.shape == (n, 8) and table.dtype == np.float64
         assert table.ctypes.data % LINE == 0 or n == 0
+
+
+def test_tables_of_zeros_take_memory_where_they_are_written_to():
+    """40 MB of them, of which a page is written; read they are zeros without memory."""
+    table = sparse_zeros((5000, 1000))
+    assert table.shape == (5000, 1000) and table.dtype == np.float64 and sparse_zeros(3, np.int32).tolist() == [0, 0, 0]
+    before = resident()
+    assert not table.any() and resident() - before < 4e6
+    table[0, 0] = 1.0
+    assert table.sum() == 1.0 and resident() - before < 4e6
+    table[:] = 1.0
+    assert resident() - before > 35e6
+
+
+def resident() -> int:
+    """Memory of this process in bytes."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
 
 
 def test_rows_are_taken_in_any_order_by_any_number_of_threads():

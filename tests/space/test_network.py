@@ -83,13 +83,13 @@ def test_rock_breaks_beside_the_network(alone: Path) -> None:
     assert len({row["step"] for row in rows}) > 5
 
 
-@pytest.mark.parametrize("ranks", [2, 4])
+@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_the_whole_run_on_several_ranks(alone: Path, tmp_path: Path, ranks: int, needs_parallel_hdf5: None) -> None:
     start(tmp_path, SCRIPT, ranks)
     same(alone, tmp_path)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_the_second_half_from_a_checkpoint(alone: Path, tmp_path: Path, ranks: int, needs_parallel_hdf5: None) -> None:
     shutil.copy(alone / "half.sav", tmp_path)
     start(tmp_path, HALF, ranks)

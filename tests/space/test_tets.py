@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hpcdem.physics.fdem import changes, diagnostics
+from hpcdem.halo.comm import SerialComm
+from hpcdem.physics.fdem import changes, diagnostics, saved_state
 from hpcdem.physics.fdem.kernels import space, tets
 from hpcdem.physics.fdem.reference import Solid, tetrahedron_forces
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.space.support import LAME, ROCK, SHEAR, body, box, without_joints
 
 A = np.array([[1.0, 2.0, 0.0], [0.0, -1.0, 3.0], [2.0, 0.0, 1.0]]) * 1e-4
@@ -192,3 +196,27 @@ def test_a_plane_that_holds_nodes(slope: tuple[float, float, float]) -> None:
     assert np.allclose(speed, sim.clock.time * way, rtol=1e-9)
     held = np.array([diagnostics.total(sim, f"reaction_{axis}") for axis in "xyz"])
     assert np.allclose(held, -2700.0 * (n @ (1.0, 2.0, -9.0)) * n, rtol=1e-9)
+
+
+def test_a_checkpoint_with_spare_words_goes_on(tmp_path: Path) -> None:
+    """Where storage and lists were made had rows of sixteen words once."""
+    sim = body(box((2, 2, 2), (0.02, 0.02, 0.02)))
+    sim.option(collision=True)
+    changes.set_velocity(sim, None, 0.1, 0.0, 0.0)
+    for _ in range(5):
+        sim.step()
+    kept, ends = sim.origin, []
+    assert kept.shape == (48, 12) and not np.array_equal(kept, sim.places())
+    for name in ("now", "once"):
+        if name == "once":
+            wide = np.zeros((48, 4, 4))
+            wide[:, :, :3] = kept.reshape(48, 4, 3)
+            sim.origin = sim.listed = wide.reshape(48, 16)
+        saved_state.save(sim, tmp_path / f"{name}.sav")
+        other = Blocks(SerialComm())
+        saved_state.restore(other, tmp_path / f"{name}.sav")
+        assert np.array_equal(other.origin, kept) and np.array_equal(other.listed, kept)
+        for _ in range(50):
+            other.step()
+        ends.append(other.x)
+    assert np.array_equal(*ends)

@@ -13,6 +13,7 @@ from hpcdem.cases import Creep
 from tests.cases.ready import results
 
 
+@pytest.mark.slow  # quick: tests/blocks/test_creep.py
 def test_against_the_closed_form(launch, tmp_path):
     done = results(launch, tmp_path, Creep(size=0.025))
     print(done.strain, done.exact, done.error, done.steps)

@@ -17,6 +17,7 @@ from tests.cases.ready import results
 COARSE = {"size": 0.5, "coarse": 1.0, "openings": 2, "transits": 20.0}
 
 
+@pytest.mark.slow  # quick: yielding, tests/blocks
 def test_tributary_area(launch, tmp_path):
     """An endless row has the stress of its tributary area; of two rooms the abutments carry a part."""
     row = results(launch, tmp_path / "row", Pillar(**COARSE))

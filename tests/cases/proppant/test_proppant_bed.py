@@ -10,6 +10,7 @@ from tests.cases.ready import results
 COARSE = {"size": 0.0762, "layer": 0.01905, "time": 6.0, "steps": 60}
 
 
+@pytest.mark.slow  # quick: tests/proppant
 def test_grains_come_in_and_settle(launch, tmp_path):
     """Of a coarse mesh: what came is there or left, and lies at the bottom; the speed of a grain is that of its law."""
     done = results(launch, tmp_path, ProppantBed(**COARSE))
@@ -20,7 +21,7 @@ def test_grains_come_in_and_settle(launch, tmp_path):
     assert (tmp_path / "data" / "proppant-bed.png").stat().st_size > 5000
 
 
-@pytest.mark.slow  # quick: the one above
+@pytest.mark.slow  # quick: tests/proppant
 def test_a_slot_of_the_laboratory(launch, tmp_path):
     """Chun et al. 2020, d 0.45 mm, 2550 kg/m3, c 0.07: the bed of the simulation that agrees with theirs."""
     done = results(launch, tmp_path, ProppantBed())

@@ -8,6 +8,7 @@ from hpcdem.cases import ProppantSlot
 from tests.cases.ready import results
 
 
+@pytest.mark.slow  # quick: tests/proppant
 def test_a_slurry_settles_as_kynch_says(launch, tmp_path):
     done = results(launch, tmp_path, ProppantSlot())
     print({name: value for name, value in vars(done).items() if name != "profiles"})
@@ -19,7 +20,7 @@ def test_a_slurry_settles_as_kynch_says(launch, tmp_path):
     assert (tmp_path / "data" / "proppant-slot.png").stat().st_size > 5000
 
 
-@pytest.mark.slow  # quick: the one above, tests/proppant
+@pytest.mark.slow  # quick: tests/proppant
 def test_sand_in_water(launch, tmp_path):
     """0.45 mm, 2550 kg/m3, 7 %: between the laws of Ferguson and Church for natural and smooth grains; the pack takes
     up what the front leaves, c (front + bed) = limit bed."""

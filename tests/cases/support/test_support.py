@@ -16,6 +16,7 @@ from tests.cases.ready import results
 COARSE = {"size": 0.6, "coarse": 5.0, "reach": 7.0, "stages": 2000}
 
 
+@pytest.mark.slow  # quick: bolts by themselves, tests/bolts
 def test_bolts_hold(launch, tmp_path):
     """With them less of the rock yields, and it comes in less."""
     usual = results(launch, tmp_path / "usual", Support(**COARSE))

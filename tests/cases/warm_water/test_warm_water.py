@@ -12,6 +12,7 @@ from hpcdem.cases import Doublet, Lauwerier
 from tests.cases.ready import results
 
 
+@pytest.mark.slow  # quick: tests/heat
 def test_water_cools_a_fracture(launch, tmp_path):
     """9.14: within 2 % of the difference of temperature, water and rock; values of the water printed there."""
     done = results(launch, tmp_path, Lauwerier())
