@@ -59,7 +59,7 @@ PARAMETERS = {
     "of the disc in three dimensions, and of the platens": "三维圆盘和压板的厚度",
     "diameter of the disc": "圆盘直径",
     "angle, seen from the centre, of its flat ends at the platens": "压板处平台所对的圆心角",
-    "edges of the mesh along the loaded diameter, so that the crack can run straight":
+    "edges (in space faces) of the mesh along the loaded diameter, so that the crack can run straight":
     "沿加载直径布置网格边,使裂纹可以直线扩展",
     "joints, along which it breaks; without them it stays elastic": "节理,沿其断裂;没有时保持弹性",
     "friction angle between platens and disc": "压板与圆盘之间的摩擦角",

@@ -10,7 +10,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
-from hpcdem.physics.flow.energy import ENTRIES
+from hpcdem.physics.flow.account import ENTRIES
 from hpcdem.physics.flow.model import Flow
 from tests.blocks.support import JOINT
 from tests.flow.support import at, line, over

@@ -255,7 +255,6 @@ REFUSED_IN_SPACE = [
     ("mesh structured (0,0,0) (1,1,1) cells 2 2 2 type tri", "type tri: in three dimensions it is tet or hex"),
     ("geometry create circle (0,0) 1 as-layer 'c'", "'geometry create circle' is for two dimensions in this version"),
     ("liner create range x 0 1", "'liner create' is for two dimensions"),
-    ("element c-model null relax 0.1 s", "'relax' is for two dimensions"),
 ]  # fmt: skip
 
 

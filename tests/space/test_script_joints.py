@@ -57,6 +57,28 @@ def test_it_breaks_where_it_is_weak(alone: Path) -> None:
     assert opened[0, 2] > 0.0
 
 
+def test_cracks_are_measured(alone: Path, tmp_path: Path) -> None:
+    """The bar is parted at x = 0.1: poles along x, all in tension; its free end has gone at most as far as it was
+    pulled. Without the table that the run writes the last frame knows the events."""
+    shutil.copytree(alone / "data", tmp_path / "data")
+    found = []
+    for _ in range(2):
+        done = run([sys.executable, "-m", "hpcdem", "measure", "data", "cracks", "emission"], cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        with (tmp_path / "data" / "measure" / "emission_events.csv").open(encoding="utf-8") as file:
+            found.append(sorted((row["joint"], row["z[m]"], row["area[m2]"]) for row in csv.DictReader(file)))
+        (tmp_path / "data" / "cracks.csv").unlink(missing_ok=True)
+    assert found[0] == found[1] and len(found[0]) == 8
+    with (tmp_path / "data" / "measure" / "cracks_last.csv").open(encoding="utf-8") as file:
+        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    assert sum(row["area[m2]"] for row in rows) == pytest.approx(0.04) and len(rows) == 8
+    state = read_mesh_frame(max((tmp_path / "data").glob("bar_*.vtkhdf")), solid=True)
+    for row in rows:
+        assert row["dip[deg]"] == pytest.approx(90.0, abs=0.1) and row["mode"] < 4.0 / 3.0
+        assert min(abs(row["dip_direction[deg]"] - way) for way in (90.0, 270.0)) < 0.1
+        assert 0.0 < row["opening[m]"] < 0.1 * state.time and row["slip[m]"] < 0.1 * row["opening[m]"]
+
+
 def test_what_joints_took_is_told_in_joules(alone: Path) -> None:
     """At least gf1 of the area that broke."""
     path = alone / "data" / "history_lost.csv"

@@ -13,7 +13,7 @@ from hpcdem.cli.measure import measure, work
 from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
-from hpcdem.post.measure import block_figures, bodies
+from hpcdem.post.measure import block_figures, blocks, bodies
 from tests.conftest import Launcher
 from tests.view import frames
 
@@ -123,8 +123,9 @@ def test_fragments_are_bodies_that_hang_together(folder: Path):
 def test_groups_places_and_steps(folder: Path):
     run(folder, "--format=none", "--groups=roof", "--from=10", "--xmove=5")
     names = {path.name for path in (folder / "measure").iterdir()}
-    assert names == {f"{name}.csv" for name in ("regions", "displacement", "displacement_last", "fragments",
-                                                "fragments_last")}  # fmt: skip
+    assert names == {f"{name}.csv" for name in ("regions", "displacement", "displacement_last", "cracks_joints",
+                                                "cracks_last", "fragments", "fragments_last")}  # fmt: skip
+    assert table(folder, "cracks_last") == []  # those that broke have one side in the base
     rows = table(folder, "regions")
     assert [row["group"] for row in rows] == ["all", "roof"] and {row["step"] for row in rows} == {"10"}
     assert float(rows[0]["xmin[m]"]) == pytest.approx(5.0) and rows[0]["elements"] == "72"
@@ -167,11 +168,42 @@ def test_the_plane_of_a_fracture():
     assert block_figures._in_its_plane(np.random.default_rng(1).uniform(size=(9, 3, 3)))[0] is None
 
 
+def test_joints_that_broke(folder: Path):
+    """The crack is 4 x 3 m in the mesh, of all joints; it lies level, and the roof sits on it as it did."""
+    run(folder, "cracks", "emission")
+    row = {name: float(value) for name, value in table(folder, "cracks_joints")[-1].items() if value}
+    assert (row["tension"], row["mixed"], row["shear"], row["broken"]) == (0.0, 0.0, 24.0, 24.0)
+    assert row["broken_area[m2]"] == row["shear_area[m2]"] == pytest.approx(12.0)
+    assert row["damage"] == pytest.approx(12.0 / row["area[m2]"]) and row["kinetic_energy[J]"] == pytest.approx(24.0)
+    assert row["p32[1/m]"] == pytest.approx(12.0 / 24.0)
+    last = table(folder, "cracks_last")
+    assert len(last) == 24 and {float(one["dip[deg]"]) for one in last} == {0.0}
+    for one in last:
+        assert float(one["z[m]"]) == pytest.approx(1.0 + GROWN) and float(one["mode"]) == 2.0
+        assert max(abs(float(one["opening[m]"])), float(one["slip[m]"])) < 1e-12
+    events = table(folder, "emission_events")
+    assert len(events) == 24 and {round(float(one["z[m]"]), 9) for one in events} == {1.0}  # in the mesh
+    assert float(events[0]["magnitude"]) == pytest.approx(2.0 / 3.0 * -4.8)
+    for name in ("cracks_joints", "emission"):
+        assert (folder / "measure" / f"{name}.png").stat().st_size > 10_000, name
+
+
+def test_dip_and_dip_direction():
+    """A plane that falls 30 degrees to the east-north-east, whichever way its corners run."""
+    dip, direction = np.radians(30.0), np.radians(67.5)
+    down = np.array([np.cos(dip) * np.sin(direction), np.cos(dip) * np.cos(direction), -np.sin(dip)])
+    strike = np.array([np.cos(direction), -np.sin(direction), 0.0])
+    for order in ([0, 1, 2], [0, 2, 1]):
+        corners = np.array([np.zeros(3), down, strike])[None, order]
+        assert [float(one[0]) for one in blocks.orientation(corners)] == pytest.approx([30.0, 67.5])
+    level = np.array([[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]])
+    assert [float(one[0]) for one in blocks.orientation(level)] == [0.0, 0.0]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["cracks"], "cracks is for two dimensions; body_0000000010.vtkhdf has three"),
-        (["emission"], "emission is for two dimensions"), (["fluid"], "have no channels"),
+        (["fluid"], "have no channels"),
         (["wedge"], "holds no frames"), (["--groups=floor"], "no element is of group floor; there is base, roof"),
         (["regions", "--box=9,9,9,10,10,10"], "--box: no element"), (["--box=1,0,0,0,1,1"], "--box: the least x"),
         (["fragments", "--box=0,0,0,1,1,1"], "--box goes with regions"),

@@ -138,14 +138,17 @@ def body(
     volume = np.full(count, np.prod(SIZE) / count)
     elements = {"number": number, "corners": np.full(count, 4), **stress, "stress_max": 0.0 * zz, "stress_min": zz,
                 "volume": volume, "strain_energy": 0.5 * volume, "group_rock": roof.astype(np.int32)}  # fmt: skip
-    joints = {name: np.zeros(0, np.int64) for name in ("number", *CORNERS)} | {"state": np.zeros(0)}
+    values = "state", "damage", "mode", "joint_area", "break_time", "break_energy"
+    joints = {name: np.zeros(0, np.int64) for name in ("number", *CORNERS)} | {name: np.zeros(0) for name in values}
     if broken:
         pairs = mesh.edges().faces
         lower, upper = pairs[pairs[:, 1] >= 0].T
         apart = roof[lower // 4] != roof[upper // 4]
         corner_of = dict(zip(CORNERS, tetrahedra.face_corners(lower).T, strict=True))
-        joints = {"number": lower, **corner_of, "state": np.where(apart, 3.0, 1.0),
-                  "mode": np.where(apart, 2.0, 0.0)}  # fmt: skip
+        joints = {"number": lower, **corner_of, "state": np.where(apart, 3.0, 1.0), "damage": np.where(apart, 1.0, 0.0),
+                  "mode": np.where(apart, 2.0, 0.0), "joint_area": areas(mesh.points[mesh.face_points(lower)]),
+                  "break_time": np.where(apart, 2e-3, np.nan),
+                  "break_energy": np.where(apart, 1.0, np.nan)}  # fmt: skip
         if wet:
             near = mesh.points[mesh.face_points(lower)].mean(axis=1)[:, 0] < 2.0
             full = {"aperture": 1e-3, "saturation": np.where(near, 1.0, 0.25), "fluid_velocity": 0.2,
@@ -153,6 +156,12 @@ def body(
             joints |= {name: np.where(apart, value, np.nan) for name, value in full.items()}
     tables = (Table(columns, 0, len(columns["number"])) for columns in (corners, elements, joints))
     return MeshFrame(step, 1e-3 * step, 1e-6, *tables, {"group_rock": ["base", "roof"]})
+
+
+def areas(corners: np.ndarray) -> np.ndarray:
+    """(n,) of triangles (n, 3, 3)."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
 
 
 def write_body(folder: Path, step: int = 5, **values: Any) -> Path:

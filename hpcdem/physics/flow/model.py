@@ -25,7 +25,7 @@ from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, JOINT
 from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.tables import Value
-from hpcdem.physics.flow import energy, kernels, kernels_space
+from hpcdem.physics.flow import account, kernels, kernels_space
 from hpcdem.physics.flow.network import LINKS, Network, at_nodes, links_of, wet_faces
 from hpcdem.physics.flow.properties import FLUID, POROUS
 from hpcdem.physics.flow.wells import PRESSURE as HELD
@@ -137,7 +137,7 @@ class Flow(SurfaceLoad):
         self.nodes = np.empty((0, kernels.NODE))
         self.state = np.empty((0, kernels.STATE))
         self.removed = dict.fromkeys(("given", "leaked", "removed"), 0.0)
-        self.energy: dict[str, float] | None = dict.fromkeys(energy.ENTRIES, 0.0)
+        self.energy: dict[str, float] | None = dict.fromkeys(account.ENTRIES, 0.0)
         """Of implicit steps [J/m], in space [J], see `energy`; None: not known any more."""
         """Accounts of nodes that are gone [m2]."""
         self.time = blocks.clock.time
@@ -481,11 +481,11 @@ class Flow(SurfaceLoad):
         return found
 
     def energies(self) -> dict[str, float]:
-        """The energy of the fluid and the blocks in implicit steps [J/m], in space [J]: `energy.ENTRIES`, what does not
-        add up (closing), over the largest (relative). CommandError where packs of grains took some."""
+        """The energy of the fluid and the blocks in implicit steps [J/m], in space [J]: `account.ENTRIES`, what does
+        not add up (closing), over the largest (relative). CommandError where packs of grains took some."""
         if self.energy is None:
             raise CommandError("no account of energy is kept where grains bear: what their packs take is not known")
-        return energy.closed(self.energy)
+        return account.closed(self.energy)
 
     @property
     def owned(self) -> int:

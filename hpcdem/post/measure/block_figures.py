@@ -10,7 +10,7 @@ import numpy as np
 from hpcdem.io.vtkhdf_mesh import MeshState
 from hpcdem.post import blocks, plots
 from hpcdem.post.measure import bodies, emission
-from hpcdem.post.measure.blocks import Emission, Part
+from hpcdem.post.measure.blocks import Emission, Part, orientation
 from hpcdem.post.measure.emission import Events
 from hpcdem.post.measure.figures import BOTTOM, GAP, INK, LEFT, LINES, RIGHT, TOP, key, label, length_unit, page, scaled
 
@@ -125,10 +125,20 @@ def _elements(axes: Any, state: MeshState, colour: Any = PALE, edges: Any = "fac
 def cracks(parts: Sequence[Part], state: MeshState, events: Events | None) -> Any:
     """Broken joints by mode (of the events, which are finer than the frames, if there are any) and damage over time;
     below, where they are in the last frame, by mode and by time."""
-    known = [one.cracks for one in parts if one.cracks is not None]
     timed = "break_time" in state.of_joints and bool((state.of_joints["state"] == blocks.BROKEN).any())
     sheet = _Maps(state, [4.6, 3.6], [GAP, LOWER_GAP + LEGEND], 2 if timed else 1)
-    a, b = sheet.panels
+    _crack_curves(sheet.panels, parts, events, "length")
+    sheet.legend(blocks.panel(sheet.maps[0], state, sheet.seen, sheet.width, blocks.Looks(font=plots.FONT)))
+    if timed:
+        _by_time(sheet, state)
+    _letters([*sheet.panels, *sheet.maps])
+    return sheet.figure
+
+
+def _crack_curves(panels: Sequence[Any], parts: Sequence[Part], events: Events | None, size: str) -> None:
+    """Broken joints by mode, and damage over time; size: what is measured of joints."""
+    known = [one.cracks for one in parts if one.cracks is not None]
+    a, b = panels
     at, axis = when(parts)
     if events is None or not len(events):
         ends, counts = at, np.array([c.broken for c in known])
@@ -144,21 +154,76 @@ def cracks(parts: Sequence[Part], state: MeshState, events: Events | None) -> An
     label(a, None, "broken joints")
     key(a, loc="upper left")
     damage = np.array([c.damage for c in known])
-    length = np.array([c.broken_length.sum() for c in known])
-    total = np.array([c.length for c in known])
+    length = np.array([c.broken_size.sum() for c in known])
+    total = np.array([c.size for c in known])
     b.plot(at, 100.0 * damage, _marks(len(at)), ms=2.5, lw=1.2, color=LINES[0], label="damage index")
-    b.plot(at, 100.0 * length / np.where(total > 0.0, total, 1.0), "--", lw=1.0, color=INK, label="broken length")
+    b.plot(at, 100.0 * length / np.where(total > 0.0, total, 1.0), "--", lw=1.0, color=INK, label=f"broken {size}")
     label(b, axis, "of all joints (%)")
     key(b, loc="upper left")
     for ax in (a, b):
         _plain(ax)
         ax.set_xlim(*_ends(at))
         ax.set_ylim(bottom=0.0)
-    sheet.legend(blocks.panel(sheet.maps[0], state, sheet.seen, sheet.width, blocks.Looks(font=plots.FONT)))
-    if timed:
-        _by_time(sheet, state)
-    _letters([a, b, *sheet.maps])
-    return sheet.figure
+
+
+STEREONET = 6.0
+"""Diameter of a stereonet [cm]."""
+
+
+def cracks_in_space(parts: Sequence[Part], state: MeshState, rows: np.ndarray, events: Events | None) -> Any:
+    """Broken joints by mode and damage over time; below, of the broken ones of the last frame (rows of joints) the
+    middles, seen along the axis of which the body has least, and the poles in a stereonet."""
+    figure, (a, b, low) = page([4.6, 3.6, STEREONET], [GAP, LOWER_GAP])
+    _crack_curves((a, b), parts, events, "area")
+    corners = state.points[state.joints[rows, :3]]
+    kinds = np.searchsorted(emission.LIMITS, state.of_joints["mode"][rows], side="right")
+    place, (width, _) = low.get_position(), 2.54 * figure.get_size_inches()
+    low.set_position((place.x0, place.y0, place.width - (STEREONET + 2.0) / width, place.height))
+    _scatter(low, dict(zip("xyz", corners.mean(axis=1).T)), kinds, np.full(len(rows), 6.0),
+             np.ptp(state.points, axis=0))  # fmt: skip
+    net = figure.add_axes((place.x1 - STEREONET / width, place.y0, STEREONET / width, place.height))
+    _stereonet(net, corners, kinds)
+    _letters([a, b, low])
+    net.text(-1.0, 1.015, "(d)", fontsize=plots.FONT - 1.0, va="bottom")
+    return figure
+
+
+def _stereonet(axes: Any, corners: np.ndarray, kinds: np.ndarray) -> None:
+    """Poles of triangles (n, 3, 3) in the lower hemisphere, equal areas (Schmidt net); y is north."""
+    dip, direction = (np.radians(one) for one in orientation(corners))
+    r = np.sqrt(2.0) * np.sin(0.5 * dip)
+    x, y = -r * np.sin(direction), -r * np.cos(direction)
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    axes.plot(np.cos(turn), np.sin(turn), lw=0.8, color=INK)
+    axes.plot([-0.03, 0.03], [0.0, 0.0], lw=0.6, color=INK)
+    axes.plot([0.0, 0.0], [-0.03, 0.03], lw=0.6, color=INK)
+    for k, shade in enumerate(MODE_COLOURS):
+        some = kinds == k
+        axes.scatter(x[some], y[some], s=6.0, facecolors="none", edgecolors=shade, linewidths=0.6)
+    for words, at in (("y", (0.0, 1.04)), ("x", (1.06, 0.0))):
+        axes.text(*at, words, fontsize=plots.FONT, ha="center", va="bottom" if words == "y" else "center")
+    axes.text(0.0, -1.06, f"{len(dip)} poles, lower hemisphere", fontsize=plots.FONT - 1.0, ha="center", va="top")
+    axes.set_aspect("equal")
+    axes.set_xlim(-1.15, 1.15)
+    axes.set_ylim(-1.15, 1.15)
+    axes.axis("off")
+
+
+def _scatter(
+    axes: Any, places: dict[str, np.ndarray], kinds: np.ndarray, sizes: np.ndarray, extent: np.ndarray, more: str = ""
+) -> None:
+    """Places [m] of broken joints, in space seen along the axis of which there is least; extent (dim,) [m]."""
+    least = "" if len(places) == 2 else "xyz"[int(np.argmin(extent))]
+    one, other = (axis for axis in places if axis != least)
+    size, unit = length_unit(float(max(extent["xyz".index(axis)] for axis in (one, other))))
+    for k, shade in enumerate(MODE_COLOURS):
+        rows = kinds == k
+        axes.scatter(places[one][rows] / size, places[other][rows] / size, s=sizes[rows], facecolors="none",
+                     edgecolors=shade, linewidths=0.6)  # fmt: skip
+    axes.set_aspect("equal", adjustable="box")
+    axes.margins(0.06)
+    label(axes, f"{one} ({unit}){more}", f"{other} ({unit})")
+    _plain(axes)
 
 
 def _ends(at: np.ndarray) -> tuple[float, float]:
@@ -522,12 +587,5 @@ def _places(axes: Any, found: Emission, kinds: np.ndarray) -> None:
     e = found.events
     m = np.nan_to_num(found.magnitude, nan=float(np.nanmin(found.magnitude, initial=0.0)))
     part = (m - m.min()) / max(float(np.ptp(m)), 1e-12)
-    size, unit = length_unit(float(max(np.ptp(e.x), np.ptp(e.y))))
-    for k, shade in enumerate(MODE_COLOURS):
-        rows = kinds == k
-        axes.scatter(e.x[rows] / size, e.y[rows] / size, s=2.0 + 34.0 * part[rows] ** 2, facecolors="none",
-                     edgecolors=shade, linewidths=0.6)  # fmt: skip
-    axes.set_aspect("equal", adjustable="box")
-    axes.margins(0.06)
-    label(axes, f"x ({unit}); size: magnitude", f"y ({unit})")
-    _plain(axes)
+    extent = np.array([float(np.ptp(values)) for values in e.places.values()])
+    _scatter(axes, e.places, kinds, 2.0 + 34.0 * part**2, extent, "; size: magnitude")

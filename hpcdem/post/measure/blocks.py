@@ -35,6 +35,8 @@ INTACT = 1.0
 SHARES = 0.2, 0.5, 0.8
 """Parts of the area for which the size is told that holds as much in smaller fragments."""
 HEAD = ("step", "time[s]")
+MEASURES = {2: ("length", "area"), 3: ("joint_area", "volume")}
+"""Columns of frames: of the size of joints and of elements, by dimensions of space."""
 
 
 @dataclass(frozen=True)
@@ -68,16 +70,17 @@ class Pieces:
 @dataclass(frozen=True)
 class Cracks:
     """Joints of a frame: how many there are, behind their strength, broken by MODES (3,); lengths of all, of those, of
-    these [m]; damage index; area of the elements [m2]; kinetic energy of the broken ones when they broke [J/m]."""
+    these [m], in space areas [m2]; damage index; area of the elements [m2], in space volume [m3]; kinetic energy of the
+    broken ones when they broke [J/m], in space [J]."""
 
     joints: int
     yielded: int
     broken: np.ndarray
-    length: float
-    yielded_length: float
-    broken_length: np.ndarray
+    size: float
+    yielded_size: float
+    broken_size: np.ndarray
     damage: float
-    area: float
+    body: float
     energy: float
 
 
@@ -99,7 +102,7 @@ class Fluid:
 
 @dataclass(frozen=True)
 class Part:
-    """What is taken from a frame: joints in the plane, regions and surface in space."""
+    """What is taken from a frame: joints, in the plane always; regions and surface in space."""
 
     step: int
     time: float
@@ -136,7 +139,8 @@ def part(state: MeshState, request: Request, what: Sequence[str]) -> Part:
     if state.points.shape[1] == 3:
         found = bodies.regions(state, request, wanted) if "regions" in what else None
         moved = bodies.surface(state, wanted) if "displacement" in what else None
-        return Part(state.step, state.time, None, pieces, fluid, found, moved)
+        of_joints = cracks(state, wanted) if "cracks" in what else None
+        return Part(state.step, state.time, of_joints, pieces, fluid, found, moved)
     return Part(state.step, state.time, cracks(state, wanted), pieces, fluid)
 
 
@@ -157,9 +161,9 @@ def chosen(state: MeshState, request: Request) -> np.ndarray:
 
 def cracks(state: MeshState, wanted: np.ndarray) -> Cracks:
     """Joints between elements that are wanted (ne,)."""
-    j = state.of_joints
+    j, (size, body) = state.of_joints, MEASURES[state.points.shape[1]]
     keep = _between(state, wanted) & (j["state"] != FREE)
-    now, length, damage = j["state"][keep], j["length"][keep], np.nan_to_num(j["damage"][keep])
+    now, length, damage = j["state"][keep], j[size][keep], np.nan_to_num(j["damage"][keep])
     broken = now == BROKEN
     kind = np.searchsorted(emission.LIMITS, j["mode"][keep][broken], side="right")
     energy = np.nan_to_num(j.get("break_energy", np.zeros(len(keep)))[keep][broken])
@@ -167,7 +171,7 @@ def cracks(state: MeshState, wanted: np.ndarray) -> Cracks:
     return Cracks(
         len(now), int((now == YIELDED).sum()), np.bincount(kind, minlength=len(MODES)), total,
         float(length[now == YIELDED].sum()), np.bincount(kind, length[broken], len(MODES)),
-        float((length * damage).sum()) / total if total > 0.0 else 0.0, float(state.of_elements["area"][wanted].sum()),
+        float((length * damage).sum()) / total if total > 0.0 else 0.0, float(state.of_elements[body][wanted].sum()),
         math.fsum(energy),
     )  # fmt: skip
 
@@ -292,24 +296,78 @@ def _middles(state: MeshState) -> np.ndarray:
 # --- tables ------------------------------------------------------------------------------------------------------
 
 
-def cracks_sheets(parts: Sequence[Part]) -> list[Sheet]:
+def orientation(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Dip and dip direction [degrees] of triangles (n, 3, 3): z is up, directions run clockwise from y, as from north,
+    to x. Level ones have the direction 0."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal *= np.where(normal[:, 2] < 0.0, -1.0, 1.0)[:, None]
+    flat = np.hypot(normal[:, 0], normal[:, 1])
+    direction = np.degrees(np.arctan2(normal[:, 0], normal[:, 1])) % 360.0
+    return np.degrees(np.arctan2(flat, normal[:, 2])), np.where(flat > 1e-12 * np.abs(normal[:, 2]), direction, 0.0)
+
+
+def parted(state: MeshState, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far both sides of joints in space (rows) have come apart across them and along them (n,) [m], as means of the
+    three corners; NaN where one side was taken out."""
+    lower, node = faces_of_joints(state)[rows], state.of_points["node"].astype(np.int64)
+    upper = tetrahedra.face_partners(node[state.cells])[lower]
+    mine, other = (tetrahedra.face_points(state.cells, faces) for faces in (lower, np.maximum(upper, 0)))
+    a, b = (np.take_along_axis(one, np.argsort(node[one], axis=1), axis=1) for one in (mine, other))
+    apart = (state.points[b] - state.points[a]).mean(axis=1)
+    corners = state.points[mine]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    across = (apart * normal).sum(axis=1)
+    along = np.linalg.norm(apart - across[:, None] * normal, axis=1)
+    return np.where(upper >= 0, across, NAN), np.where(upper >= 0, along, NAN)
+
+
+def broken_joints(state: MeshState, wanted: np.ndarray) -> np.ndarray:
+    """Rows of the joints between elements that are wanted (ne,) that are broken."""
+    return np.flatnonzero((state.of_joints["state"] == BROKEN) & _between(state, wanted))
+
+
+def _each_crack(state: MeshState, wanted: np.ndarray) -> Sheet:
+    """The broken joints of a frame in space, one by one."""
+    rows, j = broken_joints(state, wanted), state.of_joints
+    corners = state.points[state.joints[rows, :3]]
+    there = {name: column for name, column in OF_CRACKS.items() if column in j}
+    columns = (
+        j["number"][rows].astype(np.int64), *corners.mean(axis=1).T, j[MEASURES[3][0]][rows], *orientation(corners),
+        *parted(state, rows), *(j[column][rows] for column in there.values()),
+    )  # fmt: skip
     head = (
-        *HEAD, "joints", "yielded", *MODES, "broken", "length[m]", "yielded_length[m]",
-        *(f"{name}_length[m]" for name in MODES), "broken_length[m]", "damage", "p21[1/m]", "kinetic_energy[J/m]",
+        "joint", *(f"{c}[m]" for c in "xyz"), "area[m2]", "dip[deg]", "dip_direction[deg]", "opening[m]", "slip[m]",
+        *there,
+    )  # fmt: skip
+    return Sheet("cracks_last", head, zip(*(c.tolist() for c in columns), strict=True))
+
+
+OF_CRACKS = {"mode": "mode", "aperture[m]": "aperture", "time[s]": "break_time"}
+"""Columns of broken joints, and in frames; apertures are there with fluid."""
+
+
+def cracks_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) -> list[Sheet]:
+    """Over time; in space also each broken joint of a frame, the last one."""
+    dim = state.points.shape[1]
+    size, density, joule = ("length[m]", "p21", "J/m") if dim == 2 else ("area[m2]", "p32", "J")
+    head = (
+        *HEAD, "joints", "yielded", *MODES, "broken", size, f"yielded_{size}", *(f"{name}_{size}" for name in MODES),
+        f"broken_{size}", "damage", f"{density}[1/m]", f"kinetic_energy[{joule}]",
     )  # fmt: skip
 
     def rows() -> Iterable[Sequence[Any]]:
         for one in parts:
             c = one.cracks
             assert c is not None
-            broken = float(c.broken_length.sum())
+            broken = float(c.broken_size.sum())
             yield (
-                one.step, one.time, c.joints, c.yielded, *c.broken.tolist(), int(c.broken.sum()), c.length,
-                c.yielded_length, *c.broken_length.tolist(), broken, c.damage, broken / c.area if c.area else NAN,
+                one.step, one.time, c.joints, c.yielded, *c.broken.tolist(), int(c.broken.sum()), c.size,
+                c.yielded_size, *c.broken_size.tolist(), broken, c.damage, broken / c.body if c.body else NAN,
                 c.energy,
             )  # fmt: skip
 
-    return [Sheet("cracks_joints", head, rows())]
+    return [Sheet("cracks_joints", head, rows()), *([_each_crack(state, wanted)] if dim == 3 else [])]
 
 
 def fragments_sheets(parts: Sequence[Part]) -> list[Sheet]:
@@ -395,12 +453,12 @@ def events_of(request: Request, files: Sequence[FrameFile]) -> Events:
     if path.is_file():
         found = emission.read_events(path)
     else:
-        found = _in_frame(read_mesh_frame(files[-1].path))
+        found = _in_frame(read_mesh_frame(files[-1].path, solid=True))
     keep = (found.step >= (request.first or 0)) & (request.last is None or found.step <= (request.last or 0))
     if request.groups and not files:
         raise UsageError(f"--groups: {request.folder} has no frames of blocks, which tell the groups of elements")
     if request.groups:
-        state = read_mesh_frame(files[0].path)
+        state = read_mesh_frame(files[0].path, solid=True)
         keep &= np.isin(found.joint // 4, state.of_elements["number"][chosen(state, request)])
     found = found.take(keep)
     found.x[:] += request.xmove
@@ -418,11 +476,12 @@ def _in_frame(state: MeshState) -> Events:
     rows = np.flatnonzero(j["state"] == BROKEN)
     rows = rows[np.lexsort((j["number"][rows], j["break_time"][rows]))]
     # Places in the mesh: those of the corners less what they have moved.
-    x, y = (state.points - state.of_points["displacement"])[state.joints[rows]].mean(axis=1).T
+    dim = state.points.shape[1]
+    x, y, *z = (state.points - state.of_points["displacement"])[state.joints[rows, :dim]].mean(axis=1).T
     unknown = np.full(len(rows), np.nan)
     return Events(
         np.full(len(rows), state.step), j["break_time"][rows], j["number"][rows].astype(np.int64), x, y,
-        j["mode"][rows], j["length"][rows], j["break_energy"][rows], unknown,
+        j["mode"][rows], j[MEASURES[dim][0]][rows], j["break_energy"][rows], unknown, z[0] if z else np.zeros(0),
     )  # fmt: skip
 
 
@@ -452,7 +511,7 @@ def emitted(request: Request, files: Sequence[FrameFile]) -> Emission:
 def emission_sheets(found: Emission) -> list[Sheet]:
     e = found.events
     columns = (
-        e.step, e.time, e.joint, e.x, e.y, e.mode, e.length, found.energy, found.magnitude,
+        e.step, e.time, e.joint, *e.places.values(), e.mode, e.size, found.energy, found.magnitude,
     )  # fmt: skip
     each = zip(*(c.tolist() for c in columns), strict=True)
     unit = "[s]" if found.timed else "[step]"
@@ -462,7 +521,8 @@ def emission_sheets(found: Emission) -> list[Sheet]:
         (*row[:2], *(int(n) for n in row[2:5]), int(n), int(total), *row[5:])
         for row, n, total in zip(found.rates.tolist(), counts, np.cumsum(counts), strict=True)
     )
-    names = ("step", "time[s]", "joint", "x[m]", "y[m]", "mode", "length[m]", "energy[J]", "magnitude")
+    size = "length[m]" if len(e.places) == 2 else "area[m2]"
+    names = ("step", "time[s]", "joint", *(f"{c}[m]" for c in e.places), "mode", size, "energy[J]", "magnitude")
     edges, number, above = emission.frequencies(found.magnitude)
     f = found.fit
     return [

@@ -33,17 +33,23 @@ FEWEST = 10
 MODES = ("tension", "mixed", "shear")
 LIMITS = 4.0 / 3.0, 5.0 / 3.0
 """Modes (1 opened, 2 slid) from which a joint counts as mixed and as shear."""
-COLUMNS = {
+_COLUMNS = {
     "step": "step", "time [s]": "time", "joint": "joint", "x [m]": "x", "y [m]": "y", "mode": "mode",
-    "length [m]": "length", "kinetic_energy [J/m]": "kinetic", "peak_kinetic_energy [J/m]": "peak_kinetic",
 }  # fmt: skip
-"""Of `cracks.csv`, and what they are called here."""
+COLUMNS = {
+    2: {**_COLUMNS, "length [m]": "size", "kinetic_energy [J/m]": "kinetic",
+        "peak_kinetic_energy [J/m]": "peak_kinetic"},
+    3: {**_COLUMNS, "z [m]": "z", "joint_area [m2]": "size", "kinetic_energy [J]": "kinetic",
+        "peak_kinetic_energy [J]": "peak_kinetic"},
+}  # fmt: skip
+"""Of `cracks.csv` by dimensions of space, and what they are called here."""
 
 
 @dataclass(frozen=True)
 class Events:
-    """Joints that broke, in the order of steps; (n,) each: step, time [s], joint, x, y, length [m], mode (1 opened, 2
-    slid), kinetic: energy of the two elements then, peak_kinetic: when the joint had passed its strength [J/m]."""
+    """Joints that broke, in the order of steps; (n,) each: step, time [s], joint, x, y [m], mode (1 opened, 2 slid),
+    size: length [m], in space area [m2], kinetic: energy of the two elements then, peak_kinetic: when the joint had
+    passed its strength [J/m], in space [J]; z [m], in the plane empty."""
 
     step: np.ndarray
     time: np.ndarray
@@ -51,16 +57,22 @@ class Events:
     x: np.ndarray
     y: np.ndarray
     mode: np.ndarray
-    length: np.ndarray
+    size: np.ndarray
     kinetic: np.ndarray
     peak_kinetic: np.ndarray
+    z: np.ndarray
 
     def __len__(self) -> int:
         return len(self.step)
 
     def take(self, keep: np.ndarray) -> Events:
         """Those chosen by a mask or by rows."""
-        return Events(**{name: values[keep] for name, values in vars(self).items()})
+        return Events(**{name: values[keep] if len(values) else values for name, values in vars(self).items()})
+
+    @property
+    def places(self) -> dict[str, np.ndarray]:
+        """Their coordinates (n,) [m] by axis."""
+        return {"x": self.x, "y": self.y} | ({"z": self.z} if len(self.z) else {})
 
     def kinds(self) -> np.ndarray:
         """(n,) row of MODES."""
@@ -79,19 +91,20 @@ def read_events(path: Path) -> Events:
     except OSError as failure:
         raise HpcdemError(explain(path, failure, "read")) from None
     head = lines[0] if lines else []
-    missing = [name for name in COLUMNS if name not in head]
+    columns = COLUMNS[3 if "z [m]" in head else 2]
+    missing = [name for name in columns if name not in head]
     if missing:
         raise HpcdemError(f"{path} is no table of broken joints: it has no column '{missing[0]}'")
-    place = [head.index(name) for name in COLUMNS]
-    columns = np.empty((len(lines) - 1, len(place)))
+    place = [head.index(name) for name in columns]
+    table = np.empty((len(lines) - 1, len(place)))
     for k, row in enumerate(lines[1:]):
         try:
             if len(row) != len(head):
                 raise ValueError
-            columns[k] = [float(row[p]) for p in place]
+            table[k] = [float(row[p]) for p in place]
         except ValueError:
             raise HpcdemError(f"{path}:{k + 2}: {len(head)} numbers are expected, not '{','.join(row)}'") from None
-    found = dict(zip(COLUMNS.values(), columns.T.copy()))
+    found = {"z": np.zeros(0)} | dict(zip(columns.values(), table.T.copy()))
     for name in ("step", "joint"):
         found[name] = found[name].astype(np.int64)
     return Events(**found)

@@ -11,11 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.fields import sides_of_box
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.frames import FrameFile, left_out, list_frames
+from hpcdem.io.vtkhdf_mesh import MeshState
 from hpcdem.post import fluid
 from hpcdem.post.measure import block_figures, blocks, bodies, cracks, emission, figures, kinds
 from hpcdem.post.measure import walls as curves
@@ -169,7 +172,6 @@ def _of_blocks(request: Request) -> list[str]:
         raise UsageError("--box: only frames of blocks in three dimensions are measured in a box")
     if frames:
         others = {*BLOCK_KINDS, *SOLID_KINDS} - {*(SOLID_KINDS if solid else BLOCK_KINDS)} - {*KINDS}
-        others |= {"cracks"} if solid and not list_frames(request.folder) else set()
         for kind in request.what:
             if kind in others:
                 raise HpcdemError(f"{kind} is for {'two' if solid else 'three'} dimensions; {frames[-1].path.name} has "
@@ -179,8 +181,10 @@ def _of_blocks(request: Request) -> list[str]:
             raise UsageError("--colors: blocks have groups, no colours")
         if request.box is not None and request.what and "regions" not in request.what:
             raise UsageError("--box goes with regions")
-        wet = request.what or fluid.there(blocks.read(frames[-1], request))
-        return [kind for kind in SOLID_KINDS if kind in request.what or (not request.what and (wet or kind != "fluid"))]
+        last = blocks.read(frames[-1], request)
+        missing = [] if fluid.there(last) else ["fluid"]
+        missing += [] if len(last.joints) else ["cracks", "emission"]
+        return [kind for kind in SOLID_KINDS if kind in request.what or not (request.what or kind in missing)]
     there = dict.fromkeys(("cracks", "fragments", "fluid"), bool(frames))
     there |= dict.fromkeys(("regions", "displacement"), False)
     if frames and "fluid" not in request.what:
@@ -256,8 +260,10 @@ def _write_blocks(kind: str, request: Request, files: list[FrameFile], parts: li
         of_last = parts[-1].cracks
         if kind == "cracks" and (of_last is None or not of_last.joints):
             raise _NothingThere(f"cracks: the blocks in {request.folder} have no joints")
-        sheets = blocks.cracks_sheets(parts) if kind == "cracks" else blocks.fragments_sheets(parts)
-        draw = lambda: _draw_blocks(kind, request, files, parts)  # noqa: E731
+        state = blocks.read(files[-1], request)
+        wanted = blocks.chosen(state, request)
+        sheets = blocks.cracks_sheets(parts, state, wanted) if kind == "cracks" else blocks.fragments_sheets(parts)
+        draw = lambda: _draw_blocks(kind, request, files, parts, state, wanted)  # noqa: E731
     paths = [write_sheet(request.target, sheet) for sheet in sheets]
     if request.formats:
         figure = draw()
@@ -265,12 +271,15 @@ def _write_blocks(kind: str, request: Request, files: list[FrameFile], parts: li
     return paths
 
 
-def _draw_blocks(kind: str, request: Request, files: list[FrameFile], parts: list[blocks.Part]) -> Any:
-    state = blocks.read(files[-1], request)
+def _draw_blocks(
+    kind: str, request: Request, files: list[FrameFile], parts: list[blocks.Part], state: MeshState, wanted: np.ndarray
+) -> Any:
     if kind == "fragments":
         return block_figures.fragments(parts, state)
-    known = (request.folder / emission.TABLE).is_file()
-    return block_figures.cracks(parts, state, blocks.events_of(request, files) if known else None)
+    events = blocks.events_of(request, files) if (request.folder / emission.TABLE).is_file() else None
+    if state.points.shape[1] == 3:
+        return block_figures.cracks_in_space(parts, state, blocks.broken_joints(state, wanted), events)
+    return block_figures.cracks(parts, state, events)
 
 
 # --- files -----------------------------------------------------------------------------------------------------

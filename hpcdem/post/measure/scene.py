@@ -28,7 +28,7 @@ KINDS = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks"
 """What can be measured of particles, by its word on the command line."""
 BLOCK_KINDS = ("cracks", "fragments", "emission", "fluid")
 """What can be measured of blocks."""
-SOLID_KINDS = ("regions", "displacement", "fragments", "fluid")
+SOLID_KINDS = ("regions", "displacement", "cracks", "fragments", "emission", "fluid")
 """What can be measured of blocks in space."""
 
 
