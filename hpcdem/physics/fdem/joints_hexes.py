@@ -85,8 +85,8 @@ class HexJoints:
         )  # fmt: skip
 
     def moved(self, which: np.ndarray) -> Faces:
-        """Some of them (n,), numbered anew, as the joints of triangles that they are once their corners are moved: the
-        first faces of elements in rows 0 .. n - 1, the corners opposite in those behind."""
+        """Some of them (n,) as joints of triangles, with corners shifted as the bilinear opening has it: slots from 0
+        to n - 1 are the first faces of the elements in these rows, the opposite corners are in the rows behind."""
         local, n = self.local, len(which)
         at = local.sim.x.reshape(-1)[self.at[which][:, :, None] + np.arange(3)]
         near, far = at[:, :4], at[:, 4:]

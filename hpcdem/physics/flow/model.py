@@ -137,9 +137,9 @@ class Flow(SurfaceLoad):
         self.nodes = np.empty((0, kernels.NODE))
         self.state = np.empty((0, kernels.STATE))
         self.removed = dict.fromkeys(("given", "leaked", "removed"), 0.0)
-        self.energy: dict[str, float] | None = dict.fromkeys(account.ENTRIES, 0.0)
-        """Of implicit steps [J/m], in space [J], see `energy`; None: not known any more."""
         """Accounts of nodes that are gone [m2]."""
+        self.energy: dict[str, float] | None = dict.fromkeys(account.ENTRIES, 0.0)
+        """Of implicit steps [J/m], in space [J], see `energies`; None: not known any more."""
         self.time = blocks.clock.time
         self.cycles = self.waited = self.sub_steps = 0
         self.dt = self.implicit_dt = 0.0
