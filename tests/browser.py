@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import absent
+from tests.conftest import PATIENCE, absent
 
 # Root in a container has no sandbox, and the page under test is ours; a canvas that is read often changes over from the
 # graphics card to the processor, which rounds differently.
@@ -21,6 +21,23 @@ def executable() -> str | None:
     """A browser of the Chromium family on this machine; HPCDEM_TEST_BROWSER names another."""
     named = os.environ.get("HPCDEM_TEST_BROWSER")
     return named or next(filter(None, map(shutil.which, BROWSERS)), None)
+
+
+class Patient:
+    """A browser whose tabs wait as long as all tests do."""
+
+    def __init__(self, browser: Any) -> None:
+        self._browser = browser
+
+    def new_context(self, **options: Any) -> Any:
+        context = self._browser.new_context(**options)
+        context.set_default_timeout(1e3 * PATIENCE)
+        return context
+
+    def new_page(self, **options: Any) -> Any:
+        page = self._browser.new_page(**options)
+        page.set_default_timeout(1e3 * PATIENCE)
+        return page
 
 
 @pytest.fixture(scope="session")
@@ -35,5 +52,5 @@ def browser() -> Iterator[Any]:
         absent("browser", f"no browser here: apt-get install {BROWSERS[0]}, or set HPCDEM_TEST_BROWSER")
     with sync_api.sync_playwright() as play:
         found = play.chromium.launch(executable_path=program, args=BROWSER_OPTIONS)
-        yield found
+        yield Patient(found)
         found.close()

@@ -18,10 +18,31 @@ import pytest
 pytest_plugins = ["tests.browser"]
 ROOT = Path(__file__).resolve().parent.parent
 BIN = Path(sys.executable).parent
+PATIENCE = 300.0
+"""Seconds after which what has not come is given up. Whatever a test waits for comes within seconds on a quiet machine;
+on a busy one it comes later, which is no failure."""
+
+
+def sources(folder: str, pattern: str = "*") -> list[Path]:
+    """Files of the project below a folder of it, as git knows them: what runs and users leave there is none."""
+    try:
+        known = subprocess.run(["git", "ls-files", "-z", folder], cwd=ROOT, capture_output=True, text=True, check=False)
+        names = known.stdout.split("\0")[:-1]
+    except OSError:  # no git
+        names = []
+    if names:
+        found = [ROOT / name for name in names]
+    else:  # an archive of the sources
+        found = [p for p in (ROOT / folder).rglob("*") if not {"data", "__pycache__"} & {*p.relative_to(ROOT).parts}]
+    return sorted(path for path in found if path.is_file() and path.match(pattern))
 
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # `nohup ... &`: programs that are started would ignore it too
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Programs that tests start are those of this tree, whatever tree the environment was made for.
+others = [place for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place not in ("", str(ROOT))]
+os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), *others])
 
 # A ZDEM script that runs alone takes all cores unless this is set; tests run side by side.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -334,13 +355,15 @@ def resident() -> Iterator[Any]:
 
 @pytest.fixture
 def wait_until() -> Callable[..., None]:
-    """`wait_until(condition, timeout, what)`: poll until true, fail the test otherwise."""
+    """`wait_until(condition, what)`: poll until true; the test fails if that never comes."""
+    return until
 
-    def wait(condition: Callable[[], object], timeout: float, what: str) -> None:
-        deadline = time.monotonic() + timeout
-        while not condition():
-            if time.monotonic() > deadline:
-                pytest.fail(f"waited {timeout} s for {what}", pytrace=False)
-            time.sleep(0.1)
 
-    return wait
+def until(condition: Callable[[], object], what: object = "it", pause: Callable[[float], object] = time.sleep) -> None:
+    """Poll until true. what: to wait for, or a function that says what there is instead."""
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > deadline:
+            found = what() if callable(what) else what
+            pytest.fail(f"waited {PATIENCE:g} s for {found}", pytrace=False)
+        pause(0.05)

@@ -41,14 +41,16 @@ install() {
             "Behind a proxy set HTTPS_PROXY, for a mirror PIP_INDEX_URL."
 }
 
-# once DIR NAME KEY COMMAND...: run the command unless DIR carries the stamp NAME with this key; one at a time.
+# ready DIR NAME KEY: whether DIR carries the stamp NAME with this key, and its Python is still on the machine.
+ready() { [[ -x $1/bin/python && -e $1/.ready-$2 && $(<"$1/.ready-$2") == "$3" ]]; }
+
+# once DIR NAME KEY COMMAND...: run the command unless the environment DIR is ready; one at a time.
 once() {
-    local stamp=$1/.ready-$2 key=$3
-    if [[ -e $stamp && $(<"$stamp") == "$key" ]]; then return; fi
+    if ready "${@:1:3}"; then return; fi
     (
         if command -v flock >/dev/null; then flock 9; fi
-        if [[ -e $stamp && $(<"$stamp") == "$key" ]]; then exit; fi
-        "${@:4}" && printf '%s\n' "$key" >"$stamp"
+        if ready "${@:1:3}"; then exit; fi
+        "${@:4}" && printf '%s\n' "$3" >"$1/.ready-$2"
     ) 9>"${1%/}.setup.lock"
 }
 

@@ -11,10 +11,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from tests.conftest import sources
 from tests.docs.pages import ROOT
 
 FOLDER = ROOT / "examples" / "notebooks"
-NAMES = tuple(sorted(path.stem for path in FOLDER.glob("*.ipynb")))
+NAMES = tuple(path.stem for path in sources("examples/notebooks", "*.ipynb"))
 
 
 def carried_out(name: str, folder: Path, **changes: str) -> Any:

@@ -8,7 +8,6 @@ import io
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.conftest import BIN, end, popen, run
+from tests.conftest import BIN, end, popen, run, until
 
 REQUEST: dict[str, Any] = {
     "number": 300,
@@ -125,21 +124,21 @@ class Page:
         tab.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
         tab.on("request", lambda request: self.asked.append(request.url))
         tab.goto(url)
-        self.wait(0, 400.0)  # the first time kernels are compiled
+        self.wait(0)
 
-    def wait(self, after: int, timeout: float = 120.0) -> int:
+    def until(self, holds: Callable[[], object], what: object = None) -> None:
+        """Wait; the policy of the page forbids what Playwright would put in for that."""
+        until(holds, what or (lambda: self.text("#error")), lambda seconds: self.tab.wait_for_timeout(1e3 * seconds))
+
+    def wait(self, after: int) -> int:
         """Wait for a drawing later than number `after`; its number."""
-        deadline = time.monotonic() + timeout
-        while self.drawn() <= after:
-            if time.monotonic() > deadline:
-                pytest.fail(f"no drawing after number {after}: {self.text('#error')}", pytrace=False)
-            self.tab.wait_for_timeout(20)
+        self.until(lambda: self.drawn() > after, lambda: f"a drawing after number {after}: {self.text('#error')}")
         self.rest()
         return self.drawn()
 
-    def rest(self, timeout: float = 60.0) -> None:
+    def rest(self) -> None:
         """Wait until nothing is being computed."""
-        self.tab.wait_for_selector("#packing[aria-busy=false]", timeout=1e3 * timeout)
+        self.tab.wait_for_selector("#packing[aria-busy=false]")
         self.tab.wait_for_timeout(60)
 
     def drawn(self) -> int:

@@ -15,7 +15,7 @@ import pytest
 from hpcdem.page.maker import request_of
 from hpcdem.post.specimen import class_colours
 from hpcdem.pre.specimen import make_specimen
-from tests.conftest import BIN
+from tests.conftest import BIN, PATIENCE
 from tests.page.conftest import REQUEST, command_line
 
 
@@ -280,16 +280,13 @@ def test_the_view_zooms_and_moves_by_wheel_mouse_and_keys(open_page):
     before = fitted
     for step in steps:
         step()
-        page.tab.wait_for_timeout(150)
-        now = page.pixels()
-        assert differing(now, before) > UNLIKE
-        before = now
+        page.until(lambda: differing(page.pixels(), before) > UNLIKE)  # noqa: B023
+        before = page.pixels()
     page.change(lambda: page.fill("#seed", 2))  # a view that was chosen stays
     page.change(lambda: page.fill("#seed", 1))
     assert differing(page.pixels(), before) < ALIKE
     page.tab.press("#canvas", "0")
-    page.tab.wait_for_timeout(150)
-    assert differing(page.pixels(), fitted) < ALIKE
+    page.until(lambda: differing(page.pixels(), fitted) < ALIKE)
 
 
 def test_all_grains_of_a_loose_column_can_be_shown(open_page):
@@ -298,9 +295,7 @@ def test_all_grains_of_a_loose_column_can_be_shown(open_page):
     high, wide = page.numbers("fact_height")[0], page.numbers("fact_box")[0]
     assert high > 10 * wide
     page.tab.click("#fit-all")
-    page.tab.wait_for_timeout(150)
-    rows = np.flatnonzero((page.pixels()[..., 3] > 0).any(1))
-    assert rows[0] >= MARGIN - 2 and rows[0] < MARGIN + 40
+    page.until(lambda: MARGIN - 2 <= np.flatnonzero((page.pixels()[..., 3] > 0).any(1))[0] < MARGIN + 40)
 
 
 def test_a_grain_tells_its_size(open_page):
@@ -374,8 +369,7 @@ def test_the_theme_follows_the_system_until_it_is_chosen(open_page):
     ground = "getComputedStyle(document.documentElement).backgroundColor"
     assert page.tab.evaluate(ground) == "rgb(17, 22, 24)"
     page.tab.emulate_media(color_scheme="light")
-    page.tab.wait_for_timeout(100)
-    assert page.tab.evaluate(ground) == "rgb(244, 242, 236)"
+    page.until(lambda: page.tab.evaluate(ground) == "rgb(244, 242, 236)")
     page.tab.click("#theme")  # light
     page.tab.click("#theme")  # dark
     assert page.tab.evaluate(ground) == "rgb(17, 22, 24)"
@@ -465,7 +459,7 @@ def of_command_line(launch_once, grading_file, tmp_path_factory):
 
 def saved(page, name: str) -> bytes:
     """Press Save beside a file, and what the browser then has."""
-    with page.tab.expect_download(timeout=300e3) as download:
+    with page.tab.expect_download() as download:
         page.tab.click(f"[data-file='{name}']")
     assert download.value.suggested_filename == name
     return Path(download.value.path()).read_bytes()
@@ -540,7 +534,7 @@ def test_a_server_that_has_ended_is_told(open_page, serve_page, grading_file):
     page = open_page(url=served.url)
     picture = page.pixels()
     served.process.terminate()
-    served.process.wait(30)
+    served.process.wait(PATIENCE)
     page.fill("#seed", 2)
     page.tab.wait_for_selector("#error:not([hidden])")
     assert page.text("#error").startswith("The server does not answer. Has hpcdem ended?")
@@ -550,17 +544,20 @@ def test_a_server_that_has_ended_is_told(open_page, serve_page, grading_file):
 @pytest.mark.alone
 @pytest.mark.parametrize("shape", ["circle", "pentagon"])
 def test_four_thousand_grains_are_redrawn_in_a_moment(open_page, shape, record_property):
-    """Well under a second on a machine of two cores that does nothing else; the limit leaves room for one that does."""
+    """Well under a second on a machine of two cores that does nothing else; on any machine not much longer for a grain
+    than with a tenth of them, which work that grows with their square would be."""
     page = open_page()
-    page.change(lambda: page.fill("#number-exact", 4000))
     page.change(lambda: page.tab.check(f"#shape-{shape}"))
-    took = []
-    for seed in range(2, 7):
-        took.append(page.tab.evaluate(REDRAW, seed))
-        page.rest()
+    took = {}
+    for number in (400, 4000):
+        page.change(lambda: page.fill("#number-exact", number))  # noqa: B023
+        took[number] = []
+        for seed in range(2, 7):
+            took[number].append(page.tab.evaluate(REDRAW, seed))
+            page.rest()
     record_property("milliseconds", took)
-    print(f"{shape}: redrawn after {sorted(took)} ms")
-    assert np.median(took) < 3000
+    print(f"{shape}: redrawn after {took} ms")
+    assert min(took[4000]) < 30 * min(took[400])
 
 
 REDRAW = """(seed) => new Promise((done) => {

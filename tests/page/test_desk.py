@@ -15,7 +15,7 @@ import pytest
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.page.desk import Desk, check, complete
-from tests.conftest import BIN, run
+from tests.conftest import BIN, run, until
 from tests.page.viewing import Tab, Viewing
 
 SCRIPT = """\
@@ -48,12 +48,14 @@ def viewing(folder: Path) -> Iterator[Viewing]:
 
 def until_ready(viewing: Viewing, since: int = 0) -> list[str]:
     """Wait until nothing is carried out; what was said after a line."""
-    for _ in range(1200):
-        told = viewing.ask("console", {"since": since})
-        if not told["busy"]:
-            return [text for text, kind in told["lines"] if kind != "asked"]
-        time.sleep(0.1)
-    pytest.fail("the console is still at work")
+    told: dict[str, Any] = {}
+
+    def ready() -> bool:
+        told.update(viewing.ask("console", {"since": since}))
+        return not told["busy"]
+
+    until(ready, "the console, which is still at work")
+    return [text for text, kind in told["lines"] if kind != "asked"]
 
 
 def talk(viewing: Viewing, text: str, **more: Any) -> list[str]:
@@ -274,7 +276,7 @@ class Bench:
         self.page.wait_for_selector("#desk-toggle:not([hidden])")
 
     def wait(self, state: str = "ready") -> None:
-        self.page.wait_for_selector(f"body[data-desk={state}]", timeout=120_000)
+        self.page.wait_for_selector(f"body[data-desk={state}]")
 
     def type(self, line: str) -> None:
         self.wait()
@@ -283,11 +285,11 @@ class Bench:
 
     def until(self, holds: Callable[[], bool]) -> None:
         """Wait; the policy of the page forbids what Playwright would put in for that."""
-        for _ in range(600):
-            if holds():
-                return
-            self.page.wait_for_timeout(100)
-        pytest.fail(f"{self.page.inner_text('#output')}\n{self.page.inner_text('#message')}", pytrace=False)
+        until(
+            holds,
+            lambda: f"{self.page.inner_text('#output')}\n{self.page.inner_text('#message')}",
+            lambda seconds: self.page.wait_for_timeout(1e3 * seconds),
+        )
 
     def says(self, text: str) -> None:
         self.until(lambda: text in self.page.inner_text("#output"))
@@ -334,7 +336,7 @@ def test_a_session_at_the_page(bench: Bench, folder: Path):
     page.keyboard.type("step 20")
     page.keyboard.press("Enter")
     bench.at(80)
-    assert page.locator("#windows canvas").first.evaluate("canvas => canvas.toDataURL()") != before
+    bench.until(lambda: page.locator("#windows canvas").first.evaluate("canvas => canvas.toDataURL()") != before)
     bench.wait()
     page.press("#input", "ArrowUp")
     assert page.input_value("#input") == "pcdc model step 20"

@@ -19,12 +19,12 @@ from hpcdem.page import lifetime, viewer
 from hpcdem.page.limits import LIMITS
 from hpcdem.page.maker import request_of, values_of
 from hpcdem.pre.specimen import Request
-from tests.conftest import popen
+from tests.conftest import PATIENCE, popen
 from tests.page.conftest import command_line
 
 
 def get(url: str) -> bytes:
-    with urllib.request.urlopen(url, timeout=20) as answer:
+    with urllib.request.urlopen(url, timeout=PATIENCE) as answer:
         return answer.read()
 
 
@@ -43,7 +43,7 @@ def test_ctrl_c_ends_the_page_and_all_it_has_started(serve_page, grading_file, h
     makers = served.makers
     assert makers
     served.process.send_signal(how)
-    out, err = served.process.communicate(timeout=30)
+    out, err = served.process.communicate(timeout=PATIENCE)
     assert served.process.returncode == 0 and err == ""
     assert out.splitlines()[-1] == "Page closed."
     assert not any(map(alive, makers))
@@ -60,16 +60,16 @@ def test_ctrl_c_in_the_midst_of_work_ends_it_too(serve_page, grading_file):
     assert asking.stdout is not None and asking.stdout.readline() == "asked\n"
     makers = served.makers
     served.process.send_signal(signal.SIGINT)
-    served.process.communicate(timeout=30)
+    served.process.communicate(timeout=PATIENCE)
     assert served.process.returncode == 0 and not any(map(alive, makers))
-    assert asking.wait(30) != 0
+    assert asking.wait(PATIENCE) != 0
 
 
 def test_the_makers_end_when_the_server_is_killed(serve_page, grading_file, wait_until):
     served = serve_page(grading_file)
     makers = served.makers
     served.process.kill()
-    wait_until(lambda: not any(map(alive, makers)), 60, "the end of the makers")
+    wait_until(lambda: not any(map(alive, makers)), "the end of the makers")
 
 
 def test_a_port_can_be_chosen_and_one_in_use_is_refused(serve_page, grading_file):
@@ -79,7 +79,7 @@ def test_a_port_can_be_chosen_and_one_in_use_is_refused(serve_page, grading_file
         port = taken.getsockname()[1]
         words = [sys.executable, *command_line(grading_file), "--serve", "--no-browser", "--port", str(port)]
         process = popen(words)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == 2
         assert f"--port {port}: cannot listen there" in err and "Traceback" not in err
     assert f":{port}/" in serve_page(grading_file, "--port", str(port)).url
@@ -95,7 +95,7 @@ def test_the_browser_is_opened_at_an_address_that_works_once(
     monkeypatch.setenv("BROWSER", str(program))
     monkeypatch.setenv("DISPLAY", ":99")
     served = serve_page(grading_file, browser_opens=True)
-    wait_until(note.exists, 30, "the browser")
+    wait_until(note.exists, "the browser")
     ticket = note.read_text()
     key = served.url.split("/")[3]
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/open/[\w-]+", ticket) and key not in ticket

@@ -6,7 +6,6 @@ import http.client
 import json
 import socket
 import threading
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -14,6 +13,7 @@ import pytest
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.page import server as module
 from hpcdem.page.server import Answer, PageServer, as_json
+from tests.conftest import PATIENCE, until
 
 
 def refused(_: dict) -> Answer:
@@ -40,7 +40,7 @@ def server() -> Iterator[PageServer]:
 
 def ask(server: PageServer, method: str, path: str, body: bytes | None = None, **headers: str):
     """Status, headers and body; the header names are written with underscores."""
-    line = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
+    line = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=PATIENCE)
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     line.request(method, path, body, {"Content-Type": "application/json", **named} if method == "POST" else named)
     answer = line.getresponse()
@@ -75,7 +75,7 @@ def test_it_listens_on_the_loopback_address_only(server):
     "path", ["/", "/page.css", "/wrong/", "/wrong/page.css", "//", "/\xe9/", "*", "/open/", "/open/x"]
 )
 def test_without_the_key_there_is_nothing(server, path):
-    line = socket.create_connection(("127.0.0.1", server.server_port), timeout=10)
+    line = socket.create_connection(("127.0.0.1", server.server_port), timeout=PATIENCE)
     line.sendall(f"GET {path} HTTP/1.0\r\nHost: localhost\r\n\r\n".encode("latin-1"))
     answer = b"".join(iter(lambda: line.recv(4096), b""))
     line.close()
@@ -87,7 +87,7 @@ def test_without_the_key_there_is_nothing(server, path):
     "name", ["../pyproject.toml", "%2e%2e/x", "/etc/passwd", "page.css/", "static/page.css", "x\x00"]
 )
 def test_names_are_looked_up_in_a_table_never_on_the_disk(server, name):
-    line = socket.create_connection(("127.0.0.1", server.server_port), timeout=10)
+    line = socket.create_connection(("127.0.0.1", server.server_port), timeout=PATIENCE)
     line.sendall(f"GET /{server.key}/{name} HTTP/1.0\r\nHost: localhost\r\n\r\n".encode())
     answer = b"".join(iter(lambda: line.recv(4096), b""))
     line.close()
@@ -111,7 +111,7 @@ def test_a_name_that_was_bent_to_this_machine_is_refused(server, host):
 
 def test_a_request_without_or_with_two_hosts_is_refused(server):
     for hosts in ("", "Host: localhost\r\nHost: evil.example\r\n"):
-        line = socket.create_connection(("127.0.0.1", server.server_port), timeout=10)
+        line = socket.create_connection(("127.0.0.1", server.server_port), timeout=PATIENCE)
         line.sendall(f"GET /{server.key}/ HTTP/1.0\r\n{hosts}\r\n".encode())
         assert b" 403 " in line.recv(4096)
         line.close()
@@ -186,7 +186,7 @@ def test_a_port_in_use_is_a_clear_error(server):
 
 def test_who_sends_nothing_is_not_waited_for(server, monkeypatch):
     monkeypatch.setattr(module.Conversation, "timeout", 0.2)
-    line = socket.create_connection(("127.0.0.1", server.server_port), timeout=10)
+    line = socket.create_connection(("127.0.0.1", server.server_port), timeout=PATIENCE)
     line.sendall(f"POST /{server.key}/echo HTTP/1.0\r\nHost: localhost\r\nContent-Type: application/json\r\n".encode())
     line.sendall(b"Content-Length: 10\r\n\r\n{")
     assert line.recv(4096) == b""
@@ -196,17 +196,16 @@ def test_who_sends_nothing_is_not_waited_for(server, monkeypatch):
 def test_more_conversations_than_allowed_are_closed_and_later_ones_answered(server, monkeypatch):
     free = threading.BoundedSemaphore(2)
     monkeypatch.setattr(server, "free", free)
-    lines = [socket.create_connection(("127.0.0.1", server.server_port), timeout=10) for _ in range(3)]
+    lines = [socket.create_connection(("127.0.0.1", server.server_port), timeout=PATIENCE) for _ in range(3)]
     assert lines[2].recv(1) == b""
     for line in lines:
         line.close()
-    deadline = time.monotonic() + 10
-    while time.monotonic() < deadline:
+
+    def answered() -> bool:
         try:
-            if ask(server, "GET", f"/{server.key}/")[0] == 200:
-                break
+            return ask(server, "GET", f"/{server.key}/")[0] == 200
         except (OSError, http.client.HTTPException):
-            time.sleep(0.05)
-    else:
-        pytest.fail("not answered again")
-    assert all(free.acquire(timeout=10) for _ in range(2)), "conversations that have ended were not counted"
+            return False
+
+    until(answered, "an answer")
+    assert all(free.acquire(timeout=PATIENCE) for _ in range(2)), "conversations that have ended were not counted"

@@ -6,7 +6,7 @@ import json
 import re
 import time
 import urllib.error
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ import pytest
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.page import exports
 from hpcdem.post.view.model import read_view
-from tests.conftest import Launcher
+from tests.conftest import PATIENCE, Launcher, until
 from tests.page.viewing import Tab, Viewing
 from tests.view import frames
 
@@ -191,15 +191,13 @@ def test_windows_are_linked(page: Tab):
     before = [page.pixels(k) for k in range(4)]
     page.tab.mouse.move(*page.place(0.5, 0.5))
     page.after(lambda: page.tab.mouse.wheel(0, -240))
-    page.tab.wait_for_timeout(800)
-    assert not any(same(before[k], page.pixels(k)) for k in range(4))
+    page.until(lambda: not any(same(before[k], page.pixels(k)) for k in range(4)))
     page.tab.uncheck("#linked")
     page.tab.wait_for_timeout(800)
     before = [page.pixels(k) for k in range(4)]
     page.tab.mouse.move(*page.place(0.5, 0.5))
     page.after(lambda: page.tab.mouse.wheel(0, -240))
-    page.tab.wait_for_timeout(500)
-    assert [same(before[k], page.pixels(k)) for k in range(4)] == [False, True, True, True]
+    page.until(lambda: [same(before[k], page.pixels(k)) for k in range(4)] == [False, True, True, True])
     page.after(lambda: page.tab.select_option("#split", "1"))
     assert page.tab.locator(".window").count() == 1
 
@@ -219,10 +217,7 @@ def test_time_goes_on(page: Tab):
     chart = page.tab.locator("#chart").screenshot()
     page.tab.select_option("#speed", "20")
     page.tab.click("#play")
-    deadline = time.monotonic() + 20.0
-    while page.text("#moment") != "step 30, 0.03 s" and time.monotonic() < deadline:
-        page.tab.wait_for_timeout(50)
-    assert page.text("#moment") == "step 30, 0.03 s"
+    page.until(lambda: page.text("#moment") == "step 30, 0.03 s")
     assert page.tab.locator("#chart").screenshot() != chart
 
 
@@ -248,8 +243,7 @@ def test_files(page: Tab, tmp_path: Path, browser: Any):
     assert tab.locator("svg").count() >= 1 and "step 30" in tab.title()
     before = tab.screenshot()
     tab.mouse.wheel(0, -300)
-    tab.wait_for_timeout(200)
-    assert tab.screenshot() != before
+    until(lambda: tab.screenshot() != before, pause=lambda seconds: tab.wait_for_timeout(1e3 * seconds))
     tab.close()
 
 
@@ -335,37 +329,30 @@ def test_a_run_is_followed_told_to_save_and_to_stop(browser: Any, launch: Launch
     (tmp_path / "a.sc").write_text(MODEL)
     run = launch.start(1, "a.sc", "--no-figure", cwd=tmp_path)
     data = tmp_path / "data"
-    wait(lambda: len(list(data.glob("rock_*.vtkhdf"))) > 1)
+    until(lambda: len(list(data.glob("rock_*.vtkhdf"))) > 1)
     viewing = Viewing(data)
     try:
         page = Tab(browser, viewing.url, locale="en-GB")
         assert "running on" in page.text("#run-state") and page.text("#run-state").startswith("a.sc")
-        wait(lambda: page.text("#far"))  # how far it is, of what, how long it takes, and the last line of the log
+        until(lambda: page.text("#far"))  # how far it is, of what, how long it takes, and the last line of the log
         assert re.fullmatch(r"step \d+, step 100000000 · \d\.\d % · left [\d:]+", page.text("#far"))
         assert "step 100000000" in page.text("#log-line") or "steps/s" in page.text("#log-line")
         first = page.text("#moment")
-        wait(lambda: page.text("#moment") != first)
+        until(lambda: page.text("#moment") != first)
         page.tab.click("#checkpoint")
-        wait(lambda: list(data.glob("*.sav")))
+        until(lambda: list(data.glob("*.sav")))
         saved = len(list(data.glob("*.sav")))
         assert run.poll() is None and "SIGUSR2" in page.text("#message")
         time.sleep(2.5)  # a second request so soon after the first counts as the same
         page.tab.on("dialog", lambda dialog: dialog.accept())
         page.tab.click("#stop")
-        assert run.wait(60) == 85
+        assert run.wait(PATIENCE) == 85
         assert len(list(data.glob("*.sav"))) >= saved
-        wait(lambda: "stopped at step" in page.text("#run-state"))
+        until(lambda: "stopped at step" in page.text("#run-state"))
         assert page.tab.locator("#stop").is_disabled() and page.errors == [] and not page.tab.is_visible("#far")
         assert not (data / "progress.json").exists()
     finally:
         viewing.close()
-
-
-def wait(there: Callable[[], object], seconds: float = 120.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not there():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.1)
 
 
 def test_what_is_no_run_is_refused(tmp_path: Path, launch: Launcher):

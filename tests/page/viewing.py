@@ -8,13 +8,14 @@ import json
 import re
 import sys
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.conftest import BIN, end, popen
+from tests.conftest import BIN, PATIENCE, end, popen, until
 
 
 class Viewing:
@@ -35,7 +36,7 @@ class Viewing:
         request = urllib.request.Request(
             self.url + name, json.dumps(content).encode(), {"Content-Type": "application/json", **headers}
         )
-        with urllib.request.urlopen(request, timeout=60) as response:
+        with urllib.request.urlopen(request, timeout=PATIENCE) as response:
             return json.load(response)
 
     def close(self) -> None:
@@ -60,13 +61,17 @@ class Tab:
 
     def rest(self) -> None:
         """Wait until the fine picture of what was asked for last is there."""
-        self.tab.wait_for_selector("body[data-fine=true]", timeout=60_000)
+        self.tab.wait_for_selector("body[data-fine=true]")
+
+    def until(self, holds: Callable[[], object]) -> None:
+        """Wait; the policy of the page forbids what Playwright would put in for that."""
+        until(holds, lambda: self.text("#message"), lambda seconds: self.tab.wait_for_timeout(1e3 * seconds))
 
     def after(self, action: Any) -> np.ndarray:
         """Do something; the picture when it rests again."""
         before = int(self.tab.locator("body").get_attribute("data-pictures"))
         action()
-        self.tab.wait_for_selector(f"body:not([data-pictures='{before}'])", timeout=30_000)
+        self.tab.wait_for_selector(f"body:not([data-pictures='{before}'])")
         self.rest()
         return self.pixels()
 
@@ -87,7 +92,7 @@ class Tab:
 
     def saved(self, kind: str, folder: Path) -> Path:
         """A file of the menu."""
-        with self.tab.expect_download(timeout=60_000) as waiting:
+        with self.tab.expect_download() as waiting:
             self.tab.select_option("#save", kind)
         path = folder / waiting.value.suggested_filename
         waiting.value.save_as(path)

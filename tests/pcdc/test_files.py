@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 
 import pytest
 
@@ -122,10 +121,9 @@ def test_what_is_nested_too_deeply_has_a_line(bench, text, line, message):
      ("equilateral (0,0) (1,1) size 1e-320", "size 9.99989e-321 would make some inf elements")],
 )  # fmt: skip
 def test_meshes_that_are_too_large_are_refused_before_they_are_made(bench, words, message):
-    began = time.monotonic()
     with pytest.raises(ScriptError, match=message):
         bench(f"pcdc mesh {words}\n")
-    assert bench.project.mesh is None and time.monotonic() - began < 60
+    assert bench.project.mesh is None
 
 
 OWN_LOOP = """

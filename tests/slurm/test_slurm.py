@@ -110,9 +110,9 @@ def test_chain_of_jobs_equals_one_run(
     steps = 8_000
     whole, chain = tmp_path / "whole", tmp_path / "chain"
     number = submit("restart_chain.sh", chain, write_push(chain, steps).name, "--no-figure")
-    wait_until(lambda: list((chain / "data").glob("all_0000000400_ini.*")), 240, "the second command to begin")
+    wait_until(lambda: list((chain / "data").glob("all_0000000400_ini.*")), "the second command to begin")
     slurm.signal(number, "USR1")
-    wait_until(lambda: slurm.job(number).restarts == 1, 60, "the job to be put back into the queue")
+    wait_until(lambda: slurm.job(number).restarts == 1, "the job to be put back into the queue")
     assert list((chain / "data").glob("*.sav")), log_of(chain, number)
     assert not list((chain / "data").glob(f"*{steps}.vtkhdf")), "the run was over before the signal came"
     slurm.start_again(number)

@@ -49,13 +49,13 @@ def test_an_array_that_is_killed_and_put_back_has_the_report_of_a_sweep_on_this_
     def saved(k: int) -> bool:
         return any((members[k].folder / "data").glob("*.sav"))
 
-    wait_until(lambda: saved(0) and saved(1), 240, "two tasks to write checkpoints")
+    wait_until(lambda: saved(0) and saved(1), "two tasks to write checkpoints")
     for rank in ranks_of(members[0].folder):
         os.kill(rank, signal.SIGKILL)
     slurm.signal(f"{number}_1", "USR1")  # as when time is nearly up: it saves and goes back into the queue
-    wait_until(lambda: members[0].state == FAILED, 60, "the member to end")
-    wait_until(lambda: members[1].state == STOPPED, 60, "the member to stop")
-    wait_until(lambda: slurm.job(f"{number}_1").restarts == 1, 60, "the task to be put back into the queue")
+    wait_until(lambda: members[0].state == FAILED, "the member to end")
+    wait_until(lambda: members[1].state == STOPPED, "the member to stop")
+    wait_until(lambda: slurm.job(f"{number}_1").restarts == 1, "the task to be put back into the queue")
     slurm.start_again(f"{number}_1")
     assert [slurm.wait(f"{number}_{k}").state for k in (1, 2)] == ["COMPLETED"] * 2
     assert [one.state for one in members] == [FAILED, DONE, DONE]

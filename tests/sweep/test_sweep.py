@@ -9,8 +9,6 @@ import os
 import shutil
 import signal
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +19,7 @@ from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.lock import holder_of
 from hpcdem.sweep import driver
 from hpcdem.sweep.plan import DONE, RUNNING, read_json
-from tests.conftest import end, popen, run
+from tests.conftest import end, popen, run, until
 from tests.short_push import parametrised_push, ranks_of
 
 FALL = """\
@@ -61,13 +59,6 @@ def call(*words: object, cwd: Path, code: int = 0) -> str:
 def table(path: Path) -> list[dict[str, str]]:
     with open(path, newline="") as file:
         return list(csv.DictReader(file))
-
-
-def wait_for(what: Callable[[], object], seconds: float = 60.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < deadline, "nothing happens"
-        time.sleep(0.02)
 
 
 # --- what the members answer -------------------------------------------------------------------------------------
@@ -161,12 +152,12 @@ def undisturbed_and_killed(tmp_path: Path, seeds: str, steps: int) -> None:
     folder = tmp_path / "killed" / "push_sweep"
     first = popen([sys.executable, "-m", "hpcdem", "sweep", *words], cwd=tmp_path / "killed")
     try:
-        wait_for(lambda: any((folder / "0000" / "data").glob("*.sav")))
+        until(lambda: any((folder / "0000" / "data").glob("*.sav")))
         victims = ranks_of(folder / "0000")
         assert victims
         for pid in victims:
             os.kill(pid, signal.SIGKILL)
-        wait_for(lambda: read_json(folder / "0000" / "state.json", {"tries": 0})["tries"] == 2)
+        until(lambda: read_json(folder / "0000" / "state.json", {"tries": 0})["tries"] == 2)
         first.send_signal(signal.SIGKILL)
         first.wait()
     finally:
@@ -202,7 +193,7 @@ def test_a_driver_that_is_asked_to_stop_lets_members_save_and_goes_on(tmp_path):
     (tmp_path / "push.py").write_text(parametrised_push(40000))
     words = ["push.py", "--set", "friction=0.1,0.4", "--jobs", "1"]
     first = popen([sys.executable, "-m", "hpcdem", "sweep", *words], cwd=tmp_path)
-    wait_for(lambda: any((tmp_path / "push_sweep/0000/data").glob("*.sav")))
+    until(lambda: any((tmp_path / "push_sweep/0000/data").glob("*.sav")))
     assert "runs this sweep already" in call(*words, cwd=tmp_path, code=2)
     assert [one.state for one in hpcdem.Sweep.open(tmp_path / "push_sweep").members] == [RUNNING, "waiting"]
     first.terminate()

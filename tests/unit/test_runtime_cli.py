@@ -92,26 +92,26 @@ def test_a_wrong_command_line_is_code_2(words):
 
 @pytest.mark.mpi
 def test_a_wrong_command_line_is_said_once(launch):
-    done = launch(3, "--nonsense", "a.py", timeout=60)
+    done = launch(3, "--nonsense", "a.py")
     assert done.returncode == 2
     assert done.stderr.count("No such option") == 1
 
 
 def test_a_missing_script(launch, tmp_path):
-    done = launch(1, "nowhere.py", cwd=tmp_path, timeout=60)
+    done = launch(1, "nowhere.py", cwd=tmp_path)
     assert done.returncode == 2 and "hpcdem: nowhere.py: no such script" in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.mpi
 def test_a_missing_script_is_said_once(launch, tmp_path):
-    done = launch(3, "nowhere.py", cwd=tmp_path, timeout=60)
+    done = launch(3, "nowhere.py", cwd=tmp_path)
     assert done.returncode == 2 and done.stderr.count("no such script") == 1
 
 
 def test_a_pcdc_script_is_read_whole_before_anything_runs(launch, tmp_path):
     (tmp_path / "a.sc").write_text("open('ran', 'w')\nfor i in range(3):\n    pcdc block create\n")
-    done = launch(1, "a.sc", cwd=tmp_path, timeout=60)
+    done = launch(1, "a.sc", cwd=tmp_path)
     assert done.returncode == 2 and "hpcdem: a.sc:3: pcdc block create: read 'block'" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["a.sc"]
 
@@ -121,7 +121,7 @@ def test_a_pcdc_script_is_checked_without_running_it(launch, tmp_path):
              "    pcdc geometry create circle ([i],0) 1 as-layer 'hole'",
              "pcdc mesh create from-layer 'whole' size 0.5"]  # fmt: skip
     (tmp_path / "a.sc").write_text("\r\n".join(lines))
-    done = launch(1, "--check", "a.sc", cwd=tmp_path, timeout=60)
+    done = launch(1, "--check", "a.sc", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "a.sc: 3 commands read, nothing was run" in done.stdout and "1 geometry create circle" in done.stdout
     assert "warning: line 6: no line makes the geometry layer 'whole'" in done.stdout
@@ -136,7 +136,7 @@ def test_a_pcdc_script_without_a_checkpoint_starts_at_the_beginning(launch, tmp_
 
 def test_a_return_outside_of_a_function_is_found_before_the_run(launch, tmp_path):
     (tmp_path / "a.sc").write_text("pcdc model new\nreturn 3\n")
-    done = launch(1, "--check", "a.sc", cwd=tmp_path, timeout=60)
+    done = launch(1, "--check", "a.sc", cwd=tmp_path)
     assert (
         done.returncode == 2 and "hpcdem: a.sc:2: return 3: this is not correct Python: 'return' outside" in done.stderr
     )
@@ -144,20 +144,20 @@ def test_a_return_outside_of_a_function_is_found_before_the_run(launch, tmp_path
 
 @pytest.mark.mpi
 def test_the_console_is_for_one_rank(launch, tmp_path):
-    done = launch(2, "console", cwd=tmp_path, timeout=60)
+    done = launch(2, "console", cwd=tmp_path)
     assert done.returncode == 2 and done.stderr.count("hpcdem console is for one rank") == 1
 
 
 @pytest.mark.parametrize("option", ["--check", "--resume"])
 def test_options_for_zdem_scripts_are_refused_for_python(launch, tmp_path, option):
     (tmp_path / "a.py").write_text("import hpcdem\n")
-    done = launch(1, option, "a.py", cwd=tmp_path, timeout=60)
+    done = launch(1, option, "a.py", cwd=tmp_path)
     assert done.returncode == 2 and f"hpcdem: a.py: {option} is for ZDEM and PCDC scripts" in done.stderr
 
 
 def test_a_zdem_script_takes_no_arguments(launch, tmp_path):
     (tmp_path / "a.py").write_text("START\nSTOP\n")
-    done = launch(1, "a.py", "0.3", cwd=tmp_path, timeout=60)
+    done = launch(1, "a.py", "0.3", cwd=tmp_path)
     assert done.returncode == 2 and "0.3: a ZDEM script takes no arguments" in done.stderr
 
 
@@ -174,7 +174,7 @@ STOP
 
 def test_check_runs_nothing(launch, tmp_path):
     (tmp_path / "a.py").write_text(SHORT)
-    done = launch(1, "--check", "a.py", cwd=tmp_path, timeout=60)
+    done = launch(1, "--check", "a.py", cwd=tmp_path)
     assert done.returncode == 0 and "100" in done.stdout
     assert [p.name for p in tmp_path.iterdir()] == ["a.py"]
 

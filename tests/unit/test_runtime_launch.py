@@ -89,7 +89,7 @@ with launch.one_voice():
 def test_copies_of_rank_0_are_refused_by_one_of_them(launch, rank, code):
     """A launcher of another MPI says 4, MPI says 1. Only the first copy speaks."""
     strange = {"MV2_COMM_WORLD_SIZE": "4", "MV2_COMM_WORLD_RANK": str(rank)}
-    done = launch.python(1, "-c", COPIES, env=strange, timeout=60)
+    done = launch.python(1, "-c", COPIES, env=strange)
     assert done.returncode == code, done.stderr
     assert ("MVAPICH started 4 processes" in done.stdout and "rank 0 of 1" in done.stdout) is (rank == 0)
 
@@ -293,7 +293,7 @@ def test_all_ranks_see_each_other(launch):
         "comm.rank or print(launch.start_report(places, launch.mpi_library()))\n"
         "shutdown.leave(shutdown.ExitStatus())\n"
     )
-    done = launch.python(3, "-c", program, timeout=60)
+    done = launch.python(3, "-c", program)
     assert done.returncode == 0, done.stderr
     assert "3 ranks x 1 thread" in done.stdout
 

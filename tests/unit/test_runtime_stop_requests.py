@@ -101,7 +101,7 @@ def test_a_signal_to_one_rank_is_seen_by_all_on_the_same_poll(launch, tmp_path):
         "        break\n"
         "shutdown.leave(shutdown.ExitStatus())\n"
     )
-    done = launch.python(3, program, timeout=60)
+    done = launch.python(3, program)
     assert done.returncode == 0, done.stderr
     lines = sorted(done.stdout.splitlines())
     assert [line.split()[:3] for line in lines] == [

@@ -5,14 +5,13 @@ from __future__ import annotations
 import ast
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.lang.zdem.lexer import Token, expression, number
 from hpcdem.lang.zdem.parser import parse_text
-from tests.conftest import ROOT
+from tests.conftest import ROOT, sources
 
 PACKAGE = ROOT / "hpcdem"
 
@@ -239,19 +238,19 @@ HOSTILE = {
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_expressions_are_refused_at_once(name):
-    began = time.monotonic()
+    began = time.process_time()
     with pytest.raises(ScriptError) as caught:
         expression(Token(HOSTILE[name], 3, 1), "push.py")
-    assert time.monotonic() - began < 2.0
+    assert time.process_time() - began < 2.0
     message = str(caught.value)
     assert message.startswith("push.py:3: read ") and len(message) < 600 and "\n" not in message
 
 
 def test_a_million_brackets_are_separators():
     """Brackets only separate words in this language: nothing is nested, so nothing can be nested too deep."""
-    began = time.monotonic()
+    began = time.process_time()
     script = parse_text("START\nDEL RANGE y " + "(" * MILLION + "0 {top}" + ")" * MILLION, "push.py")
-    assert time.monotonic() - began < 10.0
+    assert time.process_time() - began < 10.0
     assert script.statements[-1].command == "DEL"
 
 
@@ -269,9 +268,9 @@ EXTENTS = {"left": 0.0, "right": 10.0, "bottom": 0.0, "top": 5.0}
     ids=["sum", "product", "digits", "exponent"],
 )
 def test_a_long_expression_has_a_value(text, value):
-    began = time.monotonic()
+    began = time.process_time()
     assert expression(Token(text, 1, 1), "push.py").value(EXTENTS) == value
-    assert time.monotonic() - began < 2.0
+    assert time.process_time() - began < 2.0
 
 
 @pytest.mark.parametrize(
@@ -289,9 +288,9 @@ def test_values_that_do_not_exist_are_told_in_a_short_line(text):
     "text", ["9" * MILLION, "1e" + "9" * MILLION, "0." + "0" * MILLION + "1"], ids=["whole", "exponent", "zeros"]
 )
 def test_plain_numbers_of_a_million_digits(text):
-    began = time.monotonic()
+    began = time.process_time()
     number(Token(text, 1, 1))
-    assert time.monotonic() - began < 2.0
+    assert time.process_time() - began < 2.0
 
 
 @pytest.mark.parametrize(
@@ -307,5 +306,5 @@ def test_huge_numbers_in_a_script_are_refused_in_a_short_line(line):
 
 def test_no_file_of_the_project_is_a_pickle():
     """Nor is there any data file that would have to be one."""
-    tracked = [p for folder in ("hpcdem", "examples", "scripts", "slurm", "tests") for p in (ROOT / folder).rglob("*")]
-    assert not [p for p in tracked if Path(p).suffix in (".pkl", ".pickle", ".joblib", ".npy")]
+    files = sources(".")
+    assert len(files) > 1000 and not [p for p in files if p.suffix in (".pkl", ".pickle", ".joblib", ".npy")]

@@ -57,10 +57,10 @@ def test_what_is_chosen(text, rows):
     ],
 )  # fmt: skip
 def test_what_is_no_filter_is_refused_at_once(text):
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(HpcdemError):
         chosen(text, 5, FIELDS, groups)
-    assert time.perf_counter() - began < 1.0
+    assert time.process_time() - began < 1.0
 
 
 def test_what_is_said():
