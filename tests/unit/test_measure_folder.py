@@ -71,6 +71,9 @@ def test_frames_begin_where_the_wall_begins_to_move(folder: Path, tmp_path: Path
     assert column(rows, "shortening[m]") == pytest.approx([0.0, HEAVE, HEAVE, 2 * HEAVE])
     assert column(rows, "time[s]") == pytest.approx([100.0, 150.0, 150.0, 200.0])
     lines = run(folder, "wedge", "--from", 0, "--to", 3000, "-o", tmp_path)
+    assert any(
+        "no wedge yet in 2 frames, steps 1000 to 2000; at step 1000: the surface is flat" in one for one in lines
+    )
     assert len(table(tmp_path, "wedge")) == 4 and "all_0000001000 to all_0000003000_ini; wall 1 moves" in lines[0]
     assert "--from 0" not in lines[0]
 
@@ -92,7 +95,8 @@ def test_wedge_of_the_last_frame(folder: Path) -> None:
     assert float(row["base_slope[deg]"]) == 0.0 and row["taper[deg]"] == row["surface_slope[deg]"]
     assert float(row["height[m]"]) == pytest.approx(DEPTH + 2.0 * SLIP * np.sin(np.radians(DIP)), abs=3.0 * R)
     assert float(row["width[m]"]) == pytest.approx(float(row["toe_x[m]"]) - 2.0 * HEAVE)
-    assert table(folder / "measure", "wedge")[0]["height[m]"] == ""  # flat ground
+    flat = table(folder / "measure", "wedge")[0]
+    assert flat["height[m]"] == "" and flat["note"].startswith("no wedge yet: the surface is flat") and not row["note"]
 
 
 @pytest.mark.parametrize("kind", ["vtkhdf", "dat"])

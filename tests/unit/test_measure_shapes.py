@@ -61,6 +61,17 @@ def test_flat_or_empty_ground_is_no_wedge() -> None:
         wedge.shape(x[:0], y[:0], y[:0], FLAT, 200.0)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_rough_top_of_a_level_pile_is_no_wedge(seed: int) -> None:
+    """Grains piled by chance, with hollows and heaps of several diameters: crest and toe were anywhere."""
+    rng = np.random.default_rng(seed)
+    x = np.arange(R, 20000.0, 2.0 * R)
+    top = 3000.0 + 6.0 * R * rng.uniform(-1.0, 1.0, len(x)) + 2.0 * R * np.sin(x / 1500.0)
+    x, y = np.tile(x, 2), np.concatenate([np.full(len(x), R), top])
+    with pytest.raises(ValueError, match=r"the surface is flat: (behind the toe|it falls by)"):
+        wedge.shape(x, y, np.full(len(x), R), FLAT, 200.0)
+
+
 def test_width_of_columns_is_a_round_number_of_about_three_radii() -> None:
     assert [columns_of(np.array([r])) for r in (80.0, 50.0, 0.3, 2.0)] == pytest.approx([250.0, 200.0, 1.0, 5.0])
 

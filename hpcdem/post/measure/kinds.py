@@ -48,16 +48,16 @@ def surface_sheets(done: Done, plan: Plan) -> list[Sheet]:
     return [Sheet("surface", (*Stamp.HEAD, "x[m]", "height[m]"), rows)]
 
 
-def wedge_part(scene: Scene) -> wedge.Shape | None:
-    """Shape of the wedge in front of the wall; x is mirrored if that pushes to the left."""
+def wedge_part(scene: Scene) -> wedge.Shape | str:
+    """Shape of the wedge in front of the wall, or why there is none; x is mirrored if that pushes to the left."""
     bed, plan = scene.bed, scene.plan
     sign = plan.forward
     walls = {i: ((sign * a[0], a[1]), (sign * b[0], b[1])) for i, (a, b) in bed.walls.items()}
     back = None if plan.wall not in walls else float(np.mean(walls[plan.wall], axis=0)[0])
     try:
         return wedge.shape(sign * bed.x, bed.y, bed.r, walls, plan.cell, back)
-    except ValueError:
-        return None
+    except ValueError as reason:
+        return str(reason)
 
 
 WEDGE_HEAD = (
@@ -69,8 +69,8 @@ WEDGE_HEAD = (
 def wedge_rows(done: Done, plan: Plan) -> np.ndarray:
     """(frames, columns of WEDGE_HEAD); NaN where there is no wedge."""
 
-    def row(stamp: Stamp, s: wedge.Shape | None) -> list[float]:
-        if s is None:
+    def row(stamp: Stamp, s: wedge.Shape | str) -> list[float]:
+        if isinstance(s, str):
             return [stamp.shortening] + [NAN] * (len(WEDGE_HEAD) - 1)
         (cx, cy), (tx, ty) = s.wedge.crest, s.wedge.toe
         sign = plan.forward
@@ -80,8 +80,16 @@ def wedge_rows(done: Done, plan: Plan) -> np.ndarray:
 
 
 def wedge_sheets(done: Done, plan: Plan) -> list[Sheet]:
-    rows = ((*stamp.row, *numbers) for (stamp, _), numbers in zip(done, wedge_rows(done, plan).tolist()))
-    return [Sheet("wedge", (*Stamp.HEAD, *WEDGE_HEAD), rows)]
+    rows = (
+        (*stamp.row, *numbers, f"no wedge yet: {part}" if isinstance(part, str) else "")
+        for (stamp, part), numbers in zip(done, wedge_rows(done, plan).tolist())
+    )
+    return [Sheet("wedge", (*Stamp.HEAD, *WEDGE_HEAD, "note"), rows)]
+
+
+def without_wedge(done: Done) -> list[tuple[Stamp, str]]:
+    """The frames that have no wedge, and why."""
+    return [(stamp, part) for stamp, part in done if isinstance(part, str)]
 
 
 # --- faults ----------------------------------------------------------------------------------------------------

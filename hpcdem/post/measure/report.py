@@ -74,6 +74,8 @@ def run(comm: Any, log: Any, request: Request, without: Sequence[str] = ()) -> l
             log.info(f"left out: {problem}")
         elif files:
             log.info(f"{kind}: {', '.join(path.name for path in files)}")
+        if kind == "wedge" and files:
+            on_first(comm, lambda: _tell_of_no_wedge(log, parts["wedge"]))
         written += files
     written += _blocks(comm, log, request, of_blocks) if of_blocks else []
     log.info(f"{request.target}: {len(written)} files in {time.monotonic() - began:.1f} s")
@@ -94,6 +96,16 @@ def _tell(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
         )
     if others := left_out(plan.request.folder):
         log.warn(others)
+
+
+def _tell_of_no_wedge(log: Any, done: Done) -> None:
+    """A line about the frames without a wedge."""
+    flat = kinds.without_wedge(done)
+    if flat:
+        (first, reason), (last, _) = flat[0], flat[-1]
+        at = f"at step {first.step}" if len(flat) == 1 else f"in {len(flat)} frames, steps {first.step} to {last.step}"
+        of = "" if len(flat) == 1 else f"; at step {first.step}"
+        log.info(f"wedge: no wedge yet {at}{of}: {reason}; the column `note` of wedge.csv says it of each frame")
 
 
 def _tried(work: Callable[[], list[Path]], must: bool) -> tuple[list[Path], str | None]:
@@ -305,8 +317,9 @@ def _refuse(kind: str, done: Done, plan: Plan) -> None:
     if kind == "faults" and not some:
         names = "the sections in ss/data are of other frames; with --increment the frames themselves are compared"
         raise _NothingThere(f"faults: {names if plan.sections else f'{where} has only one frame, and no sections'}")
-    if kind == "wedge" and not some:
-        raise _NothingThere(f"wedge: no frame in {where} has a surface that falls away from its highest point")
+    if kind == "wedge" and len(flat := kinds.without_wedge(done)) == len(done):
+        last, reason = flat[-1]
+        raise _NothingThere(f"wedge: no frame in {where} has a wedge yet; at step {last.step}: {reason}")
     if kind == "cracks" and not any(len(part.change.made) for part in some):
         raise _NothingThere(f"cracks: no frame in {where} has bonds")
 

@@ -15,6 +15,14 @@ import numpy as np
 from hpcdem.post.measure.grains import Walls
 from hpcdem.post.measure.surface import surface
 
+ROUGH = 3.0
+"""How much higher the bed stands behind the toe than in front of it, on average and at least, over the standard
+deviation of the surface in front. The highest and the farthest point of a rough level surface lie anywhere, but part
+nothing."""
+LEAST_FRONT = 5
+"""Surface points from the toe on; where there are fewer, the fall from crest to toe is held against the roughness
+there."""
+
 
 @dataclass(frozen=True)
 class Wedge:
@@ -28,21 +36,39 @@ class Wedge:
 def wedge(xs: np.ndarray, ys: np.ndarray, trim: float = 0.2) -> Wedge:
     """Wedge of a surface by the rule in the head of this file.
 
-    Raises ValueError if the crest is the last point, so that there is no slope to measure.
+    Raises ValueError with the reason where there is none: nothing falls away from the crest, or by no more than the
+    surface is rough.
     """
     crest = int(np.argmax(ys))
     px, py = xs[crest:], ys[crest:]
     if len(px) < 3:
-        raise ValueError("no surface in front of the crest")
+        raise ValueError("the highest point of the surface is its far end: nothing falls away from it")
     ex, ey = px[-1] - px[0], py[-1] - py[0]
     away = np.abs(ex * (py - py[0]) - ey * (px - px[0])) / np.hypot(ex, ey)
     toe = int(np.argmax(away))
     skip = int(toe * trim)
     inside = slice(skip, toe - skip + 1)
     if toe - 2 * skip < 1:
-        raise ValueError("fewer than two surface points between crest and toe")
-    slope = np.polyfit(px[inside], py[inside], 1)[0]
+        raise ValueError("crest and toe have fewer than two surface points between them")
+    slope = _fitted(px[inside], py[inside])[0]
+    if len(px) - toe >= LEAST_FRONT:
+        rough = _fitted(px[toe:], py[toe:])[1]
+        rise = float(np.mean(ys[: crest + toe]) - np.mean(py[toe:]))
+        what = f"behind the toe it stands {max(rise, 0.0):.4g} m higher on average than in front of it"
+    else:
+        rough, rise = _fitted(px[: toe + 1], py[: toe + 1])[1], -slope * float(px[toe] - px[0])
+        what = f"from crest to toe it falls by {max(rise, 0.0):.4g} m"
+    if rise < ROUGH * rough:
+        raise ValueError(f"the surface is flat: {what}, and is rough by {rough:.4g} m (standard deviation)")
     return Wedge((float(px[0]), float(py[0])), (float(px[toe]), float(py[toe])), float(np.degrees(np.arctan(-slope))))
+
+
+def _fitted(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Slope of the line through points, and their standard deviation about it; 0 for fewer than three."""
+    if len(x) < 3:
+        return (float((y[-1] - y[0]) / (x[-1] - x[0])) if len(x) > 1 else 0.0), 0.0
+    slope, height = np.polyfit(x, y, 1)
+    return float(slope), float(np.std(y - (height + slope * x)))
 
 
 @dataclass(frozen=True)
@@ -64,13 +90,14 @@ class Shape:
 
 def shape(x: np.ndarray, y: np.ndarray, r: np.ndarray, walls: Walls, cell: float, back: float | None = None) -> Shape:
     """Shape of the wedge of all these grains. back: where it begins, the face of the wall that pushes [m]; the
-    leftmost grain by default. Raises ValueError where there is no wedge: no slope in front of the crest, or the crest
-    less than the largest diameter above the toe."""
+    leftmost grain by default. Raises ValueError where there is no wedge: as `wedge`, or where the crest stands less
+    than the largest diameter above the toe."""
     if not len(x):
         raise ValueError("no particles")
     found = wedge(*surface(x, y, cell))
-    if found.crest[1] - found.toe[1] < 2.0 * float(np.max(r)):
-        raise ValueError("the surface is flat")
+    fall, diameter = found.crest[1] - found.toe[1], 2.0 * float(np.max(r))
+    if fall < diameter:
+        raise ValueError(f"the surface is flat: it falls by {fall:.4g} m, the largest diameter is {diameter:g} m")
     back = float(np.min(x - r)) if back is None else back
     rise, height = base(x, y, r, walls, cell, found.crest[0], found.toe[0])
     top = surface(x, y + r, cell)[1].max()
