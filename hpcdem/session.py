@@ -8,13 +8,13 @@ also sees to it that an error on one rank ends all of them, with its message and
 from __future__ import annotations
 
 import atexit
+import importlib
 import sys
 from collections.abc import Callable, Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.reproducibility import Reproduction
     from hpcdem.runtime.stop_requests import StopRequests
-
-    WarmUp = tuple[Callable[[int], None], tuple[ModuleType, ...]]
 
 
 @dataclass
@@ -181,8 +179,8 @@ class Session:
 def prepare(
     comm: SerialComm, log: Log, kinds: Sequence[str], *threads: int, ready: Collection[str] = frozenset()
 ) -> Path:
-    """Collective: load the kernels of kinds, see KINDS, and of those that they need, or compile them, for each number
-    of threads; but not those that are `ready`. Returns the last cache folder."""
+    """Collective: have the kernels of kinds, see KINDS, and of those that they need compiled, for each number of
+    threads; but not those that are `ready`. Returns the folder in which they are kept."""
     from hpcdem.runtime.kernels import prepare_kernels
 
     names = [name for name in needed(kinds) if name not in ready]
@@ -198,227 +196,48 @@ def needed(kinds: Sequence[str]) -> list[str]:
 
 
 class Kernels(NamedTuple):
-    """Kernels that are loaded together, from a folder of their own. load: imports them, and gives the function that
-    calls each of them once, with the modules whose kernels these are even if they were imported with others before;
-    after: kinds that this function needs too."""
+    """Kernels that are compiled together. module, function: what calls each of them once; after: kinds that this
+    function needs too."""
 
-    load: Callable[[], WarmUp]
+    module: str
+    function: str = "warm_up"
     after: tuple[str, ...] = ()
-
-
-def _shared() -> WarmUp:
-    from hpcdem.runtime import warm_up
-
-    return warm_up.warm_up, ()
-
-
-def _particles() -> WarmUp:
-    from hpcdem.commands.dem import warm_up
-
-    return warm_up.warm_up, ()
-
-
-def _energy() -> WarmUp:
-    from hpcdem.commands.dem import warm_up
-    from hpcdem.physics.dem.kernels import energy
-
-    return warm_up.with_energy, (energy,)
-
-
-def _clumps() -> WarmUp:
-    from hpcdem.commands.dem import warm_up
-    from hpcdem.physics.dem.kernels import rigid
-
-    return warm_up.with_clumps, (rigid,)
-
-
-def _restitution() -> WarmUp:
-    from hpcdem.commands.dem import warm_up
-    from hpcdem.physics.dem.kernels import dashpots
-
-    return warm_up.with_restitution, (dashpots,)
-
-
-def _blocks() -> WarmUp:
-    from hpcdem.commands.fdem import warm_up
-
-    return warm_up.warm_up, ()
-
-
-def _coupled() -> WarmUp:
-    from hpcdem.physics.coupling import warm_up
-
-    return warm_up.warm_up, ()
-
-
-def _bolts() -> WarmUp:
-    from hpcdem.physics.bolts import kernels, warm_up
-
-    return warm_up.warm_up, (kernels,)
-
-
-def _liners() -> WarmUp:
-    from hpcdem.physics.liners import kernels, warm_up
-
-    return warm_up.warm_up, (kernels,)
-
-
-def _flow() -> WarmUp:
-    from hpcdem.physics.flow import kernels, warm_up
-
-    return warm_up.warm_up, (kernels,)
-
-
-def _flow_space() -> WarmUp:
-    from hpcdem.physics.flow import kernels_space, warm_up
-
-    return warm_up.in_space, (kernels_space,)
-
-
-def _proppant() -> WarmUp:
-    from hpcdem.physics.proppant import kernels, warm_up
-
-    return warm_up.warm_up, (kernels,)
-
-
-def _proppant_space() -> WarmUp:
-    from hpcdem.physics.proppant import kernels_space, warm_up
-
-    return warm_up.in_space, (kernels_space,)
-
-
-def _heat() -> WarmUp:
-    from hpcdem.physics.heat import kernels, warm_up
-
-    return warm_up.warm_up, (kernels,)
-
-
-def _heat_space() -> WarmUp:
-    from hpcdem.physics.heat import kernels_space, warm_up
-
-    return warm_up.in_space, (kernels_space,)
-
-
-def _yielding() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import plastic_quads, plasticity
-
-    return warm_up.yielding, (plasticity, plastic_quads)
-
-
-def _creep() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import creep
-
-    return warm_up.creeping, (creep,)
-
-
-def _tangent() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import stiffness
-
-    return warm_up.tangent, (stiffness,)
-
-
-def _plastic_tangent() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import plastic_stiffness
-
-    return warm_up.plastic_tangent, (plastic_stiffness,)
-
-
-def _yielding_space() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import plastic_tets
-
-    return warm_up.yielding_in_space, (plastic_tets,)
-
-
-def _creep_space() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import creep_tets
-
-    return warm_up.creeping_in_space, (creep_tets,)
-
-
-def _tangent_space() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import tet_stiffness
-
-    return warm_up.tangent_in_space, (tet_stiffness,)
-
-
-def _hexes() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import hexes
-
-    return warm_up.hexahedra, (hexes,)
-
-
-def _yielding_hexes() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import plastic_hexes
-
-    return warm_up.yielding_hexahedra, (plastic_hexes,)
-
-
-def _creep_hexes() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import creep_hexes
-
-    return warm_up.creeping_hexahedra, (creep_hexes,)
-
-
-def _joints_hexes() -> WarmUp:
-    from hpcdem.physics.fdem import warm_up
-    from hpcdem.physics.fdem.kernels import joints_hexes
-
-    return warm_up.jointed_hexahedra, (joints_hexes,)
-
-
-def _space() -> WarmUp:
-    from hpcdem.physics.fdem import tetrahedra, warm_up
-    from hpcdem.physics.fdem.kernels import contact_space, detect_space, space, tets
-
-    return warm_up.in_space, (tets, space, tetrahedra, contact_space, detect_space)
-
-
-def _pictures() -> WarmUp:
-    from hpcdem.post.view import screen, warm_up
-
-    return warm_up.in_space, (screen,)
 
 
 _TANGENT_SPACE = ("tangent", "plastic-tangent", "yielding-space", "tangent-space")
 KINDS = {
-    "shared": Kernels(_shared),
-    "": Kernels(_particles),
-    "energy": Kernels(_energy, after=("",)),
-    "clumps": Kernels(_clumps, after=("",)),
-    "restitution": Kernels(_restitution, after=("",)),
-    "blocks": Kernels(_blocks),
-    "coupled": Kernels(_coupled, after=("energy",)),
-    "bolts": Kernels(_bolts),
-    "liners": Kernels(_liners),
-    "flow": Kernels(_flow),
-    "flow-space": Kernels(_flow_space, after=("space", "flow")),
-    "proppant": Kernels(_proppant, after=("flow",)),
-    "proppant-space": Kernels(_proppant_space, after=("proppant", "flow-space")),
-    "heat": Kernels(_heat),
-    "heat-space": Kernels(_heat_space, after=("space", "heat")),
-    "yielding": Kernels(_yielding),
-    "creep": Kernels(_creep),
-    "tangent": Kernels(_tangent),
-    "plastic-tangent": Kernels(_plastic_tangent, after=("yielding", "tangent")),
-    "space": Kernels(_space),
-    "yielding-space": Kernels(_yielding_space, after=("space",)),
-    "creep-space": Kernels(_creep_space, after=("space",)),
-    "tangent-space": Kernels(_tangent_space, after=("tangent", "plastic-tangent", "yielding-space")),
-    "hexes": Kernels(_hexes, after=_TANGENT_SPACE),
-    "yielding-hexes": Kernels(_yielding_hexes, after=(*_TANGENT_SPACE, "hexes")),
-    "creep-hexes": Kernels(_creep_hexes, after=(*_TANGENT_SPACE, "hexes", "creep-space")),
-    "joints-hexes": Kernels(_joints_hexes, after=(*_TANGENT_SPACE, "hexes")),
-    "pictures": Kernels(_pictures),
+    "shared": Kernels("runtime.warm_up"),
+    "": Kernels("commands.dem.warm_up"),
+    "energy": Kernels("commands.dem.warm_up", "with_energy", after=("",)),
+    "clumps": Kernels("commands.dem.warm_up", "with_clumps", after=("",)),
+    "restitution": Kernels("commands.dem.warm_up", "with_restitution", after=("",)),
+    "blocks": Kernels("commands.fdem.warm_up"),
+    "coupled": Kernels("physics.coupling.warm_up", after=("energy",)),
+    "bolts": Kernels("physics.bolts.warm_up"),
+    "liners": Kernels("physics.liners.warm_up"),
+    "flow": Kernels("physics.flow.warm_up"),
+    "flow-space": Kernels("physics.flow.warm_up", "in_space", after=("space", "flow")),
+    "proppant": Kernels("physics.proppant.warm_up", after=("flow",)),
+    "proppant-space": Kernels("physics.proppant.warm_up", "in_space", after=("proppant", "flow-space")),
+    "heat": Kernels("physics.heat.warm_up"),
+    "heat-space": Kernels("physics.heat.warm_up", "in_space", after=("space", "heat")),
+    "yielding": Kernels("physics.fdem.warm_up", "yielding"),
+    "creep": Kernels("physics.fdem.warm_up", "creeping"),
+    "tangent": Kernels("physics.fdem.warm_up", "tangent"),
+    "plastic-tangent": Kernels("physics.fdem.warm_up", "plastic_tangent", after=("yielding", "tangent")),
+    "space": Kernels("physics.fdem.warm_up", "in_space"),
+    "yielding-space": Kernels("physics.fdem.warm_up", "yielding_in_space", after=("space",)),
+    "creep-space": Kernels("physics.fdem.warm_up", "creeping_in_space", after=("space",)),
+    "tangent-space": Kernels(
+        "physics.fdem.warm_up", "tangent_in_space", after=("tangent", "plastic-tangent", "yielding-space")
+    ),
+    "hexes": Kernels("physics.fdem.warm_up", "hexahedra", after=_TANGENT_SPACE),
+    "yielding-hexes": Kernels("physics.fdem.warm_up", "yielding_hexahedra", after=(*_TANGENT_SPACE, "hexes")),
+    "creep-hexes": Kernels(
+        "physics.fdem.warm_up", "creeping_hexahedra", after=(*_TANGENT_SPACE, "hexes", "creep-space")
+    ),
+    "joints-hexes": Kernels("physics.fdem.warm_up", "jointed_hexahedra", after=(*_TANGENT_SPACE, "hexes")),
+    "pictures": Kernels("post.view.warm_up", "in_space"),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
@@ -429,12 +248,11 @@ OF_BLOCKS = tuple(kind for kind in KINDS if kind not in ("shared", "", "blocks",
 
 
 def warm_up(kind: str, *threads: int) -> None:
-    """Call every kernel of a kind once for each number of threads: one of KINDS, or the name of a physics of particles.
-    Imports them: the cache must be settled before."""
-    from hpcdem.runtime.kernels import keep_here
-
-    call, modules = (PHYSICS[kind]().warm_up, ()) if kind in PHYSICS else KINDS[kind].load()
-    keep_here(modules)
+    """Call every kernel of a kind once for each number of threads. kind: one of KINDS, or a physics of particles."""
+    if kind in PHYSICS:
+        call: Callable[[int], None] = PHYSICS[kind]().warm_up
+    else:
+        call = getattr(importlib.import_module(f"hpcdem.{KINDS[kind].module}"), KINDS[kind].function)
     for n in threads:
         call(n)
 

@@ -15,6 +15,8 @@ from typing import Any
 
 import pytest
 
+from hpcdem.runtime import kept
+
 pytest_plugins = ["tests.browser"]
 ROOT = Path(__file__).resolve().parent.parent
 BIN = Path(sys.executable).parent
@@ -46,6 +48,8 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), *others])
 
 # A ZDEM script that runs alone takes all cores unless this is set; tests run side by side.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+kept.install()  # kernels that tests call in this process are those of all other runs
 
 # --- what this machine has -------------------------------------------------------------------------------------
 

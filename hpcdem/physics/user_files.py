@@ -25,7 +25,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.runtime.kernels import cache_folder, turn_of
+from hpcdem.runtime.kept import store
+from hpcdem.runtime.kernels import turn_of
 from hpcdem.runtime.launch import patient_barrier
 
 if TYPE_CHECKING:
@@ -120,7 +121,7 @@ def in_turn(comm: SerialComm, act: Callable[[], None]) -> float:
     from numba.core import event
 
     began = time.perf_counter()
-    turn = turn_of(comm.allgather((socket.gethostname(), cache_folder()[0].name)), comm.rank)
+    turn = turn_of(comm.allgather((socket.gethostname(), store()[0].name)), comm.rank)
     with event.install_recorder("numba:compile") as compiling:
         for now in range(3):
             if now == turn:

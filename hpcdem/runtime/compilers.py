@@ -1,10 +1,10 @@
-"""Compiles the kernels of warm-ups in several processes, which fill the same folders.
+"""Compiles the kernels of warm-ups in several processes, which fill the same store.
 
 Each of them runs the warm-ups once with the plain Python functions in place of the kernels, to see which kernels are
 called and with what types. That takes less than a second, as the models of a warm-up are tiny. Then each takes one
-kernel after the other from this list, the largest first, until none is left. The list may be wrong in places, because
-functions that exist for the compiler only (intrinsics) give zero here and a kernel that fails does nothing: the process
-that loads the kernels runs the warm-ups in earnest, and compiles what is missing.
+kernel after the other from this list, the largest first, until none is left; it skips those in the store. The list may
+be wrong in places, because functions that exist for the compiler only (intrinsics) give zero here and a kernel that
+fails does nothing: the process that started them runs the warm-ups in earnest, and compiles what is missing.
 """
 
 from __future__ import annotations
@@ -35,31 +35,48 @@ PATIENCE = 60.0
 
 
 @dataclass(frozen=True)
-class Part:
-    """A warm-up and the cache folder of its kernels; wanted: they are to be compiled, not only to be known."""
-
-    folder: Path
-    warm: Callable[[], None]
-    wanted: bool
-
-
-@dataclass(frozen=True)
 class Job:
-    """cores: to run on; turn: descriptor of a file that all processes share, with the number
-    of kernels taken; who holds its lock may change that, or write into the folders; patience: see PATIENCE."""
+    """warm_ups: whose kernels are compiled; cores: to run on; turn: descriptor of a file that all processes share, with
+    three numbers (see `_Count`), whoever holds its lock may change them; patience: see PATIENCE."""
 
-    parts: list[Part]
+    warm_ups: list[Callable[[], None]]
     cores: Collection[int]
     turn: int
     patience: float
 
 
-def compile_in_processes(parts: list[Part], count: int, cores: Collection[int], meanwhile: Callable[[], None]) -> str:
-    """Fill the folders of the wanted parts, with `count` processes. Returns what went wrong, empty if nothing did.
+class _Count:
+    """How many kernels of the list were taken, how many of them had to be compiled and are, and how many have to."""
 
-    parts: in the order in which this process loads them, with what it has loaded before: a kernel belongs to the folder
-    that was set when its module was imported. The processes end with this one, however that ends.
-    """
+    def __init__(self, file: int) -> None:
+        self.file = file
+
+    def read(self) -> list[int]:
+        """The three numbers."""
+        data = os.pread(self.file, 24, 0).ljust(24, b"\0")
+        return [int.from_bytes(data[at : at + 8], "little") for at in (0, 8, 16)]
+
+    def add(self, *more: int) -> list[int]:
+        """Add to them; the numbers of before."""
+        with _locked(self.file):
+            before = self.read()
+            data = b"".join((n + m).to_bytes(8, "little") for n, m in zip(before, more, strict=True))
+            os.pwrite(self.file, data, 0)
+        return before
+
+    def expect(self, count: int) -> None:
+        """So many have to be compiled, if nobody has said it before."""
+        with _locked(self.file):
+            if not any(self.read()):
+                os.pwrite(self.file, count.to_bytes(8, "little"), 16)
+
+
+def compile_in_processes(
+    warm_ups: list[Callable[[], None]], count: int, cores: Collection[int], meanwhile: Callable[[int, int], None]
+) -> str:
+    """Compile the kernels of the warm-ups into the store, with `count` processes. Returns what went wrong, empty if
+    nothing did. meanwhile: is told how many kernels are compiled, and of how many. The processes end with this one,
+    however that ends."""
     package = Path(__file__).resolve().parents[1]
     program = (  # -P and the removed entry: nothing is imported from where the run happens to be
         f"import sys; sys.path.insert(0, {str(package.parent)!r}); import {package.name}; del sys.path[0]; "
@@ -67,8 +84,8 @@ def compile_in_processes(parts: list[Part], count: int, cores: Collection[int], 
     )
     environment = {name: value for name, value in os.environ.items() if not name.startswith(LAUNCHER)}
     with tempfile.TemporaryFile() as turn, tempfile.TemporaryFile() as errors, contextlib.ExitStack() as processes:
-        os.pwrite(turn.fileno(), bytes(8), 0)
-        job = pickle.dumps(Job(parts, cores, turn.fileno(), PATIENCE))
+        job = pickle.dumps(Job(warm_ups, cores, turn.fileno(), PATIENCE))
+        told = _Count(turn.fileno())
         started = []
         for _ in range(count):
             process = subprocess.Popen(
@@ -83,7 +100,7 @@ def compile_in_processes(parts: list[Part], count: int, cores: Collection[int], 
                 process.stdin.write(job)
         while any(process.poll() is None for process in started):
             time.sleep(0.05)
-            meanwhile()
+            meanwhile(*told.read()[1:])
         if not any(process.returncode for process in started):
             return ""
         errors.seek(0)
@@ -122,20 +139,22 @@ def main() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, job.cores)
-    name_kernels_apart()
-    spare_c_entries()
+    from hpcdem.runtime import kept  # which takes from this module
+
+    kept.install()
     gc.set_threshold(50_000, 20, 100)  # a compiler makes many objects and few circles
-    filled: set[Path] = set()
-    _write_in_turn(job, filled)
     faulthandler.dump_traceback_later(job.patience, exit=True)
-    kernels = _recorded(job.parts)
+    kernels = _recorded(job.warm_ups)
     faulthandler.cancel_dump_traceback_later()
-    while (number := _take(job.turn)) < len(kernels):
-        kernel, types, folder = kernels[number]
-        filled.clear()
-        filled.add(folder)
-        with contextlib.suppress(Exception):  # wrong types in the list; an error of a kernel comes again in the parent
-            kernel.compile(types)
+    count = _Count(job.turn)
+    count.expect(sum(not kept.has(*one) for one in kernels))
+    with kept.warming():
+        while (number := count.add(1, 0, 0)[0]) < len(kernels):
+            kernel, types = kernels[number]
+            if not kept.has(kernel, types):
+                with contextlib.suppress(Exception):  # wrong types in the list; an error comes again in the parent
+                    kernel.compile(types)
+                count.add(0, 1, 0)
 
 
 def _end_with_parent() -> None:
@@ -151,52 +170,17 @@ def _locked(file: int) -> Iterator[None]:
     try:
         yield
     finally:
-        os.lockf(file, os.F_ULOCK, 8)
+        os.lockf(file, os.F_ULOCK, 24)
 
 
-def _take(turn: int) -> int:
-    """The number of the next kernel that nobody has taken."""
-    with _locked(turn):
-        number = int.from_bytes(os.pread(turn, 8, 0), "little")
-        os.pwrite(turn, (number + 1).to_bytes(8, "little"), 0)
-    return number
-
-
-def _write_in_turn(job: Job, filled: Collection[Path]) -> None:
-    """numba looks for a free name for its file and enters it into an index: two at a time would take the same.
-
-    filled: the folder of the kernel that is compiled. Of those of other folders, which are compiled within it, nothing
-    is kept: what a folder holds does not depend on what is compiled at the same time.
-    """
-    from numba.core.caching import FunctionCache
-
-    save = FunctionCache.save_overload
-
-    def save_in_turn(cache: Any, signature: Any, kernel: Any) -> None:
-        if not set(Path(cache.cache_path).parents).isdisjoint(filled):
-            with _locked(job.turn):
-                save(cache, signature, kernel)
-
-    FunctionCache.save_overload = save_in_turn  # type: ignore[method-assign]
-
-
-def _recorded(parts: list[Part]) -> list[tuple[Any, tuple[Any, ...], Path]]:
-    """The kernels that the wanted parts call, with types of arguments and folder; the same list in each process."""
-    import numba
-
-    kernels: list[tuple[Any, tuple[Any, ...], Path]] = []
-    known: set[tuple[Any, tuple[Any, ...]]] = set()
-    for part in parts:
-        numba.config.CACHE_DIR = str(part.folder)  # type: ignore[attr-defined]
+def _recorded(warm_ups: list[Callable[[], None]]) -> list[tuple[Any, tuple[Any, ...]]]:
+    """The kernels that the warm-ups call, with types of arguments, the longest first; the same list in each process."""
+    found: dict[tuple[Any, tuple[Any, ...]], None] = {}
+    for warm in warm_ups:
         with _calls_recorded() as calls, warnings.catch_warnings(action="ignore"), contextlib.suppress(Exception):
-            part.warm()
-        if part.wanted:  # each folder before the next: what is in memory already is not stored again
-            new = sorted(
-                (call for call in calls if call not in known), key=lambda call: -_length(call[0].py_func, set())
-            )
-            kernels += [(kernel, types, part.folder) for kernel, types in new]
-        known |= calls.keys()
-    return kernels
+            warm()
+        found |= calls
+    return sorted(found, key=lambda call: -_length(call[0].py_func, set()))
 
 
 @contextlib.contextmanager

@@ -1,9 +1,8 @@
-"""Compiled kernels that are made of a function of the user, kept beside those of hpcdem for later runs and other ranks.
+"""The store of compiled kernels: one file per kernel and types of arguments, under a name that says what it is made of.
 
-numba keeps a kernel by the place of its source, and those that are made of other kernels not at all. Here who asks says
-what a kernel is made of besides hpcdem: all of that is in the name of the folder, with all that `cache_key` knows. Each
-kernel is a file of its own, which gets its name when it is whole, so that any number of processes may write it at the
-same time. A file that is damaged, or belongs to somebody else, is as one that is not there.
+A file gets its name when it is whole and never changes its meaning, so any number of processes may read and write at
+the same time, whatever ends them. A file that is damaged or belongs to somebody else counts as absent: the kernel is
+compiled, and replaces it.
 """
 
 from __future__ import annotations
@@ -12,22 +11,328 @@ import contextlib
 import hashlib
 import os
 import pickle
+import re
+import sys
 import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hpcdem.runtime.compilers import name_kernels_apart
-from hpcdem.runtime.kernels import cache_folder, tidy
+from hpcdem.runtime.compilers import name_kernels_apart, spare_c_entries
+from hpcdem.runtime.launch import version
 
+UNUSED_DAYS = 60
+"""Kernels that nobody has used for so long are removed."""
 _DIGEST = 32
 """Bytes of SHA-256, before what a file holds."""
+_PACKAGE = Path(__file__).resolve().parent.parent
+_DAY = 86400.0
+
+
+class Files:
+    """What a dispatcher of numba takes for its cache: a folder, and how the names of the kernel's files begin."""
+
+    def __init__(self, place: Path, name: str) -> None:
+        self.cache_path, self._place, self._name, self._enabled = str(place), place, name, True
+
+    def path(self, signature: Any) -> Path | None:
+        """Where a kernel with these types of arguments is; None if the text of the types does not tell them apart."""
+        text = str(signature)
+        if " at 0x" in text:  # a function as argument
+            return None
+        return self._place / f"{self._name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.nbc"
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """The compiled kernel, None if it is not there."""
+        from numba.core.compiler import CompileResult
+
+        target.refresh()
+        data = self._read(signature) if self._enabled else None
+        return None if data is None else CompileResult._rebuild(target, *pickle.loads(data))
+
+    def _read(self, signature: Any) -> bytes | None:
+        path = self.path(signature)
+        if path is None:
+            return None
+        try:
+            with path.open("rb") as file:
+                found = os.fstat(file.fileno())
+                if hasattr(os, "getuid") and found.st_uid not in (os.getuid(), 0):
+                    return None  # what is read here is executed
+                data = file.read()
+        except OSError:
+            return None
+        if hashlib.sha256(data[_DIGEST:]).digest() != data[:_DIGEST]:
+            return None
+        if time.time() - found.st_mtime > _DAY:
+            with contextlib.suppress(OSError):
+                os.utime(path)
+        return data[_DIGEST:]
+
+    def save_overload(self, signature: Any, found: Any) -> None:
+        """Keep it, if that can be done: a full disk is no reason to stop."""
+        from numba.core.serialize import dumps
+
+        path = self.path(signature)
+        if not self._enabled or path is None or found.lifted or found.library.has_dynamic_globals:
+            return
+        data = dumps(found._reduce())
+        with contextlib.suppress(OSError):
+            write(path, hashlib.sha256(data).digest() + data)
+
+    def enable(self) -> None:
+        """Read and write files."""
+        self._enabled = True
+
+    def disable(self) -> None:
+        """Read and write nothing any more."""
+        self._enabled = False
+
+    def flush(self) -> None:
+        """Forget what is kept: numba's `recompile`."""
+        for path in self._place.glob(f"{self._name}-*"):
+            path.unlink(missing_ok=True)
+
+
+def write(path: Path, data: bytes) -> None:
+    """Write a file that has its name only when it is whole."""
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+# -- kernels of hpcdem -----------------------------------------------------------------------------------------------
+
+late: list[str] = []
+"""Kernels that this process has compiled outside of a warm-up, which should have called them."""
+_usual: Callable[[Any], None] | None = None
+_warming = 0
+
+
+class _OfPackage(Files):
+    """Of a kernel of hpcdem: the folder is that of its module and of all that this imports, as they are now."""
+
+    def __init__(self, kernel: Any) -> None:
+        function = kernel.py_func
+        source = Path(function.__code__.co_filename)
+        place = store()[0] / f"{source.stem}-{_digest(source)}"
+        name = re.sub(r"[<>]", "", function.__qualname__)
+        made = hashlib.sha256(_made_of(function).encode()).hexdigest()[:8]
+        super().__init__(place, f"{name}-{function.__code__.co_firstlineno}-{made}")
+
+    def save_overload(self, signature: Any, found: Any) -> None:
+        if not _warming:
+            late.append(f"{found.fndesc.modname}.{found.fndesc.qualname}{signature}")
+        super().save_overload(signature, found)
+
+
+def _made_of(function: Any) -> str:
+    """Its code, and what the function that made it has put into it: values, and other kernels, whose text would be the
+    place in memory."""
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    inner = [_made_of(cell.py_func) if hasattr(cell, "py_func") else repr(cell) for cell in cells]
+    code = function.__code__
+    return repr((function.__qualname__, code.co_firstlineno, code.co_code.hex(), code.co_names, inner))
+
+
+@contextlib.contextmanager
+def warming() -> Iterator[None]:
+    """What is compiled meanwhile is not late."""
+    global _warming
+    _warming += 1
+    try:
+        yield
+    finally:
+        _warming -= 1
+
+
+def install() -> None:
+    """From now on kernels of hpcdem are taken from the store, or go into it, also those that are imported already."""
+    global _usual
+    from numba.core.caching import FunctionCache
+    from numba.core.dispatcher import Dispatcher
+
+    if _usual is None:
+        name_kernels_apart()
+        spare_c_entries()
+        _usual = Dispatcher.enable_caching
+
+        def enable_caching(kernel: Any) -> None:
+            if kernel.py_func.__module__.partition(".")[0] == "hpcdem":
+                kernel._cache = _OfPackage(kernel)
+            elif _usual is not None:
+                _usual(kernel)
+
+        patched: Any = Dispatcher
+        patched.enable_caching = enable_caching
+    store.cache_clear()
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] == "hpcdem":
+            kernels: list[Any] = [thing for thing in vars(module).values() if isinstance(thing, Dispatcher)]
+            for kernel in kernels:
+                if isinstance(kernel._cache, FunctionCache | _OfPackage):
+                    kernel.enable_caching()
+
+
+def has(kernel: Any, types: tuple[Any, ...]) -> bool:
+    """Whether a kernel with these types of arguments is in the store."""
+    path = kernel._cache.path((types, None)) if isinstance(kernel._cache, Files) else None
+    return path is not None and path.is_file()
+
+
+@cache
+def _digest(source: Path) -> str:
+    """Of a module and of all modules that its first column imports: kernels take functions and constants from them, and
+    numba does not see when these change."""
+    digest, seen, wanted = hashlib.sha256(), {source}, [source]
+    for path in wanted:
+        data = path.read_bytes()
+        digest.update(data)
+        new = sorted({file for file in _imported(data.decode()) if file.is_file()} - seen)
+        seen.update(new)
+        wanted += new
+    return digest.hexdigest()[:12]
+
+
+def _imported(text: str) -> set[Path]:
+    """Files that the statements ``from hpcdem.a import b`` in the first column may mean."""
+    files = set()
+    for module, names in re.findall(r"^from (hpcdem[\w.]*) import (\([^)]*\)|.*)$", text, re.MULTILINE):
+        folder = _PACKAGE.joinpath(*module.split(".")[1:])
+        inner = [folder / name for name in re.findall(r"\w+", names)]
+        files |= {one for path in (folder, *inner) for one in (path.with_suffix(".py"), path / "__init__.py")}
+    return files
+
+
+@cache
+def sources() -> str:
+    """A digest of all modules of hpcdem that decide which kernels there are: those with kernels, what these import, and
+    those that call them with types of their choice."""
+    texts = {path: path.read_text(encoding="utf-8") for path in _PACKAGE.rglob("*.py")}
+    imports = {path: _all_imported(text) & texts.keys() for path, text in texts.items()}
+    kernels = {path for path, text in texts.items() if _COMPILES.search(text)}
+    found, wanted = set(kernels), list(kernels)
+    while wanted:
+        more = imports[wanted.pop()] - found
+        found |= more
+        wanted += more
+    callers = {path for path, used in imports.items() if used & kernels}
+    digest = hashlib.sha256()
+    for path in sorted(found | callers | set(_PACKAGE.rglob("warm_up.py"))):
+        digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + texts[path].encode())
+    return digest.hexdigest()[:12]
+
+
+def _all_imported(text: str) -> set[Path]:
+    return _imported(re.sub(r"^[ \t]+from ", "from ", text, flags=re.MULTILINE))
+
+
+_COMPILES = re.compile(r"^\s*from numba import .*njit", re.MULTILINE)
+
+
+# -- where the store is ------------------------------------------------------------------------------------------------
+
+
+@cache
+def store() -> tuple[Path, bool]:
+    """The folder of this process; False with it if it had to go to the temporary folder."""
+    return store_of(os.environ)
+
+
+def store_of(environ: Mapping[str, str]) -> tuple[Path, bool]:
+    """The folder for this machine type, compiler and user; False with it if it had to go to the temporary folder."""
+    base = cache_base(environ)
+    return (base / compiler(), True) if can_write(base) else (temporary_base() / compiler(), False)
+
+
+def cache_base(environ: Mapping[str, str] = os.environ) -> Path:
+    """NUMBA_CACHE_DIR if set, else the user's cache folder."""
+    given = environ.get("NUMBA_CACHE_DIR")
+    if given:
+        return Path(given).absolute()
+    return Path(environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hpcdem"
+
+
+def can_write(base: Path) -> bool:
+    """Whether files can be made in the folder, which is made first."""
+    try:
+        base.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=base):
+            return True
+    except OSError:
+        return False
+
+
+def temporary_base() -> Path:
+    """A folder on this host that is ours alone: what is read from the store is executed."""
+    if hasattr(os, "getuid"):
+        mine = Path(tempfile.gettempdir()) / f"hpcdem-{os.getuid()}"
+        with contextlib.suppress(OSError):
+            mine.mkdir(mode=0o700, exist_ok=True)
+            found = mine.lstat()
+            if found.st_uid == os.getuid() and found.st_mode & 0o170077 == 0o040000 and can_write(mine):
+                return mine
+    return Path(tempfile.mkdtemp(prefix="hpcdem-"))
+
+
+def compiler() -> str:
+    """Name of the folder: all that compiled code depends on besides its source."""
+    import llvmlite.binding as llvm
+    import numba
+
+    settings = sorted(f"{k}={v}" for k, v in os.environ.items() if k in COMPILER_SETTINGS)
+    all_of_it = (sys.version_info[:2], llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), settings)
+    digest = hashlib.sha256(repr(all_of_it).encode()).hexdigest()[:12]
+    return f"kernels-numba{numba.__version__}-{llvm.get_host_cpu_name()}-{digest}"
+
+
+COMPILER_SETTINGS = frozenset(
+    f"NUMBA_{name}"
+    for name in ("DISABLE_INTEL_SVML", "CPU_NAME", "CPU_FEATURES", "OPT", "BOUNDSCHECK", "THREADING_LAYER")
+)
+"""Variables that change the code numba makes, or the library it calls, without numba's cache seeing it."""
+
+
+def tidy(base: Path) -> None:
+    """Remove kernels that nobody has used for two months, what killed processes left, and folders of earlier versions
+    of hpcdem that kept kernels in another way."""
+    now = time.time()
+
+    def unused(path: Path) -> float:
+        with contextlib.suppress(OSError):
+            return (now - path.stat().st_mtime) / _DAY
+        return 0.0
+
+    for folder in base.glob("*-numba*"):
+        if folder.name.startswith("kernels-"):
+            for path in [path for path in folder.rglob("*") if path.is_file()]:
+                if unused(path) > (1 if path.name.startswith(".") else UNUSED_DAYS):
+                    path.unlink(missing_ok=True)
+            for inner in [inner for inner in folder.rglob("*") if inner.is_dir() and unused(inner) > 1]:
+                with contextlib.suppress(OSError):
+                    inner.rmdir()
+        elif unused(folder) > (1 if ".building-" in folder.name else UNUSED_DAYS):
+            import shutil
+
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+# -- kernels that are made of a function of the user ----------------------------------------------------------------
 
 
 def folder(*made_of: str) -> Path:
-    """Of the kernels that are made of these texts by this version on this type of machine."""
-    base, _ = cache_folder()
-    digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
-    return base.with_name(f"{base.name}-user-{digest[:32]}")
+    """Of the kernels that are made of these texts by this version on this type of machine. numba keeps a kernel by the
+    place of its source, and those that are made of other kernels not at all; here who asks says what it is made of."""
+    digest = hashlib.sha256(repr((version(), sources(), made_of)).encode()).hexdigest()
+    return store()[0] / f"user-{digest[:32]}"
 
 
 def knows(place: Path, name: str) -> bool:
@@ -38,62 +343,4 @@ def knows(place: Path, name: str) -> bool:
 def keep(kernel: Any, place: Path, name: str) -> None:
     """From now on a kernel that has not been compiled yet is taken from this folder, or goes into it."""
     name_kernels_apart()
-    kernel._cache = _Files(place, name)
-
-
-class _Files:
-    """What a dispatcher of numba asks for as its cache."""
-
-    def __init__(self, place: Path, name: str) -> None:
-        self.cache_path, self._place, self._name = str(place), place, name
-
-    def _path(self, signature: Any) -> Path:
-        return self._place / f"{self._name}-{hashlib.sha256(str(signature).encode()).hexdigest()[:16]}"
-
-    def load_overload(self, signature: Any, target: Any) -> Any:
-        """The compiled kernel, None if it is not there."""
-        from numba.core.compiler import CompileResult
-
-        target.refresh()
-        try:
-            with self._path(signature).open("rb") as file:
-                if hasattr(os, "getuid") and os.fstat(file.fileno()).st_uid != os.getuid():
-                    return None  # what is read here is executed
-                data = file.read()
-        except OSError:
-            return None
-        if hashlib.sha256(data[_DIGEST:]).digest() != data[:_DIGEST]:
-            return None
-        tidy(self._place)
-        return CompileResult._rebuild(target, *pickle.loads(data[_DIGEST:]))
-
-    def save_overload(self, signature: Any, found: Any) -> None:
-        """Keep it, if that can be done: a disk that is full is no reason to stop."""
-        from numba.core.serialize import dumps
-
-        if found.lifted or found.library.has_dynamic_globals:
-            return
-        data = dumps(found._reduce())
-        with contextlib.suppress(OSError):
-            self._place.mkdir(mode=0o700, parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(dir=self._place, prefix=".")
-            try:
-                with os.fdopen(handle, "wb") as file:
-                    file.write(hashlib.sha256(data).digest() + data)
-                os.replace(name, self._path(signature))
-            except OSError:
-                Path(name).unlink(missing_ok=True)
-                raise
-
-    def enable(self) -> None:
-        """Nothing: it is."""
-
-    def disable(self) -> None:
-        """Nothing is read or written any more."""
-        self.load_overload = lambda signature, target: None  # type: ignore[method-assign]
-        self.save_overload = lambda signature, found: None  # type: ignore[method-assign]
-
-    def flush(self) -> None:
-        """Forget what is kept: numba's `recompile`."""
-        for path in self._place.glob(f"{self._name}-*"):
-            path.unlink(missing_ok=True)
+    kernel._cache = Files(place, name)

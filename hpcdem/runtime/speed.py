@@ -13,7 +13,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from hpcdem.runtime.kernels import cache_base
+from hpcdem.runtime.kept import cache_base
 
 DEFAULT = 10e6
 """Rate of one core when no run has been measured [particle-steps/s]."""

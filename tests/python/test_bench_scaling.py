@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.runtime.kernels import cache_base
+from hpcdem.runtime.kept import cache_base
 from tests.conftest import ROOT, run
 
 sys.path.insert(0, str(ROOT / "scripts" / "lib"))

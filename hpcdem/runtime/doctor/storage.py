@@ -16,7 +16,7 @@ from hpcdem.io.disk import explain, publish
 from hpcdem.io.lock import FolderLock, Taken
 from hpcdem.runtime import cgroups
 from hpcdem.runtime.doctor.machine import CLOCK_SKEW, MIB, Findings, Machine, ok, problem, size, warning
-from hpcdem.runtime.kernels import cache_base, cache_folder, temporary_base
+from hpcdem.runtime.kept import cache_base, store_of, temporary_base
 
 NETWORK = frozenset(
     "nfs nfs4 cifs smb3 smbfs ncpfs afs ceph 9p lustre gpfs mmfs beegfs pvfs2 orangefs panfs wekafs gfs2 ocfs2 "
@@ -198,7 +198,7 @@ def _private(group: int) -> bool:
 
 def cache(machine: Machine) -> Findings:
     """Where the kernels are kept and whether they are there."""
-    base, (folder, writable), hosts = cache_base(machine.environ), cache_folder(machine.environ), len(machine.hosts)
+    base, (folder, writable), hosts = cache_base(machine.environ), store_of(machine.environ), len(machine.hosts)
     kind, name = _where(machine, base)
     if not writable:
         text = f"the kernel cache {base} cannot be written; {temporary_base()} is used, which is empty after a restart"
