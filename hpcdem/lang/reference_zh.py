@@ -130,7 +130,9 @@ def pcdc_page() -> str:
             parts.append("\n".join(lines))
     parts += ["## 监测记录的量\n", _chinese(_last(pcdc._recorded()))]
     parts += [
-        "\n## 三维\n\n`pcdc model new dim 3` 之后向量有三个分量,可用以下命令,除列出者外关键字都可用;其余在运行前被拒绝。\n"
+        "\n## 三维\n\n`pcdc model new dim 3` 之后向量有三个分量,可用以下命令,除列出者外关键字都可用;其余在运行前被拒绝。\n",
+        f"没有的命令:{'、'.join(f'`{name}`' for name in pcdc.missing_in_space(PCDC))};也没有:"
+        f"{'、'.join(pcdc.IN_THE_PLANE.values())}。\n",
     ]
     parts += [_chinese(_last(pcdc._dimensions(PCDC)))]
     return "\n".join(parts).rstrip("\n") + "\n"

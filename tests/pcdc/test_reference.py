@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -15,12 +14,13 @@ from hpcdem.lang.pcdc import check, trial
 from hpcdem.lang.pcdc import table as t
 from hpcdem.lang.pcdc.kinds import Unfit
 from hpcdem.lang.pcdc.parser import parse
-from hpcdem.lang.pcdc.reference import page
+from hpcdem.lang.pcdc.reference import IN_THE_PLANE, missing_in_space, page
 from hpcdem.lang.pcdc.trial import MODELS, python
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.properties import Property
+from tests.conftest import ROOT
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "pcdc_reference.md"
+PAGE = ROOT / "docs" / "pcdc_reference.md"
 
 
 def test_the_page_is_current():
@@ -47,6 +47,36 @@ def test_what_is_there_in_three_dimensions_is_listed():
         options = [o for o in command.options if o.dims == (2,)] if 3 in command.dims else []
         assert all(f"`{option.name}`" in listed for option in options)
     assert "`thermal-fluid`" in listed and "`free-field`" not in listed
+
+
+def missing() -> list[str]:
+    """Commands, models and keywords of the plane only, in the words of a script."""
+    found = missing_in_space(t.PCDC)
+    for command in t.COMMANDS:
+        if 3 in command.dims:
+            words = (*command.models, *command.options)
+            found += [f"{command.name} {word.keyword.name}" for word in words if 3 not in word.dims]
+    return found
+
+
+@pytest.mark.parametrize("name", ["README.md", "README.zh.md"])
+def test_the_readme_says_what_is_not_there_in_three_dimensions(name):
+    """Shapes and meshes of the plane have others in their place."""
+    section = (ROOT / name).read_text(encoding="utf-8")
+    section = re.split(r"^## (?:What is not there yet|还没有的)$", section, flags=re.MULTILINE)[1].partition("\n## ")[0]
+    said = set(re.findall(r"`([a-z-]+(?: [a-z-]+)*)`", " ".join(section.split()))) - {"over z"}
+    gone = [text for text in missing() if not text.startswith(("geometry create", "mesh create", "mesh structured"))]
+    assert [text for text in gone if not any(text.startswith(words) for words in said)] == []
+    assert [words for words in said if not any(text.startswith(words) for text in gone)] == []
+    for english, chinese in IN_THE_PLANE.items():
+        if "`relax`" not in english and "free-field" not in english:
+            assert (chinese if "zh" in name else english) in " ".join(section.split())
+
+
+def test_what_is_refused_in_space_is_on_the_page():
+    files = [*(ROOT / "hpcdem").rglob("*.py")]
+    refused = {text for file in files for text in re.findall(r'refuse_in_space\("([^"]+)"\)', file.read_text("utf-8"))}
+    assert len(refused) > 2 and refused <= set(IN_THE_PLANE)
 
 
 def test_tables_have_five_columns():

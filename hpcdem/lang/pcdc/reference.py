@@ -164,6 +164,23 @@ def _recorded() -> str:
     return "\n".join([*rows, ""])
 
 
+IN_THE_PLANE = {
+    "random fields": "随机场",
+    "conditions by functions of place and time": "随位置和时间变化的边界条件函数",
+    "free-field": "自由场边界",
+    "elements that come back after they were taken out": "挖去后回填的单元",
+    "`relax` of elements that are taken out from joints between hexahedra": "六面体节理旁开挖的逐步释放(`relax`)",
+    "tables `over z`": "`over z` 的表",
+    "discs that touch blocks": "与块体接触的圆盘",
+}
+"""What no word of the table tells, in English and Chinese: refused as it is met, before the run."""
+
+
+def missing_in_space(table: Table) -> list[str]:
+    """Commands that are not there in three dimensions."""
+    return [command.name for command in table.commands if 3 not in command.dims]
+
+
 def _dimensions(table: Table) -> str:
     """What is there in three dimensions."""
     rows = [
@@ -172,6 +189,8 @@ def _dimensions(table: Table) -> str:
         "After `pcdc model new dim 3` vectors have three components, and these commands ",
     ]
     rows[-1] += "are there, with all of their words but those that are named; others are refused before anything runs."
+    rows += ["", f"Not there are the commands {', '.join(f'`{name}`' for name in missing_in_space(table))}; nor are"]
+    rows[-1] += f" {', '.join(IN_THE_PLANE)}."
     rows += ["", "| command | models | not there | in three dimensions only |", "|---|---|---|---|"]
     for command in table.commands:
         if 3 not in command.dims:
