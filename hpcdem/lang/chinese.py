@@ -67,7 +67,7 @@ PCDC = {
     "mesh create": "用 Gmsh 剖分图层内部;多次剖分得到多个物体,可相互接触。",
     "mesh structured": "矩形的规则网格。",
     "mesh equilateral": "矩形内近似等边的三角形网格。",
-    "mesh import": "导入其他程序的网格(.msh、.inp 等),物理组成为组。",
+    "mesh import": "导入其他程序的网格(.msh、.inp 等),其物理组以及单元、节点、面的集合成为组。",
     "mesh intersect": "位于图层上的网格边成为裂纹。",
     "mesh glue": "分别剖分的物体在面重合处以节理相连。",
     "mesh quality": "报告网格质量:角度、尺寸。",

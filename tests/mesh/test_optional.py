@@ -50,24 +50,25 @@ def test_an_old_shapely(monkeypatch):
 def test_those_who_need_one_say_so(monkeypatch, tmp_path):
     for name in ("gmsh", "meshio", "ezdxf"):
         monkeypatch.setitem(sys.modules, name, None)
+    (tmp_path / "m.vtk").write_text("")
     layers = geometry.Layers()
     layers.add("o", geometry.rectangle((0, 0), (1, 1)))
     with pytest.raises(HpcdemError, match="Meshing of arbitrary outlines needs the package gmsh"):
         triangulate(layers, Wishes([Region("o")], 0.5))
     with pytest.raises(HpcdemError, match="Import of mesh files needs the package meshio"):
-        import_mesh(tmp_path / "m.msh")
+        import_mesh(tmp_path / "m.vtk")
     with pytest.raises(HpcdemError, match="Import of DXF drawings needs the package ezdxf"):
         read_dxf(tmp_path / "m.dxf")
 
 
 def test_a_script_is_refused_at_its_first_line_that_needs_a_missing_package(monkeypatch):
     script = check.read(
-        "x = 1\npcdc mesh structured (0,0) (1,1) cells 1 1\npcdc mesh import 'a.msh'\npcdc mesh create from-layer 'a' "
-        "size 1\npcdc mesh create from-layer 'b' size 1\n",
+        "x = 1\npcdc mesh structured (0,0) (1,1) cells 1 1\npcdc mesh import 'a.inp'\npcdc mesh import 'a.vtu'\n"
+        "pcdc mesh create from-layer 'a' size 1\npcdc mesh create from-layer 'b' size 1\n",
         "script.sc",
     )
     check.packages(script)
-    for name, line in (("meshio", 3), ("gmsh", 4)):
+    for name, line in (("meshio", 4), ("gmsh", 5)):
         with monkeypatch.context() as without:
             without.setitem(sys.modules, name, None)
             with pytest.raises(HpcdemError, match=rf"^script\.sc:{line}: .*needs the package {name}"):

@@ -11,7 +11,7 @@ from hpcdem.commands.fdem import values
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, hexahedra
-from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT
+from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, NODE
 from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
 from hpcdem.pre.mesh import cracks as cracks_of
 from hpcdem.pre.mesh import fill, fracture_discs, fractures, geometry, imported, quality, structured, structured_space
@@ -171,11 +171,24 @@ def import_file(
     """A mesh file of another program. Collective. group: one that all elements are put into; merge: points nearer than
     this are one [m]; scale: metres in a unit of the file."""
     file = project.to_read(path)
-    mesh = made_once(project.comm, lambda: imported.import_mesh(file, merge, scale, project.dim))
-    first = 0 if project.mesh is None else len(project.mesh.cells)
+    found = made_once(project.comm, lambda: imported.read(file, merge, scale, project.dim))
+    mesh = found.mesh
+    cells, points = (0, 0) if project.mesh is None else (len(project.mesh.cells), len(project.mesh.points))
     _add(project, mesh)
+    for kind, sets, first in ((NODE, found.nodes, points), (FACE, found.faces, 4 * cells)):
+        for of_set, groups in sets.items():
+            for name, numbers in groups.items():
+                project.groups[kind].assign(numbers + first, name, of_set)
     if group is not None:
-        project.groups["element"].assign(range(first, first + len(mesh.cells)), group, set_name)
+        project.groups[ELEMENT].assign(range(cells, cells + len(mesh.cells)), group, set_name)
+    low, high = (", ".join(f"{c:g}" for c in at) for at in (mesh.points.min(axis=0), mesh.points.max(axis=0)))
+    _say(project, f"{file.name}: from ({low}) to ({high}) m")
+    for kind, sets in ((ELEMENT, mesh.groups), (NODE, found.nodes), (FACE, found.faces)):
+        names = [f"set '{name}': " + ", ".join(f"'{group}'" for group in of) for name, of in sets.items()]
+        if names:
+            _say(project, f"{file.name}: groups of {kind}s, {'; '.join(names)}")
+    if found.notes:
+        _say(project, f"{file.name}: left out: " + "; ".join(found.notes))
 
 
 def intersect(project: Project, layer: str, follow: bool = False) -> None:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 
 from hpcdem.pre.mesh import optional
 
-NEEDED: Mapping[str, Callable[[], object]] = {
-    "mesh create": optional.gmsh,
-    "mesh import": optional.meshio,
-    "geometry import": optional.ezdxf,
+NEEDED: Mapping[str, Callable[[str], object]] = {
+    "mesh create": lambda file: optional.gmsh(),
+    "mesh import": optional.of_mesh,
+    "geometry import": optional.of_drawing,
 }
-"""What loads each; HpcdemError, with the way to get it, where it is missing."""
+"""What loads each, for a file of this name; HpcdemError, with the way to get it, where it is missing."""

@@ -30,12 +30,13 @@ def read(text: str, file: str) -> Source:
 
 def packages(script: Source) -> None:
     """ScriptError at the first line whose package is not here: before kernels are compiled for it."""
-    needed = {statement.command.name: statement for statement in reversed(script.statements)}
-    for name in NEEDED.keys() & needed.keys():
+    for statement in script.statements:
+        load, file = NEEDED.get(statement.command.name), statement.arguments.get("file")
         try:
-            NEEDED[name]()
+            if load is not None:
+                load(file if isinstance(file, str) else "")  # it may be an expression
         except HpcdemError as error:
-            raise needed[name].error(str(error)) from None
+            raise statement.error(str(error)) from None
 
 
 def summary(text: str, file: str) -> str:

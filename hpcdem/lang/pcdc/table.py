@@ -884,7 +884,8 @@ _MESH = (
             ("pcdc mesh equilateral (0,0) (10,5) size 0.25 group 'base'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
             (Option("size", (POSITIVE,), "length of edges", "m", required=True), _GROUP)),
-    Command("mesh imp{ort}", "A mesh of another program, for example .msh or .inp; its physical groups become groups.",
+    Command("mesh imp{ort}", "A mesh of another program, for example .msh or .inp; its physical groups and sets of "
+            "elements, nodes and faces become groups.",
             ("pcdc mesh import 'rock.msh'",), (_leading("file", FILE, "name of the file"),),
             (Option("group", (STRING,), "a group that all elements are put into, besides those of the file",
                     more=(SET,)),

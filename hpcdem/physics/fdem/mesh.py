@@ -7,10 +7,13 @@ calls an edge is a face with three points. `hpcdem.pre.mesh` makes meshes.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import HpcdemError
@@ -250,17 +253,25 @@ def crack_rows(mesh: Mesh, edges: Edges) -> np.ndarray:
     return mesh.find_edges(edges, mesh.cracks)
 
 
-def check(mesh: Mesh, source: str = "mesh") -> None:
+@dataclass(frozen=True)
+class Names:
+    """What messages call a point and an element of the mesh."""
+
+    point: Callable[[int], str] = str
+    element: Callable[[int], str] = str
+
+
+def check(mesh: Mesh, source: str = "mesh", names: Names | None = None) -> None:
     """Raise HpcdemError `source: element or point, what is wrong` for the first thing a simulation cannot take.
 
     Refused are: no elements; numbers that are not finite or name no point; an element that is flat, clockwise, folded
-    or concave; two points in one place; a point without element; an element given twice; three elements on an edge or
-    two on the same side of it; groups, layers and cracks that name what is not there or overlap.
+    or concave; two points of a body in one place; a point without element; an element given twice; three elements on an
+    edge or two on the same side of it; groups, layers and cracks that name what is not there or overlap.
     """
     if not len(mesh.cells):
         raise HpcdemError(f"{source}: there are no elements")
     for finding in (_bad_numbers, _bad_hexes, _bad_shapes, _bad_points, _bad_edges, _bad_names):
-        said = finding(mesh)
+        said = finding(mesh, names or Names())
         if said:
             raise HpcdemError(f"{source}: {said}")
 
@@ -269,20 +280,20 @@ def _at(mesh: Mesh, point: int) -> str:
     return f"({', '.join(f'{c:g}' for c in mesh.points[point])})"
 
 
-def _element(mesh: Mesh, e: int) -> str:
+def _element(mesh: Mesh, e: int, names: Names) -> str:
     corners = [int(p) for p in mesh.cells[e] if p >= 0]
     where = f" at {_at(mesh, corners[0])}" if corners and corners[0] < len(mesh.points) else ""
-    return f"element {e}{where} with the points {', '.join(map(str, corners))}"
+    return f"element {names.element(e)}{where} with the points {', '.join(map(names.point, corners))}"
 
 
 def _listed(names) -> str:
     return ", ".join(f"'{n}'" for n in names) or "none"
 
 
-def _bad_numbers(mesh: Mesh) -> str | None:
+def _bad_numbers(mesh: Mesh, names: Names) -> str | None:
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
     if len(bad):
-        return f"point {bad[0]} is not finite: {_at(mesh, int(bad[0]))}"
+        return f"point {names.point(int(bad[0]))} is not finite: {_at(mesh, int(bad[0]))}"
     n = len(mesh.points)
     wrong = (mesh.cells[:, :3] < 0).any(axis=1) | (mesh.cells[:, 3] < (0 if mesh.dim == 3 else -1))
     wrong |= (mesh.cells >= n).any(axis=1)
@@ -292,7 +303,7 @@ def _bad_numbers(mesh: Mesh) -> str | None:
     return None
 
 
-def _bad_hexes(mesh: Mesh) -> str | None:
+def _bad_hexes(mesh: Mesh, names: Names) -> str | None:
     """All tetrahedra of both overlays have a volume."""
     if not len(mesh.hexes):
         return None
@@ -307,12 +318,13 @@ def _bad_hexes(mesh: Mesh) -> str | None:
         return None
     k = int(bad[0])
     return (
-        f"hexahedron {k} at {_at(mesh, int(points[k, 0]))} with the points {', '.join(map(str, points[k].tolist()))} "
+        f"hexahedron {k if names == Names() else names.element(int(mesh.hexes[k, 8]))} at "
+        f"{_at(mesh, int(points[k, 0]))} with the points {', '.join(map(names.point, points[k].tolist()))} "
         "is turned inside out, flat, or so warped that a tetrahedron of its corners is"
     )
 
 
-def _bad_shapes(mesh: Mesh) -> str | None:
+def _bad_shapes(mesh: Mesh, names: Names) -> str | None:
     """Each corner of a convex counter-clockwise element turns left; a tetrahedron has a volume."""
     if mesh.dim == 3:
         side = tetrahedra.sides(mesh.points, mesh.cells)
@@ -322,7 +334,7 @@ def _bad_shapes(mesh: Mesh) -> str | None:
         if not len(bad):
             return None
         inverted = volume[bad[0]] < -FLAT * longest[bad[0]] ** 3
-        return f"{_element(mesh, int(bad[0]))} {'is turned inside out (inverted)' if inverted else 'is flat'}"
+        return f"{_element(mesh, int(bad[0]), names)} {'is turned inside out (inverted)' if inverted else 'is flat'}"
     for n in (3, 4):
         rows = np.flatnonzero(connectivity.corner_counts(mesh.cells) == n)
         xy = mesh.points[mesh.cells[rows, :n]]
@@ -339,30 +351,42 @@ def _bad_shapes(mesh: Mesh) -> str | None:
                 what = "is flat"
             else:
                 what = "is folded or concave"
-            return f"{_element(mesh, int(rows[i]))} {what}"
+            return f"{_element(mesh, int(rows[i]), names)} {what}"
     return None
 
 
-def _bad_points(mesh: Mesh) -> str | None:
+def _bad_points(mesh: Mesh, names: Names) -> str | None:
     used = np.zeros(len(mesh.points), bool)
     used[mesh.cells[mesh.cells >= 0]] = True
     if not used.all():
         lost = int(np.flatnonzero(~used)[0])
-        return f"point {lost} at {_at(mesh, lost)} belongs to no element"
+        return f"point {names.point(lost)} at {_at(mesh, lost)} belongs to no element"
     corners = mesh.cells[:, : mesh.dim + 1]
     a, b = mesh.points[corners], mesh.points[np.roll(corners, -1, axis=1)]
     shortest = float(np.sqrt(((b - a) ** 2).sum(axis=2)).min())
     twins = cKDTree(mesh.points).query_pairs(SAME * shortest, output_type="ndarray")
     if len(twins):
+        twins = twins[_of_one_body(mesh, twins)]
+    if len(twins):
         p, q = min((int(min(t)), int(max(t))) for t in twins)
         return (
-            f"points {p} and {q} lie in the same place {_at(mesh, p)}: elements on both sides would not hang together; "
-            "merge the points (a crack between them is an edge flagged as crack)"
+            f"points {names.point(p)} and {names.point(q)} lie in the same place {_at(mesh, p)} of one body: elements "
+            "on both sides would not hang together; merge the points (a crack between them is an edge flagged as crack)"
         )
     return None
 
 
-def _bad_edges(mesh: Mesh) -> str | None:
+def _of_one_body(mesh: Mesh, pairs: np.ndarray) -> np.ndarray:
+    """(n,) bool of pairs of points (n, 2): a chain of elements leads from one to the other. Bodies that share no point
+    may touch: each has points of its own there."""
+    first = np.repeat(mesh.cells[:, 0], 3)
+    other = mesh.cells[:, 1:].ravel()
+    ends, n = (first[other >= 0], other[other >= 0]), len(mesh.points)
+    _, of = connected_components(coo_array((np.ones(len(ends[0])), ends), shape=(n, n)), directed=False)
+    return np.asarray(of[pairs[:, 0]] == of[pairs[:, 1]])
+
+
+def _bad_edges(mesh: Mesh, names: Names) -> str | None:
     partner = np.empty(4 * len(mesh.cells), np.int64)
     if mesh.dim == 3:
         face, what = tetrahedra.pair_faces(mesh.cells, partner), "face"
@@ -371,9 +395,9 @@ def _bad_edges(mesh: Mesh) -> str | None:
     if face >= 0:
         points = mesh.face_points(np.array([face]))[0].tolist()
         both = np.flatnonzero(np.all([(mesh.cells == p).any(axis=1) for p in points], axis=0))
-        return _given_twice(mesh, face // 4) or (
-            f"the {what} between points {' and '.join(map(str, points))} at {_at(mesh, points[0])} is used by more "
-            f"than two elements: {', '.join(map(str, both[:5]))}"
+        return _given_twice(mesh, face // 4, names) or (
+            f"the {what} between points {' and '.join(map(names.point, points))} at {_at(mesh, points[0])} is used by "
+            f"more than two elements: {', '.join(map(names.element, both[:5].tolist()))}"
         )
     lower = np.flatnonzero(partner > np.arange(len(partner)))
     mine, other = (mesh.face_points(f) for f in (lower, partner[lower]))
@@ -385,18 +409,23 @@ def _bad_edges(mesh: Mesh) -> str | None:
         bad = np.flatnonzero(mine[:, 0] == other[:, 0])
     if len(bad):
         f = int(lower[bad[0]])
-        return _given_twice(mesh, f // 4) or (
-            f"{_element(mesh, f // 4)} lies on the same side of a common {what} as element {partner[f] // 4}"
+        return _given_twice(mesh, f // 4, names) or (
+            f"{_element(mesh, f // 4, names)} lies on the same side of a common {what} as element "
+            f"{names.element(int(partner[f] // 4))}"
         )
     return None
 
 
-def _given_twice(mesh: Mesh, e: int) -> str | None:
+def _given_twice(mesh: Mesh, e: int, names: Names) -> str | None:
     twins = np.flatnonzero((np.sort(mesh.cells, axis=1) == np.sort(mesh.cells[e])).all(axis=1))
-    return f"{_element(mesh, int(twins[0]))} is there again as element {twins[1]}" if len(twins) > 1 else None
+    return (
+        f"{_element(mesh, int(twins[0]), names)} is there again as element {names.element(int(twins[1]))}"
+        if len(twins) > 1
+        else None
+    )
 
 
-def _bad_names(mesh: Mesh) -> str | None:
+def _bad_names(mesh: Mesh, names: Names) -> str | None:
     n = len(mesh.cells)
     for set_name, groups in mesh.groups.items():
         taken = np.zeros(n, bool)

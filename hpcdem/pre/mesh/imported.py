@@ -1,9 +1,10 @@
-"""Meshes from files, read by meshio: gmsh .msh, Abaqus .inp, VTK, and whatever else it knows."""
+"""Meshes from files: Gmsh .msh and Abaqus .inp by readers of this package, VTK and whatever else by meshio."""
 
 from __future__ import annotations
 
 import contextlib
 import io
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,217 +13,214 @@ from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.physics.fdem import hexahedra
-from hpcdem.physics.fdem.connectivity import areas, corner_counts, find_edges
-from hpcdem.physics.fdem.mesh import Mesh, check
+from hpcdem.physics.fdem.connectivity import areas, corner_counts
+from hpcdem.physics.fdem.mesh import Mesh, Names, check
 from hpcdem.physics.fdem.tetrahedra import volumes
-from hpcdem.pre.mesh import optional
+from hpcdem.pre.mesh import abaqus, gmsh_file, optional
+from hpcdem.pre.mesh.file_mesh import CORNERS, DIMENSIONS, IN_WORDS, Block, FileMesh, listed
 
-CORNERS = {"triangle": 3, "quad": 4}
-SOLIDS = {"tetra": 4, "hexahedron": 8}
-SURFACES = frozenset("triangle6 triangle7 quad8 quad9 triangle10 quad16 polygon".split())
-"""Plane elements that cannot be taken."""
 SET = "physical"
 """Groups of the file come into this set."""
+INSTANCES = "instance"
+"""Set of the instances of an assembly."""
 FLATNESS = 1e-9
 """How far points may lie from a plane z = constant, in parts of the model's size."""
+OWN = dict(zip(optional.OWN_READERS, (gmsh_file.read, abaqus.read), strict=True))
+FROM_0 = frozenset((".vtk", ".vtu", ".vtp", ".xdmf", ".xmf", ".off", ".ply", ".h5m"))
+"""Files whose points and elements are counted from 0."""
+
+Sets = dict[str, dict[str, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A mesh, with its groups of elements; set -> group -> numbers of its nodes and of its faces; notes: what else the
+    file held, or was changed."""
+
+    mesh: Mesh
+    nodes: Sets = field(default_factory=dict)
+    faces: Sets = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
 
 def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2) -> Mesh:
-    """Read a mesh of triangles and quads in the x-y plane; dim 3: of tetrahedra and
-    hexahedra.
+    """The mesh of `read`."""
+    return read(path, merge, scale, dim).mesh
 
-    Physical groups (gmsh) and element sets (Abaqus) become groups of the set SET; one that overlaps an earlier one gets
-    a set of its own, of the same name. Physical lines become layers. Elements that run clockwise are turned over, and
-    points that no element uses are left out. merge: points nearer than that [m, after scaling] are made one; scale:
-    metres per unit of the file.
 
-    HpcdemError `file: element n ...` for what cannot be used, n counted from 1 over the plane elements of the file.
+def read(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2) -> Imported:
+    """A mesh of triangles and quads in the x-y plane; dim 3: of tetrahedra and hexahedra (which come first).
+
+    Physical groups (Gmsh) and sets (Abaqus) of elements and of points become groups of the set SET; one that overlaps
+    an earlier one gets a set of its own, of the same name. Physical lines, in space surfaces, and surfaces of Abaqus
+    become layers and groups of faces; physical points, in space lines, groups of nodes. Elements that run clockwise, or
+    are turned inside out, are turned back; elements of second order get straight edges; points that no element uses are
+    left out. merge: points nearer than that [m, after scaling] are made one; scale: metres per unit of the file.
+
+    HpcdemError, with the numbers of the file, for what cannot be used.
     """
     path = Path(path)
     if not scale > 0.0 or not merge >= 0.0:
         raise CommandError(f"a scale must be positive and a merging distance not negative, not {scale:g} and {merge:g}")
     data = _read(path)
-    if dim == 3:
-        return _in_space(path, data, merge, scale)
-    points = _plane(path, np.asarray(data.points, np.float64)) * scale
-    cells, blocks, lines = _cells(path, data, len(points))
-    _corners(path, points, cells)
-    if merge > 0.0:
-        number = _merged(points, merge)
-        cells = np.where(cells >= 0, number[cells], -1)
-        lines = {name: number[pairs] for name, pairs in lines.items()}
-        _collapsed(path, cells, merge)
-    turn = areas(points, cells) < 0.0
+    bad = np.flatnonzero(~np.isfinite(data.points).all(axis=1))
+    if len(bad):
+        raise data.refuse(f"point {data.point(bad[0])} is not finite: {data.points[bad[0]].tolist()}")
+    notes = list(data.notes)
+    _straightened(data, notes)
+    _refuse_kinds(data, dim)
+    points = (data.points if dim == 3 else _plane(data)) * scale
+    number = _merged(points, merge) if merge > 0.0 else np.arange(len(points))
+    own, place = (_in_space if dim == 3 else _in_plane)(data, points, number, merge)
+    return _with_names(data, own, place, notes)
+
+
+@dataclass(frozen=True)
+class _Own:
+    """mesh: still without names; elements (n file elements,): first element of the mesh, -1 none; parts: how many it
+    has; names: of elements and points, in the file."""
+
+    mesh: Mesh
+    elements: np.ndarray
+    parts: np.ndarray
+    names: Names
+
+
+def _in_plane(data: FileMesh, points: np.ndarray, number: np.ndarray, merge: float) -> tuple[_Own, np.ndarray]:
+    """Triangles and quads, in the order of the file, and the row of each point of the file in the mesh, -1 none."""
+    of_mesh = np.concatenate([np.full(len(b.rows), DIMENSIONS[b.kind] == 2) for b in data.blocks])
+    file = np.flatnonzero(of_mesh)
+    rows = [b.rows for b in data.blocks if DIMENSIONS[b.kind] == 2]
+    cells = np.concatenate([np.pad(r, ((0, 0), (0, 4 - r.shape[1])), constant_values=-1) for r in rows])
+    _corners(data, points, cells, file)
+    cells = np.where(cells >= 0, number[cells], -1)
     counts = corner_counts(cells)
     for n in (3, 4):
-        rows = np.flatnonzero(turn & (counts == n))
-        cells[rows, :n] = cells[rows, :n][:, ::-1]
-    used = np.zeros(len(points), bool)
-    used[cells[cells >= 0]] = True
-    number = np.where(used, np.cumsum(used) - 1, -1)
-    cells = np.where(cells >= 0, number[cells], -1)
-    mesh = Mesh.of(points[used], cells, blocks)
-    check(mesh, f"{path} (elements and points counted from 0)")
-    edges = mesh.edges()
-    layers = {name: number[pairs] for name, pairs in lines.items()}
-    for name, pairs in layers.items():
-        if (pairs < 0).any() or (find_edges(edges, pairs, len(mesh.points)) < 0).any():
-            raise HpcdemError(f"{path}: lines of the group '{name}' are not edges of the elements")
-    return Mesh.of(mesh.points, mesh.cells, mesh.groups, layers)
+        at = np.flatnonzero(counts == n)
+        _collapsed(data, cells[at, :n], file[at], merge)
+        at = at[areas(points, cells[at]) < 0.0]
+        cells[at, :n] = cells[at, :n][:, ::-1]
+    used, place = _used(len(points), cells[cells >= 0])
+    mesh = Mesh.of(points[used], np.where(cells >= 0, place[cells], -1))
+    elements = np.where(of_mesh, np.cumsum(of_mesh) - 1, -1)
+    names = Names(lambda p: data.point(used[p]), lambda e: data.element(file[e]))
+    return _Own(mesh, elements, np.ones(len(elements), np.int64), names), place[number]
 
 
-def _in_space(path: Path, data: Any, merge: float, scale: float) -> Mesh:
-    """Hexahedra and tetrahedra, with physical volumes as groups and physical surfaces as layers. Those that are turned
-    inside out are turned back. Hexahedra come first."""
-    points = np.asarray(data.points, np.float64) * scale
-    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-        raise HpcdemError(f"{path}: finite points with three coordinates were expected")
-    names = {(int(v[1]), int(v[0])): str(k) for k, v in getattr(data, "field_data", {}).items() if len(v) == 2}
-    physical = data.cell_data.get("gmsh:physical")
-    solids = {kind: [np.empty((0, n), np.int64)] for kind, n in SOLIDS.items()}
-    groups: dict[str, list] = {}
-    layers: dict[str, list] = {}
-    for k, block in enumerate(data.cells):
-        rows = np.asarray(block.data, np.int64)
-        tags = np.zeros(len(rows), np.int64) if physical is None else np.asarray(physical[k], np.int64)
-        if block.type not in (*SOLIDS, "triangle", "quad", "line", "vertex"):
-            raise HpcdemError(
-                f"{path}: block {k + 1} holds {len(rows)} elements of type '{block.type}'; in three dimensions only "
-                "tetrahedra of four points and hexahedra of eight can be used"
-            )
-        if ((rows < 0) | (rows >= len(points))).any():
-            raise HpcdemError(f"{path}: block {k + 1} names a point that is not in the file")
-        for tag in np.unique(tags[tags != 0]).tolist():
-            if block.type in SOLIDS:
-                here = sum(map(len, solids[block.type])) + np.flatnonzero(tags == tag)
-                groups.setdefault(names.get((3, tag), str(tag)), []).append((block.type, here))
-            elif block.type in ("triangle", "quad"):
-                layers.setdefault(names.get((2, tag), str(tag)), []).append(rows[tags == tag])
-        if block.type in SOLIDS:
-            solids[block.type].append(rows)
-    number = _merged(points, merge) if merge > 0.0 else np.arange(len(points))
-    tets, hexes = (number[np.concatenate(solids[kind])] for kind in SOLIDS)
-    if not len(tets) + len(hexes):
-        raise HpcdemError(f"{path}: there are no tetrahedra and no hexahedra")
+def _in_space(data: FileMesh, points: np.ndarray, number: np.ndarray, merge: float) -> tuple[_Own, np.ndarray]:
+    """Hexahedra and tetrahedra, and the row of each point of the file in the mesh, -1 none."""
+    firsts = data.firsts
+    of: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    for kind in ("tetra", "hexahedron"):
+        at = [k for k, b in enumerate(data.blocks) if b.kind == kind]
+        rows = np.concatenate([np.empty((0, CORNERS[kind]), np.int64), *(data.blocks[k].rows for k in at)])
+        file = np.concatenate([np.empty(0, np.int64), *(np.arange(firsts[k], firsts[k + 1]) for k in at)])
+        _collapsed(data, rows, file, 0.0)
+        _collapsed(data, number[rows], file, merge)
+        of[kind] = number[rows], file
+    tets, hexes = of["tetra"][0], of["hexahedron"][0]
     turned = volumes(points, tets) < 0.0
     tets[turned] = tets[turned][:, [0, 2, 1, 3]]
     turned = hexahedra.volumes(points, hexes).sum(axis=1) < 0.0
     hexes[turned] = hexes[turned][:, [4, 5, 6, 7, 0, 1, 2, 3]]
-    used = np.unique(np.concatenate([tets.reshape(-1), hexes.reshape(-1)]))
-    place = np.full(len(points), -1, np.int64)
+    used, place = _used(len(points), np.concatenate([tets.ravel(), hexes.ravel()]))
+    mesh = Mesh.of_hexes(points[used], place[hexes], more=place[tets])
+    n, elements, parts = len(hexes), np.full(firsts[-1], -1), np.ones(firsts[-1], np.int64)
+    elements[of["hexahedron"][1]] = hexahedra.PARTS * np.arange(n)
+    parts[of["hexahedron"][1]] = hexahedra.PARTS
+    elements[of["tetra"][1]] = hexahedra.PARTS * n + np.arange(len(tets))
+    file = np.concatenate([np.repeat(of["hexahedron"][1], hexahedra.PARTS), of["tetra"][1]])
+    names = Names(lambda p: data.point(used[p]), lambda e: data.element(file[e]))
+    return _Own(mesh, elements, parts, names), place[number]
+
+
+def _used(n: int, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points that elements use, and the place of each (n,) among them, -1: none."""
+    used, place = np.unique(corners), np.full(n, -1, np.int64)
     place[used] = np.arange(len(used))
-    sides = {n: hexahedra.triangles([place[number[of]] for of in p]) for n, p in layers.items()}
-    made, n = Mesh.of_hexes(points[used], place[hexes], sides, place[tets]), len(hexes)
-
-    def elements(kind: str, at: np.ndarray) -> np.ndarray:
-        parts = hexahedra.PARTS
-        return parts * n + at if kind == "tetra" else (parts * at[:, None] + np.arange(parts)).reshape(-1)
-
-    of_groups = {name: np.concatenate([elements(*part) for part in parts]) for name, parts in groups.items()}
-    mesh = Mesh.of(made.points, made.cells, _in_sets(of_groups, len(made.cells)), made.layers, hexes=made.hexes)
-    check(mesh, f"{path} (elements and points counted from 0)")
-    return mesh
+    return used, place
 
 
-def _read(path: Path) -> Any:
-    meshio = optional.meshio()
-    if not path.is_file():
-        raise CommandError(f"{path}: there is no such file")
-    said = io.StringIO()
-    _know_plane_strain()
-    try:
-        # meshio prints what it cannot read and then ends the program.
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return meshio.read(path)
-    except (Exception, SystemExit) as error:
-        reason = " ".join(said.getvalue().split()) or str(error)
-        raise HpcdemError(f"{path}: this is not a mesh that can be read ({reason or type(error).__name__})") from None
+# ---- names of parts ------------------------------------------------------------------------------------------------
 
 
-def _know_plane_strain() -> None:
-    """Names that Abaqus gives to triangles and quads in plane strain; meshio has those in plane stress only."""
-    with contextlib.suppress(ImportError, AttributeError):
-        from meshio.abaqus._abaqus import abaqus_to_meshio_type as kinds
-
-        for name, kind in (("CPE3", "triangle"), ("CPE4", "quad"), ("CPE4R", "quad")):
-            kinds.setdefault(name, kind)
-
-
-def _plane(path: Path, points: np.ndarray) -> np.ndarray:
-    if points.ndim != 2 or points.shape[1] not in (2, 3) or not len(points):
-        raise HpcdemError(f"{path}: points with two or three coordinates were expected, found {points.shape}")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(bad):
-        raise HpcdemError(f"{path}: point {bad[0] + 1} is not finite: {points[bad[0]].tolist()}")
-    if points.shape[1] == 3:
-        z = points[:, 2]
-        off = np.abs(z - z[0])
-        if off.max() > FLATNESS * float(np.ptp(points[:, :2], axis=0).max()):
-            i = int(off.argmax())
-            raise HpcdemError(
-                f"{path}: point {i + 1} lies at z = {z[i]:g}, point 1 at z = {z[0]:g}: only meshes in the x-y plane "
-                "can be used"
-            )
-    return points[:, :2].copy()
-
-
-def _cells(path: Path, data: Any, n_points: int) -> tuple[np.ndarray, dict[str, dict], dict[str, np.ndarray]]:
-    """Elements, element numbers by set and group, and pairs of points by name of a group of lines."""
-    names = {(int(v[1]), int(v[0])): str(k) for k, v in getattr(data, "field_data", {}).items() if len(v) == 2}
-    physical = data.cell_data.get("gmsh:physical")
-    cells, first_of_block, seen = [np.empty((0, 4), np.int64)], [], 0
-    groups: dict[str, list[np.ndarray]] = {}
-    lines: dict[str, list[np.ndarray]] = {}
-    for k, block in enumerate(data.cells):
-        kind, rows = block.type, np.asarray(block.data)
-        first_of_block.append(seen)
-        tags = None if physical is None else np.asarray(physical[k], np.int64)
-        if kind in CORNERS:
-            rows = rows.astype(np.int64)
-            out = np.flatnonzero(((rows < 0) | (rows >= n_points)).any(axis=1))
-            if len(out):
-                raise HpcdemError(f"{path}: element {seen + out[0] + 1} names a point that is not in the file")
-            cells.append(np.column_stack([rows, np.full((len(rows), 4 - CORNERS[kind]), -1, np.int64)]))
-            for tag in np.unique(tags) if tags is not None else ():
-                if tag != 0:
-                    name = names.get((2, int(tag)), str(tag))
-                    groups.setdefault(name, []).append(seen + np.flatnonzero(tags == tag))
-            seen += len(rows)
-        elif kind == "line":
-            for tag in np.unique(tags) if tags is not None else ():
-                if tag != 0:
-                    pairs = rows[tags == tag].astype(np.int64)
-                    lines.setdefault(names.get((1, int(tag)), str(tag)), []).append(pairs)
-        elif kind in SURFACES or block.dim > 2:
-            raise HpcdemError(
-                f"{path}: block {k + 1} holds {len(rows)} elements of type '{kind}', the first after element {seen}; "
-                "only triangles of three points and quads of four can be used"
-            )
-    for name, per_block in getattr(data, "cell_sets", {}).items():
-        if name.startswith("gmsh:"):
-            continue
-        found = [
-            first_of_block[k] + np.asarray(r, np.int64)
-            for k, r in enumerate(per_block)
-            if r is not None and len(r) and data.cells[k].type in CORNERS
-        ]
-        if found:
-            groups.setdefault(str(name), []).extend(found)
-    if not seen:
-        kinds = ", ".join(dict.fromkeys(b.type for b in data.cells)) or "none at all"
-        raise HpcdemError(f"{path}: there are no triangles and no quads (element types: {kinds})")
-    return (
-        np.concatenate(cells),
-        _in_sets({n: np.unique(np.concatenate(r)) for n, r in groups.items()}, seen),
-        {n: np.concatenate(p) for n, p in lines.items()},
+def _with_names(data: FileMesh, own: _Own, place: np.ndarray, notes: list[str]) -> Imported:
+    """The mesh with groups and layers; place (points of the file,): their rows in the mesh, -1: none."""
+    mesh, dim = own.mesh, own.mesh.dim
+    check(mesh, str(data.path), own.names)
+    kinds = np.concatenate([np.full(len(b.rows), DIMENSIONS[b.kind]) for b in data.blocks])
+    elements: dict[str, np.ndarray] = {}
+    nodes: dict[str, list[np.ndarray]] = {}
+    sides: dict[str, list[np.ndarray]] = {name: list(of) for name, of in data.face_sets.items()}
+    for name, numbers in data.element_sets.items():
+        mine = numbers[kinds[numbers] == dim]
+        if len(mine):
+            elements[name] = _parts(own, mine)
+        for block, at in _by_block(data, numbers[kinds[numbers] == dim - 1]):
+            sides.setdefault(name, []).append(block.rows[at])
+        for block, at in _by_block(data, numbers[kinds[numbers] < dim - 1]):
+            nodes.setdefault(name, []).append(block.rows[at].ravel())
+        if not len(numbers):
+            notes.append(f"the set '{name}', which has no element that is read")
+    for name, rows in data.node_sets.items():
+        nodes.setdefault(name, []).append(rows)
+    edges = mesh.edges()
+    layers: dict[str, np.ndarray] = {}
+    faces: dict[str, np.ndarray] = {}
+    for name, of in sides.items():
+        given = _cut([place[rows] for rows in of if len(rows)], dim)
+        rows = mesh.find_edges(edges, given)
+        lost = (given < 0).any(axis=1) | (rows < 0)
+        if lost.any():
+            what = "lines" if dim == 2 else "surfaces"
+            said = f"{what} of the group '{name}' are not {'edges' if dim == 2 else 'faces'} of the elements"
+            if data.strict:
+                raise data.refuse(said)
+            notes.append(f"{int(lost.sum())} {said}")
+        if (~lost).any():
+            layers[name] = given[~lost]
+            both = edges.faces[rows[~lost]].ravel()
+            faces[name] = np.unique(both[both >= 0])
+    at_nodes = {name: place[np.unique(np.concatenate(rows))] for name, rows in nodes.items()}
+    for name, rows in at_nodes.items():
+        if (rows < 0).any():
+            notes.append(f"{int((rows < 0).sum())} points of the set '{name}', which are of no element")
+    at_nodes = {name: np.unique(rows[rows >= 0]) for name, rows in at_nodes.items() if (rows >= 0).any()}
+    groups = _in_sets(elements, len(mesh.cells))
+    whole = {name: _parts(own, numbers[kinds[numbers] == dim]) for name, numbers in data.instances.items()}
+    if whole:
+        groups[INSTANCES] = {**groups.get(INSTANCES, {}), **{name: rows for name, rows in whole.items() if len(rows)}}
+    return Imported(
+        Mesh.of(mesh.points, mesh.cells, groups, layers, hexes=mesh.hexes),
+        _in_sets(at_nodes, len(mesh.points)),
+        _in_sets(faces, 4 * len(mesh.cells)),
+        notes,
     )
 
 
-def _in_sets(groups: dict[str, np.ndarray], n: int) -> dict[str, dict[str, np.ndarray]]:
-    """Set -> group -> elements: all in SET, but for those that name elements another group has already."""
+def _parts(own: _Own, numbers: np.ndarray) -> np.ndarray:
+    """Elements of the mesh of these of the file."""
+    first, parts = own.elements[numbers], own.parts[numbers]
+    return np.repeat(first, parts) + np.concatenate([np.arange(n) for n in parts] or [np.empty(0, np.int64)])
+
+
+def _by_block(data: FileMesh, numbers: np.ndarray) -> list[tuple[Block, np.ndarray]]:
+    firsts = data.firsts
+    of = np.searchsorted(firsts, numbers, side="right") - 1
+    return [(data.blocks[k], numbers[of == k] - firsts[k]) for k in np.unique(of).tolist()]
+
+
+def _cut(sides: list[np.ndarray], dim: int) -> np.ndarray:
+    """Lines, in space triangles: sides of hexahedra as their elements are cut."""
+    return np.concatenate([np.empty((0, 2), np.int64), *sides]) if dim == 2 else hexahedra.triangles(sides)
+
+
+def _in_sets(groups: dict[str, np.ndarray], n: int) -> Sets:
+    """Set -> group -> numbers: all in SET, but for those that name one that another group has already."""
     taken = np.zeros(n, bool)
-    out: dict[str, dict[str, np.ndarray]] = {}
+    out: Sets = {}
     for name, rows in groups.items():
+        rows = np.unique(rows)
         set_name = name if taken[rows].any() else SET
         if set_name == SET:
             taken[rows] = True
@@ -230,15 +228,114 @@ def _in_sets(groups: dict[str, np.ndarray], n: int) -> dict[str, dict[str, np.nd
     return out
 
 
-def _corners(path: Path, points: np.ndarray, cells: np.ndarray) -> None:
-    """Refuse elements by their number in the file, while it is still known."""
+# ---- what a file holds ---------------------------------------------------------------------------------------------
+
+
+def _read(path: Path) -> FileMesh:
+    if not path.is_file():
+        raise CommandError(f"{path}: there is no such file")
+    kind = path.suffix.lower()
+    fluent = kind == ".msh" and path.read_bytes()[:1] == b"("  # meshes of another program have the same ending
+    return _by_meshio(path) if kind not in OWN or fluent else OWN[kind](path)
+
+
+def _by_meshio(path: Path) -> FileMesh:
+    meshio = optional.meshio()
+    known = sorted(meshio.extension_to_filetypes)
+    if path.suffix.lower() not in known:
+        raise HpcdemError(f"{path}: files *{path.suffix} are not read; known are {', '.join(known)}")
+    said = io.StringIO()
+    try:
+        # meshio prints what it cannot read and then ends the program.
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            found = meshio.read(path)
+    except (Exception, SystemExit):
+        raise HpcdemError(
+            f"{path}: this is not a mesh that can be read: damaged, or not of the kind that *{path.suffix} says"
+        ) from None
+    points = np.asarray(found.points, np.float64)
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or not len(points):
+        raise HpcdemError(f"{path}: points with two or three coordinates were expected, found {points.shape}")
+    start = 0 if path.suffix.lower() in FROM_0 else 1
+    made = FileMesh(path, np.pad(points, ((0, 0), (0, 3 - points.shape[1]))), np.arange(len(points)) + start, [])
+    count = 0
+    for block in found.cells:
+        rows = (
+            np.asarray(block.data, np.int64)
+            if not isinstance(block.data, list)
+            else np.empty((len(block.data), 0), int)
+        )
+        ids = np.arange(count, count + len(rows)) + start
+        out: Any = np.flatnonzero(((rows < 0) | (rows >= len(points))).any(axis=1)) if rows.size else []
+        if len(out):
+            raise HpcdemError(f"{path}: element {ids[out[0]]} names a point that is not in the file")
+        made.blocks.append(Block(block.type.rstrip("0123456789"), rows, ids, block.type))
+        count += len(rows)
+    firsts = made.firsts
+    for name, parts in found.cell_sets.items():
+        at = [firsts[k] + np.asarray(r, np.int64) for k, r in enumerate(parts) if r is not None and len(r)]
+        if at:
+            made.element_sets[str(name)] = np.concatenate(at)
+    for name, rows in found.point_sets.items():
+        made.node_sets[str(name)] = np.asarray(rows, np.int64)
+    lost = [*found.point_data, *found.cell_data, *found.field_data]
+    made.notes += [f"data of points and elements ({listed(lost)})"] if lost else []
+    return made
+
+
+def _straightened(data: FileMesh, notes: list[str]) -> None:
+    """Elements of second order keep their corners."""
+    for k, block in enumerate(data.blocks):
+        n = CORNERS.get(block.kind)
+        if n is None or block.rows.shape[1] <= n:
+            continue
+        data.blocks[k] = Block(block.kind, block.rows[:, :n], block.ids, block.label)
+        if DIMENSIONS[block.kind] > 1:
+            notes.append(
+                f"points between the corners of {len(block.ids)} elements ({block.label}): their edges are straight"
+            )
+
+
+def _refuse_kinds(data: FileMesh, dim: int) -> None:
+    """HpcdemError for what is no element of a model of this dimension."""
+    kinds: dict[str, int] = {}
+    for block in data.blocks:
+        kinds[block.label] = kinds.get(block.label, 0) + len(block.rows)
+        if DIMENSIONS.get(block.kind, 4) > dim:
+            can = ("triangles and quads can be used in two dimensions" if dim == 2 else
+                   "tetrahedra and hexahedra can be used in three")  # fmt: skip
+            three = "; model new dim 3 makes a model for it" if dim == 2 and DIMENSIONS.get(block.kind) == 3 else ""
+            name = IN_WORDS.get(block.kind, f"elements of type '{block.label}'")
+            raise data.refuse(
+                f"{len(block.rows)} {name} ({block.label}), the first of them element {block.ids[0]}: only {can}{three}"
+            )
+    if not any(DIMENSIONS[block.kind] == dim for block in data.blocks):
+        lacks = "no triangles and no quads" if dim == 2 else "no tetrahedra and no hexahedra"
+        held = ", ".join(f"{n} of {label}" for label, n in kinds.items()) or "none at all"
+        raise data.refuse(f"there are {lacks} (elements: {held})")
+
+
+def _plane(data: FileMesh) -> np.ndarray:
+    points = data.points
+    if not len(points):
+        raise data.refuse("there are no points")
+    used = np.unique(np.concatenate([b.rows.ravel() for b in data.blocks if DIMENSIONS[b.kind] == 2]))
+    z = points[used, 2]
+    off = np.abs(z - z[0])
+    if off.max() > FLATNESS * float(np.ptp(points[used, :2], axis=0).max()):
+        i = int(off.argmax())
+        raise data.refuse(
+            f"point {data.point(used[i])} lies at z = {z[i]:g}, point {data.point(used[0])} at z = {z[0]:g}: only "
+            "meshes in the x-y plane can be used in two dimensions"
+        )
+    return points[:, :2].copy()
+
+
+def _corners(data: FileMesh, points: np.ndarray, cells: np.ndarray, file: np.ndarray) -> None:
+    """Refuse elements of the plane that are flat, folded or concave; file: their numbers in it, over all blocks."""
     for n in (3, 4):
         rows = np.flatnonzero(corner_counts(cells) == n)
-        corners = np.sort(cells[rows, :n], axis=1)
-        twice = np.flatnonzero((corners[:, 1:] == corners[:, :-1]).any(axis=1))
-        if len(twice):
-            e = rows[twice[0]]
-            raise HpcdemError(f"{path}: element {e + 1} has the same point twice: {(cells[e, :n] + 1).tolist()}")
+        _collapsed(data, cells[rows, :n], file[rows], 0.0)
         xy = points[cells[rows, :n]]
         side = np.roll(xy, -1, axis=1) - xy
         before = np.roll(side, 1, axis=1)
@@ -248,10 +345,8 @@ def _corners(path: Path, points: np.ndarray, cells: np.ndarray) -> None:
         if len(bad):
             e = rows[bad[0]]
             (x, y), what = points[cells[e, 0]], "is flat" if n == 3 else "is flat, folded or concave"
-            kind = "triangle" if n == 3 else "quad"
-            raise HpcdemError(
-                f"{path}: element {e + 1} ({kind} of points {(cells[e, :n] + 1).tolist()}, at ({x:g}, {y:g})) {what}"
-            )
+            kind, of = ("triangle" if n == 3 else "quad"), ", ".join(data.point(p) for p in cells[e, :n])
+            raise data.refuse(f"element {data.element(file[e])} ({kind} of points {of}, at ({x:g}, {y:g})) {what}")
 
 
 def _merged(points: np.ndarray, distance: float) -> np.ndarray:
@@ -266,12 +361,13 @@ def _merged(points: np.ndarray, distance: float) -> np.ndarray:
     return lowest[label]
 
 
-def _collapsed(path: Path, cells: np.ndarray, merge: float) -> None:
-    for n in (3, 4):
-        rows = np.flatnonzero(corner_counts(cells) == n)
-        corners = np.sort(cells[rows, :n], axis=1)
-        bad = np.flatnonzero((corners[:, 1:] == corners[:, :-1]).any(axis=1))
-        if len(bad):
-            raise HpcdemError(
-                f"{path}: merging points nearer than {merge:g} makes a line of element {rows[bad[0]] + 1}"
-            )
+def _collapsed(data: FileMesh, rows: np.ndarray, file: np.ndarray, merge: float) -> None:
+    """HpcdemError if an element has a point twice: in the file, or once points are merged."""
+    corners = np.sort(rows, axis=1)
+    bad = np.flatnonzero((corners[:, 1:] == corners[:, :-1]).any(axis=1))
+    if not len(bad):
+        return
+    name = data.element(file[bad[0]])
+    if merge > 0.0:
+        raise data.refuse(f"merging points nearer than {merge:g} m makes an edge of element {name} a point")
+    raise data.refuse(f"element {name} has the same point twice: {', '.join(data.point(p) for p in rows[bad[0]])}")

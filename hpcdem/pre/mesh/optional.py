@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
 from hpcdem.core.errors import HpcdemError
@@ -59,6 +60,26 @@ def ezdxf() -> ModuleType:
         return ezdxf
 
     return _wanted("ezdxf", "Import of DXF drawings", load)
+
+
+OWN_READERS = (".msh", ".inp")
+"""Mesh files that need no package."""
+
+
+def of_mesh(file: str) -> None:
+    """What reads a mesh file of this name."""
+    ending = Path(file).suffix.lower()
+    if ending and ending not in OWN_READERS:
+        meshio()
+
+
+def of_drawing(file: str) -> None:
+    """What reads a drawing, or a file of bodies, of this name."""
+    ending = Path(file).suffix.lower()
+    if ending == ".dxf":
+        ezdxf()
+    elif ending in (".step", ".stp", ".brep"):
+        gmsh()
 
 
 def _wanted(name: str, what: str, load: Callable[[], ModuleType]) -> ModuleType:
