@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from hpcdem.runtime import kept
+from hpcdem.runtime.launch import openmp_runtime_found
 
 pytest_plugins = ["tests.browser"]
 ROOT = Path(__file__).resolve().parent.parent
@@ -49,7 +50,10 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), *others])
 # A ZDEM script that runs alone takes all cores unless this is set; tests run side by side.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-kept.install()  # kernels that tests call in this process are those of all other runs
+# Kernels that tests call in this process are those of the programs they start.
+os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
+os.environ.setdefault("NUMBA_THREADING_LAYER", "omp" if openmp_runtime_found() else "workqueue")
+kept.install()
 
 # --- what this machine has -------------------------------------------------------------------------------------
 

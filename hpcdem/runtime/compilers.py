@@ -13,7 +13,6 @@ import contextlib
 import faulthandler
 import gc
 import inspect
-import itertools
 import os
 import pickle
 import subprocess
@@ -27,6 +26,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
+
+from hpcdem.runtime import kept
 
 LAUNCHER = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "MPI_", "MV2_", "PALS_", "HYDRA_", "HYDI_", "H5PY_ALWAYS_USE_MPI")
 """How variables begin that make a process take part in the MPI job of its parent."""
@@ -108,28 +109,6 @@ def compile_in_processes(
         return f"exit codes {codes}; {errors.read().decode(errors='replace').strip().rpartition(chr(10))[2]}"
 
 
-def name_kernels_apart() -> None:
-    """See to it that kernels of this process have names of their own in object code.
-
-    numba counts the functions that a process compiles, and tells functions of the same qualified name and types, such
-    as two closures of one factory, apart by that number alone. Of two of the same name that were compiled by different
-    processes the linker takes one for both.
-    """
-    from numba.core.bytecode import FunctionIdentity
-
-    counter: Any = FunctionIdentity
-    counter._unique_ids = itertools.count(int.from_bytes(os.urandom(7), "little"))
-
-
-def spare_c_entries() -> None:
-    """Make kernels without the entry for programs in C that numba gives each of them, and nobody calls here: a
-    fourteenth of the time of compiling."""
-    from numba.core.compiler import Flags
-
-    option: Any = Flags.options["no_cfunc_wrapper"]  # type: ignore[attr-defined]
-    option._default = True
-
-
 # -- in one of these processes -----------------------------------------------------------------------------------------
 
 
@@ -139,8 +118,6 @@ def main() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, job.cores)
-    from hpcdem.runtime import kept  # which takes from this module
-
     kept.install()
     gc.set_threshold(50_000, 20, 100)  # a compiler makes many objects and few circles
     faulthandler.dump_traceback_later(job.patience, exit=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import itertools
 import os
 import pickle
 import re
@@ -20,7 +21,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hpcdem.runtime.compilers import name_kernels_apart, spare_c_entries
 from hpcdem.runtime.launch import version
 
 UNUSED_DAYS = 60
@@ -166,7 +166,7 @@ def install() -> None:
         _usual = Dispatcher.enable_caching
 
         def enable_caching(kernel: Any) -> None:
-            if kernel.py_func.__module__.partition(".")[0] == "hpcdem":
+            if kernel.py_func.__module__.startswith("hpcdem"):
                 kernel._cache = _OfPackage(kernel)
             elif _usual is not None:
                 _usual(kernel)
@@ -175,7 +175,7 @@ def install() -> None:
         patched.enable_caching = enable_caching
     store.cache_clear()
     for name, module in list(sys.modules.items()):
-        if name.partition(".")[0] == "hpcdem":
+        if name.startswith("hpcdem"):
             kernels: list[Any] = [thing for thing in vars(module).values() if isinstance(thing, Dispatcher)]
             for kernel in kernels:
                 if isinstance(kernel._cache, FunctionCache | _OfPackage):
@@ -214,8 +214,16 @@ def _imported(text: str) -> set[Path]:
 
 @cache
 def sources() -> str:
-    """A digest of all modules of hpcdem that decide which kernels there are: those with kernels, what these import, and
-    those that call them with types of their choice."""
+    """A digest of all modules of hpcdem that decide which kernels there are."""
+    digest = hashlib.sha256()
+    for path, text in deciding().items():
+        digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + text.encode())
+    return digest.hexdigest()[:12]
+
+
+def deciding() -> dict[Path, str]:
+    """The modules of hpcdem with kernels, all that these import, and those that call them with types of their choice;
+    with their texts."""
     texts = {path: path.read_text(encoding="utf-8") for path in _PACKAGE.rglob("*.py")}
     imports = {path: _all_imported(text) & texts.keys() for path, text in texts.items()}
     kernels = {path for path, text in texts.items() if _COMPILES.search(text)}
@@ -225,10 +233,7 @@ def sources() -> str:
         found |= more
         wanted += more
     callers = {path for path, used in imports.items() if used & kernels}
-    digest = hashlib.sha256()
-    for path in sorted(found | callers | set(_PACKAGE.rglob("warm_up.py"))):
-        digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + texts[path].encode())
-    return digest.hexdigest()[:12]
+    return {path: texts[path] for path in sorted(found | callers | set(_PACKAGE.rglob("warm_up.py")))}
 
 
 def _all_imported(text: str) -> set[Path]:
@@ -236,6 +241,28 @@ def _all_imported(text: str) -> set[Path]:
 
 
 _COMPILES = re.compile(r"^\s*from numba import .*njit", re.MULTILINE)
+
+
+def name_kernels_apart() -> None:
+    """See to it that kernels of this process have names of their own in object code.
+
+    numba counts the functions that a process compiles, and tells functions of the same qualified name and types, such
+    as two closures of one factory, apart by that number alone. Of two of the same name that were compiled by different
+    processes the linker takes one for both.
+    """
+    from numba.core.bytecode import FunctionIdentity
+
+    counter: Any = FunctionIdentity
+    counter._unique_ids = itertools.count(int.from_bytes(os.urandom(7), "little"))
+
+
+def spare_c_entries() -> None:
+    """Make kernels without the entry for programs in C that numba gives each of them, and nobody calls here: a
+    fourteenth of the time of compiling."""
+    from numba.core.compiler import Flags
+
+    option: Any = Flags.options["no_cfunc_wrapper"]  # type: ignore[attr-defined]
+    option._default = True
 
 
 # -- where the store is ------------------------------------------------------------------------------------------------

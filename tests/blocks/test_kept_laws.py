@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from pathlib import Path
 
@@ -51,7 +52,7 @@ def stresses(law: user_laws.UserLaw) -> np.ndarray:
 def test_a_law_is_compiled_once(tmp_path, monkeypatch):
     """The next run takes it from the folder, to the same bits; with another value it is compiled again. A file
     that is damaged or of somebody else is not taken."""
-    monkeypatch.setattr(kept, "cache_folder", lambda: (tmp_path / "cache" / "kernels", True))
+    monkeypatch.setattr(kept, "store", lambda: (tmp_path / "cache", True))
     path, told = tmp_path / "law.py", []
     path.write_text(TEXT)
 
@@ -78,10 +79,14 @@ def test_a_law_is_compiled_once(tmp_path, monkeypatch):
     whole = loop.read_bytes()
     files_ = law.loops.triangles._cache
     assert files_.load_overload(signature, law.loops.triangles.targetctx) is not None
-    if hasattr(kept.os, "getuid"):
+    if loop.stat().st_uid:  # what is root's is as safe as the system
         with monkeypatch.context() as somebody:
             somebody.setattr(kept.os, "getuid", lambda: 987654)
             assert files_.load_overload(signature, law.loops.triangles.targetctx) is None
+    else:
+        os.chown(loop, 54321, -1)
+        assert files_.load_overload(signature, law.loops.triangles.targetctx) is None
+        os.chown(loop, 0, -1)
     for damage in (whole[:-100], whole[:50] + b"?" + whole[51:], b""):
         loop.write_bytes(damage)
         assert files_.load_overload(signature, law.loops.triangles.targetctx) is None

@@ -1,6 +1,6 @@
-"""A cache folder of kernels is complete when it gets its name: no program compiles any more, on whatever ranks.
+"""The warm-ups call every kernel that a program may call: no program compiles any more, on whatever ranks.
 
-It must be, as nothing is ever added to it: each process would compile for itself what the warm-up has forgotten.
+Else each rank would compile for itself, while the others wait, what the warm-up has forgotten.
 """
 
 from __future__ import annotations
@@ -184,15 +184,17 @@ def test_of_two_threads(late, tmp_path: Path) -> None:
     assert late(1, "both.sc", "-j", 2) == [NOTHING]
 
 
-def test_what_was_forgotten_is_told_and_not_stored(launch: Launcher, tmp_path: Path) -> None:
+def test_what_was_forgotten_is_told_and_kept_for_later_runs(launch: Launcher, tmp_path: Path) -> None:
     """A kernel of the particles with arguments that no run has."""
     (tmp_path / "model.py").write_text(
         "import hpcdem\nsim = hpcdem.Simulation()\nsim.box(0, 1, 0, 1)\n"
-        "from hpcdem.numerics import rng\nrng.uniform(True, 1, 2)\n"
-        "from hpcdem.runtime import kernels\nprint(*kernels.late)\n"
-        "from pathlib import Path\nprint(len(list(Path(rng.uniform._cache.cache_path).glob('rng.uniform*.nbc'))))\n"
+        "from hpcdem.numerics import rng\nfrom hpcdem.runtime import kernels, kept\n"
+        "rng.uniform._cache._name += 'of-this-test'\nrng.uniform._cache.flush()\n"
+        "import sys\nrng.uniform(True, 1, 2)\nprint(*kernels.late)\n"
+        "print(sum(rng.uniform.stats.cache_hits.values()), kept.has(rng.uniform, rng.uniform.signatures[-1]))\n"
+        "rng.uniform._cache.flush()\n"
     )
     done = launch.python(1, "model.py", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     said = done.stdout.splitlines()[-2:]
-    assert said[0].startswith("hpcdem.numerics.rng.uniform(bool, ") and said[1] == "1"
+    assert said[0].startswith("hpcdem.numerics.rng.uniform(bool, ") and said[1] == "0 True"

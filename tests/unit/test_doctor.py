@@ -515,21 +515,21 @@ def test_where_the_kernels_are(make_machine, tmp_path, monkeypatch):
     base = tmp_path / "kernels"
     folder = base / "1-numba"
     machine = make_machine({}, {"NUMBA_CACHE_DIR": str(base)})
-    monkeypatch.setattr(storage, "cache_folder", lambda environ: (folder, True))
+    monkeypatch.setattr(storage, "store_of", lambda environ: (folder, True))
     (found,) = storage.cache(machine)
     assert "no kernels of this version" in found.text and found.cure == "hpcdem warmup"
     (folder / "a").mkdir(parents=True)
-    (folder / "a" / "k.1.nbc").write_bytes(bytes(2048))
-    (folder / "a" / "k.nbi").write_bytes(bytes(1024))
+    (folder / "a" / "k.nbc").write_bytes(bytes(2048))
+    (folder / "ready-blocks-0").write_bytes(b"")
     (found,) = storage.cache(machine)
     assert f"{folder} (ext4): 1 entries" in found.text
 
-    monkeypatch.setattr(storage, "cache_folder", lambda environ: (folder, False))
+    monkeypatch.setattr(storage, "store_of", lambda environ: (folder, False))
     assert "cannot be written" in only(storage.cache(machine)).text
 
 
 def test_one_cache_for_many_hosts(make_machine, tmp_path, monkeypatch):
-    monkeypatch.setattr(storage, "cache_folder", lambda environ: (tmp_path / "1-numba", True))
+    monkeypatch.setattr(storage, "store_of", lambda environ: (tmp_path / "1-numba", True))
     nfs, environ = {"proc/self/mountinfo": NFS.format("/")}, {"NUMBA_CACHE_DIR": str(tmp_path)}
     two = places(1, host="a") + places(1, host="b")
     assert "2 hosts will read it" in only(storage.cache(make_machine(nfs, environ, places=two))).text

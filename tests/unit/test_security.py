@@ -51,6 +51,7 @@ KNOWN = {
     ("cli/__init__.py", "importlib.import_module"),
     ("commands/dem/__init__.py", "importlib.import_module"),
     ("commands/fdem/__init__.py", "importlib.import_module"),
+    ("session.py", "importlib.import_module"),
     # The packages that hpcdem needs, for the doctor.
     ("runtime/doctor/software.py", "importlib.import_module"),
     # libgomp.so.1, by that name, where the system finds it.
