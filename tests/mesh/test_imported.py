@@ -330,7 +330,7 @@ def test_sets_become_groups_of_the_model(tmp_path):
     blocks = FakeBlocks()
     project = Project(blocks, tmp_path, tmp_path / "data")
     meshes.import_file(project, "m.inp")
-    meshes.import_file(project, "m.inp", group="second", set_name="file")
+    meshes.import_file(project, "m.inp", group="second", set_name="file", scale=2.0)
     sets = {kind: names(groups.sets) for kind, groups in project.groups.items() if groups.sets}
     assert sets == {
         "element": {"A": [0, 2], "B": [1, 3], "second": [2, 3]},
@@ -338,7 +338,7 @@ def test_sets_become_groups_of_the_model(tmp_path):
         "element-face": {"END": [5, 13]},
     }
     assert blocks.log.lines[1:6] == [
-        "m.inp: from (0, 0) to (2, 1) m",
+        "m.inp: from (0, 0) to (2, 1) m, one body",
         "m.inp: groups of elements, set 'physical': 'A', 'B'",
         "m.inp: groups of nodes, set 'physical': 'ALL'",
         "m.inp: groups of element-faces, set 'physical': 'END'",

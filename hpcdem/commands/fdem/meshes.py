@@ -11,10 +11,21 @@ from hpcdem.commands.fdem import values
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, hexahedra
+from hpcdem.physics.fdem.connectivity import bodies as bodies_of
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, NODE
 from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
 from hpcdem.pre.mesh import cracks as cracks_of
-from hpcdem.pre.mesh import fill, fracture_discs, fractures, geometry, imported, quality, structured, structured_space
+from hpcdem.pre.mesh import (
+    fill,
+    fit,
+    fracture_discs,
+    fractures,
+    geometry,
+    imported,
+    quality,
+    structured,
+    structured_space,
+)
 from hpcdem.pre.mesh import glue as glue_of
 from hpcdem.pre.mesh.once import made_once
 from hpcdem.pre.mesh.regions import polygon_of
@@ -182,13 +193,18 @@ def import_file(
     if group is not None:
         project.groups[ELEMENT].assign(range(cells, cells + len(mesh.cells)), group, set_name)
     low, high = (", ".join(f"{c:g}" for c in at) for at in (mesh.points.min(axis=0), mesh.points.max(axis=0)))
-    _say(project, f"{file.name}: from ({low}) to ({high}) m")
+    apart = int(bodies_of(mesh.face_partners()).max()) + 1
+    said = f"{apart} bodies, which meet by contact" if apart > 1 else "one body"
+    _say(project, f"{file.name}: from ({low}) to ({high}) m, {said}")
     for kind, sets in ((ELEMENT, mesh.groups), (NODE, found.nodes), (FACE, found.faces)):
         names = [f"set '{name}': " + ", ".join(f"'{group}'" for group in of) for name, of in sets.items()]
         if names:
             _say(project, f"{file.name}: groups of {kind}s, {'; '.join(names)}")
     if found.notes:
         _say(project, f"{file.name}: left out: " + "; ".join(found.notes))
+    unfit = fit.fit(project.whole_mesh(), cells).said()
+    if unfit and project.log is not None:
+        project.log.warn(f"{file.name}: {unfit}")
 
 
 def intersect(project: Project, layer: str, follow: bool = False) -> None:
