@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 
 from hpcdem.cli.common import HELP, messages_only, read_command_line, run_program
+from hpcdem.cli.programs import BY_NAME
 from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
 from hpcdem.core.errors import EXIT_OK
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 __all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "start_zdemss"]
 
 
-PROGRAMS = ("movie", "measure", "info", "draw")
-"""`hpcdem NAME ...`: modules of this package."""
 STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
 """`hpcdem ... -s DIR`, as ZDEM has it; the misspelt form is the manual's."""
 
@@ -53,20 +52,12 @@ def warmup(**options: object) -> None:
 def main() -> NoReturn:
     """The programs hpcdem and zdem."""
     words, cores_before = sys.argv[1:], launch.cores()
-    if words[:1] and words[0] in PROGRAMS:
-        start(words[0], words[1:])
-    if words[:1] == ["grade"]:
-        importlib.import_module("hpcdem.cli.grade_page").start(words[1:])
-    if words[:1] == ["sweep"]:
-        importlib.import_module("hpcdem.cli.sweep").start(words[1:])
-    if words[:1] == ["view"]:
-        importlib.import_module("hpcdem.cli.view").start(words[1:])
-    if words[:1] == ["case"]:
-        importlib.import_module("hpcdem.cli.case").start(words[1:])
-    if words[:1] == ["console"]:
-        importlib.import_module("hpcdem.cli.console").start(words[1:])
-    if words[:1] == ["doctor"]:
-        importlib.import_module("hpcdem.cli.doctor").start(words[1:], cores_before)
+    program = BY_NAME.get(words[0]) if words else None
+    if program is not None and program.looks:
+        start(program.name, words[1:])
+    if program is not None and program.module:
+        more = (cores_before,) if program.name == "doctor" else ()
+        importlib.import_module(f"hpcdem.cli.{program.module}").start(words[1:], *more)
     if any(word.split("=")[0] in STRESS_AND_STRAIN for word in words):
         start("strain_stress", words)
     with messages_only(), launch.one_voice():
@@ -137,5 +128,5 @@ def start_zdemss() -> NoReturn:
 def start(name: str, words: list[str]) -> NoReturn:
     """A program that looks at finished runs: its module holds a command of the same name, and a function `work`."""
     module = importlib.import_module(f"hpcdem.cli.{name}")
-    shown = {"strain_stress": "hpcdem"} | {program: f"hpcdem {program}" for program in PROGRAMS}
+    shown = {"strain_stress": "hpcdem"} | {program.name: f"hpcdem {program.name}" for program in BY_NAME.values()}
     run_program(getattr(module, name), shown.get(name, name), words, module.work)

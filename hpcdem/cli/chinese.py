@@ -39,15 +39,30 @@ TEXTS = {
     "Compare the fingerprints with those of an earlier log.": "与以前日志中的指纹比较。",
     "Show the version and exit.": "显示版本后退出。",
     "Show this message and exit.": "显示本说明后退出。",
-    "Also: `hpcdem measure DIR` measures a finished run, `hpcdem movie DIR` makes a film, `hpcdem grade FILE` makes grains "
-    "from a grading curve, `hpcdem case` writes scripts of ready-made models, `hpcdem warmup` compiles all kernels for later "
-    "runs, `hpcdem console` takes PCDC commands and Python line by line, `hpcdem doctor` says what is wrong with this machine "
-    "or job. Exit codes: 0 done, 1 the run failed, 2 command line or script not understood, 3 no equilibrium (model solve), "
-    "85 stopped on request with a checkpoint (go on with --resume).":
-    "另有:`hpcdem measure DIR` 测量结果,`hpcdem movie DIR` 制作动画,`hpcdem grade FILE` 由级配曲线生成颗粒,`hpcdem case` "
-    "写出现成模型的脚本,`hpcdem warmup` 预先编译计算核,`hpcdem console` 逐条输入 PCDC 命令和 Python,`hpcdem doctor` "
-    "检查本机或作业的环境。退出码:0 完成,1 运行失败,2 命令行或脚本有误,3 没有达到平衡(model solve),85 "
+    "Each command has its own help: hpcdem NAME --help. Exit codes: 0 done, 1 the run failed, 2 command line or script not "
+    "understood, 3 no equilibrium (model solve), 85 stopped on request with a checkpoint (go on with --resume).":
+    "每个命令有自己的说明:hpcdem NAME --help。退出码:0 完成,1 运行失败,2 命令行或脚本有误,3 没有达到平衡(model solve),85 "
     "按要求存盘后停止(用 --resume 继续)。",
+    # hpcdem NAME
+    "Run": "运行", "Look": "查看", "Measure": "测量", "Make": "制作", "Manage": "管理",
+    "continue an interrupted run from its newest checkpoint": "从最新的重启文件继续中断的运行",
+    "take PCDC commands and Python line by line": "逐条输入 PCDC 命令和 Python",
+    "run one script for many values and report on them": "用多组参数运行同一脚本并汇总",
+    "open a run or a script in the browser": "在浏览器中打开运行结果或脚本",
+    "draw frames as the window shows them": "按窗口中的样子画出各帧",
+    "make a film of a run": "制作动画",
+    "say what a frame or a checkpoint holds": "说明一帧或重启文件的内容",
+    "measure a finished run: wedge, cracks, fluid, stress, ...": "测量已完成的运行:楔体、裂缝、流体、应力等",
+    "stress and strain of the frames of a finished run": "计算已完成运行各帧的应力和应变",
+    "write the script of a ready-made model": "写出现成模型的脚本",
+    "list the examples, or copy one to this folder": "列出示例,或复制一个到当前目录",
+    "make grains from a grading curve": "由级配曲线生成颗粒",
+    "report problems of this machine or job and the commands that fix them": "检查本机或作业的问题并给出解决命令",
+    "compile the kernels now, so that no job waits for it": "现在编译计算核,以后的作业不必等待",
+    # hpcdem examples
+    "List the examples; with NAME, copy one of them, with the files it reads.": "列出示例;给出 NAME 时复制该示例及其读取的文件。",
+    "Then: hpcdem NAME.py. Each example says in its first lines what it shows.": "然后:hpcdem NAME.py。每个示例的开头几行说明其内容。",
+    "Folder to copy the example to [this one].": "复制到的目录 [当前目录]。",
     # hpcdem -s
     "Stress and strain of the frames of a finished run, on a grid and on the particles.\n\nStrain is that since the first "
     "frame of DIR. Results of an earlier call are replaced when the new ones are complete.":
@@ -384,6 +399,11 @@ HEADS = {
 }  # fmt: skip
 
 PARTLY = "(部分说明目前只有英文。)"
+
+
+def in_chinese(text: str) -> str:
+    """A text of the table, or the text itself."""
+    return TEXTS.get(text, text)
 
 
 def translated(command: click.Command) -> click.Command:

@@ -12,6 +12,7 @@ from hpcdem.cli.case import listing
 from hpcdem.cli.console import console
 from hpcdem.cli.doctor import doctor
 from hpcdem.cli.draw import draw
+from hpcdem.cli.examples import examples
 from hpcdem.cli.grade_page import grade
 from hpcdem.cli.info import info
 from hpcdem.cli.measure import measure
@@ -28,7 +29,8 @@ from hpcdem.lang.pages import escaped
 PROGRAMS: dict[str, click.Command] = {
     "hpcdem": hpcdem, "hpcdem resume": resume, "hpcdem info": info, "hpcdem -s": strain_stress,
     "hpcdem measure": measure, "hpcdem draw": draw, "hpcdem movie": movie, "hpcdem view": view, "hpcdem sweep": sweep,
-    "hpcdem sweep report": report, "hpcdem grade": grade, "hpcdem case": listing([]), "hpcdem console": console,
+    "hpcdem sweep report": report, "hpcdem grade": grade, "hpcdem case": listing([]), "hpcdem examples": examples,
+    "hpcdem console": console,
     "hpcdem warmup": warmup, "hpcdem doctor": doctor, "zdem2jpg": zdem2jpg, "zdemss": zdemss,
 }  # fmt: skip
 

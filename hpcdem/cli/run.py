@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcdem.cli.chinese import translated
+from hpcdem.cli.chinese import in_chinese, translated
 from hpcdem.cli.common import HELP, PATH
+from hpcdem.cli.programs import GROUPS, suggestion
 from hpcdem.core import chinese
 from hpcdem.core.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import launch
@@ -292,7 +293,7 @@ def read_script(comm: SerialComm, path: Path) -> bytes:
         try:
             source = path.read_bytes()
         except FileNotFoundError:
-            error = f"{path}: no such script"
+            error = f"{path}: no such script{suggestion(str(path))}"
         except OSError as problem:
             error = f"{path}: cannot read the script: {problem.strerror}"
     source, error = comm.bcast((source, error))
@@ -395,14 +396,20 @@ def keeping(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class RunCommand(click.Command):
-    """`hpcdem SCRIPT`; its help lists the options of `hpcdem -s DIR`, too, as the manual's `zdem -h` does."""
+    """`hpcdem SCRIPT`; its help lists the other commands, and the options of `hpcdem -s DIR` as the manual's `zdem -h`
+    does."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        super().format_options(ctx, formatter)
         from hpcdem.cli.strain_stress import strain_stress
 
+        told = str
         if chinese.wanted(encoding=getattr(sys.stdout, "encoding", None)):
             translated(strain_stress)
+            told = in_chinese
+        for group, programs in GROUPS.items():
+            with formatter.section(told(group)):
+                formatter.write_dl([(f"hpcdem {one.name} {one.use}".rstrip(), told(one.line)) for one in programs])
+        super().format_options(ctx, formatter)
         hidden = [parameter for parameter in self.get_params(ctx) if getattr(parameter, "hidden", False)]
         shown = {option for parameter in self.get_params(ctx) if parameter not in hidden for option in parameter.opts}
         rows = [
@@ -418,13 +425,8 @@ class RunCommand(click.Command):
     cls=RunCommand,
     context_settings=HELP,
     no_args_is_help=True,
-    epilog="Also: `hpcdem measure DIR` measures a finished run, `hpcdem movie DIR` makes a film, "
-    "`hpcdem grade FILE` makes grains from a grading curve, "
-    "`hpcdem case` writes scripts of ready-made models, "
-    "`hpcdem warmup` compiles all kernels for later runs, "
-    "`hpcdem console` takes PCDC commands and Python line by line, "
-    "`hpcdem doctor` says what is wrong with this machine or job. "
-    "Exit codes: 0 done, 1 the run failed, 2 command line or script not understood, 3 no equilibrium (model "
+    epilog="Each command has its own help: hpcdem NAME --help. Exit codes: 0 done, 1 the run failed, 2 command line or "
+    "script not understood, 3 no equilibrium (model "
     "solve), 85 stopped on request with a checkpoint (go on with --resume).",
 )
 @click.argument("script", type=PATH)

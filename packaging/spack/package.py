@@ -20,3 +20,4 @@ class PyHpcdem(PythonPackage):
     depends_on("py-rich@13.0:", type=("build", "run"))
     depends_on("py-packaging@21.0:", type=("build", "run"))
     depends_on("py-pydantic@2.5:", type=("build", "run"))
+    depends_on("py-filelock@3.9:", type=("build", "run"))

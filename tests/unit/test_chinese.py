@@ -14,6 +14,7 @@ import pytest
 from hpcdem.cases import CASES, find
 from hpcdem.cli import case, case_chinese
 from hpcdem.cli import chinese as helps
+from hpcdem.cli.programs import GROUPS
 from hpcdem.cli.reference import PROGRAMS
 from hpcdem.core import chinese
 
@@ -63,6 +64,7 @@ def test_every_text_is_that_of_an_option_that_is_there() -> None:
     for command in PROGRAMS.values():
         there |= {p.help for p in command.params if isinstance(p, click.Option)}
         there |= {command.epilog, __import__("inspect").cleandoc(command.help or "")}
+    there |= {*GROUPS, *(one.line for group in GROUPS.values() for one in group)}
     assert not set(helps.TEXTS) - there - {"Show this message and exit."}
     assert set(helps.LONG) <= {command.name for command in PROGRAMS.values()}
     assert all(HAN.search(text) for text in (*helps.TEXTS.values(), *helps.LONG.values()))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 
+import click
 import pytest
 
 from hpcdem import cli
+from hpcdem.cli.chinese import TEXTS
+from hpcdem.cli.programs import BY_NAME, GROUPS
 
 
 def program(name: str, *args: str) -> subprocess.CompletedProcess[str]:
@@ -64,6 +68,46 @@ def test_help_also_as_the_manual_spells_it(word):
     for option in ("--strin-stres DIR", "-g, --grid SIZE", "--addball", "--delball", "--leftwallid ID", "--rightwallid",
                    "--xmove X", "--ymove", "--increment", "--smooth"):  # fmt: skip
         assert option in done.stdout
+
+
+def test_help_lists_every_command_by_group_and_in_chinese():
+    page = cli.hpcdem.get_help(click.Context(cli.hpcdem, info_name="hpcdem", max_content_width=110))
+    for group, programs in GROUPS.items():
+        assert f"\n{group}:\n" in page and group in TEXTS
+        for one in programs:
+            assert f"hpcdem {one.name}" in page and one.line in TEXTS
+    assert page.index("hpcdem view") < page.index("--time-limit")
+
+
+def test_every_command_of_the_table_starts():
+    for one in (one for one in BY_NAME.values() if one.module):
+        module = importlib.import_module(f"hpcdem.cli.{one.module}")
+        assert hasattr(module, "work") and hasattr(module, one.name) if one.looks else hasattr(module, "start")
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("viw", "no such script and no such command; did you mean hpcdem view?"),
+        ("mesure", "did you mean hpcdem measure?"),
+        ("xyzzyxyzzy", "see hpcdem --help"),
+        ("viw.py", "viw.py: no such script\n"),
+    ],
+)
+def test_a_mistyped_command_is_met_with_the_nearest(word, said):
+    done = program("main", word)
+    assert done.returncode == 2 and said in done.stderr + done.stdout
+
+
+def test_examples_are_listed_and_copied(tmp_path):
+    said = program("main", "examples")
+    assert said.returncode == 0 and "push.py" in said.stdout and "Thrust sheets" in said.stdout
+    done = program("main", "examples", "specimens.py", "--into", str(tmp_path))
+    assert done.returncode == 0 and {path.name for path in tmp_path.iterdir()} == {"specimens.py", "grading.txt"}
+    again = program("main", "examples", "specimens", "--into", str(tmp_path))
+    assert again.returncode == 2 and "exists already" in again.stderr
+    wrong = program("main", "examples", "puhs")
+    assert wrong.returncode == 2 and "did you mean push?" in wrong.stderr
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,58 @@
+"""The commands `hpcdem NAME ...`: one table for the dispatch, `hpcdem --help` and suggestions for typing errors."""
+
+from __future__ import annotations
+
+import difflib
+from typing import NamedTuple
+
+
+class Program(NamedTuple):
+    """module: in hpcdem.cli, with a function `start(words)`, or, where `looks` is set, a command of its name and `work`
+    (see cli.start); use: its arguments; line: what it does."""
+
+    name: str
+    use: str
+    line: str
+    module: str = ""
+    looks: bool = False
+
+
+GROUPS: dict[str, tuple[Program, ...]] = {
+    "Run": (
+        Program("resume", "[DIR]", "continue an interrupted run from its newest checkpoint"),
+        Program("console", "", "take PCDC commands and Python line by line", "console"),
+        Program("sweep", "SCRIPT", "run one script for many values and report on them", "sweep"),
+    ),
+    "Look": (
+        Program("view", "[DIR]", "open a run or a script in the browser", "view"),
+        Program("draw", "DIR", "draw frames as the window shows them", "draw", looks=True),
+        Program("movie", "DIR", "make a film of a run", "movie", looks=True),
+        Program("info", "FILE", "say what a frame or a checkpoint holds", "info", looks=True),
+    ),
+    "Measure": (
+        Program(
+            "measure", "WHAT DIR", "measure a finished run: wedge, cracks, fluid, stress, ...", "measure", looks=True
+        ),
+        Program("-s", "DIR", "stress and strain of the frames of a finished run"),
+    ),
+    "Make": (
+        Program("case", "[NAME]", "write the script of a ready-made model", "case"),
+        Program("examples", "[NAME]", "list the examples, or copy one to this folder", "examples"),
+        Program("grade", "FILE", "make grains from a grading curve", "grade_page"),
+    ),
+    "Manage": (
+        Program("doctor", "", "report problems of this machine or job and the commands that fix them", "doctor"),
+        Program("warmup", "", "compile the kernels now, so that no job waits for it"),
+    ),
+}
+BY_NAME = {program.name: program for group in GROUPS.values() for program in group}
+
+
+def suggestion(word: str) -> str:
+    """What to add to a message that `word` is no script and no command; empty if it looks like a file."""
+    if "." in word or "/" in word:
+        return ""
+    near = difflib.get_close_matches(word, BY_NAME, 1, 0.5)
+    return (
+        f" and no such command; did you mean hpcdem {near[0]}?" if near else " and no such command; see hpcdem --help"
+    )
