@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import doctor, launch, run_folder, shutdown, speed
+from hpcdem.runtime.pace import Pace
 
 if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
@@ -36,7 +37,8 @@ class Session:
     script, where its relative file names begin; figure: draw the last state of each simulation; draws: DRAW makes
     pictures; text: of the script; job: the same in a few words, for run.json; keep: which numbered checkpoints
     stay; ends_with_frame: write the last state of each simulation, too, if no command has; reproduction: of
-    --check-reproducible; interpreter: what carries out the PCDC commands of this process, if it has any.
+    --check-reproducible; interpreter: what carries out the PCDC commands of this process, if it has any; adapts: nobody
+    has said how many threads, so that a model may take fewer.
     """
 
     comm: SerialComm
@@ -58,6 +60,7 @@ class Session:
     unfinished: list[Simulation] = field(default_factory=list)
     projects: list[Project] = field(default_factory=list)
     interpreter: Any = None
+    adapts: bool = False
 
     def simulation(self, outdir: Path | None = None, log: Log | None = None) -> Simulation:
         """Collective: an empty model; the first one waits for the kernels."""
@@ -69,6 +72,8 @@ class Session:
         sim.script, sim.draws, sim.job, sim.keep = self.text, self.draws, self.job, self.keep
         sim.number, self.made = self.made, self.made + 1
         sim.prepare_kernels = self.prepare
+        if self.adapts and self.threads > 1:
+            sim.pace = Pace(self.threads, log)
         run_folder.claim(Path(outdir), self.comm, self.job)
         if self.reproduction is not None:
             watch_states(sim, self.reproduction)
@@ -356,7 +361,7 @@ def _open(threads: int | None) -> Session:
     stop = StopRequests(None, comm.bcast(slurm_end_time() if comm.rank == 0 else None), AUTOSAVE)
     program = getattr(sys.modules["__main__"], "__file__", None)
     directory = Path(program).parent if program else Path()
-    session = Session(comm, log, stop, count, directory, ends_with_frame=True)
+    session = Session(comm, log, stop, count, directory, ends_with_frame=True, adapts=threads is None)
     session.job = run_folder.Job(program or "", "python", tuple(sys.argv[1:]), count)
     _watch_the_end(session)
     return session

@@ -94,7 +94,7 @@ def new_session(comm: SerialComm, log: Log, options: Options, threads: int) -> S
     stop = StopRequests(options.time_limit, end, options.autosave)
     return Session(
         comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance, options.draw,
-        keep=options.retention,
+        keep=options.retention, adapts=options.threads is None,
     )  # fmt: skip
 
 

@@ -116,6 +116,8 @@ def let_waiting_threads_sleep(threads: int) -> None:
     ranks = next((int(count) for count in counts if count.isdigit()), 1)
     if threads > 1 and ranks * threads > (os.cpu_count() or 1):
         os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    # For some ten microseconds, a fork and join takes two; by default it is milliseconds, in which other programs wait.
+    os.environ.setdefault("GOMP_SPINCOUNT", "10000")
 
 
 LOCAL_RANKS = ("OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE")

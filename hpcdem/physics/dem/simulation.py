@@ -123,6 +123,7 @@ class Simulation(Model):
         self.keep = Retention()
         self.watchers: list[Watcher] = []
         self.number = 0  # of the simulations of a program, in the order in which they were made
+        self.pace: Any = None  # runtime.pace.Pace: chooses the threads; None: nobody does
         self.coupled = False  # to blocks, which step them both (physics/coupling)
         self.resume_advice = "--resume"
         self.draws = False
@@ -425,6 +426,8 @@ class Simulation(Model):
         self.hist = self.hist.resized(self.own_laws.memory)
         cell = self._share_out()
         p, rebuild_state, borders = self.particles, self.rebuild_state, self.ownership.borders
+        if self.pace is not None and self.own_laws.loops is None:  # laws of users are compiled for one number
+            self.threads = self.pace.choose(p.n_own, self.timers, self.clock.step)
         with self.timers("neighbour"):
             order = strips.global_order(cell, p["gid"])
             cell = cell[order]
