@@ -402,7 +402,7 @@ class RunCommand(click.Command):
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         from hpcdem.cli.strain_stress import strain_stress
 
-        told = str
+        told: Callable[[str], str] = str
         if chinese.wanted(encoding=getattr(sys.stdout, "encoding", None)):
             translated(strain_stress)
             told = in_chinese

@@ -18,7 +18,7 @@ from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate
 @pytest.mark.parametrize("name", ["shapely", "gmsh", "meshio", "ezdxf"])
 def test_a_missing_package_is_named_with_the_way_to_get_it(monkeypatch, name):
     monkeypatch.setitem(sys.modules, name, None)  # what Python itself does to forbid an import
-    with pytest.raises(HpcdemError, match=rf"needs the package {name}, which .*hpcdem\[mesh\]"):
+    with pytest.raises(HpcdemError, match=rf"needs the package {name}, which .* -m pip install -e '.*\[mesh\]'"):
         getattr(optional, name)()
 
 
@@ -73,3 +73,18 @@ def test_a_script_is_refused_at_its_first_line_that_needs_a_missing_package(monk
             without.setitem(sys.modules, name, None)
             with pytest.raises(HpcdemError, match=rf"^script\.sc:{line}: .*needs the package {name}"):
                 check.packages(script)
+
+
+def test_all_that_is_missing_is_said_at_once_and_by_check(monkeypatch):
+    for name in ("gmsh", "shapely", "ezdxf"):
+        monkeypatch.setitem(sys.modules, name, None)
+    text = (
+        "pcdc geometry import 'a.dxf'\npcdc mesh create from-layer 'a' size 1\npcdc mesh create from-layer 'b' size 1\n"
+    )
+    with pytest.raises(HpcdemError) as found:
+        check.packages(check.read(text, "script.sc"))
+    said = str(found.value)
+    assert said.startswith("script.sc:1: ") and said.count("pip install") == 1
+    assert [said.count(f"the package {name},") for name in ("ezdxf", "gmsh", "shapely")] == [1, 1, 1]
+    (warned,) = [line for line in check.summary(text, "script.sc").splitlines() if "package" in line]
+    assert warned.startswith("warning: line 1: ") and warned.count("the package") == 3

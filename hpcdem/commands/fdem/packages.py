@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 
 from hpcdem.pre.mesh import optional
 
-NEEDED: Mapping[str, Callable[[str], object]] = {
-    "mesh create": lambda file: optional.gmsh(),
+NEEDED: Mapping[str, Callable[[str], tuple[optional.Load, ...]]] = {
+    "mesh create": lambda file: (optional.gmsh, optional.shapely),
     "mesh import": optional.of_mesh,
     "geometry import": optional.of_drawing,
 }
-"""What loads each, for a file of this name; HpcdemError, with the way to get it, where it is missing."""
+"""What loads them, for a file of this name; each raises HpcdemError, with the way to get it, where it is missing."""

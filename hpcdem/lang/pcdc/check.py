@@ -10,7 +10,9 @@ from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.pcdc import source
 from hpcdem.lang.pcdc.kinds import Pending, TableName
 from hpcdem.lang.pcdc.source import Source
+from hpcdem.lang.pcdc.statement import Statement
 from hpcdem.physics.fdem.tables import Drawn, Over
+from hpcdem.pre.mesh.optional import EXTRA
 
 
 def read(text: str, file: str) -> Source:
@@ -29,14 +31,34 @@ def read(text: str, file: str) -> Source:
 
 
 def packages(script: Source) -> None:
-    """ScriptError at the first line whose package is not here: before kernels are compiled for it."""
+    """ScriptError at the first line whose package is not here, with all others that are missing: before kernels are
+    compiled for it."""
+    missing = missing_packages(script)
+    if missing:
+        raise next(iter(missing.values())).error(_in_one(list(missing)))
+
+
+def missing_packages(script: Source) -> dict[str, Statement]:
+    """What is said of each package that is not here, with the first statement that needs it."""
+    missing: dict[str, Statement] = {}
     for statement in script.statements:
-        load, file = NEEDED.get(statement.command.name), statement.arguments.get("file")
-        try:
-            if load is not None:
-                load(file if isinstance(file, str) else "")  # it may be an expression
-        except HpcdemError as error:
-            raise statement.error(str(error)) from None
+        needs, file = NEEDED.get(statement.command.name), statement.arguments.get("file")
+        for load in (
+            needs(file if isinstance(file, str) else "") if needs is not None else ()
+        ):  # it may be an expression
+            try:
+                load()
+            except HpcdemError as error:
+                missing.setdefault(str(error), statement)
+    return missing
+
+
+def _in_one(messages: list[str]) -> str:
+    """Several of them, the command that helps said once."""
+    command = f": {EXTRA}"
+    alike = [text for text in messages if text.endswith(command)]
+    whole = "; ".join(text.removesuffix(command) for text in alike) + (command if alike else "")
+    return "; ".join(filter(None, [whole, *(text for text in messages if text not in alike)]))
 
 
 def summary(text: str, file: str) -> str:
@@ -46,6 +68,8 @@ def summary(text: str, file: str) -> str:
     lines = [f"{file}: {len(script.statements)} commands read, nothing was run"]
     lines += [f"  {number:4d} {name}" for name, number in sorted(counts.items())]
     lines += [f"warning: {text}" for text in _loose_names(script)]
+    if missing := missing_packages(script):
+        lines.append(f"warning: line {next(iter(missing.values())).line}: {_in_one(list(missing))}")
     return "\n".join(lines)
 
 

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
 from hpcdem.core.errors import HpcdemError
 
-EXTRA = "pip install 'hpcdem[mesh]'"
+ROOT = Path(__file__).resolve().parents[3]
+EXTRA = f"{sys.executable} -m pip install " + (
+    f"-e '{ROOT}[mesh]'" if (ROOT / "pyproject.toml").is_file() else "'hpcdem[mesh]'"
+)
+"""The command that adds what is missing, for a source tree or for an installed package."""
+Load = Callable[[], ModuleType]
 GMSH_LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
 
 
@@ -66,20 +72,16 @@ OWN_READERS = (".msh", ".inp")
 """Mesh files that need no package."""
 
 
-def of_mesh(file: str) -> None:
+def of_mesh(file: str) -> tuple[Load, ...]:
     """What reads a mesh file of this name."""
     ending = Path(file).suffix.lower()
-    if ending and ending not in OWN_READERS:
-        meshio()
+    return (meshio,) if ending and ending not in OWN_READERS else ()
 
 
-def of_drawing(file: str) -> None:
+def of_drawing(file: str) -> tuple[Load, ...]:
     """What reads a drawing, or a file of bodies, of this name."""
     ending = Path(file).suffix.lower()
-    if ending == ".dxf":
-        ezdxf()
-    elif ending in (".step", ".stp", ".brep"):
-        gmsh()
+    return (ezdxf,) if ending == ".dxf" else (gmsh,) if ending in (".step", ".stp", ".brep") else ()
 
 
 def _wanted(name: str, what: str, load: Callable[[], ModuleType]) -> ModuleType:
