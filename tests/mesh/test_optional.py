@@ -78,9 +78,7 @@ def test_a_script_is_refused_at_its_first_line_that_needs_a_missing_package(monk
 def test_all_that_is_missing_is_said_at_once_and_by_check(monkeypatch):
     for name in ("gmsh", "shapely", "ezdxf"):
         monkeypatch.setitem(sys.modules, name, None)
-    text = (
-        "pcdc geometry import 'a.dxf'\npcdc mesh create from-layer 'a' size 1\npcdc mesh create from-layer 'b' size 1\n"
-    )
+    text = "pcdc geometry import 'a.dxf' as-layer 'a'\n" + "pcdc mesh create from-layer 'a' size 1\n" * 2
     with pytest.raises(HpcdemError) as found:
         check.packages(check.read(text, "script.sc"))
     said = str(found.value)
