@@ -1110,6 +1110,12 @@ class BlockCommands:
         self._blocks("model sub-step", given)
 
     @property
+    def wet_faces(self) -> dict[str, np.ndarray]:
+        """Free faces before which water stands: number (element * 4 + face), size [m], in space [m2], and the mean
+        pressure that pushes on each [Pa]. Collective."""
+        return fdem.queries.wet_faces(self._blocks.project())
+
+    @property
     def fluid(self) -> dict[str, float]:
         """The account of the fluid [m2]: given, stored, leaked, removed; what does not add up. Collective."""
         return fdem.queries.fluid(self._blocks.project())

@@ -332,7 +332,8 @@ PCDC_KEYWORDS = {
     "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, histories of the model, a table at the "
     "end":
     "动力计算中从此统计能量平衡:`pcdc.energies`、模型的监测量和结束时的平衡表",
-    "flow of fluid in joints that have a hydraulic model": "流体在有渗流模型的节理中流动",
+    "flow of fluid in joints that have a hydraulic model; off: pressures stay as they are and go on pushing, so that "
+    "blocks come to rest at them": "流体在有渗流模型的节理中流动;off:压力保持不变并继续作用于岩块,可在此压力下求静力平衡",
     "fluid follows the blocks, but does not push on them": "单向耦合:流体随块体变化,但不对块体施加压力",
     "heat flows in elements that have a thermal model; off: temperatures, and the stress that they bring, stay as "
     "they are":

@@ -107,10 +107,12 @@ def _node_conditions(blocks: Blocks) -> Columns | None:
 
 
 def _face_conditions(blocks: Blocks) -> Columns | None:
-    """Stresses that act on faces, and heat; quiet: whether waves leave through them."""
-    heat = Heat.there(blocks)
+    """Stresses that act on faces, and heat; quiet: whether waves leave through them; water_pressure: of water before
+    them, NaN where they are dry. Collective."""
+    heat, flow = Heat.there(blocks), Flow.there(blocks)
     given = np.zeros(1, np.int32) if heat is None else heat.face
-    numbers = np.flatnonzero((blocks.load_row > 0) | (given > 0))
+    wet = {"number": np.empty(0, np.int64)} if flow is None else flow.wet_faces()
+    numbers = np.union1d(np.flatnonzero((blocks.load_row > 0) | (given > 0)), wet["number"])
     numbers = numbers[blocks.alive[numbers // 4]]
     if not len(numbers):
         return None
@@ -124,6 +126,9 @@ def _face_conditions(blocks: Blocks) -> Columns | None:
         word = name if name.startswith("incoming") else "normal_stress" if name == "normal" else f"stress_{name}"
         columns[word] = values.copy()
     columns["quiet"] = blocks.quiet_faces()[numbers].astype(np.int8)
+    if flow is not None:
+        columns["water_pressure"] = np.full(len(numbers), np.nan)
+        columns["water_pressure"][np.searchsorted(numbers, wet["number"])] = wet["pressure"]
     if heat is not None:
         for name in ("flux", "transfer", "environment"):
             now = [said.now(blocks.tables, _or_nan(getattr(one, name)), heat.time) for one in heat.faces]

@@ -59,6 +59,14 @@ def wells(project: Project) -> dict[str, dict[str, float]]:
     }  # fmt: skip
 
 
+def wet_faces(project: Project) -> dict[str, np.ndarray]:
+    """Free faces that fluid pushes on, see `Flow.wet_faces`; no rows without fluid. Collective."""
+    found = Flow.there(project.ready(use=False))
+    if found is None:
+        return {"number": np.empty(0, np.int64), "size": np.empty(0), "pressure": np.empty(0)}
+    return found.wet_faces()
+
+
 def fluid(project: Project) -> dict[str, float]:
     """The account of the fluid [m2], see `Flow.account`. Collective."""
     found = Flow.there(project.ready(use=False))

@@ -70,6 +70,12 @@ class Model:
         return self._look(lambda: fdem.queries.wells(self._project))
 
     @property
+    def wet_faces(self) -> dict[str, np.ndarray]:
+        """Free faces before which water stands: number (element * 4 + face), size [m], in space [m2], and the mean
+        pressure that pushes on each [Pa]."""
+        return self._look(lambda: fdem.queries.wet_faces(self._project))
+
+    @property
     def fluid(self) -> dict[str, float]:
         """The account of the fluid [m2]: given, stored, leaked, removed, closing, relative."""
         return self._look(lambda: fdem.queries.fluid(self._project))

@@ -1015,6 +1015,12 @@ class ModelDefinition:
         names = TRACTIONS[self.dim]
         return np.array([[self._now(getattr(one, name), time) for name in names] for one in self.loads])
 
+    def stressed(self, faces: np.ndarray) -> np.ndarray:
+        """Those of these faces (k,) on which a stress is prescribed, bool: the total of what acts there."""
+        names = ("normal", *COMPONENTS[self.dim])
+        rows = [any(getattr(one, name) != 0.0 for name in names) for one in self.loads]
+        return np.array(rows)[self.load_row[faces]]
+
     def quiet_faces(self) -> np.ndarray:
         """(4 ne,) bool: faces with dashpots."""
         return np.array([one.quiet for one in self.loads])[self.load_row]

@@ -346,6 +346,7 @@ class Coupled:
             found.past = past
         if found.error:
             equilibrium.place_corners(sim, self.x)
+            self.fluid.conditions = None
             self.fluid.show(self.fluid.state_of(self.fluid.u, self.x))
             return found
         total = float(found.fluid.sizes.sum())

@@ -53,7 +53,8 @@ def of_blocks(
 
     dry = done(0.0, *np.polynomial.legendre.leggauss(POINTS))
     middle = np.zeros(1), np.full(1, 2.0)
-    pushed = done(0.5 * (before + after)[fluid.held_rows], *middle)["outside"] - done(0.0, *middle)["outside"]
+    mean = 0.5 * np.concatenate([(before + after)[fluid.held_rows], fluid.shore_before + shown[len(fluid.held_rows) :]])
+    pushed = done(mean, *middle)["outside"] - done(0.0, *middle)["outside"]
     fluid.flow.state[:] = shown
     equilibrium.place_corners(sim, b)
     return dry["joints"], pushed, dry["gravity"] + dry["outside"]

@@ -98,12 +98,14 @@ class Fluid:
     variable counts for them, tied (n,) bool: another one's; wells: with the rows of their nodes; at (m, 4): nodes of
     the blocks at the corners a, b of the lower face and p, q of the other (p faces b), in space (m, 6): a, b, c and p,
     q, r (p faces a, r faces b); ends (l, 2): of links, `of` each channel; face_at (k, dim), face_node (k, dim): nodes
-    of the blocks and flow nodes at the corners of faces of this rank that fluid pushes on, face_key (k,): their
-    numbers."""
+    of the blocks and flow nodes at the corners of faces of this rank that fluid pushes on, first the sides of channels,
+    beyond the flow nodes the shore (model.Shore); face_key (k,): their numbers; shore_before: its state when a step
+    begins."""
 
     flow: Flow
     p0: float
     u: np.ndarray = field(init=False)
+    conditions: np.ndarray | None = field(init=False, default=None)
     thicken: Callable[[np.ndarray, np.ndarray], None] | None = field(init=False, default=None)
     packs: Callable[[np.ndarray], np.ndarray] | None = field(init=False, default=None)
 
@@ -120,9 +122,12 @@ class Fluid:
         self.of = np.repeat(np.arange(self.m), LINKS[self.dim])
         self.law = (flow.row[self.channels] - 1).astype(np.int64)[self.of]
         self.laws, self.bulk = flow.laws(), flow.fluid("fluid_bulk")
-        faces = flow.wet() if flow.pushes else np.empty(0, np.int64)
-        self.face_key = faces
+        sides, wet = flow.pushed() if flow.pushes else (np.empty(0, np.int64),) * 2
+        self.face_key = faces = np.concatenate([sides, wet])
+        self.of_channels = len(sides)
         self.face_at, self.face_node = self._corners(faces), row_of[blocks.the_mesh().face_points(faces)]
+        self.face_node[self.face_node < 0] = self.n + np.arange(len(flow.shore))
+        self.shore_node = np.where(flow.shore.node >= 0, row_of[flow.shore.node], -1)
         half, fourth, *weights = blocks.the_mesh().on_sides(faces)
         self.on_sides = half, blocks.node.reshape(-1)[fourth], *weights
         self.condition = flow.condition[self.numbers]
@@ -219,11 +224,13 @@ class Fluid:
             if one.pressure is not None:
                 known[rows], u[rows[0]] = True, (one.pressure + float(np.ptp(energy[rows]))) / self.p0
             asked.append(one)
+        flow.find_shore()
+        self.shore_before, self.conditions = flow.state[len(flow.held) :].copy(), conditions
         return Step(flow.time, flow.time + dt, self.fluid, conditions, known, asked), u
 
     def show(self, state: np.ndarray, volume: np.ndarray | None = None) -> None:
         """Loads are those of this state, and of packs in rooms of this volume (n,), None: as they are, from now on."""
-        self.flow.state[:] = state[self.held_rows]
+        self.flow.show(state[self.held_rows], self.conditions)
         if self.packs is not None and self.flow.slurry is not None:
             self.flow.slurry.show(self.packs(self.volume if volume is None else volume)[0, self.held_rows])
 
@@ -351,13 +358,14 @@ class Fluid:
         own = [Pieces(one.key[mine], one.node[mine], one.stiffness[mine]) for one in self._own_pieces(now, u, first)]
         made = [
             self._channel_pieces(step, now, u, x, first, mine), *own,
-            *self._face_pieces(self._rises(u, now)[0], x, first + self.first),
+            *self._face_pieces(self._rises(u, now)[0], x, first + self.first, len(self.face_key)),
         ]  # fmt: skip
         if now.slow is not None:
             made.append(self._turbulent_pieces(step, now, u, first, mine))
         if now.packs is not None:
             packs = first + self.n + np.arange(self.n)
-            made += [*self._pack_pieces(now, x, packs, mine), *self._face_pieces(np.ones(self.n), x, packs)]
+            made += self._pack_pieces(now, x, packs, mine)
+            made += self._face_pieces(np.ones(self.n), x, packs, self.of_channels)
         return made
 
     def _pack_pieces(self, now: Balance, x: np.ndarray, packs: np.ndarray, mine: slice) -> list[Pieces]:
@@ -471,19 +479,23 @@ class Fluid:
         out[:, ::dim, ::dim] = values
         return Pieces(self.channels[mine], first + self.first[nodes], out)
 
-    def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, variable: np.ndarray) -> list[Pieces]:
-        """Of the forces on faces by variables at their ends: kernels.loads, and in space those on sides of hexahedra.
-        p_u (n,): derivatives of pressures by them; variable (n,): their "nodes"."""
-        at, dim = x[self.face_at], self.dim
+    def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, variable: np.ndarray, count: int) -> list[Pieces]:
+        """Of the forces on the first `count` faces by variables at their ends: kernels.loads, and in space those on
+        sides of hexahedra. p_u (n,): derivatives of pressures by them; variable (n,): their "nodes"."""
+        if len(self.shore_node):  # there pressures follow the lowest node of a well, or nothing that is unknown
+            shore = self.flow.state[len(self.held_rows) :, kernels.P]
+            p_u = np.append(p_u, np.where((self.shore_node >= 0) & (shore > 0.0), p_u[self.shore_node], 0.0))
+            variable = np.append(variable, variable[np.maximum(self.shore_node, 0)])
+        at, dim = x[self.face_at[:count]], self.dim
         way = at[:, 1:] - at[:, :1]
         if dim == 2:
             normal = np.column_stack([way[:, 0, 1], -way[:, 0, 0]]) / 6.0
         else:
             normal = np.cross(way[:, 0], way[:, 1]) / 24.0
-        weight = (1.0 + np.eye(dim)) * p_u[self.face_node][:, None]
+        weight = (1.0 + np.eye(dim)) * p_u[self.face_node[:count]][:, None]
         if dim == 2:
-            return [self._pushed(slice(None), weight, normal, self.face_at, variable)]
-        half, fourth, g, e = self.on_sides
+            return [self._pushed(slice(count), weight, normal, self.face_at[:count], variable)]
+        half, fourth, g, e = (one[self.on_sides[0] < count] for one in self.on_sides)
         rest = np.delete(np.arange(len(at)), half)
         share = np.concatenate([weight[half], np.zeros((len(half), 1, dim))], axis=1)
         share -= g[:, :, None] * (e[:, :, None] * weight[half]).sum(axis=1)[:, None]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -20,13 +20,12 @@ from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.halo.copies import Copies, moved
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import said
-from hpcdem.physics.fdem.connectivity import corner_counts
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, JOINT
 from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow import account, kernels, kernels_space
-from hpcdem.physics.flow.network import LINKS, Network, at_nodes, links_of, wet_faces
+from hpcdem.physics.flow.network import LINKS, Network, around, at_nodes, faces_of, links_of, sides_and_free
 from hpcdem.physics.flow.properties import FLUID, POROUS
 from hpcdem.physics.flow.wells import PRESSURE as HELD
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
@@ -39,11 +38,15 @@ LOOK = 100
 """Cycles of flow after which an estimated sub-step is estimated again."""
 SAFETY = 0.8
 """Part of half the stability limit that an estimated sub-step may be when blocks move."""
+FAR = 2.0
+"""Times the stability limit: where a sub-step is longer any full node that nothing holds overshoots ever further."""
 MANY = 100_000
 """Sub-steps in a cycle that are too many to be meant."""
 _PROPERTIES = tuple(one.name for one in POROUS.properties)
 _COLUMNS = ("fluid", "volume", "given", "leaked", "removed", "inflow", "pressure", "saturation")
 """Of nodes, as they are saved: kernels.W .. INFLOW, then P and S."""
+BY_CONDITION, BY_WELL = 1, 2
+"""Bits of what says that water stands before a face, should it be free."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,23 @@ QUANTITIES = {FLOW_NODE: NODE_QUANTITIES, CHANNEL: CHANNEL_QUANTITIES}
 """What can be asked of flow nodes and channels: unit and meaning."""
 
 
+@dataclass
+class Shore:
+    """Corners of wet free faces at which no channel ends: what is said of them gives the pressure there.
+
+    at (k,): where they begin in x, flat; row (k,): of the conditions; node (k,): points of the mesh, the lowest flow
+    node of their well, -1: they belong to none; ref (k,): its row in the state.
+    """
+
+    at: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    row: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    node: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    ref: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+
 class Slurry(Protocol):
     """What grains in the fluid do to it; rows of nodes and channels are those of the flow. values: their properties."""
 
@@ -115,8 +135,9 @@ class Flow(SurfaceLoad):
     ranks, for what makes no sense.
 
     row (4 ne,): of the table of properties, by joint, 0: no channel; since (4 ne,): flow time at which leak-off began
-    [s], inf: it has not; condition (np,): row of the conditions. number (n,): flow nodes owned here, ascending;
-    nodes (n, kernels.NODE): what they hold; state (n + copies, kernels.STATE), held (n + copies,): numbers of its rows.
+    [s], inf: it has not; condition (np,): row of the conditions; said_wet (4 ne,): bits, see `BY_CONDITION`. number
+    (n,): flow nodes owned here, ascending; nodes (n, kernels.NODE): what they hold; held (n + copies,): numbers of the
+    first rows of state (n + copies + shore, kernels.STATE).
     """
 
     name: ClassVar[str] = "fluid"
@@ -129,6 +150,7 @@ class Flow(SurfaceLoad):
         self.row = np.zeros(mesh.cells.size, np.int32)
         self.since = np.full(mesh.cells.size, math.inf)
         self.condition = np.zeros(len(mesh.points), np.int32)
+        self.said_wet = np.zeros(mesh.cells.size, np.int8)
         self.rows: list[tuple[float, ...]] = []
         self._fluid: dict[str, float] = {}
         self.conditions: list[Condition] = [Condition()]
@@ -147,8 +169,13 @@ class Flow(SurfaceLoad):
         self._network: Network | None = None
         self._reshaped = False
         self._found_for: list[float] = []
+        self._checked = False
+        """The length of a sub-step that was said is one that can be."""
         self._copies: Copies | None = None
         self.held = np.empty(0, np.int64)
+        self.shore = Shore()
+        self.frozen = False
+        """Blocks have moved since flow was switched off: fluid that the pressures of now need is to be given."""
         self.more: dict[str, Callable[[], np.ndarray]] = {}
         """By name quantities (n,) of this rank's flow nodes that other physics keep."""
         self.slurry: Slurry | None = None
@@ -161,6 +188,11 @@ class Flow(SurfaceLoad):
         self._leaked_before = np.empty(0)
         """Volumes [m2] that flowed along the channels of this rank in the last cycle; None: nobody asks."""
         self._told: tuple[float, float] = (0.0, 0.0)
+        self._told_wet = ""
+        self._wet, self._wet_rows = np.empty(0, np.int64), np.empty((0, blocks.dim), np.int64)
+        """Wet free faces of this rank, and rows of the state at their corners."""
+        self._loads: list[tuple[np.ndarray, ...]] = []
+        """What kernels take of sides of channels, and of those."""
 
     @property
     def stays(self) -> bool:
@@ -210,8 +242,11 @@ class Flow(SurfaceLoad):
         blocks.changed()
 
     def prescribe(self, nodes: np.ndarray | None, does: int, value: Number) -> None:
-        """What holds at flow nodes among these points (None: all) from now on, see `Condition`."""
+        """What holds at flow nodes among these points (None: all) from now on, see `Condition`. A pressure or a level
+        wets free faces all of whose corners are among the points; without points it is said of joints alone."""
         at = self.flow_nodes(nodes)
+        said_at = np.flatnonzero(self.condition) if nodes is None else self.blocks.numbers_of_nodes(nodes)
+        beside = said_at[~self.network.there[said_at]]
         for well in self.wells:
             both = np.intersect1d(well.points, at)
             if len(both):
@@ -223,8 +258,17 @@ class Flow(SurfaceLoad):
         wanted = Condition(does, value)
         if wanted not in self.conditions:
             self.conditions.append(wanted)
-        self.condition[at] = self.conditions.index(wanted)
+        row = self.conditions.index(wanted)
+        self.condition[at], self.condition[beside] = row, 0 if does == kernels.RATE else row
+        if does == kernels.RATE:
+            self._dry(np.union1d(at, beside))
+        elif nodes is not None:
+            self.said_wet[around(self.blocks.the_mesh(), said_at)[0]] |= BY_CONDITION
         self.blocks.changed(stiffness=False)
+
+    def _dry(self, points: np.ndarray) -> None:
+        """No condition says any more that water stands before faces with a corner among these points."""
+        self.said_wet[around(self.blocks.the_mesh(), points)[1]] &= ~BY_CONDITION
 
     def drill(self, name: str, nodes: np.ndarray | None) -> None:
         """Flow nodes among these points (None: all) are a well."""
@@ -242,7 +286,13 @@ class Flow(SurfaceLoad):
         if len(held):
             raise CommandError(f"node {held[0]} of well '{name}' has a condition: node boundary remove comes first")
         self.blocks.before_change()
-        self.wells.append(Well(name, at))
+        wall = at[:0]
+        if nodes is not None:
+            asked = self.blocks.numbers_of_nodes(nodes)
+            wall = np.setdiff1d(asked, at)
+            self.said_wet[around(self.blocks.the_mesh(), asked)[0]] |= BY_WELL
+        self.condition[wall] = 0
+        self.wells.append(Well(name, at, wall=wall))
         self.blocks.changed(stiffness=False)
 
     def well(self, name: str) -> Well:
@@ -278,6 +328,10 @@ class Flow(SurfaceLoad):
         """Take back what is prescribed at these points (None: all)."""
         self.blocks.before_change()
         self.condition[slice(None) if nodes is None else nodes] = 0
+        if nodes is None:
+            self.said_wet &= ~BY_CONDITION
+        else:
+            self._dry(nodes)
         self.blocks.changed(stiffness=False)
 
     def fill(self, nodes: np.ndarray | None, pressure: float | None = None, saturation: float | None = None) -> None:
@@ -299,6 +353,7 @@ class Flow(SurfaceLoad):
         self.nodes[mine, kernels.W] = w
         self._find_state(mine)
         self._refresh()
+        self.find_shore()
         if self.slurry is not None:
             self.slurry.filled()
 
@@ -312,7 +367,10 @@ class Flow(SurfaceLoad):
         if not len(found):
             raise CommandError(f"no channel ends at node {asked[0]}" + " nor at the others" * (len(asked) > 1))
         if len(found) < len(asked) and self.blocks.log is not None:
-            self.blocks.log.info(f"no channel ends at {len(asked) - len(found)} of the {len(asked)} nodes: left out")
+            self.blocks.log.info(
+                f"no channel ends at {len(asked) - len(found)} of the {len(asked)} nodes: what is said of them counts "
+                "for free faces alone"
+            )
         return found
 
     def uses_table(self, name: str) -> bool:
@@ -352,6 +410,9 @@ class Flow(SurfaceLoad):
         """Columns of this rank's flow nodes or channels (those on whose lower face its elements lie), with their
         "number"."""
         self.blocks.close_model()
+        if self.frozen:
+            self.find_geometry()
+            self._find_volumes()
         if kind == FLOW_NODE:
             made = {
                 "number": self.number, "pressure": self.state[: len(self.number), kernels.P],
@@ -382,11 +443,12 @@ class Flow(SurfaceLoad):
         own = self.more[name]() if name in self.more else np.full(self.owned, math.nan)
         out = np.append(own, np.full(len(self.held) - len(own), math.nan))
         if copies and self._copies is not None:
-            kept = self.state[:, kernels.P].copy()
-            self.state[:, kernels.P] = out
+            column = self.state[: len(out), kernels.P]
+            kept = column.copy()
+            column[:] = out
             self._copies.refresh()
-            out = self.state[:, kernels.P].copy()
-            self.state[:, kernels.P] = kept
+            out = column.copy()
+            column[:] = kept
         return out
 
     def places_of(self, channels: np.ndarray) -> np.ndarray:
@@ -500,25 +562,69 @@ class Flow(SurfaceLoad):
 
     @property
     def pushes(self) -> bool:
-        return self._on and not self.blocks.options.one_way
+        """Fluid loads blocks, also where it does not flow at present."""
+        return len(self.network.channels) > 0 and not self.blocks.options.one_way
 
-    def wet(self) -> np.ndarray:
-        """Faces of owned elements that fluid pushes on, ascending."""
+    def pushed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Faces of owned elements that fluid pushes on, ascending: sides of channels, and wet free faces."""
+        sides, free = self._sides_and_free()
+        return sides, free[self._is_wet(free)]
+
+    def _is_wet(self, free: np.ndarray) -> np.ndarray:
+        """Free faces (k,) before which water is said to stand, and on which no stress is prescribed."""
+        return (self.said_wet[free] > 0) & ~self.blocks.stressed(free)
+
+    def _sides_and_free(self) -> tuple[np.ndarray, np.ndarray]:
+        """Faces of owned elements, ascending: sides of channels, and free ones."""
         blocks, mesh = self.blocks, self.blocks.the_mesh()
-        number = np.sort(blocks.number[blocks.owned])
-        faces = (4 * number[:, None] + np.arange(4))[np.arange(4) < corner_counts(mesh.cells[number])[:, None]]
+        faces = faces_of(mesh, np.sort(blocks.number[blocks.owned]))
         channel = np.zeros(mesh.cells.size, bool)
         channel[self.network.channels] = True
         closed, again = blocks.closed_faces(), np.flatnonzero(blocks.broken > 1)
         if len(again):  # free faces but for the static solve, see physics/fdem/pressed.py
             closed = closed.copy()
             closed[again] = closed[blocks.partner[again]] = False
-        return wet_faces(mesh, blocks.partner, faces, closed, channel, self.network.there)
+        return sides_and_free(blocks.partner, faces, closed, channel)
+
+    def wet_faces(self) -> dict[str, np.ndarray]:
+        """Free faces that fluid pushes on, on all ranks: number, element * 4 + face, ascending, size [m], in space
+        [m2], and mean pressure of their corners [Pa]."""
+        self.blocks.close_model()
+        faces, mean = self._wet, self.state[self._wet_rows, kernels.P].mean(axis=1)
+        comm = self.blocks.comm
+        parts = comm.allgather((faces, mean)) if comm.size > 1 else [(faces, mean)]
+        faces, mean = (np.concatenate(column) for column in zip(*parts, strict=True))
+        order = np.argsort(faces)
+        faces, mean = faces[order], mean[order]
+        return {"number": faces, "size": self.blocks.the_mesh().face_sizes(faces), "pressure": mean}
+
+    def _tell_wet(self, free: np.ndarray) -> None:
+        """A word in the log about the free faces (k,) of this rank where they are others than before. Collective."""
+        blocks, mesh = self.blocks, self.blocks.the_mesh()
+        said_wet, stressed = self.said_wet[free] > 0, blocks.stressed(free)
+        between = self.network.there[mesh.face_points(free)].all(axis=1)
+        kinds = said_wet & ~stressed, said_wet & stressed, between & ~said_wet & ~stressed
+        wet, total, dry = blocks.comm.sum_into(np.array([kind.sum() for kind in kinds], np.int64)).tolist()
+        told = []
+        if wet:
+            told.append(f"water stands before {wet} free faces, as conditions and wells say, and pushes on them")
+        if total:
+            told.append(f"{total} with water have a prescribed stress, which is all that acts there")
+        if dry:
+            told.append(
+                f"{dry} free faces between flow nodes are dry, as nothing says that water stands before them: node "
+                "boundary hydraulic-constant-flow-boundary pressure or flow-surface, or well create, whose range holds "
+                "their nodes"
+            )
+        text = "; ".join(told)
+        if blocks.log is not None and text != self._told_wet:
+            blocks.log.info(f"flow: {text or 'no free face is wet any more'}")
+        self._told_wet = text
 
     def corners(self, blocks: Any) -> np.ndarray:
         out = np.zeros((blocks.n_own, 4), bool)
         if self.pushes:
-            mesh, faces = blocks.the_mesh(), self.wet()
+            mesh, faces = blocks.the_mesh(), np.concatenate(self.pushed())
             for corner in (mesh.face_corners(faces), mesh.on_sides(faces)[1]):
                 out[blocks.where[corner // 4] - blocks.n_left, corner % 4] = True
         return out
@@ -526,16 +632,14 @@ class Flow(SurfaceLoad):
     def springs(self, blocks: Any) -> np.ndarray | None:
         """A channel that cannot drain is as stiff as its fluid: K / aperture, in each step. By the aperture without
         opening and the length in the mesh: where things are must not count, as a restart finds masses again."""
-        if not self.pushes or blocks.options.flow_every > 1:
+        if not self.pushes or not self._on or blocks.options.flow_every > 1:
             return None
         return self.springs_of(blocks, self.fluid("fluid_bulk"))
 
     def springs_of(self, blocks: Any, modulus: float) -> np.ndarray:
         """Stiffness (n_own, 4) that what fills the channels brings to corners, by its modulus [Pa]."""
-        faces, mesh = self.wet(), self.blocks.the_mesh()
-        lower = np.minimum(faces, np.where(blocks.partner[faces] >= 0, blocks.partner[faces], faces))
-        there = (self.row[lower] > 0) & blocks.joint_exists()[lower]
-        faces, laws = faces[there], self.laws()[self.row[lower[there]] - 1]
+        faces, mesh = self._sides_and_free()[0], self.blocks.the_mesh()
+        laws = self.laws()[self.row[np.minimum(faces, blocks.partner[faces])] - 1]
         delta = np.clip(laws[:, kernels.INITIAL], laws[:, kernels.LEAST], laws[:, kernels.MOST])
         each = modulus / mesh.dim * mesh.face_sizes(faces) / delta
         out = np.zeros((blocks.n_own, 4))
@@ -614,6 +718,7 @@ class Flow(SurfaceLoad):
         blocks, network, comm = self.blocks, self.network, self.blocks.comm
         if not len(network.channels):
             self._forget_nodes(np.ones(len(self.number), bool))
+            self._wet, self._wet_rows = self._wet[:0], self._wet_rows[:0]
             return
         points, mesh = len(network.there), blocks.the_mesh()
         leads = blocks.local.leads[network.nodes]
@@ -624,9 +729,15 @@ class Flow(SurfaceLoad):
         beside = (at >= blocks.owned.start) & (at < blocks.owned.stop)
         self._channels = network.channels[np.isin(network.corners, mine).any(axis=1) | beside]
         corners = mesh.face_points(self._channels)
-        self._pushed = self.wet() if self.pushes else np.empty(0, np.int64)
-        loaded = mesh.face_points(self._pushed)
-        wanted = np.setdiff1d(np.concatenate([corners.reshape(-1), loaded.reshape(-1)]), mine)
+        sides = self._wet = np.empty(0, np.int64)
+        if self.pushes:
+            sides, free = self._sides_and_free()
+            self._wet = free[self._is_wet(free)]
+            self._tell_wet(free)
+        self.shore, beyond = self._shore_of(np.concatenate([sides, self._wet]))
+        loaded = mesh.face_points(np.concatenate([sides, self._wet]))
+        of_loads = loaded.reshape(-1)[~beyond], self.shore.node[self.shore.node >= 0]
+        wanted = np.setdiff1d(np.concatenate([corners.reshape(-1), *of_loads]), mine)
         self._forget_nodes(~network.there[self.number])
         n = len(self.number)
         had = np.column_stack([self.nodes, self.state[:n, : kernels.E]])
@@ -634,7 +745,8 @@ class Flow(SurfaceLoad):
         order = np.lexsort((wanted, owner))
         wanted, owner = wanted[order], owner[order]
         self.number, self.nodes = mine, np.ascontiguousarray(rows[:, : kernels.NODE])
-        self.state = np.zeros((len(mine) + len(wanted), kernels.STATE))
+        count = len(mine) + len(wanted)
+        self.state = np.zeros((count + len(self.shore), kernels.STATE))
         self.state[: len(mine), : kernels.E] = rows[:, kernels.NODE :]
         if self._copies is not None:
             self._copies.close()
@@ -647,9 +759,13 @@ class Flow(SurfaceLoad):
         self._begin, self._channel, self._side = at_nodes(self._ends, len(mine))
         self._lead = row * blocks.x.shape[1] + blocks.local.stride * (leads % 4)
         self._q, self._lost_fluid = np.zeros(len(ends)), np.zeros(len(ends))
-        self._sums = np.zeros((2, len(self.state)))
+        self._sums = np.zeros((2, count))
         self.note_leaks()
-        self._bind_loads(loaded, local)
+        self.shore.ref = np.where(self.shore.node >= 0, local[self.shore.node], -1)
+        at = local[loaded]
+        at.reshape(-1)[beyond] = count + np.arange(len(self.shore))
+        self._wet_rows = at[len(sides) :]
+        self._loads = [self._bound(sides, at[: len(sides)]), self._bound(self._wet, self._wet_rows)]
         self._sides, self._law, lost = self._sides_of(self._channels)
         self._law_table = self.laws()
         self._table, self._flowing = (np.empty((len(ends), kernels.CHANNEL)) for _ in range(2))
@@ -666,7 +782,8 @@ class Flow(SurfaceLoad):
         self._shrink()
         self._take_heights()
         self._copies.refresh()
-        self._reshaped = False
+        self.find_shore()
+        self._reshaped = self._checked = False
         if self._found_for != self._given():
             self._find_step()
         if not blocks.options.mechanical:
@@ -690,7 +807,10 @@ class Flow(SurfaceLoad):
         before = self.nodes[:, kernels.V].copy()
         self._find_volumes()
         self.kept = np.ones(len(self.number))
-        if self._reshaped:
+        if self.frozen and (self._on or self._reshaped):
+            self._keep_pressures()
+            self.frozen = not self._on
+        elif self._reshaped:
             less = np.flatnonzero((self.nodes[:, kernels.V] < before) & (before > 0.0))
             self.kept[less] = self.nodes[less, kernels.V] / before[less]
             w = self.nodes[less, kernels.W] * self.kept[less]
@@ -730,19 +850,57 @@ class Flow(SurfaceLoad):
         if self._copies is not None:
             self._copies.refresh()
 
-    def _bind_loads(self, loaded: np.ndarray, local: np.ndarray) -> None:
-        blocks, faces = self.blocks, self._pushed
-        corner, of = blocks.the_mesh().face_corners(faces), blocks.local
-        row, k = blocks.where[corner // 4], corner % 4
-        self._push_edge = np.ascontiguousarray((row * blocks.x.shape[1] + of.stride * k)[:, 0])
-        self._push_corner = of.force_width * row + of.stride * k
-        self._push_node = local[loaded]
-        if blocks.dim == 3:
-            at, fourth, *weights = blocks.the_mesh().on_sides(faces)
-            last = of.force_width * blocks.where[fourth // 4] + of.stride * (fourth % 4)
-            self._on_sides = np.column_stack([self._push_corner[at], last]), self._push_node[at], *weights
-            rest = np.delete(np.arange(len(faces)), at)
-            self._push_corner, self._push_node = self._push_corner[rest], self._push_node[rest]
+    def _begins(self, corner: np.ndarray) -> np.ndarray:
+        """Where corners, element * 4 + k, begin in x, flat."""
+        return self.blocks.where[corner // 4] * self.blocks.x.shape[1] + self.blocks.local.stride * (corner % 4)
+
+    def _shore_of(self, faces: np.ndarray) -> tuple[Shore, np.ndarray]:
+        """Of faces (m,) that fluid pushes on; and which of all their corners belong to it, flat, bool. Rows of the
+        state come with `storage_rebuilt`."""
+        network, mesh, o = self.network, self.blocks.the_mesh(), self.blocks.options
+        points, corner = (of.reshape(-1) for of in (mesh.face_points(faces), mesh.face_corners(faces)))
+        beyond = ~network.there[points]
+        points, corner = points[beyond], corner[beyond]
+        row = self.condition[points].astype(np.int64)
+        node = np.full(len(points), -1, np.int64)
+        down = np.array([o.gx, o.gy, o.gz][: mesh.dim])
+        for well in self.wells:
+            at = well.points[network.there[well.points]]
+            mine = (node < 0) & (row == 0) & np.isin(points, well.wall)
+            if len(at) and mine.any():
+                node[mine] = at[np.argmax(mesh.points[at] @ down)]
+        return Shore(self._begins(corner), row, node, np.full(len(points), -1, np.int64)), beyond
+
+    def find_shore(self, conditions: np.ndarray | None = None) -> None:
+        """Pressures at the shore where it is now, by a table of conditions (None: that of now). Not collective."""
+        shore = self.shore
+        if not len(shore):
+            return
+        flat, rho = self.blocks.x.reshape(-1), self.fluid("fluid_density")
+        energy = -rho * sum(g * flat[shore.at + k] for k, g in enumerate(self._gravity()))
+        does, value = (self.conditions_at(self.time) if conditions is None else conditions)[shore.row].T
+        p = np.where(does == kernels.SURFACE, np.maximum(value - energy, 0.0), value)
+        of_well = np.flatnonzero(shore.ref >= 0)
+        lowest = self.state[shore.ref[of_well]]
+        head = lowest[:, kernels.P] + lowest[:, kernels.E]
+        p[of_well] = np.where(lowest[:, kernels.P] > 0.0, np.maximum(head - energy[of_well], 0.0), 0.0)
+        self.state[len(self.held) :, kernels.P] = p
+
+    def show(self, rows: np.ndarray | float, conditions: np.ndarray | None = None) -> None:
+        """The state of the nodes held here is this; that of the shore follows. Not collective."""
+        self.state[: len(self.held)] = rows
+        self.find_shore(conditions)
+
+    def _bound(self, faces: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What the kernels of loads take of these faces (m,), with the rows of the state at their corners (m, dim)."""
+        corner, of, blocks = self.blocks.the_mesh().face_corners(faces), self.blocks.local, self.blocks
+        at = of.force_width * blocks.where[corner // 4] + of.stride * (corner % 4)
+        if blocks.dim == 2:
+            return np.ascontiguousarray(self._begins(corner)[:, 0]), at, nodes
+        half, fourth, *weights = blocks.the_mesh().on_sides(faces)
+        last = of.force_width * blocks.where[fourth // 4] + of.stride * (fourth % 4)
+        rest = np.delete(np.arange(len(faces)), half)
+        return at[rest], nodes[rest], np.column_stack([at[half], last]), nodes[half], *weights
 
     def note_leaks(self, broken: np.ndarray | None = None) -> None:
         """Leak-off begins where a joint is open, or among these that broke, and has it. Not collective."""
@@ -793,7 +951,7 @@ class Flow(SurfaceLoad):
     def _find_step(self) -> None:
         """Sub-steps of a cycle and their length, from what was said and what is stable."""
         blocks, o, limit = self.blocks, self.blocks.options, self.limit()
-        self._found_for = self._given()
+        self._found_for, self._checked = self._given(), False
         period = 0.0 if not o.mechanical or not o.dynamic else o.flow_every * blocks.clock.dt
         if o.flow_dt > 0.0:
             self.sub_steps, self.dt = max(1, o.flow_steps), o.flow_dt
@@ -836,6 +994,33 @@ class Flow(SurfaceLoad):
         if surface and not any(self._gravity()):
             raise CommandError("flow-surface needs gravity: model gravity comes first")
         self.check_wells()
+        if not self._checked and (o.flow_dt > 0.0 or o.flow_steps > 0):
+            self._refuse_far()
+            self._checked = True
+
+    def _refuse_far(self) -> None:
+        """CommandError for a sub-step with which the flow would certainly blow up. Collective."""
+        if not self.dt > FAR * 2.0 * self.limit():
+            return
+        n = self.owned
+        rise = np.abs(np.diff(self.state[self._ends, kernels.E], axis=1)[:, 0]) * self._table[:, kernels.WEIGHT]
+        each = np.abs(self._table[:, kernels.CONDUCT]) * (self.fluid("fluid_bulk") + kernels.STEEPEST * rise)
+        rate = sum(np.bincount(ends, each, len(self.state))[:n] for ends in self._ends.T)
+        does = np.array([one.does for one in self.conditions])[self.condition[self.number]]
+        held = np.isin(does, (kernels.PRESSURE, kernels.SURFACE))
+        held |= np.isin(self.number, np.concatenate([self.number[:0], *(well.points for well in self.wells)]))
+        stable = np.divide(self.nodes[:, kernels.V], rate, out=np.full(n, math.inf), where=(rate > 0.0) & ~held)
+        least = stable.min(initial=math.inf)
+        least = float(self.blocks.comm.min_into(np.array([least]))[0])
+        if self.dt > FAR * least:
+            said_by = "time-step" if self.blocks.options.flow_dt > 0.0 else "sub-step"
+            first = self.number[stable == least].min(initial=len(self.condition))
+            first = int(self.blocks.comm.min_into(np.array([first], np.int64))[0])
+            raise CommandError(
+                f"model {said_by} hydraulic: sub-steps of {self.dt:.4g} s are {self.dt / least:.3g} times what is "
+                f"stable at flow node {first}, {least:.4g} s, and the flow would blow up: make them shorter, or use "
+                "model solve hydraulic, which takes implicit steps"
+            )
 
     def check_wells(self) -> None:
         """CommandError for one that would pump into nothing."""
@@ -847,6 +1032,7 @@ class Flow(SurfaceLoad):
         """Flow for as long as the step that the elements have moved by."""
         blocks, o = self.blocks, self.blocks.options
         if not self._on:
+            self.frozen |= blocks.options.mechanical and len(self.network.channels) > 0
             return
         self.waited += 1
         if o.mechanical and self.waited < o.flow_every:
@@ -867,6 +1053,7 @@ class Flow(SurfaceLoad):
             condition = self.condition[self.number]
             for _ in range(self.sub_steps):
                 self._sub_step(condition)
+            self.find_shore()
             self.cycles += 1
         if self.cycles % LOOK == 0:
             self._check()
@@ -931,6 +1118,8 @@ class Flow(SurfaceLoad):
         room = np.zeros((3, len(at)))
         room[:2, mine], room[2, mine] = self.nodes[row, : kernels.V + 1].T, self.state[row, kernels.E]
         room = self.blocks.comm.sum_into(room)
+        if not np.isfinite(room).all():
+            raise self._blown_up(int(at[~np.isfinite(room).all(axis=0)][0]))
         after, bulk = np.empty(len(at)), self.fluid("fluid_bulk")
         value_at = partial(said.now, self.blocks.tables)
         ends = np.cumsum([len(one) for one in points])
@@ -982,33 +1171,42 @@ class Flow(SurfaceLoad):
         comm = self.blocks.comm
         first = int(comm.min_into(np.array([self.number[bad].min(initial=len(self.condition))], np.int64))[0])
         if first < len(self.condition):
-            raise PhysicsError(
-                f"step {self.blocks.clock.step}: the fluid at flow node {first} is not finite; the hydraulic time step "
-                f"{self.dt:g} s is probably too large (stable: {2.0 * self.limit():g} s)"
-            )
+            raise self._blown_up(first)
+
+    def _blown_up(self, node: int) -> PhysicsError:
+        """What is raised where the fluid of a node is not finite. Collective."""
+        return PhysicsError(
+            f"step {self.blocks.clock.step}: the fluid at flow node {node} is not finite; the hydraulic time step "
+            f"{self.dt:g} s is probably too large (stable: {2.0 * self.limit():g} s)"
+        )
 
     # ---- forces --------------------------------------------------------------------------------------------------
 
     def add_to(self, applied: np.ndarray) -> None:
         self.push(self.state, kernels.P, applied)
 
-    def push(self, state: np.ndarray, column: int, applied: np.ndarray) -> None:
-        """Add a pressure on faces to what is applied to corners: a column of rows like those of `state`, copies too.
-        Not collective."""
+    def push(self, state: np.ndarray, column: int, applied: np.ndarray, free: bool = True) -> None:
+        """Add a pressure on sides of channels, and on wet free faces if asked, to what is applied to corners: a column
+        of rows like those of `state`, copies too. Not collective."""
         if not self.pushes:
             return
-        at = self._push_corner, self._push_node, self.blocks.x, state, column, applied
-        if self.blocks.dim == 2:
-            kernels.loads(self._push_edge, *at)
-        else:
-            kernels_space.loads(*at)
-            corner, nodes, g, e = self._on_sides
-            kernels_space.loads_on_sides(corner, nodes, g, e, *at[2:])
+        at = self.blocks.x, state, column, applied
+        for of in self._loads if free else self._loads[:1]:
+            if self.blocks.dim == 2:
+                edge, corner, nodes = of
+                kernels.loads(edge, corner, nodes, *at)
+            else:
+                corner, nodes, on_sides, nodes_there, g, e = of
+                kernels_space.loads(corner, nodes, *at)
+                kernels_space.loads_on_sides(on_sides, nodes_there, g, e, *at)
 
     def balanced(self) -> None:
-        """Pressures and saturations are those of before: fluid that this takes is given, what has no room left goes."""
-        if not self.pushes:
+        if self._on and not self.pushes:
             return
+        self._keep_pressures()
+
+    def _keep_pressures(self) -> None:
+        """Pressures and saturations are those of before: fluid that this takes is given, what has no room left goes."""
         p, s = self.state[: self.owned, kernels.P], self.state[: self.owned, kernels.S]
         w = self.nodes[:, kernels.V] * (s + p / self.fluid("fluid_bulk"))
         self.nodes[:, kernels.GIVEN] += w - self.nodes[:, kernels.W]
@@ -1024,16 +1222,18 @@ class Flow(SurfaceLoad):
             "cycles": self.cycles, "waited": self.waited, "sub_steps": self.sub_steps, "dt": self.dt,
             "implicit_dt": self.implicit_dt, "since_peak": self.since_peak, "passed": self.passed,
             "reshaped": self._reshaped, "found_for": self._found_for, "wells": [well.saved() for well in self.wells],
-            "energy": self.energy,
+            "energy": self.energy, "frozen": self.frozen,
         }  # fmt: skip
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
-        """Channels with their properties, and prescribed nodes, of all ranks."""
+        """Channels with their properties, prescribed nodes, and faces said to be wet, of all ranks."""
         channels, points = np.flatnonzero(self.row), np.flatnonzero(self.condition)
+        faces = np.flatnonzero(self.said_wet)
         return {
             "flow_channels": {"number": channels, "row": self.row[channels].astype(np.int64),
                               "since": self.since[channels]},
             "flow_conditions": {"number": points, "row": self.condition[points].astype(np.int64)},
+            "flow_wet": {"number": faces, "said": self.said_wet[faces].astype(np.int64)},
         }  # fmt: skip
 
     def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
@@ -1041,6 +1241,15 @@ class Flow(SurfaceLoad):
         held = [*self.nodes.T, *self.state[: len(self.number), : kernels.E].T]
         columns = {name: np.ascontiguousarray(values) for name, values in zip(_COLUMNS, held)}
         return {"flow_nodes": {"number": self.number, **columns}}
+
+    def _wet_of_before(self) -> None:
+        """Checkpoints that do not say which faces are wet: those whose nodes all have a pressure or a level, or are of
+        one well."""
+        does = np.array([one.does for one in self.conditions])[self.condition]
+        held = np.isin(does, (kernels.PRESSURE, kernels.SURFACE))
+        self.said_wet[around(self.blocks.the_mesh(), np.flatnonzero(held))[0]] |= BY_CONDITION
+        for well in self.wells:
+            self.said_wet[around(self.blocks.the_mesh(), well.points)[0]] |= BY_WELL
 
     @staticmethod
     def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
@@ -1062,6 +1271,11 @@ class Flow(SurfaceLoad):
         channels, points, nodes = (tables[f"flow_{name}"] for name in ("channels", "conditions", "nodes"))
         made.row[channels["number"]], made.since[channels["number"]] = channels["row"], channels["since"]
         made.condition[points["number"]] = points["row"]
+        if "flow_wet" in tables:
+            made.said_wet[tables["flow_wet"]["number"]] = tables["flow_wet"]["said"]
+        else:
+            made._wet_of_before()
+        made.frozen = state.get("frozen", False)
         made.number = nodes["number"].astype(np.int64)
         held = np.column_stack([nodes[name] for name in _COLUMNS])
         made.nodes = np.ascontiguousarray(held[:, : kernels.NODE])

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpcdem.physics.fdem.connectivity import corner_counts
 from hpcdem.physics.fdem.mesh import Mesh
 
 LINKS = {2: 1, 3: 3}
@@ -80,20 +81,29 @@ def path(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     return np.array(order), np.array(points)
 
 
-def wet_faces(
-    mesh: Mesh,
-    partner: np.ndarray,
-    faces: np.ndarray,
-    closed: np.ndarray,
-    channel: np.ndarray,
-    there: np.ndarray,
-) -> np.ndarray:
-    """Those of these faces (k,) that fluid pushes on: sides of channels, and free faces between flow nodes.
+def faces_of(mesh: Mesh, elements: np.ndarray) -> np.ndarray:
+    """All faces of these elements (n,), in their order."""
+    faces = 4 * elements[:, None] + np.arange(4)
+    return faces[np.arange(4) < corner_counts(mesh.cells[elements])[:, None]]
 
-    closed (4 ne,) bool: faces that hang together with their partner; channel (4 ne,) bool: lower faces of channels;
-    there (np,) bool: points that are flow nodes.
+
+def around(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Faces whose corners all are among these points, and those of which some corner is; ascending."""
+    member = np.zeros(len(mesh.points), bool)
+    member[points] = True
+    beside = ((mesh.cells >= 0) & member[mesh.cells]).any(axis=1)
+    faces = faces_of(mesh, np.flatnonzero(beside))
+    inside = member[mesh.face_points(faces)]
+    return faces[inside.all(axis=1)], faces[inside.any(axis=1)]
+
+
+def sides_and_free(
+    partner: np.ndarray, faces: np.ndarray, closed: np.ndarray, channel: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Those of these faces (k,) that are sides of channels, and the free ones among the others.
+
+    closed (4 ne,) bool: faces that hang together with their partner; channel (4 ne,) bool: lower faces of channels.
     """
     other = partner[faces]
     is_channel = channel[np.where(other >= 0, np.minimum(faces, other), faces)]
-    between = there[mesh.face_points(faces)].all(axis=1)
-    return faces[is_channel | (between & ~closed[faces])]
+    return faces[is_channel], faces[~is_channel & ~closed[faces]]

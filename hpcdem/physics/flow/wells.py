@@ -51,7 +51,8 @@ class Asked:
 
 @dataclass
 class Well:
-    """points (n,): of the mesh, ascending; see `QUANTITIES` for the rest."""
+    """points (n,): of the mesh, ascending; wall (k,): others that the water of the well touches, at which no channel
+    ended when it was made; see `QUANTITIES` for the rest."""
 
     name: str
     points: np.ndarray
@@ -59,6 +60,7 @@ class Well:
     pressure: float = 0.0
     rate: float = 0.0
     injected: float = 0.0
+    wall: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
 
     def add(self, stage: Stage, now: float) -> None:
         """One more stage, after the others; one without an end that has begun ends now. CommandError if one would
@@ -142,7 +144,7 @@ class Well:
     def saved(self) -> dict[str, Any]:
         """As JSON values."""
         stages = [{**asdict(one), "end": _json(one.end), "limit": _json(one.limit)} for one in self.stages]
-        return {**vars(self), "points": self.points.tolist(), "stages": stages}
+        return {**vars(self), "points": self.points.tolist(), "wall": self.wall.tolist(), "stages": stages}
 
     @staticmethod
     def restored(state: dict[str, Any]) -> Well:
@@ -150,8 +152,8 @@ class Well:
         known: list[dict[str, Any]] = [
             {k: math.inf if v is None else v for k, v in one.items()} for one in state["stages"]
         ]
-        points = np.array(state["points"], np.int64)
-        return Well(**{**state, "points": points, "stages": [Stage(**one) for one in known]})
+        places = {name: np.array(state.get(name, []), np.int64) for name in ("points", "wall")}
+        return Well(**{**state, **places, "stages": [Stage(**one) for one in known]})
 
 
 def _json(value: float) -> float | None:

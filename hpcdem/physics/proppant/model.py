@@ -509,7 +509,7 @@ class Proppant(SurfaceLoad):
 
     def add_to(self, applied: np.ndarray) -> None:
         if self.values["proppant_modulus"] > 0.0:
-            self.flow.push(self.state, kernels.PUSHES, applied)
+            self.flow.push(self.state, kernels.PUSHES, applied, free=False)
 
     # ---- state on disk -------------------------------------------------------------------------------------------
 
