@@ -113,13 +113,13 @@ def test_long_explicit_runs_are_announced(tmp_path, monkeypatch, command, short)
 
 
 def test_estimates_are_of_the_right_size(tmp_path) -> None:
-    """By hand: sub-steps of 1 s for an hour, of 22 channels; implicit ones of 36 s, dense for 300 of 5000 unknowns."""
+    """By hand: sub-steps of 1 ms for an hour, of 22 channels; implicit ones of 36 s, dense for 300 of 5000 unknowns."""
     rock = Rock(tmp_path, STRIP.replace("BULK", "1e9"))
     flow = Flow.of(rock.blocks)
-    rock("pcdc model time-step hydraulic 1\npcdc model step 1\n")
+    rock("pcdc model time-step hydraulic 1e-3\npcdc model step 1\n")
     found = costs.explicit(flow, 3600.0)
     count = len(flow.network.channels)
-    assert found == costs.Cost(3600.0, 1.0, 0.0, pytest.approx(3600.0 * (15e-6 + 11e-9 * count)))
+    assert found == costs.Cost(3.6e6, 1e-3, 0.0, pytest.approx(3.6e6 * (15e-6 + 11e-9 * count)))
     found = costs.implicit(3600.0, 36.0, 5000, 300)
     assert (found.steps, found.dt) == (100, 36.0) and found.seconds == pytest.approx(500 * (5e-3 + 0.02 + 0.891e-3))
     assert costs.implicit(3600.0, 36.0, 5000, 0).seconds == pytest.approx(500 * (5e-3 + 0.07))

@@ -100,16 +100,14 @@ def test_pressure_opens_a_joint() -> None:
     assert found == pytest.approx(1e-4 + opening, rel=1e-9) and (opening > 1e-7).all()
 
 
-def test_one_way_and_off_do_not_push() -> None:
-    for switch in ({"one_way": True}, {"hydraulic": False}):
-        sim, flow = split()
-        sim.parts(**switch)
-        sim.flow_clock(dt=1e-6)
-        flow.fill(None, pressure=1e6)
-        run(sim, 50)
-        assert np.abs(diagnostics.values(sim, "stress_yy")).max() == 0.0
-        assert not applied(sim)
-    assert flow.time == 0.0  # off: no time passes
+def test_one_way_does_not_push() -> None:
+    sim, flow = split()
+    sim.parts(one_way=True)
+    sim.flow_clock(dt=1e-6)
+    flow.fill(None, pressure=1e6)
+    run(sim, 50)
+    assert np.abs(diagnostics.values(sim, "stress_yy")).max() == 0.0
+    assert not applied(sim)
 
 
 def test_fluid_that_is_pressed_has_a_pressure() -> None:
@@ -193,7 +191,7 @@ def test_pressure_breaks_joints_and_lists_follow() -> None:
     flow.assign(joints, {**CRACK, "aperature_maximum": 1e-3})
     diagnostics.account_energy(sim)
     hold(flow, at(sim, 0.3, 0.2), 30e6)
-    run(sim, 1500)
+    run(sim, 600)
     energies = diagnostics.energies(sim)
     assert diagnostics.joint_counts(sim)[2] > 3 and energies["work_outside"] > 0.0
     assert energies["relative"] < 0.02

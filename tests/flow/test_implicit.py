@@ -56,6 +56,7 @@ def test_derivatives_are_those_of_differences(viscosity: float) -> None:
         for name, value in (("full", 1e3 / fluid.p0), ("dry", -0.4)):  # full: the highest of its nodes has no pressure
             u[np.searchsorted(fluid.numbers, flow.well(name).points[0])] = value
         x = run.x + rng.uniform(-1e-6, 1e-6, run.x.shape)
+        equilibrium.place_corners(sim, x)
         now = fluid.balance(step, u, x)
         assert now.slow is not None and ((now.slow < 1.0).mean() > 0.5) == (viscosity < 1e-6)
         matrix_of = np.zeros((2 * (count + fluid.n),) * 2)

@@ -225,8 +225,10 @@ def test_what_a_well_refuses() -> None:
 
 def test_saved_stages_are_the_same() -> None:
     well = Well("w", np.array([3, 5]), [Stage(RATE, "t", 0.0, 1.0, 5e6), Stage(SHUT, 0.0, 1.0)], 1.5, -2.0, 3.0)
+    well.wall = np.array([1, 4])
     again = Well.restored(json.loads(json.dumps(well.saved())))
-    assert again.points.tolist() == [3, 5] and {**vars(again), "points": 0} == {**vars(well), "points": 0}
+    assert again.points.tolist() == [3, 5] and again.wall.tolist() == [1, 4]
+    assert {**vars(again), "points": 0, "wall": 0} == {**vars(well), "points": 0, "wall": 0}
 
 
 # ---- the language ----------------------------------------------------------------------------------------------------

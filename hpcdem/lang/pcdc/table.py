@@ -627,8 +627,8 @@ _MODEL = (
                 Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
                 Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
                        "histories of the model, a table at the end", default="off"),
-                Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model; off: pressures stay "
-                       "as they are and go on pushing, so that blocks come to rest at them", default="on"),
+                Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model; off: pressures "
+                       "stay as they are and go on pushing, so that blocks come to rest at them", default="on"),
                 Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off"),
                 Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
                        "the stress that they bring, stay as they are", default="on"),

@@ -250,11 +250,12 @@ class Coupled:
         return self.moves and Condensed.suits(self.unknowns, self._of_joints())
 
     def _of_joints(self) -> np.ndarray:
-        """Nodes of joints and fluid."""
+        """Nodes of joints, of wet faces, and of the fluid."""
         sim, mesh, network = self.sim, self.sim.the_mesh(), self.flow.network
         lower = np.union1d(np.flatnonzero(sim.joint_exists() & (sim.joint_row > 0)), network.channels)
-        faces = np.concatenate([lower, sim.partner[lower]])
-        ends = sim.node.reshape(-1)[mesh.face_corners(faces).reshape(-1)]
+        faces = np.concatenate([lower, sim.partner[lower], self.flow.wet_faces()["number"]])
+        corners = np.concatenate([mesh.face_corners(faces).reshape(-1), mesh.on_sides(faces)[1]])
+        ends = sim.node.reshape(-1)[corners]
         return np.concatenate([ends, len(self.nodes.lead) + np.arange(self._of_fluid())])
 
     # ---- time steps ----------------------------------------------------------------------------------------------
@@ -453,6 +454,8 @@ class Coupled:
             return self._evaluated(step, x, u)
 
     def _evaluated(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
+        if len(self.flow.shore):
+            equilibrium.place_corners(self.sim, x)  # heads at the shore are those there
         with self.sim.timers.around("flow"):
             now = self.fluid.balance(step, u, x)
         right = np.zeros((len(x) + self.fluid.layers * self.fluid.n, self.sim.dim))

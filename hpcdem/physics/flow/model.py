@@ -411,8 +411,7 @@ class Flow(SurfaceLoad):
         "number"."""
         self.blocks.close_model()
         if self.frozen:
-            self.find_geometry()
-            self._find_volumes()
+            self.find_rooms()
         if kind == FLOW_NODE:
             made = {
                 "number": self.number, "pressure": self.state[: len(self.number), kernels.P],
@@ -827,6 +826,11 @@ class Flow(SurfaceLoad):
         if self.slurry is not None:
             self.slurry.thicken(self._ends, self._table)
 
+    def find_rooms(self) -> None:
+        """Room of nodes where the blocks are now. Not collective."""
+        self.find_geometry()
+        self._find_volumes()
+
     def _find_volumes(self) -> None:
         kernels.volumes(self._begin, self._channel, self._table, self.nodes)
 
@@ -1040,8 +1044,7 @@ class Flow(SurfaceLoad):
         self.waited = 0
         with blocks.timers("flow"):
             if o.mechanical:
-                self.find_geometry()
-                self._find_volumes()
+                self.find_rooms()
                 if any(self._gravity()):
                     self._take_heights()
                     self._refresh()

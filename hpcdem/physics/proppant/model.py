@@ -402,6 +402,10 @@ class Proppant(SurfaceLoad):
                 )
 
     def follow(self) -> None:
+        if self.flow.frozen and self.values["proppant_modulus"] > 0.0:  # packs give way
+            self.flow.find_rooms()
+            self._find_rooms()
+            self._settle()
         self.flowed()
 
     def flowed(self) -> None:
