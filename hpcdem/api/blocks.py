@@ -320,8 +320,8 @@ class Mesh(Words):
     def glue(
         self, tolerance: float | None = None, between: tuple[str, str] | None = None, *, set: str | None = None
     ) -> None:
-        """Bodies hang together where their faces coincide; tolerance [m]; between: only elements of these two
-        groups."""
+        """Bodies hang together where their faces lie on each other; tolerance [m]; between: only elements of these
+        two groups."""
         if between is None and set is not None:
             raise TypeError("set goes with between")
         pair = None if between is None else {"value": between, "set": set}

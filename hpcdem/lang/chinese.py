@@ -69,7 +69,7 @@ PCDC = {
     "mesh equilateral": "矩形内近似等边的三角形网格。",
     "mesh import": "导入其他程序的网格(.msh、.inp 等),其物理组以及单元、节点、面的集合成为组。",
     "mesh intersect": "位于图层上的网格边成为裂纹。",
-    "mesh glue": "分别剖分的物体在面重合处以节理相连。",
+    "mesh glue": "分别剖分的物体在其面相互贴合处以节理相连;两侧网格不同处单元被切分。",
     "mesh quality": "报告网格质量:角度、尺寸。",
     "element group": "把单元放入组。",
     "element c-model": "单元的本构模型及其参数。",
@@ -491,7 +491,6 @@ PCDC_KEYWORDS = {
     "its lines are edges of the mesh, its surfaces faces": "图层中的线是网格的边,面是单元面",
     "they are not: the edges that follow them best are taken, the faces between elements on either side":
     "图层不在网格边上时:取最贴近的网格边,即两侧单元之间的面",
-    "ends of faces nearer than this are one": "面的端点距离小于此值时视为同一点",
     "only faces between the elements of these two groups": "只用这两组单元之间的面",
     "name of the group": "组名",
     "density": "密度",

@@ -245,8 +245,9 @@ def glue(
     between: tuple[str, str] | None = None,
     set_name: str = DEFAULT,
 ) -> None:
-    """Bodies that were meshed separately hang together where their faces coincide: these become joints, as inside of a
-    body. tolerance [m]: points nearer than this are one; between: only faces between the elements of two groups."""
+    """Bodies that were meshed separately hang together where their faces lie on each other: these become joints, as
+    inside of a body; where the faces differ, elements are cut. tolerance [m]: points nearer than this are one; between:
+    only faces between the elements of two groups."""
     mesh = project.whole_mesh()
     project.refuse_in_use("bodies are glued")
     sides = None
@@ -255,12 +256,36 @@ def glue(
         numbers = np.arange(len(mesh.cells))
         sides = np.isin(numbers, one), np.isin(numbers, other)
     made = glue_of.glued(mesh, tolerance, sides)
-    project.merge_points(made.mesh, made.points)
+    if made.mesh is mesh:
+        _say(project, "glue: the mesh is one body already")
+        return
+    project.refit(made)
+    merged = len(mesh.points) - len(np.unique(made.points))
     _say(
         project,
-        f"glue: {made.faces} faces of different bodies are joints now, {len(mesh.points) - len(made.mesh.points)} "
-        f"points have become one with another (within {made.tolerance:g} m)",
+        f"glue: {made.faces} faces of different bodies are joints now, {merged} points have become one with another "
+        f"(within {made.tolerance:g} m)",
     )
+    if made.cut:
+        before, after = (altitudes.min() for altitudes in (_altitudes(mesh), _altitudes(made.mesh)))
+        _say(
+            project,
+            f"glue: {made.cut} elements were cut, which makes {len(made.mesh.cells) - len(mesh.cells)} more, where "
+            f"points of others lie on their sides; the least altitude was {before:.3g} m and is {after:.3g} m",
+        )
+
+
+def _altitudes(mesh: Mesh) -> np.ndarray:
+    """(ne,) sizes over those of the largest faces, times the dimensions [m]: the least height of triangles and
+    tetrahedra, half the height of quads."""
+    faces = np.arange(4 * len(mesh.cells)).reshape(-1, 4)
+    real = np.ones(faces.shape, bool)
+    if mesh.dim == 2:
+        real[:, 3] = mesh.cells[:, 3] >= 0
+    sizes = np.zeros(faces.shape)
+    sizes[real] = mesh.face_sizes(faces[real])
+    height = mesh.dim * mesh.areas() / sizes.max(axis=1)
+    return np.where(mesh.cells[:, 3] >= 0, 0.5 * height, height) if mesh.dim == 2 else height
 
 
 def tell_quality(project: Project) -> None:

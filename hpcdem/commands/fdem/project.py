@@ -13,7 +13,7 @@ from hpcdem.commands.fdem.records import Chart, History
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.connectivity import Edges
-from hpcdem.physics.fdem.groups import ELEMENT, KINDS, NODE, Groups
+from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, KINDS, NODE, Groups
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.runtime import launch, run_folder
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from hpcdem.commands.dem.cycles import Due
     from hpcdem.physics.coupling.model import Coupled
     from hpcdem.physics.fdem.simulation import Blocks
+    from hpcdem.pre.mesh.glue import Glued
 
 
 class Project:
@@ -152,19 +153,39 @@ class Project:
                 f"the mesh has models or conditions already: {what} before the first of them is assigned"
             )
 
-    def merge_points(self, mesh: Mesh, number: np.ndarray) -> None:
-        """The same elements with fewer points; number (np,): the new one of each. Of points that were in several groups
-        of a set the lowest counts."""
+    def refit(self, made: Glued) -> None:
+        """The mesh after bodies were glued: groups and histories of what was merged, cut or renumbered go on. Of points
+        that were in several groups of a set the lowest counts."""
+        before, mesh, number = self.whole_mesh(), made.mesh, made.points
         self.replace_mesh(mesh)
+        self.alive = self.alive[made.parent]
         for sets in self.groups[NODE].sets.values():
             lowest = np.full(len(mesh.points), len(number))
             for members in sets.values():
                 np.minimum.at(lowest, number[members], members)
             for name, members in sets.items():
                 sets[name] = np.unique(number[members[lowest[number[members]] == members]])
+        edges = self.edges()
+
+        def faces(numbers: np.ndarray, joints: bool) -> np.ndarray:
+            """Where these faces, or joints, are now."""
+            points, of = made.moved.faces(before.face_points(numbers))
+            both = edges.faces[mesh.find_edges(edges, points)]
+            own = made.parent[both // 4] == (numbers // 4)[of][:, None]
+            return np.unique(both[:, 0] if joints else np.where(own[:, 0], both[:, 0], both[:, 1]))
+
+        moved: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+            NODE: lambda numbers: np.unique(number[numbers]),
+            ELEMENT: lambda numbers: np.flatnonzero(np.isin(made.parent, numbers)),
+            FACE: lambda numbers: faces(numbers, False),
+            JOINT: lambda numbers: faces(numbers, True),
+        }
+        for kind in (ELEMENT, FACE, JOINT):
+            for sets in self.groups[kind].sets.values():
+                sets.update((name, moved[kind](members)) for name, members in sets.items() if len(members))
         for history in self.histories.values():
-            if history.kind == NODE:
-                history.numbers = np.unique(number[history.numbers]).tolist()
+            if history.kind in (NODE, FACE, JOINT):  # a piece of an element keeps its number
+                history.numbers = moved[history.kind](np.array(history.numbers, np.int64)).tolist()
 
     def edges(self) -> Edges:
         """The edges of the mesh."""

@@ -897,13 +897,13 @@ _MESH = (
             options=(Option("layer", (STRING,), "its lines are edges of the mesh, its surfaces faces", required=True),
                      Option("follow", (), "they are not: the edges that follow them best are taken, the faces between "
                             "elements on either side")), dims=BOTH),
-    Command("mesh glue", "Bodies that were meshed separately hang together where their faces coincide: these become "
-            "joints, as between the elements of a body. Faces that lie on each other only in part are refused.",
+    Command("mesh glue", "Bodies that were meshed separately hang together where their faces lie on each other: these "
+            "become joints, as inside of a body. Elements are cut where points of others lie on their sides.",
             ("pcdc mesh glue", "pcdc mesh glue tolerance 1e-4 between 'lining' 'rock' set 'domain'"),
-            options=(Option("tol{erance}", (POSITIVE,), "ends of faces nearer than this are one", "m",
+            options=(Option("tol{erance}", (POSITIVE,), "points nearer than this are one", "m",
                             "a thousandth of the shortest edge"),
                      Option("betw{een}", (STRING, STRING), "only faces between the elements of these two groups",
-                            more=(SET,)))),
+                            more=(SET,))), dims=BOTH),
     Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",)),
 )  # fmt: skip
 

@@ -16,6 +16,8 @@ TOLERANCE = 1e-3
 """Points are one if they are nearer than this part of the shortest edge on a surface."""
 OPPOSITE = 0.999
 """Faces that lie on each other look away from each other: the cosine of their normals is below minus this."""
+LEVEL = 0.5
+"""Two triangles are a quad if the cosine of their normals is above this."""
 PLACES = 3
 """Places that a message names."""
 
@@ -34,8 +36,15 @@ class Free:
 
     def of(self, rows: np.ndarray) -> Free:
         """Some of them."""
-        parts = (one[rows] for one in (self.faces, self.points, self.at, self.normal, self.body))
-        return Free(self.mesh, *parts, self.bodies)
+        return Free(
+            self.mesh,
+            self.faces[rows],
+            self.points[rows],
+            self.at[rows],
+            self.normal[rows],
+            self.body[rows],
+            self.bodies,
+        )
 
     def tolerance(self) -> float:
         """TOLERANCE of the shortest edge [m]."""
@@ -111,9 +120,9 @@ def united(n: int, one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return low[part]
 
 
-def crossed(corners: np.ndarray) -> np.ndarray:
-    """(m, 4) rows of triangles (n, 3), by the spots of their corners: two of them are a quad, and two others the same
-    quad, cut along the other diagonal."""
+def cut_otherwise(free: Free, corners: np.ndarray) -> np.ndarray:
+    """(m, 4) rows of faces in space, with these spots of their corners (n, 3): two of them are a quad, and two others,
+    back to back with them, the same quad, cut along the other diagonal."""
     ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     order = np.lexsort((ends[:, 1], ends[:, 0]))
     quads, rows, cuts = [np.empty((0, 4), np.int64)], [np.empty((0, 2), np.int64)], [np.empty((0, 2), np.int64)]
@@ -134,7 +143,12 @@ def crossed(corners: np.ndarray) -> np.ndarray:
     order = np.lexsort((cut[:, 1], cut[:, 0], key))
     a, b = order[:-1], order[1:]
     found = (key[a] == key[b]) & (cut[a] != cut[b]).any(axis=1)
-    return np.column_stack([row[a[found]], row[b[found]]])
+    quads_found = np.column_stack([row[a[found]], row[b[found]]])
+    n = np.moveaxis(free.normal[quads_found], 1, 0)
+    level = ((n[0] * n[1]).sum(axis=1) > LEVEL) & ((n[2] * n[3]).sum(axis=1) > LEVEL)
+    element = free.faces[quads_found] // 4
+    one = (element == element[:, :1]).all(axis=1)  # the four faces of a tetrahedron are two such quads
+    return quads_found[level & ~one & (((n[0] + n[1]) * (n[2] + n[3])).sum(axis=1) < 0.0)]
 
 
 @dataclass(frozen=True)
@@ -176,8 +190,8 @@ def fit(mesh: Mesh, since: int = 0) -> Fit:
     new = free.faces // 4 >= since
     pairs = pairs[new[pairs].any(axis=1)]
     same = (np.sort(corners[pairs[:, 0]], axis=1) == np.sort(corners[pairs[:, 1]], axis=1)).all(axis=1)
-    quads = crossed(corners) if mesh.dim == 3 else np.empty((0, 4), np.int64)
-    quads = quads[new[quads].any(axis=1) & _back_to_back(free, quads)]
+    quads = cut_otherwise(free, corners) if mesh.dim == 3 else np.empty((0, 4), np.int64)
+    quads = quads[new[quads].any(axis=1)]
     turned = np.isin(pairs, quads).all(axis=1)
     middle = free.at.mean(axis=1)
     return Fit(
@@ -186,12 +200,6 @@ def fit(mesh: Mesh, since: int = 0) -> Fit:
         middle[quads].mean(axis=1),
         middle[pairs[~same & ~turned]].mean(axis=1),
     )
-
-
-def _back_to_back(free: Free, quads: np.ndarray) -> np.ndarray:
-    """(m,) bool: the first two of these triangles (m, 4) look away from the last two."""
-    normal = free.normal[quads]
-    return np.asarray(((normal[:, 0] + normal[:, 1]) * (normal[:, 2] + normal[:, 3])).sum(axis=1) < 0.0)
 
 
 def places(at: np.ndarray) -> str:

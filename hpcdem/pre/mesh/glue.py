@@ -1,151 +1,281 @@
-"""Bodies that were meshed separately become one: where their faces coincide, points are merged."""
+"""Bodies that were meshed separately become one where their faces lie on each other.
+
+Points in one place are merged. Sides of hexahedra are cut from their lowest point (`hexahedra.split`), so where
+tetrahedra have another diagonal points change their numbers; what fits in no numbering, and faces of other sizes, are
+cut into the pieces that both sides have in common (`refine.py`).
+"""
 
 from __future__ import annotations
 
+import heapq
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.connectivity import bodies, face_partners, face_points
+from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.mesh import Mesh
-
-TOLERANCE = 1e-3
-"""Points of two bodies are one if they are nearer than this part of the shortest edge on a surface."""
+from hpcdem.pre.mesh import fit, refine
 
 
 @dataclass(frozen=True)
 class Glued:
-    """mesh; faces: how many pairs of faces are inner edges now; points (np,): the number in it of each point before;
-    tolerance [m]."""
+    """mesh; faces: how many pairs of faces are inner ones now; points (np,): the number in it of each point before;
+    parent (ne,): element before of which each is a piece; cut: how many elements were cut; tolerance [m]."""
 
     mesh: Mesh
     faces: int
     points: np.ndarray
+    parent: np.ndarray
+    moved: Moved
     tolerance: float
+    cut: int = 0
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Where faces are now: by their points before, see `faces`."""
+
+    points: np.ndarray
+    quads: dict[tuple[int, ...], list[tuple[int, ...]]]
+    pieces: dict[tuple[int, ...], list[tuple[int, ...]]]
+
+    def faces(self, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (m, dim) of the pieces of these faces (n, dim), and the row of the face each comes from."""
+        out: list[tuple[int, ...]] = []
+        rows: list[int] = []
+        for k, face in enumerate(np.sort(self.points[before], axis=1).tolist()):
+            for half in self.quads.get(tuple(face), [tuple(face)]):
+                found = self.pieces.get(half, [half])
+                out += found
+                rows += [k] * len(found)
+        dim = before.shape[1]
+        return np.array(out, np.int64).reshape(-1, dim), np.array(rows, np.int64)
 
 
 def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray, np.ndarray] | None = None) -> Glued:
-    """Faces of different bodies whose ends are nearer than `tolerance` [m] become inner edges. Elements keep their
-    numbers; of points that become one the lowest stays where it is.
+    """Faces that lie on each other within `tolerance` [m] become inner faces. Elements keep their numbers, pieces of
+    those that are cut come last; of points that become one the lowest stays where it is.
 
     between: elements (ne,) bool of the two sides; faces between others stay as they are. CommandError, with the place,
-    if nothing coincides, if faces lie on each other only in part, if bodies overlap there, or if the tolerance would
-    make points of one body one.
+    if nothing lies on each other, if a face in space is covered in part only, if bodies overlap there, or if the
+    tolerance would make points of one body one.
     """
-    partner = face_partners(mesh.cells, len(mesh.points))
-    body = bodies(partner)
-    real = np.ones(len(partner), bool)
-    real[3::4] = mesh.cells[:, 3] >= 0
-    faces = np.flatnonzero(real & (partner < 0))
-    side = np.zeros((len(faces), 2), bool)
-    if between is None:
-        side[:] = True
-    else:
-        side[:, 0], side[:, 1] = (flags[faces // 4] for flags in between)
-        faces, side = faces[side.any(axis=1)], side[side.any(axis=1)]
-    if not len(faces):
+    free = _between(fit.free_faces(mesh), between)
+    if not len(free.faces):
         raise CommandError("no face on a surface belongs to an element of these groups")
-    ends = face_points(mesh.cells, faces)
-    way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
-    shortest = float(np.hypot(way[:, 0], way[:, 1]).min())
-    tolerance = TOLERANCE * shortest if tolerance is None else tolerance
-    of = body[faces // 4]
-    spot = _spots(mesh, ends, of, tolerance)
-    pairs = _coinciding(mesh, faces, ends, of, side, spot)
-    single = np.ones(len(faces), bool)
-    single[pairs] = False
-    _refuse_partial(mesh, faces[single], ends[single], of[single], side[single], tolerance)
+    tolerance = free.tolerance() if tolerance is None else tolerance
+    spot = _spots(free, tolerance)
+    pairs = _touching(free, spot, tolerance, between)
+    if not len(pairs) and free.bodies == 1:
+        same = np.arange(len(mesh.points))
+        return Glued(mesh, 0, same, np.arange(len(mesh.cells)), Moved(same, {}, {}), tolerance)
     if not len(pairs):
         raise CommandError(
-            f"no faces of different bodies coincide within {tolerance:g} m: there is nothing to glue; a larger "
-            "tolerance may help"
+            f"no faces of different bodies lie on each other within {tolerance:g} m: there is nothing to glue; a "
+            "larger tolerance may help"
         )
-    i, j = pairs.T
-    one, other = np.concatenate([ends[i, 0], ends[i, 1]]), np.concatenate([ends[j, 1], ends[j, 0]])
-    point = _united(len(mesh.points), one, other)
-    lead = np.unique(point)
-    number = np.searchsorted(lead, point)
-    cells = np.where(mesh.cells >= 0, number[mesh.cells], -1)
-    layers = {name: number[rows] for name, rows in mesh.layers.items()}
-    made = Mesh.of(mesh.points[lead], cells, mesh.groups, layers, number[mesh.cracks], mesh.crack_sets)
-    flat = np.flatnonzero(made.areas() <= 0.0)
+    one, number, quads = _merged(mesh, free, spot, pairs)
+    flat = np.flatnonzero(one.areas() <= 0.0)
     if len(flat):
         raise CommandError(f"with the tolerance {tolerance:g} m element {flat[0]} would have no area")
-    return Glued(made, len(pairs), number, tolerance)
+    faces = int((one.face_partners() >= 0).sum() - (mesh.face_partners() >= 0).sum()) // 2
+    left = _between(fit.free_faces(one), between)
+    still = _touching(left, np.arange(len(one.points)), tolerance, between)
+    made = refine.refined(one, left, still, tolerance)
+    flags = None if between is None else (made.flags(between[0]), made.flags(between[1]))
+    rest = _between(fit.free_faces(made.mesh), flags)
+    lost = fit.lying(rest, tolerance) if len(rest.faces) else np.empty((0, 2), np.int64)
+    lost = lost[_allowed(rest, lost, flags)]
+    if len(lost):
+        raise CommandError(
+            f"faces of the elements {made.parent[rest.faces[lost[0]] // 4].tolist()} at "
+            f"{fit.places(rest.at[lost[:1, 0]].mean(axis=1))} cannot be glued: mesh both bodies with the same points "
+            "there"
+        )
+    moved = Moved(number, quads, made.pieces)
+    whole = Mesh.of(
+        made.mesh.points,
+        made.mesh.cells,
+        {name: {group: made.with_pieces(rows) for group, rows in of.items()} for name, of in mesh.groups.items()},
+        {name: moved.faces(rows)[0] for name, rows in mesh.layers.items()},
+        *_cracks(mesh, moved),
+        hexes=made.mesh.hexes,
+    )
+    return Glued(whole, faces + made.faces, number, made.parent, moved, tolerance, made.cut)
 
 
-def _united(n: int, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """(n,) lowest member of the set that each of n things is in, when those of one and other (m,) are joined."""
-    _, part = connected_components(coo_array((np.ones(len(one)), (one, other)), shape=(n, n)), directed=False)
-    low = np.full(part.max() + 1, n)
-    np.minimum.at(low, part, np.arange(n))
-    return low[part]
+def _cracks(mesh: Mesh, moved: Moved) -> tuple[np.ndarray, np.ndarray]:
+    rows, of = moved.faces(mesh.cracks)
+    return rows, mesh.crack_sets[of]
 
 
-def _spots(mesh: Mesh, ends: np.ndarray, of: np.ndarray, tolerance: float) -> np.ndarray:
+def _between(free: fit.Free, between: tuple[np.ndarray, np.ndarray] | None) -> fit.Free:
+    """The faces of the two sides."""
+    if between is None:
+        return free
+    return free.of(np.flatnonzero(between[0][free.faces // 4] | between[1][free.faces // 4]))
+
+
+def _spots(free: fit.Free, tolerance: float) -> np.ndarray:
     """(np,) the lowest of the surface points nearer to each other than the tolerance; CommandError if two are of one
     body."""
-    points, first = np.unique(ends, return_index=True)
-    body = np.repeat(of, 2)[first]
-    near = cKDTree(mesh.points[points]).query_pairs(tolerance, output_type="ndarray").reshape(-1, 2)
-    same = near[body[near[:, 0]] == body[near[:, 1]]]
+    mesh, dim = free.mesh, free.mesh.dim
+    points, first = np.unique(free.points, return_index=True)
+    spot = fit.spots(mesh.points, points, tolerance)
+    body = np.repeat(free.body, dim)[first]
+    key = np.column_stack([spot[points], body])
+    order = np.lexsort((key[:, 1], key[:, 0]))
+    same = np.flatnonzero((key[order[1:]] == key[order[:-1]]).all(axis=1))
     if len(same):
-        x, y = mesh.points[points[same[0, 0]]]
+        p, q = points[order[same[0]]], points[order[same[0] + 1]]
         raise CommandError(
-            f"the tolerance {tolerance:g} m is too large: points {points[same[0, 0]]} and {points[same[0, 1]]} of one "
-            f"body at ({x:g}, {y:g}) would become one"
+            f"the tolerance {tolerance:g} m is too large: points {p} and {q} of one body at "
+            f"{fit.places(mesh.points[p : p + 1])} would become one"
         )
-    return _united(len(mesh.points), points[near[:, 0]], points[near[:, 1]])
+    return spot
 
 
-def _coinciding(
-    mesh: Mesh, faces: np.ndarray, ends: np.ndarray, of: np.ndarray, side: np.ndarray, spot: np.ndarray
+def _touching(
+    free: fit.Free, spot: np.ndarray, tolerance: float, between: tuple[np.ndarray, np.ndarray] | None
 ) -> np.ndarray:
-    """(m, 2) rows of faces whose ends are in the same spots, in opposite order."""
-    key = np.sort(spot[ends], axis=1)
-    order = np.lexsort((faces, key[:, 1], key[:, 0]))
-    at = np.flatnonzero((key[order[1:]] == key[order[:-1]]).all(axis=1))
-    i, j = order[at], order[at + 1]
-    use = (of[i] != of[j]) & ((side[i, 0] & side[j, 1]) | (side[i, 1] & side[j, 0]))
-    i, j = i[use], j[use]
-    wrong = np.flatnonzero(spot[ends[i, 0]] == spot[ends[j, 0]])
+    """(m, 2) rows of faces that lie on each other, back to back, and of the halves of quads that are cut along
+    different diagonals; CommandError if bodies overlap there."""
+    if not len(free.faces):
+        return np.empty((0, 2), np.int64)
+    corners = spot[free.points]
+    _refuse_overlap(free, corners, between)
+    pairs = [fit.lying(free, tolerance)]
+    if free.mesh.dim == 3:
+        quads = fit.cut_otherwise(free, corners)
+        pairs += [np.sort(quads[:, [a, b]], axis=1) for a in (0, 1) for b in (2, 3)]
+    found = np.unique(np.concatenate(pairs), axis=0)
+    return found[_allowed(free, found, between)]
+
+
+def _allowed(free: fit.Free, pairs: np.ndarray, between: tuple[np.ndarray, np.ndarray] | None) -> np.ndarray:
+    if between is None:
+        return np.ones(len(pairs), bool)
+    one, other = (flags[free.faces // 4] for flags in between)
+    i, j = pairs.T
+    return np.asarray((one[i] & other[j]) | (other[i] & one[j]))
+
+
+def _refuse_overlap(free: fit.Free, corners: np.ndarray, between: tuple[np.ndarray, np.ndarray] | None) -> None:
+    """CommandError if faces with the same corners look the same way, or if three have them."""
+    key = np.sort(corners, axis=1)
+    order = np.lexsort((free.faces, *key.T[::-1]))
+    same = np.flatnonzero((key[order[1:]] == key[order[:-1]]).all(axis=1))
+    pairs = np.column_stack([order[same], order[same + 1]])
+    pairs = pairs[_allowed(free, pairs, between) & (free.body[pairs[:, 0]] != free.body[pairs[:, 1]])]
+    i, j = pairs.T
+    wrong = np.flatnonzero((free.normal[i] * free.normal[j]).sum(axis=1) > 0.0)
     if not len(wrong):
         wrong = np.flatnonzero(np.isin(i, j))
     if len(wrong):
-        x, y = mesh.points[ends[i[wrong[0]]]].mean(axis=0)
-        a, b = faces[i[wrong[0]]] // 4, faces[j[wrong[0]]] // 4
-        raise CommandError(f"elements {a} and {b} lie on the same side of their common face at ({x:g}, {y:g}): bodies "
-                           "overlap there")  # fmt: skip
-    return np.column_stack([i, j])
+        a, b = free.faces[pairs[wrong[0]]] // 4
+        at = fit.places(free.at[i[wrong[:1]]].mean(axis=1))
+        raise CommandError(
+            f"elements {a} and {b} lie on the same side of their common face at {at}: bodies overlap there"
+        )
 
 
-def _refuse_partial(
-    mesh: Mesh, faces: np.ndarray, ends: np.ndarray, of: np.ndarray, side: np.ndarray, tolerance: float
-) -> None:
-    """CommandError if two of these faces, of different bodies, lie on each other."""
-    if not len(faces):
-        return
-    a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
-    length = np.hypot(*(b - a).T)
-    along = (b - a) / length[:, None]
-    tree = cKDTree(0.5 * (a + b))
-    for i, near in enumerate(tree.query_ball_point(0.5 * (a + b), 0.5 * (length + length.max()) + tolerance)):
-        j = np.array(near, np.int64)
-        j = j[(j > i) & (of[j] != of[i])]
-        j = j[(side[i, 0] & side[j, 1]) | (side[i, 1] & side[j, 0])]
-        t = [(p[j] - a[i]) @ along[i] for p in (a, b)]
-        off = [np.abs((p[j] - a[i]) @ [-along[i, 1], along[i, 0]]) for p in (a, b)]
-        low, high = np.maximum(np.minimum(*t), 0.0), np.minimum(np.maximum(*t), length[i])
-        bad = np.flatnonzero((np.maximum(*off) <= tolerance) & (high - low > 2.0 * tolerance))
-        if len(bad):
-            k = bad[0]
-            p, q = a[i] + along[i] * low[k], a[i] + along[i] * high[k]
-            raise CommandError(
-                f"faces of the elements {faces[i] // 4} and {faces[j[k]] // 4} lie on each other from ({p[0]:g}, "
-                f"{p[1]:g}) to ({q[0]:g}, {q[1]:g}), but their ends do not coincide within {tolerance:g} m: mesh both "
-                "bodies with the same points there"
-            )
+def _merged(
+    mesh: Mesh, free: fit.Free, spot: np.ndarray, pairs: np.ndarray
+) -> tuple[Mesh, np.ndarray, dict[tuple[int, ...], list[tuple[int, ...]]]]:
+    """The mesh with the points of these pairs of faces merged and numbered so that sides of hexahedra are cut as
+    tetrahedra on them are; the new number of each point; halves of sides that are cut otherwise now, by the sorted
+    points of both halves together and of each."""
+    of = free.points[pairs]  # (m, 2, dim)
+    same = spot[of[:, 0, :, None]] == spot[of[:, 1, None, :]]
+    k, a, b = np.nonzero(same)
+    lead, number = np.unique(fit.united(len(mesh.points), of[k, 0, a], of[k, 1, b]), return_inverse=True)
+    number = number.reshape(-1)
+    if not len(mesh.hexes):
+        cells = np.where(mesh.cells >= 0, number[mesh.cells], -1)
+        return Mesh.of(mesh.points[lead], cells), number, {}
+    order = _numbered(mesh, free, number, len(lead))
+    number, points = order[number], np.empty((len(lead), 3))
+    points[order] = mesh.points[lead]
+    table = np.column_stack([number[mesh.hexes[:, :8]], mesh.hexes[:, 8]])
+    cells = number[mesh.cells]
+    cells[table[:, 8, None] + np.arange(hexahedra.PARTS)] = hexahedra.split(table[:, :8])
+    made = Mesh.of(points, cells, hexes=table)
+    before = np.sort(number[mesh.face_points(hexahedra.halves(mesh.cells, mesh.hexes).ravel())], axis=1).reshape(
+        -1, 2, 3
+    )
+    after = np.sort(made.face_points(hexahedra.halves(made.cells, made.hexes).ravel()), axis=1).reshape(-1, 2, 3)
+    changed = ~((before == after) | (before == after[:, ::-1])).all(axis=(1, 2))
+    halves: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
+    for old, new in zip(before[changed].tolist(), after[changed].tolist(), strict=True):
+        # Of a group or layer both halves come: each stands for one.
+        halves.update((tuple(one), [tuple(other)]) for one, other in zip(sorted(old), sorted(new), strict=True))
+    return made, number, halves
+
+
+def _numbered(mesh: Mesh, free: fit.Free, number: np.ndarray, n: int) -> np.ndarray:
+    """(n,) new numbers of points, such that of each side of a hexahedron with two faces of tetrahedra on it the lowest
+    point is on their diagonal, as far as that can be; all stay as they are where it is so already."""
+    sides, cuts = _wanted_cuts(mesh, free, number)
+    here = np.arange(n)
+    low = np.where(sides == cuts[:, :1], True, sides == cuts[:, 1:])
+    if low[np.arange(len(sides)), np.argmin(sides, axis=1)].all():
+        return here
+    of_point: dict[int, list[int]] = {}
+    for k, side in enumerate(sides.tolist()):
+        for p in side:
+            of_point.setdefault(p, []).append(k)
+    off = {p: sum(p not in cuts[k] for k in of) for p, of in of_point.items()}
+    open_sides = set(range(len(sides)))
+    ready = [p for p in off if not off[p]]
+    heapq.heapify(ready)
+    order: list[int] = []
+    done: set[int] = set()
+    slots = sorted(of_point)
+    while len(order) < len(slots):
+        if not ready:  # no numbering fits all: the lowest point that is left comes next
+            heapq.heappush(ready, next(p for p in slots if p not in done))
+        p = heapq.heappop(ready)
+        if p in done:
+            continue
+        done.add(p)
+        order.append(p)
+        for k in of_point[p]:
+            if k in open_sides:
+                open_sides.discard(k)
+                for q in sides[k].tolist():
+                    if q not in cuts[k]:
+                        off[q] -= 1
+                        if not off[q] and q not in done:
+                            heapq.heappush(ready, q)
+    here[order] = slots
+    return here
+
+
+def _wanted_cuts(mesh: Mesh, free: fit.Free, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sides of hexahedra (k, 4) with two faces of tetrahedra on them, and the ends (k, 2) of the diagonal of these."""
+    halves = hexahedra.halves(mesh.cells, mesh.hexes).reshape(-1, 2)
+    both = number[mesh.face_points(halves.ravel())].reshape(-1, 6)
+    sides = np.array([np.unique(row) for row in both]).reshape(-1, 4)
+    partner = mesh.face_partners()
+    outside = mesh.hex_of() < 0
+    over = partner[halves]
+    tets = (over >= 0).all(axis=1) & outside[np.maximum(over, 0) // 4].all(axis=1)
+    found = {}
+    for side, one in zip(sides[tets].tolist(), both[tets].tolist(), strict=True):
+        found[tuple(side)] = sorted(set(one[:3]) & set(one[3:]))
+    # Free faces of tetrahedra in twos.
+    wanted = {tuple(side) for side in sides[(over < 0).all(axis=1)].tolist()}
+    corners = number[free.points[outside[free.faces // 4]]]
+    edges: dict[tuple[int, int], list[int]] = {}
+    for row in corners.tolist():
+        for a, b in zip(row, row[1:] + row[:1], strict=True):
+            lone = next(p for p in row if p not in (a, b))
+            edges.setdefault((min(a, b), max(a, b)), []).append(lone)
+    for cut, lone in edges.items():
+        for m, a in enumerate(lone):
+            for b in lone[m + 1 :]:
+                side = tuple(sorted((*cut, a, b)))
+                if side in wanted:
+                    found[side] = list(cut)
+    return np.array(list(found), np.int64).reshape(-1, 4), np.array(list(found.values()), np.int64).reshape(-1, 2)
