@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -22,6 +23,29 @@ HELP = {"help_option_names": ["-h", "--help", "--hlep"], "max_content_width": 11
 HELP_WORDS = {"-h", "--help", "--hlep"}
 """The misspelt form is the manual's."""
 PATH = click.Path(path_type=Path)
+
+
+class Finite(click.ParamType):
+    """A number that is neither nan nor infinite, from low to high. above: low itself is none of them."""
+
+    name = "float"
+
+    def __init__(self, low: float = -math.inf, high: float = math.inf, above: bool = False) -> None:
+        self.low, self.high, self.above = low, high, above
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        found = float(click.FLOAT.convert(value, param, ctx))
+        if not math.isfinite(found) or not self.low <= found <= self.high or (self.above and found == self.low):
+            self.fail(f"{value} is not a number{self._limits()}", param, ctx)
+        return found
+
+    def _limits(self) -> str:
+        if self.high < math.inf:
+            return f" from {self.low:g} to {self.high:g}"
+        return "" if self.low == -math.inf else f" above {self.low:g}" if self.above else f" from {self.low:g} on"
+
+
+FINITE, POSITIVE = Finite(), Finite(0.0, above=True)
 Work = Callable[["SerialComm", "Log"], None]
 
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.pictures import Formats, Numbers, number, positive, processes
+from hpcdem.cli.common import FINITE, HELP, PATH, POSITIVE
+from hpcdem.cli.pictures import Formats, Numbers, number, processes
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -45,15 +45,15 @@ LOOKS = {
     "--colours", metavar="NAME", help="viridis, cividis, yellow-brown, blue-red, ... (docs/view.md) [viridis]."
 )
 @click.option("--colour", metavar="#RRGGBB", help="One colour for all.")
-@click.option("--opacity", type=float, metavar="N", help="From 0 to 1 [1].")
+@click.option("--opacity", type=FINITE, metavar="N", help="From 0 to 1 [1].")
 @click.option("--edges", is_flag=True, default=None, help="Outlines of elements and particles.")
-@click.option("--size", type=float, metavar="N", help="Factor on radii of particles and widths of lines [1].")
+@click.option("--size", type=FINITE, metavar="N", help="Factor on radii of particles and widths of lines [1].")
 @click.option("--vectors", metavar="NAME", help="Arrows of this field: displacement, velocity, force.")
-@click.option("--arrows", type=float, metavar="N", help="Factor on the length of arrows [1].")
+@click.option("--arrows", type=FINITE, metavar="N", help="Factor on the length of arrows [1].")
 @click.option("--filter", metavar="TEXT", help="Only objects for which this holds: 'stress_yy < -1e6 and x > 2'.")
 @click.option("--hide", multiple=True, metavar="WORD", help="Leave these objects out; may stand several times.")
 @click.option("--show", multiple=True, metavar="WORD", help="Show these objects (contacts and bonds are hidden).")
-@click.option("--deformed", type=float, metavar="N", help="Factor on displacements of blocks [1].")
+@click.option("--deformed", type=FINITE, metavar="N", help="Factor on displacements of blocks [1].")
 @click.option("--camera", type=Numbers(4), metavar="L,R,B,T", help="Left, right, bottom, top of the picture, m; in "
               "space along the picture and up it [all].")  # fmt: skip
 @click.option("--eye", metavar="WORD|X,Y,Z", help="In space: seen from +x, -x, +y, -y, +z, -z, iso (right, front, "
@@ -69,11 +69,11 @@ LOOKS = {
               "[beside each frame].")  # fmt: skip
 @click.option("--format", "formats", type=Formats(FORMATS), metavar="LIST", help="Some of png, jpg, tiff, pdf, svg "
               "[png].")  # fmt: skip
-@number("dpi", 300.0, "Dots per inch [300].", positive)
-@number("page", 17.0, "Width of the picture, cm [17].", positive)
-@number("font", 9.0, "Size of letters, points [9].", positive)
-@number("fps", None, "Frames per second of a film [10].", positive)
-@number("max_workers", None, "Processes that draw at a time [one per core].", positive)
+@number("dpi", 300.0, "Dots per inch [300].", POSITIVE)
+@number("page", 17.0, "Width of the picture, cm [17].", POSITIVE)
+@number("font", 9.0, "Size of letters, points [9].", POSITIVE)
+@number("fps", None, "Frames per second of a film [10].", POSITIVE)
+@number("max_workers", None, "Processes that draw at a time [one per core].", POSITIVE)
 @click.option("--save-view", type=PATH, metavar="FILE", help="Write what is shown as a view *.mv.")
 @click.option("--list", "only_list", is_flag=True, help="Draw nothing: say which objects and fields there are.")
 def draw(**options: Any) -> None:

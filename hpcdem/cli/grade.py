@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcdem.cli.common import HELP, PATH
+from hpcdem.cli.common import FINITE, HELP, PATH
 from hpcdem.cli.measure import Formats
 
 if TYPE_CHECKING:
@@ -32,27 +32,27 @@ MM = 1e-3
 @click.argument("file", type=PATH, metavar="[FILE]", required=False)
 @click.option("--shape", type=click.Choice(SHAPES), default="circle", help="Shape of the grains [circle].")
 @click.option("-n", "--number", type=int, metavar="N", help="Number of grains [200, unless --width].")
-@click.option("--width", type=float, metavar="MM", help="Width of the box in mm; the number of grains follows.")
-@click.option("--slenderness", type=float, default=2.0, metavar="L", help="Height over width of the box [2].")
-@click.option("--void-ratio", type=float, default=0.5, metavar="E", help="Voids over grains, by area [0.5].")
-@click.option("--l-over-d", type=float, default=1.5, metavar="R", help="ellipse: long over short axis [1.5].")
+@click.option("--width", type=FINITE, metavar="MM", help="Width of the box in mm; the number of grains follows.")
+@click.option("--slenderness", type=FINITE, default=2.0, metavar="L", help="Height over width of the box [2].")
+@click.option("--void-ratio", type=FINITE, default=0.5, metavar="E", help="Voids over grains, by area [0.5].")
+@click.option("--l-over-d", type=FINITE, default=1.5, metavar="R", help="ellipse: long over short axis [1.5].")
 @click.option("--size-rule", type=click.Choice(("major", "minor", "area")), default="major",
               help="ellipse: what its size is: an axis, or the diameter of a circle of its area [major].")  # fmt: skip
-@click.option("--deviation", type=float, default=0.0, metavar="DEG", help="Polygons: how far vertices may be off, in "
+@click.option("--deviation", type=FINITE, default=0.0, metavar="DEG", help="Polygons: how far vertices may be off, in "
               "degrees [0].")  # fmt: skip
-@click.option("--roundness", type=float, default=0.0, metavar="R", help="Polygons: 0 straight edges, 1 a circle [0].")
+@click.option("--roundness", type=FINITE, default=0.0, metavar="R", help="Polygons: 0 straight edges, 1 a circle [0].")
 @click.option("--mass-exponent", type=click.Choice(("2", "3")), default="2", help="Mass of a grain goes with its size "
               "squared, or cubed for the numbers of a sieve curve of real grains [2].")  # fmt: skip
 @click.option("--placement", type=click.Choice(("dense", "cells")), default="dense", help="dense: in the box at the "
               "void ratio; cells: loose, one grain per cell of a column [dense].")  # fmt: skip
-@click.option("--cell", type=float, default=2.0, metavar="F", help="cells: cell over largest grain [2].")
+@click.option("--cell", type=FINITE, default=2.0, metavar="F", help="cells: cell over largest grain [2].")
 @click.option("--seed", type=int, default=0, metavar="N", help="Seed of the random numbers [0].")
 @click.option("-o", "--out", type=PATH, metavar="DIR", help="Folder for the files [specimen].")
 @click.option("--layout", type=click.Choice(("sample", "full", "plain")), help="PPDEM file: arcs; with a column of "
               "roundness; circles without the leading 1 [sample; with --read the one that fits].")  # fmt: skip
-@click.option("--angle-factor", type=float, default=1.0, metavar="F", help="PPDEM file: numbers per degree of central "
+@click.option("--angle-factor", type=FINITE, default=1.0, metavar="F", help="PPDEM file: numbers per degree of central "
               "angle [1].")  # fmt: skip
-@click.option("--gap", type=float, default=0.03, metavar="G", help="Largest gap between outlines and the discs of "
+@click.option("--gap", type=FINITE, default=0.03, metavar="G", help="Largest gap between outlines and the discs of "
               "clumps, over the size [0.03].")  # fmt: skip
 @click.option("--format", "formats", type=Formats(), default="png", metavar="LIST",
               help="Figures: png, jpg, pdf, svg, with commas between them, or none [png].")  # fmt: skip

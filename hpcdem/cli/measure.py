@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli import pictures
-from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.pictures import finite, positive
+from hpcdem.cli.common import FINITE, HELP, PATH, POSITIVE
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -49,8 +48,8 @@ class Point(click.ParamType):
         if not isinstance(value, str):
             return value
         try:
-            x, y = (float(word) for word in value.split(","))
-        except ValueError:
+            x, y = (FINITE.convert(word, param, ctx) for word in value.split(","))
+        except (ValueError, click.BadParameter):
             self.fail(f"'{value}': two numbers with a comma between them are expected", param, ctx)
         return x, y
 
@@ -70,7 +69,7 @@ class Formats(Words):
 
 def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
     names = (name, more) if more else (name,)
-    return click.option(*names, type=float, callback=positive, metavar=metavar, help=text)
+    return click.option(*names, type=POSITIVE, metavar=metavar, help=text)
 
 
 @click.command(
@@ -88,14 +87,14 @@ def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
 @click.option("--from", "first", type=click.IntRange(0), metavar="STEP", help="First step [where the wall that "
               "pushes begins to move].")  # fmt: skip
 @click.option("--to", "last", type=click.IntRange(0), metavar="STEP", help="Last step [the last].")
-@click.option("--xmove", type=float, default=0.0, callback=finite, metavar="X", help="Add X [m] to all x [0].")
-@click.option("--ymove", type=float, default=0.0, callback=finite, metavar="Y", help="Add Y [m] to all y [0].")
+@click.option("--xmove", type=FINITE, default=0.0, metavar="X", help="Add X [m] to all x [0].")
+@click.option("--ymove", type=FINITE, default=0.0, metavar="Y", help="Add Y [m] to all y [0].")
 @_length("--width", "W", "Width of the columns of the surface, and of cells for strain, in m [about three radii].")
 @click.option("--format", "formats", type=Formats(), default="png", metavar="LIST",
               help=f"Figures: {', '.join(FORMATS)}, with commas between them, or none [png].")  # fmt: skip
 @_length("--strain", "E", "faults: threshold of |strain| [0.5 in sections, 0.2 from frame to frame].")
 @_length("--length", "L", "faults: shortest band in m [6 cells].")
-@click.option("--skin", type=float, callback=finite, metavar="H", help="faults: leave out what is nearer "
+@click.option("--skin", type=FINITE, metavar="H", help="faults: leave out what is nearer "
               "than H m to the base and to the wall that pushes [2 cells].")  # fmt: skip
 @click.option("--increment", is_flag=True, help="faults: strain from frame to frame even where there are sections.")
 @click.option("--ids", type=Numbers(), default="", metavar="I,J", help="tracks: particles of these ids.")
@@ -108,11 +107,11 @@ def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
               "of a reaction, else of a stress].")  # fmt: skip
 @click.option("--bins", type=click.IntRange(1), default=100, metavar="N", help="emission: parts of the time in which "
               "events are counted [100].")  # fmt: skip
-@click.option("--completeness", type=float, callback=finite, metavar="M", help="emission: magnitude from which the "
+@click.option("--completeness", type=FINITE, metavar="M", help="emission: magnitude from which the "
               "b-value is taken [that of most events].")  # fmt: skip
 @click.option("--energy", type=click.Choice(("kinetic", "released")), default="kinetic", help="emission: kinetic "
               "energy when a joint broke, or by how much it grew since the joint's peak [kinetic].")  # fmt: skip
-@click.option("--joule", type=float, default=1.0, callback=positive, metavar="F", help="emission: J per unit of energy "
+@click.option("--joule", type=POSITIVE, default=1.0, metavar="F", help="emission: J per unit of energy "
               "in the files, thickness of the model included [1].")  # fmt: skip
 @click.option("--box", type=pictures.Numbers(6), metavar="X,Y,Z,X,Y,Z", help="regions: elements with their middle in "
               "this box of the mesh, m: its least x, y, z, its greatest.")  # fmt: skip

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.pictures import ManualCommand, common_view, looks, number, positive, processes, style_of
+from hpcdem.cli.common import HELP, PATH, POSITIVE
+from hpcdem.cli.pictures import ManualCommand, common_view, looks, number, processes, style_of
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -32,7 +32,7 @@ PAGE = 17.0
 @click.argument("folder", type=PATH, metavar="DIR")
 @click.option("--from", "source", type=click.Choice(["frames", "ss"]), default="frames", help="Frames of DIR, or the "
               "pictures *.jpg that zdemss made in DIR/ss [frames].")  # fmt: skip
-@click.option("--fps", type=float, default=10.0, callback=positive, metavar="N", help="Frames per second [10].")
+@click.option("--fps", type=POSITIVE, default=10.0, metavar="N", help="Frames per second [10].")
 @click.option("--size", type=click.IntRange(64, 16384), default=1200, metavar="PX", help="Width in pixels [1200].")
 @click.option("--format", "kind", type=click.Choice(["gif", "mp4", "both"]), help="[gif, and mp4 where ffmpeg is].")
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="The film [DIR/movie.gif, .mp4].")
@@ -40,7 +40,7 @@ PAGE = 17.0
 @click.option("--show", type=click.Choice(list(PANELS_SHOWN)), help="Of blocks: cracks by the way "
               "they broke, compressive stress, plastic strain, temperature, of fluid in joints pressure, saturation, "
               "aperture or velocity, concentration of proppant; both: the first two [what there is].")  # fmt: skip
-@number("max_workers", None, "Processes that draw at a time [one per core].", positive)
+@number("max_workers", None, "Processes that draw at a time [one per core].", POSITIVE)
 @looks
 def movie(**options: Any) -> None:
     """Make a film of all frames in DIR, of particles or of blocks, drawn at one view so that nothing jumps.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hpcdem.cli.common import FINITE, POSITIVE, Finite
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
@@ -58,8 +59,8 @@ class Numbers(click.ParamType):
         if isinstance(value, tuple):
             return value
         try:
-            found = tuple(float(word) for word in str(value).split(","))
-        except ValueError:
+            found = tuple(FINITE.convert(word, param, ctx) for word in str(value).split(","))
+        except click.BadParameter:
             found = ()
         if len(found) != self.count:
             self.fail(f"{value!r}: expected {self.count} numbers with commas between them", param, ctx)
@@ -81,23 +82,9 @@ def as_usual(words: Sequence[str], names: set[str]) -> list[str]:
     return result
 
 
-def positive(context: click.Context, option: click.Parameter, value: float | None) -> float | None:
-    """A number above zero."""
-    if value is not None and not 0.0 < value < float("inf"):
-        raise click.BadParameter(f"{value:g} is not a number above 0", context, option)
-    return value
-
-
-def finite(context: click.Context, option: click.Parameter, value: float | None) -> float | None:
-    """A number that is not infinite."""
-    if value is not None and not abs(value) < float("inf"):
-        raise click.BadParameter(f"{value:g} is not a number", context, option)
-    return value
-
-
-def number(name: str, default: float | None, text: str, check: Callable[..., Any] = finite) -> Callable[..., Any]:
+def number(name: str, default: float | None, text: str, kind: Finite = FINITE) -> Callable[..., Any]:
     """An option that takes a number."""
-    return click.option(f"--{name}", name, type=float, default=default, callback=check, metavar="N", help=text)
+    return click.option(f"--{name}", name, type=kind, default=default, metavar="N", help=text)
 
 
 def yes_no(name: str, default: bool, text: str) -> Callable[..., Any]:
@@ -113,10 +100,10 @@ OPTIONS = (
     number("ymax", None, "Upper end, m [the model's]."),
     number("xmove", 0.0, "Move the model along x, m [0]."),
     number("ymove", 0.0, "Move the model along y, m [0]."),
-    number("major_locator", None, "Step of ticks with numbers, m [10000, or what suits the model].", positive),
-    number("minor_locator", None, "Step of ticks without numbers, m [1000, or what suits the model].", positive),
-    number("fontsize", 9.0, "Size of the numbers, points [9].", positive),
-    number("linewidth", 0.8, "Width of lines, points [0.8].", positive),
+    number("major_locator", None, "Step of ticks with numbers, m [10000, or what suits the model].", POSITIVE),
+    number("minor_locator", None, "Step of ticks without numbers, m [1000, or what suits the model].", POSITIVE),
+    number("fontsize", 9.0, "Size of the numbers, points [9].", POSITIVE),
+    number("linewidth", 0.8, "Width of lines, points [0.8].", POSITIVE),
     yes_no("leftshow", True, "Left line of the frame"),
     yes_no("rightshow", True, "Right line of the frame"),
     yes_no("bottomshow", True, "Lower line of the frame"),

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from hpcdem.cli.common import HELP, PATH
+from hpcdem.cli.common import HELP, PATH, Finite
 from hpcdem.cli.run import Options, keeping, time_limit
 from hpcdem.core.errors import EXIT_OK, HpcdemError, UsageError
 from hpcdem.runtime import run_folder
@@ -26,7 +26,7 @@ from hpcdem.runtime import run_folder
 )
 @click.option(
     "--before",
-    type=click.FloatRange(0),
+    type=Finite(0.0),
     metavar="T",
     help="From the last checkpoint at or before T seconds of the model.",
 )

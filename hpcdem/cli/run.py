@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.chinese import in_chinese, translated
-from hpcdem.cli.common import HELP, PATH
+from hpcdem.cli.common import HELP, PATH, POSITIVE, Finite
 from hpcdem.cli.programs import GROUPS, suggestion
 from hpcdem.core import chinese
 from hpcdem.core.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
-from hpcdem.runtime import launch
+from hpcdem.runtime import launch, run_folder
 from hpcdem.runtime.run_folder import Job, Retention, claim
 from hpcdem.runtime.stop_requests import AUTOSAVE
 from hpcdem.session import Session
@@ -74,6 +74,8 @@ def run(session: Session, options: Options) -> None:
 
     name = str(options.script)
     refuse_idle(options)
+    if options.outdir is not None or options.check:
+        run_folder.refuse_file(options.outdir or options.script.parent / "data", session.comm)
     if options.saved_in is None:
         source = read_script(session.comm, options.script)
     else:
@@ -385,7 +387,7 @@ def keeping(command: Callable[..., Any]) -> Callable[..., Any]:
         ),
         click.option("--keep-steps", type=click.IntRange(1), metavar="N", help=f"{of_old}each multiple of N steps."),
         click.option(
-            "--keep-every", type=click.FloatRange(0, min_open=True), metavar="T",
+            "--keep-every", type=POSITIVE, metavar="T",
             help=f"{of_old}each multiple of T seconds of the model.",
         ),
         click.option("--keep-at", callback=seconds, metavar="T,...", help=f"{of_old}these times of the model, in s."),
@@ -444,7 +446,7 @@ class RunCommand(click.Command):
 )
 @click.option("--resume", is_flag=True, help="Go on from the newest checkpoint of this script.")
 @click.option(
-    "--before", type=click.FloatRange(0), metavar="T", help="With --resume: from the last checkpoint at or before T "
+    "--before", type=Finite(0.0), metavar="T", help="With --resume: from the last checkpoint at or before T "
     "seconds of the model."
 )  # fmt: skip
 @keeping

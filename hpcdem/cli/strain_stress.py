@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcdem.cli.common import HELP, PATH
+from hpcdem.cli.common import FINITE, HELP, PATH
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     help="Stress and strain of the frames in DIR, into DIR/ss/data.",
 )  # fmt: skip
 @click.option(
-    "-g", "--grid", "size", type=float, default=200.0, metavar="SIZE",
+    "-g", "--grid", "size", type=FINITE, default=200.0, metavar="SIZE",
     help="Length in m over which stress is averaged, and spacing of the grid of --smooth [200].",
 )  # fmt: skip
 @click.option("--addball", is_flag=True, help="Particles were added between frames (sedimentation).")
 @click.option("--delball", is_flag=True, help="Particles were deleted between frames (erosion).")
 @click.option("--leftwallid", type=int, metavar="ID", help="Leave out the particles to the left of this wall.")
 @click.option("--rightwallid", type=int, metavar="ID", help="Leave out the particles to the right of this wall.")
-@click.option("--xmove", type=float, default=0.0, metavar="X", help="Add X [m] to all x [0].")
-@click.option("--ymove", type=float, default=0.0, metavar="Y", help="Add Y [m] to all y [0].")
+@click.option("--xmove", type=FINITE, default=0.0, metavar="X", help="Add X [m] to all x [0].")
+@click.option("--ymove", type=FINITE, default=0.0, metavar="Y", help="Add Y [m] to all y [0].")
 @click.option("--increment", is_flag=True, help="Strain since the frame before, not since the first one.")
 @click.option(
     "--smooth", is_flag=True, help="Strain fitted and averaged on the grid, not by the nearest neighbours of particles."

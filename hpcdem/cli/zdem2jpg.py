@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.pictures import Formats, ManualCommand, Numbers, looks, number, positive, processes, style_of
+from hpcdem.cli.common import HELP, PATH, POSITIVE
+from hpcdem.cli.pictures import Formats, ManualCommand, Numbers, looks, number, processes, style_of
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ FORMATS = ("jpg", "png", "tiff", "pdf", "svg")
 @click.command(cls=ManualCommand, context_settings=HELP, no_args_is_help=True)
 @click.option("-d", "--dir", "folder", type=PATH, required=True, metavar="DIR", help="Folder of the frames.")
 @looks
-@number("dpi", 600.0, "Dots per inch [600].", positive)
-@number("pagesize", 14.0, "Width of the picture, cm [14].", positive)
+@number("dpi", 600.0, "Dots per inch [600].", POSITIVE)
+@number("pagesize", 14.0, "Width of the picture, cm [14].", POSITIVE)
 @click.option(
     "--format", "formats", type=Formats(FORMATS), default="jpg", metavar="LIST",
     help=f"Some of {', '.join(FORMATS)} with commas between them [jpg].",
@@ -35,7 +35,7 @@ FORMATS = ("jpg", "png", "tiff", "pdf", "svg")
 @click.option("--range", "limits", type=Numbers(2), metavar="A,B", help="--field: values of the first and the last "
               "colour [those of all frames].")  # fmt: skip
 @click.option("--colours", metavar="NAME", help="--field: viridis, cividis, blue-red, ... [viridis].")
-@number("max_workers", None, "Processes that draw at a time [one per core].", positive)
+@number("max_workers", None, "Processes that draw at a time [one per core].", POSITIVE)
 @click.version_option(launch.version(), "-v", "--version", prog_name="zdem2jpg", message="%(prog)s %(version)s")
 def zdem2jpg(**options: Any) -> None:
     """Draw every frame all_*.vtkhdf or all_*.dat in DIR as a picture of the same name beside it.

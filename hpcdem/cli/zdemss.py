@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.pictures import Formats, ManualCommand, number, positive, processes
+from hpcdem.cli.common import HELP, PATH, POSITIVE, Finite
+from hpcdem.cli.pictures import Formats, ManualCommand, number, processes
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class Switch(click.ParamType):
         self.fail(f"{value!r} is none of {', '.join(self.words)}", param, ctx)
 
 
-SWITCH, POSITIVE = Switch(), click.FloatRange(0.0, min_open=True)
+SWITCH = Switch()
 
 
 def _switch(name: str, default: str, text: str, *more: str) -> Any:
@@ -91,13 +91,13 @@ def _length(name: str, default: float | None, text: str, said: str | None = None
 @_length("--xmax", None, "Where the x axis ends (km)", "all is shown")
 @_length("--ymax", None, "Where the y axis ends (km)", "all is shown")
 @click.option(
-    "--width", type=click.FloatRange(5.0, 100.0), default=14.0, metavar="VALUE", help="Width of the pictures (cm) [14]."
+    "--width", type=Finite(5.0, 100.0), default=14.0, metavar="VALUE", help="Width of the pictures (cm) [14]."
 )
 @click.option(
     "--format", "formats", type=Formats(FORMATS), default="jpg,ps", metavar="LIST",
     help=f"Some of {', '.join(FORMATS)} with commas between them [jpg,ps].",
 )  # fmt: skip
-@number("max_workers", None, "Processes that draw at a time [one per core].", positive)
+@number("max_workers", None, "Processes that draw at a time [one per core].", POSITIVE)
 @click.version_option(launch.version(), "-v", "--version", prog_name="zdemss", message="%(prog)s %(version)s")
 def zdemss(**options: object) -> None:
     """Draw stress and strain of the frames in DIR, after `hpcdem -s DIR`.

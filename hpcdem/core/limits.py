@@ -11,6 +11,9 @@ from collections.abc import Sequence
 
 from hpcdem.core.errors import CommandError
 
+LARGEST = 1e60
+"""Of any number that is said of a model, whatever its unit: products of some of them stay within the range of a double.
+"""
 LONGEST, SHORTEST = 1e30, 1e-30
 """Beyond these, squares and cubes of lengths leave the range of a double."""
 FARTHEST = 1e12

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple, TypedDict, get_type_hints
 
 from hpcdem.core.errors import CommandError
+from hpcdem.core.limits import LARGEST
 
 Value = float | None
 
@@ -81,4 +82,6 @@ def checked(given: Mapping[str, Any]) -> dict[str, float]:
             raise CommandError(f"there is no property {name!r}; there are {', '.join(PROPERTIES)}")
         if not PROPERTIES[name].allows(value):
             raise CommandError(f"{name} must be {PROPERTIES[name].range}, got {value:g}")
+        if abs(value) > LARGEST:
+            raise CommandError(f"{name} must be at most {LARGEST:g}, got {value:g}")
     return values

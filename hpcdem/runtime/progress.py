@@ -6,6 +6,7 @@ another rank knows has to be brought to rank 0 first.
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -82,6 +83,32 @@ class Command:
     beside: bool = False
 
 
+_missing: dict[int, int] = {}
+"""Lines that found no room, by the descriptor of their stream."""
+
+
+def write(stream: TextIO, text: str) -> None:
+    """Text on a stream, in one piece, as launchers pass on pieces. The run matters more than a closed pipe, a lost
+    terminal or a full disk under the log: what finds no room is counted, and that is told when there is room again."""
+    try:
+        missing = _missing and _missing.get(stream.fileno(), 0)
+        if missing:
+            stream.write(f"warning: {missing} lines are missing here: no space left on the disk\n")
+        stream.write(text)
+        stream.flush()
+        _missing.clear()
+    except OSError as failure:
+        handle, nowhere = stream.fileno(), os.open(os.devnull, os.O_WRONLY)
+        there = os.dup(handle)
+        os.dup2(nowhere, handle)
+        stream.flush()  # what it still holds
+        if failure.errno in (errno.ENOSPC, errno.EDQUOT):
+            os.dup2(there, handle)
+            _missing[handle] = _missing.get(handle, 0) + text.count("\n")
+        os.close(nowhere)
+        os.close(there)
+
+
 class Log:
     """The log of a run.
 
@@ -136,13 +163,7 @@ class Log:
         if self._bar is not None:
             self._bar.print(text)
         else:
-            try:
-                self._stream.write(f"{text}\n")  # in one piece: launchers pass on pieces
-                self._stream.flush()
-            except OSError:  # a closed pipe, a lost terminal, a full disk under the log: the run matters more
-                nowhere = os.open(os.devnull, os.O_WRONLY)
-                os.dup2(nowhere, self._stream.fileno())
-                os.close(nowhere)
+            write(self._stream, f"{text}\n")
 
     # -- progress --------------------------------------------------------------------------------------------
 

@@ -57,8 +57,25 @@ class Job:
 
 def claim(folder: Path, comm: Any, job: Job) -> bool:
     """Lock a folder that is there; nothing happens to one that is not. Returns False if its file system has no locks.
-    UsageError on all ranks if another run writes into it."""
+    UsageError on all ranks if another run writes into it, or if it cannot become a folder."""
+
+    refuse_file(folder, comm)
     return on_first(comm, lambda: _claim(folder, job) if folder.is_dir() else True)
+
+
+def refuse_file(folder: Path, comm: Any) -> None:
+    """Collective: UsageError if something that is no folder stands where a folder of results, or one above it, would be
+    made."""
+
+    def look() -> None:
+        there = next((place for place in (folder, *folder.absolute().parents) if os.path.lexists(place)), None)
+        if there is not None and not there.is_dir():
+            kind = "a link to nothing" if there.is_symlink() and not there.exists() else "a file"
+            raise UsageError(
+                f"cannot make the folder {folder} for the results: {there} is {kind}. Choose another with --outdir"
+            )
+
+    on_first(comm, look)
 
 
 def enter(

@@ -7,6 +7,7 @@ arrive within a second it prints its message and aborts the job.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import socket
@@ -133,8 +134,9 @@ def report(failure: Failure | None, rank: int, ranks: int) -> int:
         return EXIT_OK
     if failure.text:
         head = "" if ranks == 1 else f"rank {rank} of {ranks}: "
-        sys.stderr.write(f"{head}{failure.text}\n")  # in one piece, or launchers mix it with other ranks' lines
-        sys.stderr.flush()
+        with contextlib.suppress(OSError):  # a full disk under it changes no exit code
+            sys.stderr.write(f"{head}{failure.text}\n")  # in one piece, or launchers mix it with other ranks' lines
+            sys.stderr.flush()
     return failure.code
 
 
@@ -175,11 +177,12 @@ def end_mpi(end: ExitStatus) -> int:
 
 
 def wait_for_end_of(others: tuple[tuple[str, int], ...]) -> None:
-    """Wait, 5 s at most, until the processes (host, pid) of this host are gone; give those elsewhere half a second."""
+    """Wait until the processes (host, pid) of this host are gone, which a busy machine lets take long; give those
+    elsewhere half a second."""
     here = socket.gethostname()
     if any(host != here for host, _ in others) or not os.path.isdir("/proc/self"):
         time.sleep(0.5)
-    deadline = time.monotonic() + 5.0
+    deadline = time.monotonic() + EXIT_TIMEOUT
     while any(host == here and runs(pid) for host, pid in others) and time.monotonic() < deadline:
         time.sleep(0.01)
 

@@ -27,6 +27,10 @@ from tests.blocks.support import JOINT, ROCK, jointed, model, rectangle
         ({"density": "heavy", "young": 1e9, "poisson_ratio": 0.2}, "must be a number"),
         ({"density": 2700.0, "young": 1e9, "poisson_ratio": 0.2, "colour": 3.0}, "has no property colour"),
         ({"density": 2700.0, "young": float("inf"), "poisson_ratio": 0.2}, "young must be finite"),
+        (
+            {"density": 2700.0, "young": 1e308, "poisson_ratio": 0.2},
+            r"young must be at most 1e\+60 \(Pa\), got 1e\+308",
+        ),
     ],
 )
 def test_wrong_element_properties_are_refused(values, said):

@@ -227,6 +227,13 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing() -> None:
         ([(0.5, 0.5), (0.5, 0.9)], {"grout": (0.3, 0.2)}, "grout goes from"),
         ([(0.5, 0.5), (0.5, 0.9)], {"segments": 0}, "one segment at least"),
         ([(0.5, 0.5), (0.5, 0.9)], {"segments": 2, "length": 0.1}, "exclude each other"),
+        (
+            [(0.5, 0.5), (0.5, 0.9)],
+            {"length": 1e-9},
+            "length 1e-09 would make 4e.08 segments of 0.4 m of bolt, more than",
+        ),
+        ([(0.5, 0.5), (0.5, 0.9)], {"length": 1e-320}, "would make inf segments"),
+        ([(0.5, 0.5), (0.5, 0.9)], {"segments": 10**12}, "segments 1000000000000 would make 1e.12 segments"),
     ):
         with pytest.raises(CommandError, match=message):
             bolts.create(points, **more)

@@ -91,10 +91,12 @@ def test_the_disk_is_full(launch, script, undisturbed, small_disk, n):
 
 @pytest.mark.parametrize("n", [1, pytest.param(3, marks=pytest.mark.mpi)])
 def test_the_output_folder_cannot_be_made(launch, script, n):
+    """Which is told before anything runs, with --check too."""
     (script.parent / "data").write_text("a file has the name of the folder")
-    done = launch(n, script, cwd=script.parent, timeout=120)
-    assert done.returncode == 1
-    assert done.stderr.count("cannot make the folder") == 1 and "Traceback" not in done.stderr
+    for more in ([], ["--check"] * (n == 1)):
+        done = launch(n, script, *more, cwd=script.parent)
+        assert done.returncode == 2 and "step" not in done.stdout
+        assert done.stderr.count("cannot make the folder") == 1 and "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("n", [1, pytest.param(2, marks=pytest.mark.mpi)])

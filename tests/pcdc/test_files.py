@@ -9,6 +9,7 @@ import pytest
 
 from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang import detect
+from hpcdem.lang.pcdc import check
 from hpcdem.lang.zdem import execute, parser
 
 BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2\n"
@@ -19,9 +20,9 @@ CHART = "pcdc chart create 'c'\npcdc chart add 'c' values (0,0) (1,1)\n"
 @pytest.mark.parametrize(
     ("text", "name"),
     [("pcdc model save 'script.sc'\n", "script.sc"), ("pcdc model save './x/../script.sc'\n", "script.sc"),
-     (RUN + "pcdc history export '../script.sc'\n", "script.sc"),
-     (CHART + "pcdc chart export 'c' '../mesh.svg'\n", "mesh.csv"),
-     (RUN + "pcdc history export '../mesh.csv'\n", "mesh.csv"),
+     (RUN + "pcdc history export '{folder}/script.sc'\n", "script.sc"),
+     (CHART + "pcdc chart export 'c' '{folder}/mesh.svg'\n", "mesh.csv"),
+     (RUN + "pcdc history export '{folder}/mesh.csv'\n", "mesh.csv"),
      ("pcdc model save 'before.sav'\n", "before.sav"), ("pcdc model save 'link.sc'\n", "script.sc")],
 )  # fmt: skip
 def test_nothing_is_written_over_what_is_read(bench, monkeypatch, text, name):
@@ -37,7 +38,7 @@ def test_nothing_is_written_over_what_is_read(bench, monkeypatch, text, name):
     bench.project.to_read("mesh.csv")
     bench.project.to_read("before.sav")
     with pytest.raises(ScriptError, match=r"would be written over .*; give it another name") as caught:
-        bench(text)
+        bench(text.replace("{folder}", str(folder)))
     assert (folder / name).read_bytes() == kept and caught.value.line == text.count("\n")
 
 
@@ -78,6 +79,29 @@ def test_zdem_scripts(tmp_path, text, message):
     with pytest.raises(ScriptError, match=message) as caught:
         check()
     assert caught.value.line == text.count("\n")
+
+
+CURVES = "pcdc mesh structured (0,0) (1,1) cells 1 1\npcdc history create 'a' model value time\n" + CHART
+
+
+@pytest.mark.parametrize("command", ["history export '{}.csv'", "chart export 'c' '{}.png'"])
+@pytest.mark.parametrize("name", ["../x", "../../x", "a/../../x", "./../x"])
+def test_results_stay_in_their_folder(bench, command, name):
+    """Refused as the line is read, or carried out, where the name comes from Python; a whole path says where."""
+    message = "leads out of the folder of the results; for another place give the whole path"
+    with pytest.raises(ScriptError, match=message):
+        check.read(f"pcdc {command.format(name)}\n", "script.sc")
+    with pytest.raises(ScriptError, match=message):
+        bench(f"{CURVES}name = '{name}'\npcdc {command.format('[name]')}\n")
+    assert not list(bench.project.directory.parent.glob("**/x.*"))
+
+
+@pytest.mark.parametrize("command", ["history export '{}.csv'", "chart export 'c' '{}.png'"])
+@pytest.mark.parametrize("name", ["x", "more/and/x", "a/../x", "{folder}/elsewhere/x"])
+def test_folders_of_results_are_made(bench, command, name):
+    name = name.format(folder=bench.project.directory)
+    bench(f"{CURVES}pcdc {command.format(name)}\n")
+    assert (bench.project.outdir / os.path.normpath(name)).with_suffix(command[-5:-1]).exists()
 
 
 @pytest.mark.parametrize("text", ["x = 1\nprint(x)\n", "BOX left 0 right 1\n", "import math\n", "pcdc model new\n"])

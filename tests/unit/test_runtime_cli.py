@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import pkgutil
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ import click
 import pytest
 
 from hpcdem import cli
+from hpcdem.cli import common
 from hpcdem.cli.chinese import TEXTS
 from hpcdem.cli.programs import BY_NAME, GROUPS
 
@@ -59,6 +61,39 @@ def test_version_is_quick_to_say():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def commands() -> dict[str, click.Command]:
+    """All programs of the package, by name."""
+    found = {}
+    for module in pkgutil.iter_modules(cli.__path__):
+        members = vars(importlib.import_module(f"{cli.__name__}.{module.name}"))
+        found |= {f"{module.name}.{name}": one for name, one in members.items() if isinstance(one, click.Command)}
+    return found
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+def test_no_option_takes_a_number_that_is_none(value):
+    """Not `--before nan`, not `--keep-every inf`, nor any other of any program."""
+    seen = set()
+    for name, command in commands().items():
+        for option in command.params:
+            if isinstance(option.type, click.types.FloatParamType | common.Finite):
+                seen.add(f"{name} {option.name}")
+                with pytest.raises(click.BadParameter, match=f"{value} is not a number"):
+                    option.type.convert(value, option, None)
+    assert len(seen) > 40 and {"run.hpcdem before", "run.hpcdem keep_every", "resume.resume before"} <= seen
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["--before", "nan"], ["--keep-every", "inf"], ["--keep-at", "1,inf"], ["--time-limit", "nan"],
+     ["--autosave", "inf"], ["--before", "-1"], ["--keep-every", "0"]],
+)  # fmt: skip
+def test_such_numbers_are_refused_by_name(words, capsys):
+    with pytest.raises(SystemExit) as left:
+        options(*words, "push.py")
+    assert left.value.code == 2 and words[0] in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("word", ["-h", "--help", "--hlep"])

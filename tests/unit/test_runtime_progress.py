@@ -254,3 +254,30 @@ def test_a_reader_that_goes_away_does_not_end_the_run():
         err = process.stderr.read()
         assert process.wait(60) == 0
     assert err == "still here\n"
+
+
+def test_a_disk_that_is_full_for_a_while_leaves_a_gap_that_is_told(tmp_path):
+    """A log that goes to a file: what finds no room is lost, what comes later is there, and the run goes on."""
+    code = (
+        "import os, sys\nfrom hpcdem.runtime.progress import Log, write\nlog = Log()\n"
+        "log.info('before')\n"
+        "file, full = os.dup(1), os.open('/dev/full', os.O_WRONLY)\n"
+        "os.dup2(full, 1)\nlog.info('lost')\nwrite(sys.stdout, 'lost too\\nand this\\n')\n"
+        "os.dup2(file, 1)\nlog.info('after')\nlog.info('later')\n"
+    )
+    with open(tmp_path / "log", "w") as file:
+        done = subprocess.run([sys.executable, "-c", code], stdout=file, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    gap = "warning: 3 lines are missing here: no space left on the disk"
+    assert (tmp_path / "log").read_text().splitlines() == ["before", gap, "after", "later"]
+
+
+@pytest.mark.parametrize("stream", ["1>/dev/full", "2>/dev/full", "1>/dev/full 2>&1"])
+def test_a_full_disk_under_the_log_changes_no_exit_code(tmp_path, stream):
+    """Nor do prints of a script end it."""
+    for text, code in (("print('one')\nprint('two')\n", 0), ("print('one')\n1 / 0\n", 1)):
+        (tmp_path / "a.sc").write_text(f"pcdc model new\n{text}")
+        done = subprocess.run(
+            ["bash", "-c", f'"$0" -m hpcdem a.sc {stream}', sys.executable], cwd=tmp_path, check=False
+        )
+        assert done.returncode == code

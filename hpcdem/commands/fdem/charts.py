@@ -15,7 +15,7 @@ from hpcdem.commands.fdem.records import Chart, Curve
 from hpcdem.commands.fdem.values import figure_name
 from hpcdem.core.errors import CommandError
 from hpcdem.core.units import label as unit_label
-from hpcdem.io.agreed import atomic_path, on_first
+from hpcdem.io.agreed import atomic_path, make_folder, on_first
 from hpcdem.io.files import write_sections
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, Range
 from hpcdem.physics.flow.model import Flow
@@ -115,6 +115,7 @@ def export(
     for file in (figure, figure.with_suffix(".csv")):
         project.to_write(file)
     project.folder()
+    make_folder(figure.parent, project.comm)
     write_sections(figure.with_suffix(".csv"), project.comm, lambda: [text.encode()])
     if beside:
         project.ready(use=False)

@@ -9,9 +9,10 @@ import numpy as np
 from hpcdem.commands.fdem.choices import chosen, everything, places
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES, LAW_STATE, MODEL, UNITS, WELL, History
-from hpcdem.commands.fdem.values import history_name
+from hpcdem.commands.fdem.values import history_name, result_name
 from hpcdem.core.errors import CommandError
 from hpcdem.core.units import label
+from hpcdem.io.agreed import make_folder
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
 from hpcdem.physics import supports
@@ -168,6 +169,7 @@ def _line(row: Sequence[float]) -> str:
 def export(project: Project, path: str, names: Sequence[str] = ()) -> None:
     """Write histories side by side as CSV into the folder of the results: step, time, one column each, empty where one
     has no record. Collective."""
+    result_name(path)
     wanted = {name: find(project, name) for name in names} or project.histories
     if not wanted:
         raise CommandError("there is no history to write")
@@ -184,6 +186,7 @@ def export(project: Project, path: str, names: Sequence[str] = ()) -> None:
         lines.append(",".join([str(step), repr(times[step]), *cells]))
     file = project.to_write(project.result(path))
     project.folder()
+    make_folder(file.parent, project.comm)
     write_sections(file, project.comm, lambda: [("\n".join(lines) + "\n").encode()])
 
 

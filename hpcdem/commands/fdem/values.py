@@ -6,6 +6,7 @@ Nothing here brings kernels: scripts are read before the cache of these is settl
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +75,14 @@ def frames_name(name: str) -> None:
         raise CommandError(f"'{name}' is the first part of the names of files, in the folder of the results: no folder")
 
 
+def result_name(path: str) -> None:
+    """CommandError if a file of the results would come to lie elsewhere without being told so."""
+    if not os.path.isabs(path) and os.path.normpath(path).split(os.sep)[0] == os.pardir:
+        raise CommandError(f"'{path}' leads out of the folder of the results; for another place give the whole path")
+
+
 def figure_name(path: str) -> None:
-    """CommandError if figures are not written to files of this kind."""
+    """CommandError if figures are not written to files of this kind, or to this place."""
+    result_name(path)
     if Path(path).suffix.lower() not in FIGURES:
         raise CommandError(f"'{path}': a figure is a file *.png, *.pdf or *.svg")

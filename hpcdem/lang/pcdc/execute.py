@@ -6,6 +6,7 @@ what they were told, so that a rank that took another way is found at once.
 
 from __future__ import annotations
 
+import io
 import linecache
 import math
 import os.path
@@ -30,6 +31,7 @@ from hpcdem.lang.pcdc.source import CALL, Source
 from hpcdem.lang.pcdc.statement import Statement, shown
 from hpcdem.lang.pcdc.vector import Vector
 from hpcdem.lang.pcdc.views import Model
+from hpcdem.runtime.progress import write
 
 SEED = 0
 """Of the random numbers of Python and numpy, so that all ranks draw the same."""
@@ -405,7 +407,9 @@ class Interpreter:
         if file is not None and file is not sys.stdout:
             print(*values, file=file, **how)
         elif self.project.comm.rank == 0 and not (self.journal is not None and self.journal.replays):
-            print(*values, **{**how, "flush": True})
+            text = io.StringIO()
+            print(*values, **how, file=text)
+            write(sys.stdout, text.getvalue())
 
 
 def _checksum(told: tuple[Any, ...]) -> int:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
+from hpcdem.core.limits import LARGEST
 from hpcdem.core.looks import EYES, eye_of, section_of
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
 from hpcdem.lang.zdem.nearest import hint
@@ -82,15 +83,21 @@ class Unfit(ValueError):
     """A value is not of the kind it should be."""
 
 
+class TooLarge(Unfit):
+    """It would be of this kind, but is larger than any number of a model."""
+
+
 def number(low: float = -math.inf, high: float = math.inf, above: bool = False) -> Callable[[Any], float]:
-    """A check for a finite number in [low, high]; `above`: low itself is excluded."""
+    """A check for a number in [low, high] that is no larger than there is any; `above`: low itself is excluded."""
 
     def check(value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise Unfit
         value = float(value)
-        if not math.isfinite(value) or not low <= value <= high or (above and value == low):
+        if not low <= value <= high or (above and value == low):
             raise Unfit
+        if not abs(value) <= LARGEST:
+            raise TooLarge
         return value
 
     return check
@@ -334,11 +341,14 @@ def _pending(escape: Escape, expressions: Expressions) -> Pending:
 
 
 def _checked(kind: Kind, value: Any, shown: str, what: str) -> Any:
+    advice = ""
     try:
         return kind.check(value)
+    except TooLarge:
+        advice = f"; no number is larger than {LARGEST:g}"
     except (Unfit, OverflowError, TypeError):
         pass
-    _fail(kind, shown, what)
+    _fail(kind, shown, what, advice)
 
 
 def _fail(kind: Kind, shown: str, what: str, advice: str = "") -> NoReturn:

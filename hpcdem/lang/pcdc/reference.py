@@ -32,7 +32,8 @@ This page is made from `hpcdem/lang/pcdc/table.py` and `hpcdem/physics/fdem/prop
   positive.
 - Files that are read, and those of `model save`, are named relative to the folder of the script. All else goes to the
   folder of the results (`data` beside the script, or `--outdir`): frames, histories, what `history export` and `chart
-  export` write. Nothing is written over the script, nor over a file that the run has read and not made itself.
+  export` write, whose names do not lead out of it (`../x.csv`) unless they are whole paths. Nothing is written over the
+  script, nor over a file that the run has read and not made itself.
 - A script is a program: it runs with your rights and can do to your files what you can. Run those that you trust.
 - A run that was stopped, by `--time-limit` or a signal, goes on with `--resume` where it was, also in a loop or a
   function ([how](running.md#stopping-and-going-on)); there is a checkpoint every half hour (`--autosave`).

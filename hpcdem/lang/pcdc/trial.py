@@ -185,6 +185,10 @@ def _history(arguments: Mapping[str, Any]) -> None:
     values.history_name(arguments["name"])
 
 
+def _columns(arguments: Mapping[str, Any]) -> None:
+    values.result_name(arguments["file"])
+
+
 def _export(arguments: Mapping[str, Any]) -> None:
     values.figure_name(arguments["file"])
 
@@ -195,7 +199,9 @@ def _frames(arguments: Mapping[str, Any]) -> None:
 
 def _bolt(arguments: Mapping[str, Any]) -> None:
     points = arguments["points"]
-    layout.checked(points, len(points[0]) if points else 2)
+    line = layout.checked(points, len(points[0]) if points else 2)
+    for span in layout.lengths(line[1:] - line[:-1]).tolist():
+        layout.parts(span, arguments.get("segments"), arguments.get("length"))
 
 
 def _fractures(arguments: Mapping[str, Any]) -> None:
@@ -249,6 +255,7 @@ _TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
     "mesh equilateral": _equilateral,
     "table create": _table,
     "history create": _history,
+    "history export": _columns,
     "chart export": _export,
     "output vtk": _frames,
 }  # fmt: skip

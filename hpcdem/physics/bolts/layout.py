@@ -10,6 +10,8 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 
+MOST = 100_000
+"""Most segments of one bolt."""
 SHORTEST = 0.1
 """Crossings of edges that are nearer to each other than this part of the mean edge count once."""
 INSIDE = 1e-9
@@ -38,6 +40,16 @@ def lengths(ways: np.ndarray) -> np.ndarray:
     return found
 
 
+def parts(span: float, segments: int | None, length: float | None) -> int:
+    """Of a straight part of a bolt [m]: so many segments, or ones no longer than length [m]. CommandError if they are
+    too many."""
+    wanted = float(segments) if segments is not None else span / float(length or span)
+    if not wanted <= MOST:
+        said = f"segments {segments}" if segments is not None else f"length {length:g}"
+        raise CommandError(f"{said} would make {wanted:.2g} segments of {span:g} m of bolt, more than {MOST:g}")
+    return max(1, math.ceil(wanted - 1e-9))
+
+
 def split(
     line: np.ndarray, corners: np.ndarray, cells: np.ndarray, mean_edge: float, segments: int | None,
     length: float | None,
@@ -56,7 +68,7 @@ def split(
                     kept.append(one)
             at = np.array([*kept[1:], 1.0])
         else:
-            count = segments if segments is not None else max(1, math.ceil(span / float(length or span) - 1e-9))
+            count = parts(span, segments, length)
             at = np.arange(1, count + 1) / count
         nodes.append(a + at[:, None] * (b - a))
         nodes[-1][-1] = b

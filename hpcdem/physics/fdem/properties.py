@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.core.limits import LARGEST
 
 ELEMENT, FACE, JOINT = "element", "element-face", "face-joint"
 
@@ -57,8 +58,9 @@ class Property:
             sign = ">=" if self.low_itself else ">"
             upper = f" and <= {self.high:g}" if math.isfinite(self.high) else ""
             raise CommandError(f"{self.name} must be {sign} {self.low:g}{upper} ({self.unit}), got {number:g}")
-        if math.isinf(number) and self.default != math.inf:
-            raise CommandError(f"{self.name} must be finite, got {number:g}")
+        if abs(number) > LARGEST and not (math.isinf(number) and self.default == math.inf):
+            most = "finite" if math.isinf(number) else f"at most {LARGEST:g} ({self.unit})"
+            raise CommandError(f"{self.name} must be {most}, got {number:g}")
         return number
 
 
@@ -124,7 +126,7 @@ class Model:
         for name, value in given.items():
             one, each = self.property(name), np.broadcast_to(np.asarray(value, np.float64), (n,))
             inside = (one.low <= each if one.low_itself else one.low < each) & (each <= one.high)
-            if not (inside & (np.isfinite(each) | (one.default == math.inf))).all():
+            if not (inside & ((np.abs(each) <= LARGEST) | (np.isinf(each) & (one.default == math.inf)))).all():
                 return None
             values[name] = each
         for one in self.properties:
