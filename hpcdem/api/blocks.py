@@ -409,8 +409,9 @@ class Elements(_Modelled):
         gradient: Mapping[str, Point] | None = None,
         where: Where = None,
     ) -> None:
-        """Stress [Pa] from the beginning, tension positive; gradient: by component, per metre in x and y (and z)
-        [Pa/m], ``{"yy": (0.0, 25e3)}``."""
+        """Stress [Pa] from the beginning, tension positive, 0 where it is left out; in the plane zz is then that of
+        plane strain, Poisson's ratio times xx + yy. gradient: by component, per metre in x and y (and z) [Pa/m],
+        ``{"yy": (0.0, 25e3)}``."""
         stress = {"xx": xx, "yy": yy, "xy": xy, "zz": zz, "xz": xz, "yz": yz}
         slopes = dict(gradient or {})
         for name in slopes:

@@ -75,7 +75,7 @@ PCDC = {
     "element c-model": "单元的本构模型及其参数。",
     "element law": "读取、检查、编译 Python 文件中的本构,但不赋给单元。",
     "element property": "修改单元参数,其余不变。",
-    "element initial": "初始应力,拉为正;未给的分量为零。",
+    "element initial": "初始应力,拉为正;未给的分量为零,平面问题中未给的 stress-zz 取平面应变值 ν(xx+yy)。超过单元强度时在日志中提示。",
     "element reset state": "清除单元的塑性状态,应力不变。",
     "element reset kelvin-strain": "蠕变单元的 Kelvin 应变清零,应力和位移不变。",
     "element-face group": "把单元面放入组。",

@@ -9,6 +9,7 @@ import pytest
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
+from tests.space.support import box, hexes
 
 COMPONENTS = ("xx", "yy", "xy", "zz")
 STRESS = {"xx": -7e6, "yy": -3e6, "xy": 1.5e6, "zz": -4e6}
@@ -96,6 +97,70 @@ def test_a_softened_layer_between_rigid_ends(way, kind):
     assert diagnostics.values(sim, "stress_xx") == pytest.approx(
         expected, rel=1e-6 if way in ("relaxation", "at once") else 5e-3
     )
+
+
+@pytest.mark.parametrize("first", ["model", "stress"])
+def test_across_the_plane_it_is_that_of_plane_strain(first):
+    """Where nothing is said of zz it is nu (xx + yy), of each element by its own nu, with gradients, also where the
+    model comes after the stress; said as 0, or by a gradient alone, it is what was said."""
+    mesh = shaken(rectangle(3, 3, 0.3, 0.3, kind="mixed"), 0.1)
+    sim, nu = Blocks(), {**dict.fromkeys(range(len(mesh.cells)), 0.25), 0: 0.4}
+    sim.take_mesh(mesh)
+    for what in (first, {"model": "stress", "stress": "model"}[first]):
+        if what == "model":
+            for at in (np.arange(1, len(mesh.cells)), [0]):
+                changes.element_model(sim, at, "mech_iso_elastic", {**ROCK, "poisson_ratio": nu[at[0]]})
+        else:
+            sim.initial_stress(None, xx=-6e6, yy=-10e6, gradient={"yy": (0.0, 1e6)})
+            sim.initial_stress([1], xx=-6e6, zz=0.0)
+            sim.initial_stress([2], xx=-6e6, gradient={"zz": (0.0, 1e6)})
+    wanted = np.array(list(nu.values())) * (-16e6 + 1e6 * mesh.centroids()[:, 1])
+    wanted[[1, 2]] = 0.0, 1e6 * mesh.centroids()[2, 1]
+    assert diagnostics.values(sim, "stress_zz") == pytest.approx(wanted, rel=1e-9)
+
+
+WEAK = {"density": 2000.0, "young": 20e9, "poisson_ratio": 0.25, "friction": 30.0, "cohesion": 1e6, "tensile": 1e5}
+BEARS = 2.0 * 1e6 * 3.0**0.5
+"""[Pa] without confinement."""
+
+
+class Log:
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def warn_once(self, _: str, text: str) -> None:
+        self.said.append(text)
+
+    info = warn = lambda *_: None
+
+
+@pytest.mark.parametrize("kind", ["cross", "quad", "mixed", "tets", "hexes"])
+def test_a_stress_beyond_the_strength_is_said(kind):
+    """xx -6, yy -10 MPa: within the strength with zz of plane strain, and rock that is held stays as it is; with zz 0
+    it is 10 - 2 c sqrt(N) beyond, and in tension by 1.9 MPa. Said once, with count, place and how far, also where the
+    strength comes after the stress; not again in what follows from it."""
+    if kind in ("tets", "hexes"):
+        mesh = (box if kind == "tets" else hexes)((2, 2, 2), (1.0, 1.0, 1.0))
+    else:
+        mesh = rectangle(3, 3, 1.0, 1.0, kind=kind)
+    sim = Blocks()
+    sim.log = log = Log()
+    sim.take_mesh(mesh)
+    sim.option(dynamic=False, collision=False)
+    sim.initial_stress(None, xx=-6e6, yy=-10e6, **({"zz": -4e6} if mesh.dim == 3 else {}))
+    changes.element_model(sim, None, "mech_mohr_coulomb", WEAK)
+    sim.velocity_condition(None, vx=0.0, vy=0.0, **({"vz": 0.0} if mesh.dim == 3 else {}))
+    convergence.advance(sim, 20)
+    assert not log.said and not diagnostics.values(sim, "plastic_state").any()
+    each = 6 if kind == "hexes" else 1
+    sim.initial_stress(np.arange(2 * each), xx=-6e6, yy=-10e6, zz=0.0)
+    sim.initial_stress(2 * each + np.arange(each), xx=-6e6, yy=2e6, zz=-4e6)
+    convergence.advance(sim, 20)
+    assert len(log.said) == 1
+    place = ", ".join(f"{c:.4g}" for c in mesh.centroids(np.array([2 * each]))[0])
+    assert f"element {2 * each} at ({place})" in log.said[0] and f"{3 * each} elements have an initial" in log.said[0]
+    assert f"by {3.0 * 2e6 + 6e6 - BEARS:.4g} Pa" in log.said[0] and "yy 2e+06" in log.said[0]
+    assert (diagnostics.values(sim, "plastic_state") > 0.0).sum() >= 3
 
 
 def test_it_is_saved_with_the_moduli_it_belongs_to(tmp_path):

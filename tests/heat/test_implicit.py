@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import changes, diagnostics, equilibrium
 from hpcdem.physics.fdem.groups import Span
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tables import TEMPERATURE, Over
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
 from tests.blocks.models import COHESIVE
@@ -19,6 +22,7 @@ from tests.blocks.support import JOINT, ROCK, model, rectangle, shaken
 from tests.flow.support import at, inner
 from tests.heat import exact
 from tests.heat.support import DIFFUSIVITY, GRANITE, faces_at, standing, temperatures
+from tests.space.support import box, hexes
 
 DAY = 86400.0
 
@@ -213,3 +217,98 @@ def test_equilibrium_keeps_temperatures() -> None:
     sim.gravity(0.0, -9.81)
     equilibrium.solve_elastic(sim)
     assert (temperatures(sim) == 30.0).all() and heat.time == 0.0
+
+
+# ---- rock that yields ----------------------------------------------------------------------------------------------
+
+WEAK = {"density": 2400.0, "young": 20e9, "poisson_ratio": 0.24, "cohesion": 3e6, "friction": 30.0, "tensile": 1.2e6,
+        "dilation": 10.0}  # fmt: skip
+SHRINKS = 9e-6
+KINDS = ("tri", "quad", "mixed", "tets", "hexes")
+
+
+def weak_bar(kind: str, **properties: Any) -> tuple[Blocks, Heat]:
+    """At 50 degrees, on rollers, in space between two walls across z."""
+    sim = Blocks(SerialComm())
+    in_space = kind in ("tets", "hexes")
+    mesh = {"tets": box, "hexes": hexes}[kind]((4, 2, 2), (2.0, 0.5, 0.5)) if in_space else None
+    sim.take_mesh(shaken(rectangle(6, 3, 2.0, 0.5, kind=kind), 0.2) if mesh is None else mesh)
+    if "young" in properties:
+        sim.table("young", properties["young"])
+        properties["young"] = Over("young", TEMPERATURE)
+    changes.element_model(sim, None, "mech_mohr_coulomb", {**WEAK, **properties})
+    sim.option(dynamic=False, collision=False, large_strain=False)
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "expansion_coeficient": 0.0 if properties else SHRINKS})
+    heat.initial(None, 50.0)
+    points = sim.mesh.points
+    sim.velocity_condition(np.flatnonzero(points[:, 0] < 1e-9), vx=0.0)
+    sim.velocity_condition(np.flatnonzero(points[:, 1] < 1e-9), vy=0.0)
+    if in_space:
+        sim.velocity_condition(np.flatnonzero(np.abs(points[:, 2] - 0.25) > 0.25 - 1e-9), vz=0.0)
+    return sim, heat
+
+
+def cooled_bar(kind: str, part: float, **properties: Any) -> tuple[Blocks, Heat]:
+    """Held at both ends too, and cooled over 1e5 s to so much of what it bears: sxx = szz = T, the sides are free."""
+    sim, heat = weak_bar(kind, **properties)
+    sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 0] > 2.0 - 1e-9), vx=0.0)
+    drop = part * WEAK["tensile"] * (1.0 - WEAK["poisson_ratio"]) / (WEAK["young"] * SHRINKS)
+    sim.table("ramp", [(0.0, 50.0), (1e5, 50.0 - drop)])
+    heat.prescribe(None, "ramp")
+    return sim, heat
+
+
+def bears(sim: Blocks, stress: float) -> None:
+    for name, wanted in (("stress_xx", stress), ("stress_zz", stress), ("stress_yy", 0.0)):
+        assert diagnostics.values(sim, name) == pytest.approx(wanted, rel=1e-8, abs=1e-8 * stress), name
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("steps", [1, 4])
+def test_a_bar_that_cools_flows_in_balance_only(kind: str, steps: int) -> None:
+    """Beyond its tensile strength it bears just that, in however many steps; below it nothing has flowed."""
+    sim, _ = cooled_bar(kind, 1.5)
+    over(sim, 1e5, steps)
+    bears(sim, WEAK["tensile"])
+    sim, _ = cooled_bar(kind, 0.9)
+    over(sim, 1e5, steps)
+    bears(sim, 0.9 * WEAK["tensile"])
+    assert not diagnostics.values(sim, "plastic_state").any() and not diagnostics.values(sim, "plastic_work").any()
+
+
+@pytest.mark.parametrize("kind", ["mixed", "hexes"])
+def test_temperatures_are_brought_on_in_the_same_increments(kind: str) -> None:
+    """A balance by four: what flows is as in four steps of heat, and temperatures are those of the end."""
+    both = []
+    for increments in (4, 1):
+        sim, heat = cooled_bar(kind, 2.0)
+        sim.gravity(3e3, -2e4)
+        run = Implicit(sim)
+        for _ in range(4 // increments):
+            before = run._solve(1e5 / (4 // increments))
+            heat.time += 1e5 / (4 // increments)
+            sim.local.follow_heat()
+            sim.gravity(heat.time / 1e5 * 3e3, heat.time / 1e5 * -2e4)
+            assert equilibrium.solve_elastic(sim, steps=increments, before=before).increments == increments
+        run.close()
+        assert temperatures(sim) == pytest.approx(heat.held_at(1e5)[0], rel=1e-14)
+        both.append([diagnostics.values(sim, name) for name in ("stress_xx", "stress_xy", "plastic_shear_strain")])
+    for a, b in zip(*both):
+        assert a == pytest.approx(b, rel=1e-6, abs=1e-6 * np.abs(b).max())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_modulus_that_grows_as_it_cools_lets_nothing_flow(kind: str) -> None:
+    """Under nine tenths of the load that it bears, E three times as large: the stress stays, but for the length of the
+    loaded faces."""
+    sim, heat = weak_bar(kind, young=[(0.0, 60e9), (50.0, 20e9)])
+    load = 0.9 * 2.0 * WEAK["cohesion"] * 3.0**0.5
+    edges = sim.mesh.edges()
+    end = (np.abs(sim.mesh.points[edges.points][..., 0] - 2.0) < 1e-9).all(axis=1)
+    sim.stress_condition(edges.faces[end & ~edges.inner][:, 0], normal=-load)
+    equilibrium.solve_elastic(sim)
+    heat.prescribe(None, 0.0)
+    over(sim, 1e5, 1)
+    assert diagnostics.values(sim, "stress_xx") == pytest.approx(-load, rel=1e-3)
+    assert not diagnostics.values(sim, "plastic_state").any()

@@ -4,9 +4,9 @@ python equilibrium_worker.py RUN...
 
 RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
 SOLVER-pumped: a joint that fluid opens by implicit steps, in one go and from a file in mid-injection, -propped: slurry,
-or SOLVER-cooled: a jointed bar that cools, SOLVER-rinsed: rock that water cools, or SOLVER-solid, SOLVER-crushed,
-SOLVER-burst: tetrahedra, with joints that break, that yield and are dug out, whose joints fluid opens, SOLVER-sides,
-SOLVER-seam: the first and the last of hexahedra; one after the other. Files are RUN.npz.
+or SOLVER-cooled: a jointed bar that cools and yields, SOLVER-rinsed: rock that water cools, or SOLVER-solid,
+SOLVER-crushed, SOLVER-burst: tetrahedra, with joints that break, that yield and are dug out, whose joints fluid opens,
+SOLVER-sides, SOLVER-seam: the first and the last of hexahedra; one after the other. Files are RUN.npz.
 """
 
 from __future__ import annotations
@@ -167,6 +167,9 @@ def cooled(sim: Blocks, solver: str, out: str) -> None:
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     mesh = sim.the_mesh()
     x, y = mesh.points.T
+    weak = {**{name: ROCK[name] for name in ("density", "young", "poisson_ratio")}, "friction": 30.0, "cohesion": 5e6}
+    left = np.flatnonzero(mesh.centroids()[:, 0] < 0.8)
+    changes.element_model(sim, left, "mech_mohr_coulomb", {**weak, "dilation": 10.0, "tensile": 4e6})
     joints = sim.numbers_of_joints(None)
     law = {**JOINT, "friction": 30.0, "tensile_strength": 1e8, "cohesion": 1e8, "penalty_normal": 20.0 * ROCK["young"]}
     ends = np.array([mesh.points[mesh.cells[j // 4]][:3].mean(axis=0)[0] for j in joints])
@@ -184,7 +187,8 @@ def cooled(sim: Blocks, solver: str, out: str) -> None:
     for _ in range(10):
         run.advance(1e4)
     run.close()
-    found = {name: diagnostics.values(sim, name) for name in (*NAMES, "temperature")}
+    found = {name: diagnostics.values(sim, name) for name in (*NAMES, "temperature", "plastic_work")}
+    assert found["plastic_work"].max() > 0.0
     found["joints"] = np.array(diagnostics.joint_counts(sim))
     found["account"] = np.array(list(heat.account().values())[:4])
     if sim.comm.rank == 0:

@@ -133,7 +133,8 @@ def initial_stress(
     gradient: Mapping[str, tuple[float, ...]] | None = None,
     where: Range | None = None,
 ) -> None:
-    """Stress [Pa] by component xx, yy, xy, zz, in space xz and yz too; gradient: by component, per metre."""
+    """Stress [Pa] by component xx, yy, xy, zz, in space xz and yz too; gradient: by component, per metre. In the plane
+    zz, if nothing is said of it, is that of plane strain."""
     project.ready().initial_stress(chosen(project, ELEMENT, where), **stress, gradient=gradient or None)
 
 

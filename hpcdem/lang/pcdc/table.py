@@ -930,8 +930,9 @@ _OBJECTS = (
              "pcdc element property young table 'E_of_depth' over y density field 'density'"),
             options=_OF_SOLIDS, ranged="element", needs_option=True, dims=BOTH),
     Command("el{ement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
-            "not given are zero. It is that of a strain, by the moduli of this moment: where these are lowered later, "
-            "it goes down with them.",
+            "not given are zero; in the plane stress-zz is then that of plane strain, Poisson's ratio times xx + yy. "
+            "It is that of a strain, by the moduli of this moment: where these are lowered later, it goes down with "
+            "them. A stress beyond the strength of the element is said in the log.",
             ("pcdc element initial stress-xx -5e6 stress-yy -10e6",
              "pcdc element initial stress-yy 0 gradient (0,25e3)"),
             options=tuple(

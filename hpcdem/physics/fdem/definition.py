@@ -94,6 +94,8 @@ class Traction:
 
 
 COMPONENTS = {2: ("xx", "yy", "xy", "zz"), 3: ("xx", "yy", "xy", "zz", "xz", "yz")}
+ACROSS = 3
+"""Place of zz there."""
 """Of stress, in the order of all tables, by dimensions of space."""
 TRACTIONS = {
     2: ("xx", "yy", "xy", "normal", "incoming_x", "incoming_y"),
@@ -391,9 +393,14 @@ class ModelDefinition:
         return self.alive & elements[self.element_row], self.joint_exists() & joints[self.joint_row]
 
     def _note_moduli(self, at: np.ndarray) -> None:
-        """Initial stresses of elements that had no model belong to the moduli of the one that they have now."""
+        """Initial stresses of elements that had no model belong to the moduli of the one that they have now; where
+        nothing was said of the stress across the plane, it is that of plane strain."""
         new = at[self.stress0_row[at] == 0]
         self.stress0_row[new] = self.element_row[new]
+        if self.stress0 is not None:
+            new = at[np.isnan(self.stress0[at, ACROSS]) & (self.element_row[at] > 0)]
+            nu = np.nan_to_num(self.element_rows.column("poisson_ratio"))[self.element_row[new]]
+            self.stress0[new, ACROSS] = nu * (self.stress0[new, 0] + self.stress0[new, 1])
 
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
         """Change some properties of elements that have a model. The stress follows the strain (total form)."""
@@ -595,30 +602,34 @@ class ModelDefinition:
         xx: float = 0.0,
         yy: float = 0.0,
         xy: float = 0.0,
-        zz: float = 0.0,
+        zz: float | None = None,
         gradient: Mapping[str, tuple[float, ...]] | None = None,
         xz: float = 0.0,
         yz: float = 0.0,
     ) -> None:
         """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y, in space in z)
         at the centroid as it lies in the mesh. It is the stress of a strain by the moduli of this moment, and changes
-        with them, see `initial_stresses`."""
+        with them, see `initial_stresses`. In the plane zz, if nothing is said of it, is that of plane strain, Poisson's
+        ratio times xx + yy, and in space 0."""
         at = self.numbers_of_elements(elements)
         mesh = self._mesh()
         names = COMPONENTS[mesh.dim]
         if mesh.dim == 2 and (xz != 0.0 or yz != 0.0):
             raise CommandError("in two dimensions there is no stress xz and yz")
-        given = {"xx": xx, "yy": yy, "xy": xy, "zz": zz, "xz": xz, "yz": yz}
+        given = {"xx": xx, "yy": yy, "xy": xy, "zz": 0.0 if zz is None else zz, "xz": xz, "yz": yz}
         values = np.tile(finite("initial stress", [given[name] for name in names]), (len(at), 1))
         for name, slope in (gradient or {}).items():
             if name not in names:
                 raise CommandError(f"a stress gradient is one of {', '.join(names)}, got {name}")
             values[:, names.index(name)] += mesh.centroids(at) @ self._vector(f"gradient of {name}", slope)
+        if mesh.dim == 2 and zz is None and "zz" not in (gradient or {}):
+            values[:, ACROSS] = math.nan  # until there are moduli
         self.before_change()
         if self.stress0 is None:
             self.stress0 = np.zeros((len(mesh.cells), len(names)))
         self.stress0[at] = values
         self.stress0_row[at] = self.element_row[at]
+        self._note_moduli(at)
         self.changed()
 
     def initial_stresses(self, elements: np.ndarray) -> np.ndarray:

@@ -5,7 +5,9 @@ the tangent is of its own (physics/fdem/kernels/stiffness.py, plastic_stiffness.
 Positions of all nodes are known to every rank meanwhile. Below dim is 2, in space 3; forces are in N/m, in space in N.
 
 What elements that yield remember is that of the last balance while Newton's method looks for the next one, whatever it
-tries on the way: `Local.evaluation` puts everything back. `_follow` lets them flow where balance was found.
+tries on the way: `Local.evaluation` puts everything back. They flow where balance was found, never before: what has
+changed since the last one (temperatures, moduli, strengths, stresses that were said, loads) is borne by the strain of
+the whole increment.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import changes, connectivity, diagnostics, tangent_space, user_functions, user_laws
+from hpcdem.physics.fdem.by_temperature import TEMPERATURE
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import plastic_stiffness, space, stiffness
@@ -58,6 +61,11 @@ TRIES = 3
 STILL = 1e-6
 """Change of stress by flow, over the largest stress, that does not count, where one flow makes the next one necessary:
 strength that follows tables, quads."""
+MUCH = 1e-3
+"""The same at the beginning, from which on elements are outside by what was said since they last flowed: then they flow
+at the whole load only, however many increments lead there."""
+BEFORE, AFTER = "temperature before", "temperature after"
+"""Columns of elements during a solve: temperatures of the last balance, and those of this one."""
 PASSES = 100
 """Most balances at one load, each after the flow of the one before."""
 SOLVERS = ("auto", "direct", "petsc")
@@ -107,8 +115,9 @@ class Nodes:
 
 
 def solve_elastic(
-    sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: str = "auto", steps: int = 1, softening: bool = False
-) -> Balanced:
+    sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: str = "auto", steps: int = 1, softening: bool = False,
+    before: np.ndarray | None = None,
+) -> Balanced:  # fmt: skip
     """Put the model into static equilibrium with the loads of this moment, at once.
 
     Elements are elastic or yield after Mohr and Coulomb. Joints must stay before their peak, or, with `softening`, may
@@ -121,7 +130,8 @@ def solve_elastic(
     400 000 unknowns on, else direct. steps: what is out of balance, and prescribed movement, is brought on in so many
     equal increments, in each of which elements flow once; one that finds no balance, or in which more than one joint
     would pass its peak, is halved, up to `CUTS` times (`FINE` with softening). A smallest increment may take several
-    joints past their peak, as where there is symmetry.
+    joints past their peak, as where there is symmetry. before (n_own, 3 or 4) [K]: temperatures at the last balance, if
+    they have changed since; they are brought on in the same increments where elements yield.
 
     CommandError, with the model as it was: a body that can move freely, conditions without equilibrium, surfaces
     that touch (before or in the answer), laws of users, joints behind their peak (before or in the answer), no
@@ -150,6 +160,8 @@ def solve_elastic(
     unknowns = unknowns_of(sim, nodes, cycles)
     refuse_loose_bodies(sim, nodes, unknowns)
     if softening or sim.yielding().any():
+        if before is not None and sim.yielding().any():
+            sim.cold[BEFORE], sim.cold[AFTER] = before, sim.cold[TEMPERATURE].copy()
         sim.before_change()  # what flows and breaks is the doing of a command
         sim.close_model()
     relaxations, remembered = sim.relaxations, Memory.of(sim)
@@ -502,19 +514,21 @@ def _follow(
     x, iterations, factors, increments = nodes.x, 0, 0, 0
     unit, done = 1 << FINE if softening else 1 << CUTS if yields else 1, 0
     whole, size = steps * unit, unit
-    missing = np.zeros(x.shape)
+    missing, outside = np.zeros(x.shape), False
     try:
-        if yields:
-            _flow(sim, x, step)
+        _warm(sim, 0.0)
         if whole > 1:
             missing, _, total = unbalanced(sim, nodes, unknowns, x)
             nodes.least = max(total, nodes.least) if softening else nodes.least
+            outside = yields and _still_to_flow(sim) > MUCH
         while done < whole:
             size = min(size, whole - done)
             left = 1.0 - (done + size) / whole
+            _warm(sim, 1.0 - left)
             found = _balance(
-                sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step, softening, size == 1
-            )
+                sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step, softening, size == 1,
+                yields and (left == 0.0 or not outside),
+            )  # fmt: skip
             iterations, factors = iterations + found.iterations, factors + found.factors
             if found.error and size > 1:
                 size //= 2
@@ -528,6 +542,9 @@ def _follow(
             size = min(2 * size if done % (2 * size) == 0 else size, unit)
     finally:
         solver.close()
+        if BEFORE in sim.cold:
+            sim.cold[TEMPERATURE][:] = sim.cold[AFTER]
+            del sim.cold[BEFORE], sim.cold[AFTER]
     if found.ratio > enough and sim.log is not None:
         sim.log.info(
             f"unbalanced over all forces is {found.ratio:.3g} instead of {enough:g}: strains are so small that "
@@ -536,29 +553,37 @@ def _follow(
     return x, Balanced(found.ratio, iterations, factors, unknowns.count, solver.name, increments)
 
 
+def _warm(sim: Blocks, part: float) -> None:
+    """Elements have so much of what is new in their temperatures, if that is known."""
+    if BEFORE in sim.cold:
+        before, after = sim.cold[BEFORE], sim.cold[AFTER]
+        sim.cold[TEMPERATURE][:] = after if part == 1.0 else before + part * (after - before)
+        sim.local.follow_heat()
+
+
 def _reached(part: float) -> str:
     return f"; balance was found with {100.0 * part:.3g} % of what is new in the loads"
 
 
 def _balance(
     sim: Blocks, nodes: Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
-    missing: np.ndarray, given: float, step: int, softening: bool, smallest: bool,
+    missing: np.ndarray, given: float, step: int, softening: bool, smallest: bool, flows: bool,
 ) -> _Balance:  # fmt: skip
-    """Balance of an increment, see `_newton`, where elements that can yield have flowed and joints have opened; as it
-    was, if there is none. smallest: more than one joint may pass its peak in it.
+    """Balance of an increment, see `_newton`, where elements that can yield have flowed, if `flows`, and joints have
+    opened; as it was, if there is none. smallest: more than one joint may pass its peak in it.
 
     One balance makes the next one necessary, as in steps, where strength follows tables and falls by the flow, in
     quads, where the two triangles of an overlay share their pressure after the flow and one may then flow on, and where
     a joint broke: the third of its points may have held."""
-    found = _newton(sim, nodes, unknowns, enough, solver, x, missing, given, softening)
-    if found.error or not (sim.local.yields or softening):
+    found = _newton(sim, nodes, unknowns, enough, solver, x, missing, given, softening, fresh=True)
+    if found.error or not (flows or softening):
         return found
     if softening and not smallest and int(sim.comm.sum_into(np.array([found.past], np.int64))[0]) > 1:
         found.error = "more than one joint would pass its peak"
         return found
-    before, again = Memory.of(sim), sim.local.yields and (sim.wide or "softening" in sim.cold)
+    before, again = Memory.of(sim), flows and (sim.wide or "softening" in sim.cold)
     for _ in range(PASSES):
-        broke = commit(sim, nodes, unknowns, found.x, step, softening)
+        broke = commit(sim, nodes, unknowns, found.x, step, softening, flows)
         if not (again or broke):
             return found
         found.ratio = unbalanced(sim, nodes, unknowns, found.x, missing)[1]
@@ -577,14 +602,16 @@ def _balance(
     return found
 
 
-def commit(sim: Blocks, nodes: Nodes, unknowns: Unknowns, x: np.ndarray, step: int, softening: bool) -> bool:
-    """Elements flow and joints open at these positions of the nodes (nn, dim), for good. True if some joint broke: then
-    it is a free face. CommandError if a body came loose, or its surfaces touch."""
-    if sim.local.yields:
-        _flow(sim, x, step)
+def commit(
+    sim: Blocks, nodes: Nodes, unknowns: Unknowns, x: np.ndarray, step: int, softening: bool, flows: bool
+) -> bool:
+    """Elements flow, if `flows`, and joints open at these positions of the nodes (nn, dim), for good. True if some
+    joint broke: then it is a free face. CommandError if a body came loose, or its surfaces touch."""
+    place_corners(sim, x)
+    if flows:
+        sim.local.flow(sim.local.plastic_state(), step)
     if not softening:
         return False
-    place_corners(sim, x)
     sim.local.open_joints()
     broke = sim.comm.any(bool((sim.local.slot_state == BROKEN).any()))
     if broke:
@@ -604,18 +631,12 @@ def _still_to_flow(sim: Blocks) -> float:
     return change / largest if largest > 0.0 else 0.0
 
 
-def _flow(sim: Blocks, x: np.ndarray, step: int) -> None:
-    """Elements outside their yield surface flow at these positions of the nodes (nn, dim), for good."""
-    place_corners(sim, x)
-    sim.local.flow(sim.local.plastic_state(), step)
-
-
 def _newton(
     sim: Blocks, nodes: Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
-    missing: np.ndarray, given: float, softening: bool,
+    missing: np.ndarray, given: float, softening: bool, fresh: bool = False,
 ) -> _Balance:  # fmt: skip
     """Balance of all forces but `missing` (nn, dim) [N/m], from the positions x (nn, dim) and this part of what is
-    prescribed on."""
+    prescribed on. fresh: an increment begins, with the elastic answer to what is new in it."""
     left, renew, yields = given if unknowns.given.any() else 0.0, True, sim.local.yields
     # Which elements on the yield surface will flow on is not known at the beginning: rounding would say. The first way
     # is elastic, and so is one where those with flow lead nowhere. As the stress that cannot be borne goes to many
@@ -624,6 +645,9 @@ def _newton(
     iterations = factors = past = 0
     rounding = noise = 0.0
     force, ratio, total = unbalanced(sim, nodes, unknowns, x, missing)
+    if fresh and yields:
+        with sim.local.without_flow():
+            force = unbalanced(sim, nodes, unknowns, x, missing)[0]
     ratios, error = [ratio], ""
     while iterations < MOST and (left > 0.0 or ratio > max(AIM, 0.05 * noise)):
         if renew:

@@ -302,6 +302,13 @@ class LawsSpace(Local):
             out[own.rows - sim.n_left] = found[:, None]
         return out
 
+    def _surfaces(self) -> np.ndarray:
+        """As in the plane; of parts of a hexahedron that of its first tetrahedron."""
+        of = self.law[: self.count].astype(np.int64)
+        if (own := self.hexes) is not None:
+            of[own.rows - self.sim.n_left] = self.quad_law[: own.count, :1]
+        return of
+
     def plastic_columns(self, at: slice | np.ndarray) -> np.ndarray:
         """As in the plane; parts of a hexahedron have the mean of its tetrahedra, and of their work the part of their
         volume."""

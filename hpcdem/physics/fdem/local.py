@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -29,6 +30,7 @@ from hpcdem.physics.fdem.kernels import (
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
+from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.properties import (
     COHESIVE,
     MECH_MOHR_COULOMB,
@@ -863,9 +865,15 @@ class Local:
         total, every = len(self.sim.number), np.ones(self.count, bool)
         scratch, of_joints = np.zeros((total, elements.FORCE)), np.zeros((total, elements.FORCE))
         self.pairs.pushed[:] = 0.0
+        with self.without_flow():
+            self._elements(every, np.ones(len(self.head), bool), scratch, of_joints, True)
+
+    @contextmanager
+    def without_flow(self) -> Iterator[None]:
+        """Elements are elastic meanwhile, with what they remember of flow."""
         yields, self.yields = self.yields, False
         try:
-            self._elements(every, np.ones(len(self.head), bool), scratch, of_joints, True)
+            yield
         finally:
             self.yields = yields
 
@@ -1021,6 +1029,24 @@ class Local:
         if self.yields:
             self.flow(after, self.sim.clock.step)
         return after[0], after[1], after[2]
+
+    def beyond(self) -> tuple[np.ndarray, np.ndarray]:
+        """By how much [Pa] the stress of owned elements (n_own,) is outside their strength, before they flow from it,
+        the larger of shear and tension, negative: inside; and that stress (n_own, 4), in space (n_own, 6)."""
+        stress = self.stresses(energies=False, flow=False)[0]
+        whole = np.zeros((len(stress), 6))
+        whole[:, : stress.shape[1]] = stress
+        low, _, high = principal(whole[:, [0, 2, 4, 2, 1, 5, 4, 5, 3]].reshape(-1, 3, 3))[0].T
+        surface = self.yield_table[self._surfaces()]
+        shear = surface[:, plasticity.N_PHI] * high - low - surface[:, plasticity.STRENGTH]
+        return np.maximum(shear, high - surface[:, plasticity.TENSILE]), stress
+
+    def _surfaces(self) -> np.ndarray:
+        """(n_own,) rows of the table of yield surfaces, of quads that of their first triangle."""
+        of, first = np.zeros(self.sim.n_own, np.int64), self.sim.n_left
+        of[self.triangle_rows[: self.count] - first] = self.law[: self.count]
+        of[self.quad_rows - first] = self.quad_law[:, 0]
+        return of
 
     def plastic_columns(self, at: slice | np.ndarray) -> np.ndarray:
         """Columns `plasticity.MEMORY` (n, 9) of what owned elements remember of yielding, after the flow of this

@@ -60,6 +60,8 @@ SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
 OLDEST = 2000
 """Storage is made again at this age even if nobody moved, so that borders can follow the load."""
+OUTSIDE = 1e-6
+"""Part of its largest component by which a given stress must be beyond the strength to be spoken of."""
 LOCKS = 0.45
 """Poisson's ratio above which tetrahedra are said to lock."""
 AUTO = 100
@@ -80,6 +82,8 @@ class Blocks(State):
 
     local: Local
     _known: dict[str, Any] | None = None
+    _state_given = False
+    """A stress, or what must bear it, was said before anything moved, and is still to be looked at."""
 
     # ---- mesh ----------------------------------------------------------------------------------------------------
 
@@ -161,6 +165,7 @@ class Blocks(State):
     def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         before = self.element_row.copy()
         super().set_element_model(elements, name, properties)
+        self._state_given |= self.clock.step == 0
         if name == MECH_BURGERS.name:
             self._take_kelvin_strain(elements, KELVIN_STRAIN[self.dim])
         if self.log is None or self.stress0 is None:
@@ -177,7 +182,12 @@ class Blocks(State):
 
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
         super().element_property(elements, properties)
+        self._state_given |= self.clock.step == 0
         self._take_kelvin_strain(elements, [name for name in KELVIN_STRAIN[self.dim] if name in properties])
+
+    def initial_stress(self, *args: Any, **given: Any) -> None:
+        super().initial_stress(*args, **given)
+        self._state_given = True
 
     def _take_kelvin_strain(self, elements: Numbers, names: Sequence[str]) -> None:
         """The strain of the Kelvin units becomes what their properties say, in these components; the model is open."""
@@ -596,6 +606,9 @@ class Blocks(State):
                 self._note_time()
             self.rebuilds += 1
         self.surface_loads.storage_rebuilt()
+        if self._state_given:
+            self._state_given = False
+            self._warn_of_given_stress()
         if stale:
             give_back()
 
@@ -754,6 +767,27 @@ class Blocks(State):
         if self.options.collision:
             halo.add_ghost_field(self.v)
         self.where[self.number] = np.arange(n)
+
+    def _warn_of_given_stress(self) -> None:
+        """A line in the log about elements that cannot bear the stress they were given. Collective."""
+        if self.stress0 is None or not self.local.yields:
+            return
+        beyond, stress = self.local.beyond()
+        number = self.number[self.owned]
+        bad = np.flatnonzero((beyond > OUTSIDE * np.abs(stress).max(axis=1)) & (self.stress0_row[number] > 0))
+        worst = bad[np.lexsort((number[bad], -beyond[bad]))[:1]]
+        found = self.comm.allgather((len(bad), [(-beyond[i], int(number[i]), stress[i]) for i in worst]))
+        count = sum(part[0] for part in found)
+        if self.log is None or not count:
+            return
+        far, element, of = min((one for part in found for one in part[1]), key=lambda one: one[:2])
+        place = ", ".join(f"{c:.4g}" for c in self.the_mesh().centroids(np.array([element]))[0])
+        self.log.warn_once(
+            f"initial stress beyond strength {count} {element} {far}",
+            f"{count} element{'s have an initial stress' if count > 1 else ' has an initial stress'} beyond "
+            f"{'their' if count > 1 else 'its'} strength and will yield at once; farthest beyond is element {element} "
+            f"at ({place}), by {-far:.4g} Pa: {_pascals(of)}",
+        )
 
     def _warn_of_locking(self) -> None:
         """A line in the log about tetrahedra that hardly change their volume."""

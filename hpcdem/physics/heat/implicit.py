@@ -23,7 +23,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.heat import kernels
 from hpcdem.physics.heat.hexes import Hexes
 from hpcdem.physics.heat.implicit_fluid import Fluid
-from hpcdem.physics.heat.model import CAPACITY, GIVEN, Heat
+from hpcdem.physics.heat.model import CAPACITY, GIVEN, TEMPERATURE, Heat
 
 MOST, PLENTY, CHANGE = 100, 40, 1e-7
 """Solutions of the linear system in a step with advection of second order: how many at most, from which on changes
@@ -69,25 +69,24 @@ class Implicit:
 
     def advance(self, dt: float) -> None:
         """One step of dt [s]."""
-        self._solve(dt)
+        before = self._solve(dt)
         self.heat.time += dt
-        self._settle()
+        self._settle(before)
 
     def steady(self) -> None:
         """The state to which heat goes with the conditions of this moment; no time passes."""
         self._refuse_loose()
-        self._solve(math.inf)
-        self._settle()
+        self._settle(self._solve(math.inf))
 
-    def _settle(self) -> None:
-        """Blocks come into equilibrium with their new thermal stress."""
+    def _settle(self, before: np.ndarray) -> None:
+        """Blocks come into equilibrium with their new thermal stress; before: temperatures of owned elements then."""
         sim = self.sim
         self.steps += 1
         sim.local.follow_heat()
         if self.moves:
             joints = bool((sim.joint_row[sim.joint_exists()] > 0).any())
             try:
-                equilibrium.solve_elastic(sim, solver=self.wanted, softening=joints)
+                equilibrium.solve_elastic(sim, solver=self.wanted, softening=joints, before=before)
             except CommandError as error:
                 raise CommandError(
                     f"heat time {self.heat.time:.6g} s: {error}; temperatures are those of that time, blocks lie where "
@@ -98,7 +97,8 @@ class Implicit:
 
     # ---- the step --------------------------------------------------------------------------------------------------
 
-    def _solve(self, dt: float) -> None:
+    def _solve(self, dt: float) -> np.ndarray:
+        """Temperatures after dt [s]; returns those of owned elements before."""
         sim, heat = self.sim, self.heat
         sim.close_model()
         heat.renew_nodes()
@@ -109,7 +109,7 @@ class Implicit:
         self._prepare(dt, fluid)
         assert self.solver is not None
         begin, corner, held = heat.nodes
-        flat = heat.t.reshape(-1)
+        flat, before = heat.t.reshape(-1), sim.cold[TEMPERATURE].copy()
         old = flat[corner[begin[:-1]]].copy()
         new = np.where(held >= 0, np.append(heat.held_at(after), 0.0)[held], old)
         inertia = heat.capacity / dt
@@ -153,6 +153,7 @@ class Implicit:
             got, walls = fluid.inflow(of_fluid, self._everywhere(new), beyond)
             fluid.take(dt, of_fluid, got)
         self._book(dt, after, old, new, walls[heat.node_ids])
+        return before
 
     def _everywhere(self, mine: np.ndarray) -> np.ndarray:
         """Values of all nodes of the rock from those (n,) of the nodes that this rank's elements have."""
