@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA, softening
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks import models
@@ -148,3 +148,27 @@ def test_the_account_does_not_change_the_run():
         )
     assert np.array_equal(ends[0], ends[1], equal_nan=True)
     assert math.isfinite(float(np.nansum(ends[0])))
+
+
+@pytest.mark.parametrize("damping", ["viscous", "rayleigh"])
+@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+def test_small_strains_close_to_rounding(kind, damping):
+    """Their forces are those of an energy, on the shape of the mesh: of a soft cantilever that swings far, all that
+    damping does not take is there."""
+    sim = Blocks()
+    sim.take_mesh(shaken(rectangle(6, 3, 1.0, 0.5, kind=kind), 0.2))
+    soft = {"density": 2500.0, "young": 1e7, "poisson_ratio": 0.25, "damp_factor": 0.3 * (damping == "viscous")}
+    changes.element_model(sim, None, "mech_iso_elastic", soft)
+    sim.option(large_strain=False, collision=False)
+    if damping == "rayleigh":
+        sim.rayleigh(0.1, 30.0)
+    diagnostics.account_energy(sim)
+    sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 0] < 1e-9), vx=0.0, vy=0.0)
+    sim.time_step(value=5e-5)
+    changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 0] > 0.99), 0.0, 8.0)
+    given = diagnostics.energies(sim)["kinetic"]
+    convergence.advance(sim, 600)
+    found = diagnostics.energies(sim)
+    assert np.abs(diagnostics.values(sim, "displacement_y")).max() > 0.02
+    assert found["viscous_lost"] > 0.1 * given
+    assert found["relative"] < 1e-12, found

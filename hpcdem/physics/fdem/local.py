@@ -865,8 +865,10 @@ class Local:
         total, every = len(self.sim.number), np.ones(self.count, bool)
         scratch, of_joints = np.zeros((total, elements.FORCE)), np.zeros((total, elements.FORCE))
         self.pairs.pushed[:] = 0.0
+        v = self.sim.v.copy()  # triangles kick their corners
         with self.without_flow():
             self._elements(every, np.ones(len(self.head), bool), scratch, of_joints, True)
+        self.sim.v[:] = v
 
     @contextmanager
     def without_flow(self) -> Iterator[None]:
@@ -1285,8 +1287,9 @@ class Local:
         before their kick and b times those after it."""
         sim, o, pairs, dt = self.sim, self.sim.options, self.pairs, self.sim.clock.dt
         energy.book(
-            sim.n_left, sim.n_own, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, sim.x, before,
-            after, a, b, of_joints, self.true_mass, o.gx, o.gy, o.mass_damping, o.stiffness_damping, dt, work,
+            sim.n_left, sim.n_own, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q,
+            not o.large_strain, sim.x, before, after, a, b, of_joints, self.true_mass, o.gx, o.gy, o.mass_damping,
+            o.stiffness_damping, dt, work,
         )  # fmt: skip
         energy.book_contact(pairs.rows, sim.n_left, pairs.corners, pushed, before, after, a, b, dt, work)
         energy.book_nodes(

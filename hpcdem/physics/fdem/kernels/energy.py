@@ -23,7 +23,10 @@ from hpcdem.physics.fdem.kernels.elements import (
     Q_LAMBDA,
     Q_TWO_MU,
     TWO_MU,
+    _part,
+    _part_forces,
     _part_rate,
+    _rate,
     part_stretch,
 )
 from hpcdem.physics.fdem.kernels.joints import DAMAGE, FAR, NEAR, OPENED, SLIPPED
@@ -34,45 +37,36 @@ WORK = 8
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _viscous_triangle(xy, vel, c, beta, out):
+def _viscous_triangle(xy, vel, c, small, beta, out):
     """Corner forces (6,) of the viscous stress, with that of the Rayleigh damping beta [s]."""
-    ux, uy, wx, wy = xy[2] - xy[0], xy[3] - xy[1], xy[4] - xy[0], xy[5] - xy[1]
-    f11, f12 = ux * c[0] + wx * c[2], ux * c[1] + wx * c[3]
-    f21, f22 = uy * c[0] + wy * c[2], uy * c[1] + wy * c[3]
-    cs, sn = laws.rotation(f11, f12, f21, f22)
-    dux, duy, dwx, dwy = vel[2] - vel[0], vel[3] - vel[1], vel[4] - vel[0], vel[5] - vel[1]
-    g11, g12 = dux * c[0] + dwx * c[2], dux * c[1] + dwx * c[3]
-    g21, g22 = duy * c[0] + dwy * c[2], duy * c[1] + dwy * c[3]
-    eta, d11, d22 = c[ETA] + beta * c[TWO_MU], cs * g11 + sn * g21, cs * g22 - sn * g12
-    swell = beta * c[LAMBDA] * (d11 + d22)
-    s12 = 0.5 * eta * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
-    xx, yy, xy_ = laws.turned(eta * d11 + swell, eta * d22 + swell, s12, cs, sn)
-    out[0], out[1] = 0.5 * (xx * (wy - uy) - xy_ * (wx - ux)), 0.5 * (xy_ * (wy - uy) - yy * (wx - ux))
-    out[2], out[3] = 0.5 * (xy_ * wx - xx * wy), 0.5 * (yy * wx - xy_ * wy)
+    ux, uy, wx, wy, cs, sn, _, _, _ = _part(xy[0], xy[1], xy[2], xy[3], xy[4], xy[5], c[0], c[1], c[2], c[3], small)
+    r11, r22, r12 = _rate(vel[0], vel[1], vel[2], vel[3], vel[4], vel[5], c[0], c[1], c[2], c[3], cs, sn)
+    eta, swell = c[ETA] + beta * c[TWO_MU], beta * c[LAMBDA] * (r11 + r22)
+    fx1, fy1, fx2, fy2 = _part_forces(ux, uy, wx, wy, cs, sn, eta * r11 + swell, eta * r22 + swell, eta * r12)
+    # Those of a triangle of a quad are half as large.
+    out[0], out[1], out[2], out[3] = 2.0 * fx1, 2.0 * fy1, 2.0 * fx2, 2.0 * fy2
     out[4], out[5] = -out[0] - out[2], -out[1] - out[3]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _viscous_quad(xy, vel, c, beta, out):
+def _viscous_quad(xy, vel, c, small, beta, out):
     """The same for the eight of a quad."""
     out[:] = 0.0
     eta = c[Q_ETA] + beta * c[Q_TWO_MU]
     for overlay in range(2):
         rate, area = 0.0, 0.0
         for p in (2 * overlay, 2 * overlay + 1):
-            _, _, _, _, cs, sn, _, _, _ = part_stretch(p, xy, c, False)
+            _, _, _, _, cs, sn, _, _, _ = part_stretch(p, xy, c, small)
             r11, r22, _ = _part_rate(p, vel, c, cs, sn)
             rate += c[Q_AREA + p] * (r11 + r22)
             area += c[Q_AREA + p]
         rate /= area
         for p in (2 * overlay, 2 * overlay + 1):
-            ux, uy, wx, wy, cs, sn, _, _, _ = part_stretch(p, xy, c, False)
+            ux, uy, wx, wy, cs, sn, _, _, _ = part_stretch(p, xy, c, small)
             r11, r22, r12 = _part_rate(p, vel, c, cs, sn)
             shift, swell = 0.5 * (rate - (r11 + r22)), beta * c[Q_LAMBDA] * rate
             xx, yy = eta * (r11 + shift) + swell, eta * (r22 + shift) + swell
-            xx, yy, xy_ = laws.turned(xx, yy, eta * r12, cs, sn)
-            fx1, fy1 = 0.25 * (xx * (wy - uy) - xy_ * (wx - ux)), 0.25 * (xy_ * (wy - uy) - yy * (wx - ux))
-            fx2, fy2 = 0.25 * (xy_ * wx - xx * wy), 0.25 * (yy * wx - xy_ * wy)
+            fx1, fy1, fx2, fy2 = _part_forces(ux, uy, wx, wy, cs, sn, xx, yy, eta * r12)
             i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
             out[i] += fx1
             out[i + 1] += fy1
@@ -84,22 +78,23 @@ def _viscous_quad(xy, vel, c, beta, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def book(
-    first, n_own, triangle_rows, quad_rows, c, q, x, before, after, a, b, of_joints, mass, gx, gy, drag, beta, dt, work
+    first, n_own, triangle_rows, quad_rows, c, q, small, x, before, after, a, b, of_joints, mass, gx, gy, drag, beta,
+    dt, work,
 ):  # fmt: skip
     """Add to work (n_own, 8) what joints, viscosity and gravity did on the owned elements.
 
-    first: storage row of the first owned element; before, after (n, w): velocities before and after the kick, taken
-    with the weights a and b; of_joints (n, 8) [N/m]; mass (n, 4): true masses [kg/m]; drag [1/s], beta [s]:
-    Rayleigh damping.
+    first: storage row of the first owned element; small: small strains; before, after (n, w): velocities before and
+    after the kick, taken with the weights a and b; of_joints (n, 8) [N/m]; mass (n, 4): true masses [kg/m]; drag [1/s],
+    beta [s]: Rayleigh damping.
     """
     force = np.zeros(8)
     for i in range(len(triangle_rows) + len(quad_rows)):
         if i < len(triangle_rows):
             r, n = triangle_rows[i], 3
-            _viscous_triangle(x[r], before[r], c[i], beta, force)
+            _viscous_triangle(x[r], before[r], c[i], small, beta, force)
         else:
             r, n = quad_rows[i - len(triangle_rows)], 4
-            _viscous_quad(x[r], before[r], q[i - len(triangle_rows)], beta, force)
+            _viscous_quad(x[r], before[r], q[i - len(triangle_rows)], small, beta, force)
         joint = viscous = pull = 0.0
         for k in range(2 * n):
             v = a * before[r, k] + b * after[r, k]
