@@ -334,6 +334,12 @@ def enter(session: Session | None) -> None:
     _current = session
 
 
+def refuse_after_stop() -> None:
+    """Raise what has ended the run, if it has: the program has caught it."""
+    if _current is not None:
+        _current.stop.refuse()
+
+
 def current(threads: int | None = None) -> Session:
     """The session of this process, opened if there is none yet. UsageError if it has another number of threads."""
     if _current is None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from hpcdem import session
 from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, ScriptError
 
 PACKAGE = str(Path(__file__).resolve().parent.parent)
@@ -23,6 +24,7 @@ def place() -> tuple[str, int]:
 
 def carried_out(at: tuple[str, int], name: str, make: Callable[[], Any], advice: str = HELP) -> Any:
     """What `make` returns. Errors of a command leave with file and line of the program; values of a wrong kind too."""
+    session.refuse_after_stop()
     try:
         return make()
     except CommandError as error:

@@ -10,7 +10,7 @@ from typing import IO, Any, NoReturn, Protocol
 import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
-from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.lang.completion import completion
 from hpcdem.page.pipe import DONE, MARK, READY
 from hpcdem.runtime import launch, shutdown
@@ -115,7 +115,7 @@ def _zdem(session: Session, piped: bool) -> None:
             except EOFError:
                 print()
                 return
-            except HpcdemError as error:
+            except (HpcdemError, StoppedWithCheckpoint) as error:
                 print(error)
             except KeyboardInterrupt:
                 print("\n(interrupted; Ctrl-D ends)")
@@ -143,7 +143,7 @@ def serve(talk: Talk, begin: Any, requests: IO[str], answers: IO[str]) -> None:
                 shown = talk.show()
         except SystemExit:
             return
-        except HpcdemError as error:
+        except (HpcdemError, StoppedWithCheckpoint) as error:
             good = False
             answers.write(f"{error}\n")
         except KeyboardInterrupt:

@@ -138,13 +138,12 @@ def run_python(session: Session, options: Options, source: bytes) -> None:
     sys.path.insert(0, str(options.script.resolve().parent))
     try:
         exec(compile(source, name, "exec"), {"__name__": "__main__", "__file__": name, "__builtins__": __builtins__})
+        session.stop.refuse()
     except SystemExit as leaving:
-        if leaving.code not in (None, EXIT_OK):
-            session.close(leaving)
-            raise
+        end_by_itself(session, leaving)
     except BaseException as error:
         session.close(error)
-        if isinstance(error, (HpcdemError, KeyboardInterrupt)):
+        if isinstance(error, (HpcdemError, KeyboardInterrupt, StoppedWithCheckpoint)):
             raise
         raise HpcdemError(f"{name} ended with an error\n{own_traceback(error, name)}") from None
     session.close()
@@ -189,14 +188,22 @@ def run_pcdc(session: Session, options: Options, source: bytes) -> None:
         sys.path.insert(0, str(options.script.resolve().parent))
         interpreter.run(script, past or ())
         interpreter.at_the_end()
+        session.stop.refuse()
     except SystemExit as leaving:
-        if leaving.code not in (None, EXIT_OK):
-            session.close(leaving)
-            raise
+        end_by_itself(session, leaving)
     except BaseException as error:
         session.close(error)
         raise
     session.close()
+
+
+def end_by_itself(session: Session, leaving: SystemExit) -> None:
+    """A program has called sys.exit: an error unless the code is 0; nor is it a good end if it caught the stop of the
+    run."""
+    end = session.stop.ended or leaving
+    if end is not leaving or leaving.code not in (None, EXIT_OK):
+        session.close(end)
+        raise end
 
 
 def own_traceback(error: BaseException, file: str) -> str:

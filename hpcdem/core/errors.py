@@ -57,7 +57,8 @@ class EquilibriumError(HpcdemError):
     exit_code = EXIT_UNBALANCED
 
 
-class StoppedWithCheckpoint(HpcdemError):
-    """The run was asked to stop and left a checkpoint behind."""
+class StoppedWithCheckpoint(BaseException):
+    """The run was asked to stop and left a checkpoint behind. No error that a script could deal with: its `except
+    Exception` lets it pass, as it does KeyboardInterrupt."""
 
     exit_code = EXIT_CHECKPOINT

@@ -179,8 +179,8 @@ def executed(text: str, path: str, name: str) -> dict[str, Any]:
     module.__file__ = path
     try:
         exec(code, vars(module))
-    except Exception as error:  # whatever the user's own code does
-        raise Wrong(_last_line(error, path), f"{type(error).__name__}: {error}") from None
+    except (Exception, SystemExit) as error:  # whatever the user's own code does
+        raise Wrong(_last_line(error, path), _said(error)) from None
     sys.modules[module.__name__] = module  # where numba looks for the modules of kernels that were kept
     return vars(module)
 
@@ -267,8 +267,8 @@ def stiffness_of(declared: Declared, law: str, values: Mapping[str, np.ndarray],
         for i in range(n):
             try:
                 bound[i] = float(declared.stiffness(**{name: float(values[name][i]) for name in of}))
-            except Exception as error:  # the user's own code
-                raise CommandError(f"{law}: its stiffness fails: {type(error).__name__}: {error}") from None
+            except (Exception, SystemExit) as error:  # the user's own code
+                raise CommandError(f"{law}: its stiffness fails: {_said(error)}") from None
     else:
         bound = np.full(len(next(iter(values.values()))), float(declared.stiffness))
     wrong = ~(np.isfinite(bound) & (bound > 0.0))
@@ -288,6 +288,14 @@ def compiled(kernel: Any, types: Any, path: str, line: int) -> Any:
     except Exception as error:  # numba hands on what its passes meet in the user's own code
         raise Wrong(line, f"numba: {type(error).__name__}: {error}") from None
     return kernel.overloads[tuple(types)].signature.return_type
+
+
+def _said(error: BaseException) -> str:
+    """What a user's own code raised."""
+    if isinstance(error, SystemExit):
+        code = "" if error.code is None else repr(error.code)
+        return f"sys.exit({code}) would end the whole run: take it out"
+    return f"{type(error).__name__}: {error}"
 
 
 def _last_line(error: BaseException, path: str) -> int:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from hpcdem.core.chinese import beside
-from hpcdem.core.errors import EXIT_ERROR, EXIT_OK, HpcdemError
+from hpcdem.core.errors import EXIT_ERROR, EXIT_OK, HpcdemError, StoppedWithCheckpoint
 
 EXIT_INTERRUPTED, EXIT_TERMINATED = 130, 143
 """Ended by a second Ctrl-C or SIGTERM: 128 and the number of the signal, as shells have it."""
@@ -49,7 +49,7 @@ class ExitStatus:
 
 def describe(error: BaseException) -> Failure:
     """Message alone for what a user can act on, traceback for what only we can."""
-    if isinstance(error, HpcdemError):
+    if isinstance(error, (HpcdemError, StoppedWithCheckpoint)):
         return Failure(error.exit_code, beside(f"hpcdem: {error}"))
     if isinstance(error, SystemExit):
         code = error.code if isinstance(error.code, int) else EXIT_OK if error.code is None else EXIT_ERROR

@@ -16,6 +16,9 @@ SIGINT with MPICH only, SIGUSR2 with Open MPI only (as tried with MPICH 5.0 and 
 A rank that hangs inside MPI cannot look at flags: `watchdog.Watchdog` ends it after a second SIGTERM or SIGINT, and
 after one SIGTERM that is not answered for a minute.
 
+What ends the run is no `Exception`. A script that catches it all the same (`except:`) meets it again at its next
+command: nothing is stepped, asked or written after the checkpoint.
+
 A signal may reach one rank only and the clocks of the ranks differ, so a request counts only once all ranks have
 seen it. The step loop puts `local_request()` into a maximum that it takes over the ranks anyway, and hands the
 result to `decide()`.
@@ -27,13 +30,14 @@ import math
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from types import FrameType
 from typing import Any, Literal
 
-from hpcdem.core.errors import UsageError
+from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.runtime.watchdog import SAME_SIGNAL, Watchdog
 
 NONE, AUTO, SAVE, STOP = 0, 1, 2, 3
@@ -78,7 +82,7 @@ class StopRequests:
 
     time_limit: seconds from now (wall clock) after which the run must have ended; None: no limit of its own.
     end_time: the same as a time of day [s since 1970], as Slurm gives it.
-    autosave: seconds after which a checkpoint is written if there was none; None: never.
+    autosave: seconds after which a checkpoint is written if there was none; None: never. ended: what has ended the run.
     """
 
     def __init__(
@@ -103,6 +107,7 @@ class StopRequests:
         self._before: dict[int, Any] = {}
         self._answered = False
         self._asked = 0.0
+        self.ended: StoppedWithCheckpoint | None = None
 
     # -- signals ---------------------------------------------------------------------------------------------
 
@@ -202,6 +207,18 @@ class StopRequests:
             self._last_file = time.monotonic()
             return "auto"
         return "none"
+
+    def end(self, message: str) -> StoppedWithCheckpoint:
+        """What ends the run, to be raised: the request is answered. A conversation goes on after it."""
+        end = StoppedWithCheckpoint(message)
+        if not hasattr(sys, "ps1"):
+            self.ended = end
+        return end
+
+    def refuse(self) -> None:
+        """Raise what has ended the run, if it has: the script has caught it."""
+        if self.ended is not None:
+            raise self.ended
 
     def poll(self, comm: Any) -> Decision:
         """Collective: the decision of all ranks, where no other reduction can carry the code."""

@@ -151,3 +151,45 @@ def test_two_runs_do_not_write_into_one_folder(launch, tmp_path):
     finally:
         lock.release()
     assert [path.name for path in (tmp_path / "a" / "data").iterdir() if path.suffix] == []
+
+
+CATCHES = """\
+import os, signal
+pcdc mesh structured (0,0) (2,1) cells 4 2
+pcdc element c-model mech-iso-e property density 2500 young 5e9 poisson-r 0.25
+pcdc node initial velocity (1,0)
+if os.path.exists('stop'):
+    os.kill(os.getpid(), signal.SIGTERM)
+try:
+    pcdc model step 400
+except CLAUSE:
+    print('caught')
+QUESTION
+pcdc model save 'end.sav'
+pcdc model new
+pcdc mesh structured (0,0) (1,1) cells 2 2
+pcdc element c-model mech-iso-e property density 2500 young 5e9 poisson-r 0.25
+pcdc model step 300
+"""
+
+
+@pytest.mark.parametrize("clause", ["Exception", "BaseException", "the end", "exit"])
+def test_a_script_cannot_catch_the_stop(resident, tmp_path, clause):
+    """`except Exception` lets it pass; what catches more meets it again at the next command or question, or at the end
+    of the script. Nothing is written after the checkpoint, from which the run goes on."""
+    question = {"Exception": "", "BaseException": "print(pcdc.time)", "exit": "raise SystemExit(0)"}.get(clause, "")
+    script = CATCHES.replace("CLAUSE", clause if clause == "Exception" else "BaseException")
+    script = script.replace("QUESTION", "if os.path.exists('stop'):\n    " + (question or "pass"))
+    if clause == "the end":
+        script = script[: script.index("pcdc model save")] + "print('over')\n"
+    (tmp_path / "a.sc").write_text(script)
+    (tmp_path / "stop").touch()
+    done = resident(1, "a.sc", "--no-figure", cwd=tmp_path)
+    assert done.returncode == 85 and "go on with --resume" in done.stderr, done.stdout + done.stderr
+    assert ("caught" in done.stdout) == (clause != "Exception") and ("over" in done.stdout) == (clause == "the end")
+    (path,) = (tmp_path / "data").glob("*.sav")
+    assert 0 < int(path.stem) < 400 and not (tmp_path / "end.sav").exists()
+    assert json.loads((tmp_path / "data" / "run.json").read_text())["state"] == "stopped"
+    (tmp_path / "stop").unlink()
+    again = resident(1, "a.sc", "--no-figure", "--resume", cwd=tmp_path)
+    assert again.returncode == 0 and "caught" not in again.stdout, again.stderr

@@ -7,7 +7,7 @@ import csv
 import pytest
 
 from hpcdem.core.errors import HpcdemError, PhysicsError, StoppedWithCheckpoint
-from hpcdem.runtime.stop_requests import STOP
+from hpcdem.runtime.stop_requests import STOP, StopRequests
 
 BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right\n"
 
@@ -186,11 +186,14 @@ def test_physics_that_breaks_down_leaves_the_histories(bench, monkeypatch):
     assert len(rows(bench, "data/history_t.csv")) == 4
 
 
-class Asked:
+class Asked(StopRequests):
     """Requests of the outside: a stop."""
 
-    reason = "SIGTERM"
     took: float | None = None
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reason = "SIGTERM"
 
     def overdue_request(self) -> int:
         return 0

@@ -73,7 +73,7 @@ def get_ready(comm: Any, *kinds: str, threads: int = 1) -> None:
 def carry_out(comm: Any, channel: Any, job: dict[str, Any], say: Any) -> dict[str, Any]:
     """Run job["script"] in job["folder"]; then, if job["again"] names a checkpoint, restore it and save it again."""
     from hpcdem.cli.run import Options, run
-    from hpcdem.core.errors import HpcdemError
+    from hpcdem.core.errors import HpcdemError, StoppedWithCheckpoint
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.stop_requests import StopRequests
 
@@ -88,7 +88,7 @@ def carry_out(comm: Any, channel: Any, job: dict[str, Any], say: Any) -> dict[st
         if job.get("again"):
             save_again(comm, job["again"])
     except BaseException as error:
-        failure, ours = shutdown.describe(error), not isinstance(error, HpcdemError)
+        failure, ours = shutdown.describe(error), not isinstance(error, (HpcdemError, StoppedWithCheckpoint))
     answer = {
         "code": failure.code if failure else 0, "text": failure.text if failure else "", "ours": ours,
         "told": [row for row in told.getvalue().splitlines() if TOLD.match(row)], "seen": shared.seen(),

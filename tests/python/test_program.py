@@ -248,3 +248,18 @@ def test_the_program_of_the_documentation_runs(launch: Launcher, tmp_path: Path)
     done = launch(1, "study.py", "--no-figure", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "IMPLE, 40 steps" in done.stdout
+
+
+@pytest.mark.parametrize("clause", ["Exception", "BaseException"])
+def test_a_program_cannot_catch_the_stop(resident: Resident, tmp_path: Path, clause: str) -> None:
+    """`except Exception` lets it pass; what catches more meets it again at the next method."""
+    text = (
+        "import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\n"
+        f"try:\n    sim.cycle(500)\nexcept {clause}:\n    print('caught')\n"
+        "sim.delete()\nsim.cycle(20)\nprint('went on')\n"
+    )
+    program(tmp_path, text)
+    done = resident(1, "study.py", "--no-figure", cwd=tmp_path)
+    assert done.returncode == 85 and "stopped at step" in done.stderr, done.stdout + done.stderr
+    assert ("caught" in done.stdout) == (clause == "BaseException") and "went on" not in done.stdout
+    assert len(list((tmp_path / "data").glob("*.sav"))) == 1

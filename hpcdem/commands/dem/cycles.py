@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from hpcdem.commands.dem.physics import check_time_step
-from hpcdem.core.errors import CommandError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.outputs import OUTPUTS
 from hpcdem.engine import output
 from hpcdem.physics.dem import diagnostics
@@ -473,7 +473,7 @@ def _answer(sim: Simulation, request: int) -> None:
         return
     path = output.write_checkpoint(sim, automatic=what == "auto")
     if what == "stop":
-        raise StoppedWithCheckpoint(
+        raise sim.stop.end(
             f"stopped at step {sim.clock.step} by {sim.stop.reason}; checkpoint {path} written, "
             f"go on with {sim.resume_advice}"
         )

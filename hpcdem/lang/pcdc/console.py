@@ -7,7 +7,7 @@ import codeop
 from collections.abc import Callable
 from pathlib import Path
 
-from hpcdem.core.errors import HpcdemError, ScriptError
+from hpcdem.core.errors import HpcdemError, ScriptError, StoppedWithCheckpoint
 from hpcdem.lang.completion import completion
 from hpcdem.lang.pcdc import source
 from hpcdem.lang.pcdc.complete import candidates
@@ -108,7 +108,7 @@ class Console:
             self.carry_out(text)
         except SystemExit:
             return False
-        except HpcdemError as error:
+        except (HpcdemError, StoppedWithCheckpoint) as error:
             self.say(str(error))
         except KeyboardInterrupt:
             self.say("interrupted")

@@ -22,7 +22,14 @@ from typing import Any
 import numpy as np
 
 from hpcdem.commands import fdem
-from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, ScriptError, UsageError
+from hpcdem.core.errors import (
+    CommandError,
+    EquilibriumError,
+    HpcdemError,
+    ScriptError,
+    StoppedWithCheckpoint,
+    UsageError,
+)
 from hpcdem.lang.pcdc import names, source
 from hpcdem.lang.pcdc.bindings import PASSED_OVER, Call, carry_out
 from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal, described
@@ -137,7 +144,7 @@ class Interpreter:
         linecache.cache[script.file] = len(script.python), None, [line + "\n" for line in script.lines], script.file
         try:
             exec(compile(script.python, script.file, mode), self.namespace if names is None else names)
-        except (SystemExit, KeyboardInterrupt):
+        except (SystemExit, KeyboardInterrupt, StoppedWithCheckpoint):
             raise
         except BaseException as error:
             if isinstance(error, HpcdemError) and not isinstance(error, CommandError):
@@ -181,10 +188,16 @@ class Interpreter:
             trace = trace.tb_next
         return inside
 
+    def _refuse_after_stop(self) -> None:
+        """The script has caught what ended the run: raise it again."""
+        if (stop := self.project.blocks.stop) is not None:
+            stop.refuse()
+
     # ---- one command ---------------------------------------------------------------------------------------------
 
     def _carry_out(self, index: int, *values: Any) -> None:
         """What a command of the script is in its Python text."""
+        self._refuse_after_stop()
         statement = self.statements[index]
         try:
             arguments, terms = statement.resolve(values)
@@ -298,6 +311,7 @@ class Interpreter:
 
     def _placed(self, make: Callable[[], Any]) -> Any:
         """What `make` returns; the line of the script, if it takes another way there."""
+        self._refuse_after_stop()
         try:
             return make()
         except UsageError as error:
