@@ -222,3 +222,42 @@ def test_a_checkpoint_without_calls(resident, tmp_path):
     assert again.returncode == 0, again.stderr
     assert again.stdout.count("CYC, 20 steps") == 1
     assert tables(tmp_path / "a" / "end.sav") == tables(tmp_path / "straight" / "end.sav")
+
+
+SOON = """\
+import hpcdem, os, signal, time
+sand = hpcdem.Simulation(outdir='sand')
+sand.set(disk='on', gravity=(0.0, -9.81), dt=2e-5, print=20)
+sand.box(0.0, 1.0, 0.0, 1.5, kn=2e6, ks=1e6, fric=0.3)
+sand.gen_grid([0.04], x=(0.0, 1.0), y=(0.0, 0.16))
+sand.prop(density=2000.0, kn=2e6, ks=1e6, fric=0.4)
+pcdc mesh structured (0.2,0.161) (0.8,0.361) cells 3 1
+pcdc element c-model mech-iso-e property density 2600 young 1e8 poisson-r 0.25
+pcdc output vtk 'block' every 20
+both = hpcdem.couple(sand)
+if os.path.exists('stop'):
+    os.kill(os.getpid(), signal.SIGTERM)
+pcdc node initial velocity (0.3,-3)
+if os.path.exists('stop'):
+    time.sleep(1.05)
+pcdc model step 50
+pcdc model save 'end.sav'
+"""
+
+
+def test_a_stop_before_the_first_step(resident, tmp_path):
+    """Between two commands, before discs and blocks are stepped: the state before the first step is written once."""
+    for name in ("straight", "a"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "soon.sc").write_text(SOON)
+    assert resident(1, "soon.sc", "--no-figure", cwd=tmp_path / "straight").returncode == 0
+    assert {"all_0000000000_ini.vtkhdf", "all_0000000000_ini.dat"} <= {
+        path.name for path in (tmp_path / "straight" / "sand").iterdir()
+    }
+    (tmp_path / "a" / "stop").touch()
+    done = resident(1, "soon.sc", "--no-figure", cwd=tmp_path / "a")
+    assert done.returncode == 85 and "stopped at step 0" in done.stderr
+    (tmp_path / "a" / "stop").unlink()
+    again = resident(1, "soon.sc", "--no-figure", "--resume", cwd=tmp_path / "a")
+    assert again.returncode == 0, again.stderr
+    assert_alike(tmp_path / "straight", tmp_path / "a")

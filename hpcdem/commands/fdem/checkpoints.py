@@ -16,6 +16,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import Chart, Curve, History
 from hpcdem.core.errors import CommandError, UsageError
 from hpcdem.physics.fdem.groups import Groups
+from hpcdem.physics.flow import coupled
 from hpcdem.physics.user_files import UnknownLaw
 from hpcdem.pre.mesh import solids
 from hpcdem.pre.mesh.geometry import Layers
@@ -42,8 +43,9 @@ def write_checkpoint(project: Project, automatic: bool = False) -> Path:
             project.log.warn_once("names", f"{error}; checkpoints of this run hold no m_ names")
     place = project.place()
     journal = place.get("journal") if place is not None else None
-    particles = None if project.coupled is None else project.coupled.particles.number
-    run = {**(place or {}), "progress": project.progress, "particles": particles}
+    beside = None if project.coupled is None else project.coupled.particles
+    particles = {"particles": None} if beside is None else {"particles": beside.number, "edited": beside.edited}
+    run = {**(place or {}), "progress": project.progress, **particles}
     more = {"run": run, "position": len(journal or ())}
     _write(project, path, {"names": names, **more})
     run_folder.retire(path.parent, project.comm, project.step, project.keep)
@@ -69,6 +71,7 @@ def restore(project: Project, path: str) -> dict[str, Any]:
     flush(project)
     file = project.to_read(path)
     names = dict(_restored(project, file).get("names") or {})
+    coupled.leave(project.blocks)
     project.restored = file, project.step
     return names
 

@@ -36,9 +36,10 @@ def flush(project: Project) -> None:
 
 
 def _write(project: Project, cracks: Sequence[Crack]) -> None:
-    """A model that begins, or goes on from a checkpoint, begins a new file with all that has broken."""
+    """A model that begins, or goes on from a checkpoint, begins a new file with all that has broken. What a checkpoint
+    has filed may not be known as an event yet."""
     done = project.cracks_filed
-    if done == len(cracks) or (not cracks and not project.blocks.joint_row.any()):
+    if (done is not None and done >= len(cracks)) or (not cracks and not project.blocks.joint_row.any()):
         return
     with project.blocks.timers.around("output"):
         path = project.folder() / NAME

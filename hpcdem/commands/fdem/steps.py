@@ -12,7 +12,7 @@ import numpy as np
 
 from hpcdem.commands.fdem import checkpoints, coupling, cracks, frames, histories
 from hpcdem.commands.fdem.project import Project
-from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.io.behind import under_way
 from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium
 from hpcdem.physics.fdem.convergence import RATIO, Watch
@@ -166,8 +166,7 @@ def solve_hydraulic(
         try:
             project.stepping = "solve hydraulic"
             frames.write_due(project)
-            while request := _flow_on(project, run, flow, project.progress["flow"]):
-                _answer(project, request)
+            _flow_on(project, run, flow, project.progress["flow"])
         finally:
             under_way.wait()
             project.progress, project.stepping = None, ""
@@ -233,11 +232,8 @@ def _heat_on(project: Project, run: Implicit, progress: dict[str, Any]) -> None:
     run.advance(progress["dt"])
     progress["left"] -= 1
     _write_due(project)
-    stop = project.blocks.stop
-    if stop is not None and progress["left"] > 0:
-        asked = int(project.comm.max_into(np.array([stop.local_request()], np.int64))[0])
-        if asked:
-            _answer(project, asked)
+    if progress["left"] > 0:
+        _answer_requests(project)
 
 
 def _explicit_is_cheaper(project: Project, flow: Flow, time: float, dt: float | None, solver: str) -> bool:
@@ -295,23 +291,21 @@ def _tell_of_thin(project: Project, steps: int | None, time: float | None) -> No
         )
 
 
-def _flow_on(project: Project, run: Coupled, flow: Flow, end: float) -> int:
-    """Implicit steps to this flow time [s], or until a checkpoint is asked for: then what, else 0."""
-    stop, told = project.blocks.stop, clocks.monotonic()
-    if flow.time >= end * (1.0 - 1e-12):
-        return 0
+def _flow_on(project: Project, run: Coupled, flow: Flow, end: float) -> None:
+    """Implicit steps to this flow time [s]. Checkpoints that are asked for are written between two of them, inside of
+    the run: nothing is different after one."""
+    told, last = clocks.monotonic(), end * (1.0 - 1e-12)
+    if flow.time >= last:
+        return
     with run:
-        while flow.time < end * (1.0 - 1e-12):
+        while flow.time < last:
             run.advance(end)
             _write_due(project)
             if project.log is not None and clocks.monotonic() - told > QUIET_SECONDS:
                 told = clocks.monotonic()
                 project.log.info(f"flow time {flow.time:.6g} s of {end:.6g} s, time step {flow.implicit_dt:.3g} s")
-            if stop is not None and flow.time < end:
-                asked = int(project.comm.max_into(np.array([stop.local_request()], np.int64))[0])
-                if asked:
-                    return asked
-    return 0
+            if flow.time < last:
+                _answer_requests(project)
 
 
 def _where(project: Project) -> str:
@@ -360,9 +354,8 @@ def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, 
                 raise
             creep.finish(blocks, end)
             _write_due(project)
-            if blocks.stop is not None and blocks.creep.time < end:
-                asked = np.array([blocks.stop.local_request()], np.int64)
-                _answer(project, int(project.comm.max_into(asked)[0]))
+            if blocks.creep.time < end:
+                _answer_requests(project)
         project.solved = {"reason": "time", "ratio": found.ratio, "steps": project.step - first}
         _tell_creep(project)
         histories.flush(project)
@@ -557,6 +550,12 @@ def stop_here(project: Project, request: int) -> None:
         _answer(project, request)
 
 
+def _answer_requests(project: Project) -> None:
+    """Between two implicit steps: what was asked for from outside, a checkpoint, perhaps the end. Collective."""
+    if (stop := project.blocks.stop) is not None:
+        _answer(project, int(project.comm.max_into(np.array([stop.local_request()], np.int64))[0]))
+
+
 def _answer(project: Project, request: int) -> None:
     """A signal or the time limit asked for a checkpoint, perhaps for the end."""
     stop, log, step = project.blocks.stop, project.log, project.step
@@ -567,7 +566,7 @@ def _answer(project: Project, request: int) -> None:
     cracks.flush(project)
     path = checkpoints.write_checkpoint(project, automatic=what == "auto")
     if what == "stop":
-        raise StoppedWithCheckpoint(
+        raise stop.end(
             f"stopped at step {step} by {stop.reason}; checkpoint {path} written, go on with {_onwards(project, path)}"
         )
     if log is not None:

@@ -440,14 +440,16 @@ def inverted(sim: Blocks) -> bool:
 
 
 @contextmanager
-def at_rest(sim: Blocks, nodes: Nodes) -> Iterator[None]:
-    """Velocities are zero and nothing dies down; afterwards everything is as it was."""
+def at_rest(sim: Blocks, nodes: Nodes, looks: bool = True) -> Iterator[None]:
+    """Velocities are zero and nothing dies down; afterwards everything is as it was. looks: whether surfaces touch,
+    which is refused."""
     local = sim.local
     relaxations = local.relaxing_corner
     v = sim.v.copy()
     try:
         hold_still(sim)
-        refuse_touching(sim, touching(sim), "touch")
+        if looks:
+            refuse_touching(sim, touching(sim), "touch")
         yield
     finally:
         place_corners(sim, nodes.x)

@@ -72,7 +72,9 @@ class Count:
 
 class Coupled:
     """Blocks and their fluid, or fluid alone, while time passes by implicit steps. A context: the model is settled when
-    it is left. Methods are collective; CommandError with the model as it was after the last step that found balance.
+    it is left. A checkpoint that was written inside goes on inside: nothing is settled in between that would not have
+    been without it. Methods are collective; CommandError with the model as it was after the last step that found
+    balance.
 
     longest: time step [s]. The next one that is tried is `Flow.implicit_dt`.
     """
@@ -121,42 +123,57 @@ class Coupled:
 
     def __enter__(self) -> Coupled:
         sim, flow = self.sim, self.flow
+        inside = flow.implicit  # says the checkpoint
         flow.check_wells()
         sim.close_model()
-        if self.moves and sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
+        if self.moves and not inside and sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
             sim._renew_lists()
         if flow.slurry is not None:
             flow.slurry.check_start()
         self._take_nodes()
-        if self.moves:
+        if self.moves and not inside:
             equilibrium.refuse_loose_bodies(sim, self.nodes, self.of_blocks)
             sim.before_change()
             sim.close_model()
-            self.again = pressed.join(sim, self.nodes)
-            if len(self.again):
+            if len(pressed.join(sim, self.nodes)):
                 self._take_nodes()
-        flow.implicit = True
-        self.fluid = Fluid(flow, reference_pressure(flow, self._stress()))
-        self.solver = self._solver()
-        self._stored = (0.0, 0.0)
-        if self.moves:
-            self._rest = equilibrium.at_rest(sim, self.nodes)
-            try:
-                self._rest.__enter__()
-            except CommandError:
-                self.solver.close()
-                flow.implicit = False
+        try:
+            self._begin(inside)
+        except CommandError:
+            flow.p0 = 0.0
+            if self.moves:
                 pressed.part(sim)
-                raise
-            self._stored = energy.stored(sim)
+            raise
         return self
 
+    def _begin(self, inside: bool) -> None:
+        sim, flow = self.sim, self.flow
+        if not inside:
+            flow.p0 = reference_pressure(flow, self._stress())
+        self.fluid = Fluid(flow, flow.p0)
+        self.fluid.volume = self.fluid.rooms(self.fluid.table_at(self.x))
+        self.solver = self._solver()
+        self._stored = (0.0, 0.0)
+        if not self.moves:
+            return
+        self._rest = equilibrium.at_rest(sim, self.nodes, looks=not inside)
+        try:
+            self._rest.__enter__()
+        except CommandError:
+            self.solver.close()
+            raise
+        self._stored = energy.stored(sim)
+        if isinstance(self.solver, Condensed) and flow.condensed is not None:
+            self._eliminate(self.solver, flow.condensed)
+            equilibrium.place_corners(sim, self.x)
+
     def __exit__(self, *error: Any) -> None:
-        self.flow.implicit = False
+        self.flow.p0, self.flow.condensed = 0.0, None
         if self.moves:
             sim = self.sim
             pressed.part(sim)
             self._rest.__exit__(None, None, None)
+            equilibrium.place_corners(sim, self.x)  # the next reach is measured there
             equilibrium.settle(sim, self.nodes, self.x, np.zeros_like(self.x))
             held = pressed.beside(sim, pressed.opposite(sim, self.x))
             pairs = [pair for pair in equilibrium.touching(sim) if not held[list(pair)].all()]
@@ -444,9 +461,15 @@ class Coupled:
         joints, _ = equilibrium.of_joints(self.sim, True)
         if isinstance(self.solver, Condensed):
             if not self.solver.ready:
-                self.solver.eliminate(equilibrium.of_elements(self.sim))
+                self._eliminate(self.solver, x)
             return [*joints, *of_fluid]
         return [*equilibrium.of_elements(self.sim), *joints, *of_fluid]
+
+    def _eliminate(self, solver: Condensed, x: np.ndarray) -> None:
+        """Condense the elements with their nodes at x (nn, dim), where their corners are then."""
+        equilibrium.place_corners(self.sim, x)
+        solver.eliminate(equilibrium.of_elements(self.sim))
+        self.flow.condensed = x.copy()
 
     def _lacking(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
         """What forces and fluid lack, over what contributes; the right-hand side (nn + nf, dim); the fluid."""
@@ -470,3 +493,16 @@ class Coupled:
             right[: len(x)] = force
             lack += ratio
         return lack, right, now
+
+
+def leave(sim: Blocks) -> None:
+    """The model of a checkpoint that was written inside a `Coupled` is as it is after one: nobody goes on there.
+    Collective."""
+    flow = Flow.there(sim)
+    if flow is None or not flow.implicit:
+        return
+    flow.p0, flow.condensed = 0.0, None
+    if sim.options.mechanical:
+        nodes = equilibrium.all_nodes(sim)
+        pressed.part(sim)
+        equilibrium.settle(sim, nodes, nodes.x, np.zeros_like(nodes.x))

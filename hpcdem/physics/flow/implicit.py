@@ -148,7 +148,7 @@ class Fluid:
                 self.first[rows] = rows[0]
         self.tied = self.first != np.arange(self.n)
         self._find_packs()
-        self.volume = self._gathered(flow.nodes[:, kernels.V])
+        self.volume = np.empty(0)
         self.u = self._variables(np.where(p > 0.0, p / self.p0, s - 1.0))
 
     def _find_packs(self) -> None:
@@ -205,6 +205,10 @@ class Fluid:
             own[rows] = np.maximum(y - above, 0.0) if y > 0.0 else y
         return own
 
+    def rooms(self, table: np.ndarray) -> np.ndarray:
+        """Volumes (n,) [m2] of the nodes, by the table of links."""
+        return np.bincount(self.end, table[self.both, kernels.HALF], self.n)
+
     def begin(self, dt: float, x: np.ndarray, passes: bool = True) -> tuple[Step, np.ndarray]:
         """A step of dt [s] from here, and the variables (n,) to begin with. passes: time does, else conditions are
         those of now."""
@@ -236,7 +240,7 @@ class Fluid:
 
     def balance(self, step: Step, u: np.ndarray, x: np.ndarray) -> Balance:
         """What the nodes lack at these variables (n,) and positions of the blocks' nodes (nn, dim)."""
-        table = self._table_at(x)
+        table = self.table_at(x)
         if self.thicken is not None:
             self.thicken(self.ends, table)
         does, value = step.conditions[self.condition].T
@@ -252,7 +256,7 @@ class Fluid:
         threads = self.flow.blocks.threads
         flows = kernels.flows if threads == 1 else kernels.flows_threaded
         flows(threads, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, wet, q, lost)
-        volume = np.bincount(self.end, table[self.both, kernels.HALF], self.n)
+        volume = self.rooms(table)
         fluid = volume * (state[:, kernels.S] + state[:, kernels.P] / self.bulk)
         dt, stored = step.dt, fluid - step.fluid
         into = np.bincount(self.end, self.side * q[self.both], self.n) * dt
@@ -310,7 +314,7 @@ class Fluid:
         held[rows] = found is None
         return found
 
-    def _table_at(self, x: np.ndarray) -> np.ndarray:
+    def table_at(self, x: np.ndarray) -> np.ndarray:
         """Apertures, conductances and halves of volumes of links (l, kernels.CHANNEL) at these positions (nn, dim)."""
         dim, table = self.dim, np.empty((len(self.ends), kernels.CHANNEL))
         width = self.at.shape[1] * dim
@@ -541,6 +545,8 @@ class Fluid:
         nodes[:, kernels.INFLOW] = given[mine] / step.dt
         self.show(now.state, now.volume)
         self.volume = now.volume
+        if flow.blocks.options.mechanical:  # what is shown of channels, and grains, follow where the blocks are now
+            flow.find_geometry()
         if flow.carried is not None:
             each = LINKS[self.dim]
             of = each * np.searchsorted(self.channels, flow.channels_here)

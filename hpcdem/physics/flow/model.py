@@ -180,8 +180,10 @@ class Flow(SurfaceLoad):
         """By name quantities (n,) of this rank's flow nodes that other physics keep."""
         self.slurry: Slurry | None = None
         """Grains in the fluid, which make it heavier and more viscous."""
-        self.implicit = False
-        """Implicit steps are being done."""
+        self.p0 = 0.0
+        """Pressure that the variables of implicit steps are measured by, while these are being done [Pa]; else 0."""
+        self.condensed: np.ndarray | None = None
+        """Positions (nn, dim) of the nodes of the blocks at which these have eliminated the elements."""
         self.kept = np.empty(0)
         """Part of the fluid of this rank's nodes (n,) that the last change of channels left there."""
         self.carried: np.ndarray | None = None
@@ -197,6 +199,11 @@ class Flow(SurfaceLoad):
     @property
     def stays(self) -> bool:
         return True
+
+    @property
+    def implicit(self) -> bool:
+        """Implicit steps are being done."""
+        return self.p0 > 0.0
 
     @staticmethod
     def there(blocks: Blocks) -> Flow | None:
@@ -1225,14 +1232,15 @@ class Flow(SurfaceLoad):
             "cycles": self.cycles, "waited": self.waited, "sub_steps": self.sub_steps, "dt": self.dt,
             "implicit_dt": self.implicit_dt, "since_peak": self.since_peak, "passed": self.passed,
             "reshaped": self._reshaped, "found_for": self._found_for, "wells": [well.saved() for well in self.wells],
-            "energy": self.energy, "frozen": self.frozen,
+            "energy": self.energy, "p0": self.p0, "frozen": self.frozen,
         }  # fmt: skip
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
-        """Channels with their properties, prescribed nodes, and faces said to be wet, of all ranks."""
+        """Channels with their properties, prescribed nodes, and faces said to be wet, of all ranks; see `condensed`."""
         channels, points = np.flatnonzero(self.row), np.flatnonzero(self.condition)
         faces = np.flatnonzero(self.said_wet)
-        return {
+        at = {} if self.condensed is None else {"flow_condensed": dict(zip("xyz", self.condensed.T))}
+        return at | {
             "flow_channels": {"number": channels, "row": self.row[channels].astype(np.int64),
                               "since": self.since[channels]},
             "flow_conditions": {"number": points, "row": self.condition[points].astype(np.int64)},
@@ -1266,7 +1274,10 @@ class Flow(SurfaceLoad):
         made.wells = [Well.restored(one) for one in state["wells"]]
         made.conditions = [Condition(**one) for one in state["conditions"]]
         made.removed, made.time = dict(state["removed"]), state["time"]
-        made.energy = state.get("energy", made.energy)
+        made.energy, made.p0 = state.get("energy", made.energy), state.get("p0", 0.0)
+        if "flow_condensed" in tables:
+            at = tables["flow_condensed"]
+            made.condensed = np.column_stack([at[axis] for axis in "xyz" if axis in at])
         made.cycles, made.waited = state["cycles"], state["waited"]
         made.sub_steps, made.dt, made.implicit_dt = state["sub_steps"], state["dt"], state.get("implicit_dt", 0.0)
         made.since_peak, made.passed = state.get("since_peak", 0), state.get("passed", 0)
