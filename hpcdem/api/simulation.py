@@ -366,11 +366,14 @@ class Simulation(BlockCommands):
         rext: float | None = None,
         fric: float | None = None,
         rubber: bool = False,
+        conserving: bool = False,
     ) -> int:
-        """PROP with bond keys: bond the pairs that touch, renew the bonds that are there; how many are new."""
+        """PROP with bond keys: bond the pairs that touch, renew the bonds that are there; how many are new. conserving:
+        one shear stiffness, touching or open, so that opening and closing make no energy."""
         return dem.bonds.bond(
             self.engine, _selection(where), ebmod=ebmod, gbmod=gbmod, tstrength=tstrength, sstrength=sstrength,
             n_bond=n_bond, s_bond=s_bond, tolerate=tolerate, rext=rext, fric=fric, rubber=rubber,
+            conserving=conserving,
         )  # fmt: skip
 
     @_command

@@ -220,6 +220,9 @@ ZDEM_KEYWORDS = {
     "model 1 bond: cohesion": "1 型胶结:黏聚力",
     "marks the bonds as those of a membrane: kept and written, without any effect on the motion":
     "把胶结标记为橡皮膜的胶结:保存并输出,对运动没有作用",
+    "the bonds have one shear stiffness, touching or open, so that opening and closing make no energy (docs/physics.md, "
+    "Bonds)":
+    "胶结无论接触还是张开都用同一剪切刚度,因此张开与闭合不会产生能量(docs/physics.md,Bonds)",
     "model 2 bond: tensile strength": "2 型胶结:抗拉强度",
     "model 2 bond: shear strength": "2 型胶结:抗剪强度",
     "largest gap that is bonded, up to 10 of the largest radius; the word alone keeps the default":

@@ -214,7 +214,7 @@ def test_the_last_particle_may_go(play):
     """A model may run empty and be filled again; the bonds of those before are forgotten."""
     sim, log = play(*PAIR, "PROP n_bond 1e9", "CYC 1", "DEL", "WALL id 1 nodes (0 0) (0 9) xv 2", "CYC 5", *PAIR[:1],
                     "PROP density 1 kn 1", "CYC 1")  # fmt: skip
-    assert sim.clock.step == 7 and len(sim.particles) == 1 and "outran" not in log
+    assert sim.clock.step == 7 and len(sim.particles) == 1 and "unseen" not in log
 
 
 def test_exp(play, tmp_path):

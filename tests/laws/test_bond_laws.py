@@ -149,6 +149,16 @@ def test_a_pair_that_is_apart_has_the_state_of_its_bond(model):
 
 
 @pytest.mark.parametrize("model", [laws.LINEAR, laws.HERTZ])
+@pytest.mark.parametrize("kind", [ELASTIC_BOND, CONTACT_BOND])
+def test_a_conserving_bond_has_one_shear_stiffness(model, kind):
+    """That of the bond, touching or open; all else is as it was."""
+    own = state(model, kind, -0.02)[1]
+    for u in (-0.02, -1e-6, 0.0, 0.01):
+        fn, ks, kn, energy = laws.pair_state(kind, model, 5e7, 3e7, E, -G, TWO_RT, LENGTH, True, U_MADE, u)
+        assert ks == own and (fn, kn, energy) == tuple(np.array(state(model, kind, u))[[0, 2, 3]])
+
+
+@pytest.mark.parametrize("model", [laws.LINEAR, laws.HERTZ])
 @pytest.mark.parametrize("kind, u", [(0, 0.01), (ELASTIC_BOND, -0.02), (CONTACT_BOND, -0.02), (CONTACT_BOND, 0.01)])
 def test_stiffness_and_energy_belong_to_the_force(model, kind, u):
     """kn = dFn/dU, Fn = dE/dU, by central differences."""

@@ -9,7 +9,7 @@ import pytest
 
 from hpcdem.commands.dem import cycles, particles, properties, settings, walls
 from hpcdem.core.errors import PhysicsError
-from hpcdem.physics.dem import diagnostics
+from hpcdem.physics.dem import diagnostics, simulation
 from hpcdem.runtime.progress import Log
 from hpcdem.session import report_end
 from tests.support import model, only
@@ -109,3 +109,43 @@ def test_who_is_nowhere_is_not_thought_to_have_left(tmp_path):
     sim.particles["x"][0] = np.nan
     with pytest.raises(PhysicsError, match="a number is not finite"):
         cycles.cycle(sim, 1)
+
+
+def meeting(folder, monkeypatch, glance: int, speed: float, walled: bool = False):
+    """Two discs 0.9 skins apart, or one and a wall as far away; they are set in motion between two looks, unseen."""
+    monkeypatch.setattr(simulation, "GLANCE", glance)
+    sim, _ = crowd(folder, [], dt=1e-3)
+    gap = 0.9 * simulation.NARROW
+    particles.ball(sim, 0, 0.0, 0.0, 1.0)
+    if walled:
+        walls.wall(sim, 3, ((1.0 + 1.5 * gap, -9.0), (1.0 + 1.5 * gap, 9.0)), kn=2.0)
+    else:
+        particles.ball(sim, 1, 3.2 + gap, 0.0, 1.0)
+    properties.prop(sim, density=1000.0, kn=2.0)
+    cycles.prepare(sim)
+    for _ in range(200):  # lists and looks as they are in a bed at rest
+        sim.step()
+    sim.particles["vx"][:] = np.where(sim.particles["gid"] == 0, speed, -speed)
+    return sim
+
+
+def test_who_speeds_up_between_two_looks_is_seen(tmp_path, monkeypatch):
+    """The lists are there before the contact is, as somebody glances every few steps; nothing is late."""
+    for walled in (False, True):
+        sim = meeting(tmp_path, monkeypatch, simulation.GLANCE, 25.0, walled)
+        for _ in range(64):
+            sim.step()
+        assert sim.rebuilds > 1 and diagnostics.survey(sim).deepest > 0.1
+
+
+@pytest.mark.parametrize("walled", [False, True])
+def test_a_contact_that_began_unseen_stops_the_run(tmp_path, monkeypatch, walled):
+    """Without glances: the message names who met; a motion that meets nobody goes on."""
+    whom = "particle 0 and wall 3" if walled else "particles 0 and 1"
+    with pytest.raises(PhysicsError, match=f"contacts began unseen, .*: {whom}. The time step 0.001 s is too large"):
+        sim = meeting(tmp_path, monkeypatch, 10**9, 25.0, walled)
+        for _ in range(64):
+            sim.step()
+    sim = meeting(tmp_path, monkeypatch, 10**9, -25.0, walled)
+    for _ in range(64):
+        sim.step()

@@ -21,11 +21,14 @@ from hpcdem.physics.dem import reference
 from hpcdem.physics.dem.simulation import Simulation
 from tests import support
 
-BONDS = {"none": (), "elastic": ("left",), "contact": ("right",), "both": ("left", "right")}
-HALVES = {"left": Interval("x", -9.0, 15.0), "right": Interval("x", 15.0, 99.0)}
+BONDS = {
+    "none": (), "elastic": ("left",), "contact": ("right",), "both": ("left", "right"), "conserving": ("top", "right"),
+}  # fmt: skip
+HALVES = {"left": Interval("x", -9.0, 15.0), "right": Interval("x", 15.0, 99.0), "top": Interval("x", -9.0, 15.0)}
 STRENGTHS = {
     "left": {"ebmod": 1e6, "gbmod": 1e6, "tstrength": 4e4, "sstrength": 5e4},
     "right": {"n_bond": 2e3, "s_bond": 4e4},
+    "top": {"ebmod": 1e6, "gbmod": 3e6, "tstrength": 4e4, "sstrength": 5e4, "conserving": True},
 }
 
 

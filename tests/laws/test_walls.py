@@ -11,10 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem.commands.dem import particles, properties, walls
+from hpcdem.commands.dem import cycles, particles, properties, walls
+from hpcdem.commands.dem import settings as settings_of
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.kernels import walls as kernels
+from hpcdem.physics.dem.simulation import Watcher
 from hpcdem.runtime.progress import Log
 from tests.support import at_wall, carry, force, model, only, position, steps, value, velocity
 
@@ -131,6 +133,60 @@ def test_a_floor_of_two_pieces_is_a_floor(tmp_path, which):
     for x in (-0.5, -0.3, -0.1, -1e-3, 0.0, 1e-3, 0.05, 0.2, 0.4):
         put(sim, x, 0.95)
         assert force(sim)[:2] == pytest.approx([0.0, 0.05 * K], abs=1e-6), f"x = {x}"
+
+
+def dragged(folder, *segments, x: float = -0.02, far: float = 0.04, n: int = 400, energy: int = 0):
+    """A ball that is pressed on walls with 0.05 K and carried along x past x = 0: sum of the forces along x that the
+    walls have felt, after each step. Sliding would begin after 0.5 * 0.05 of way."""
+    sim = held(folder, x, 0.95, *segments, fric=0.5)
+    if energy:
+        settings_of.set_option(sim, "energy", energy)
+        cycles.cycle(sim, 0)
+    found = []
+    sim.watchers.append(Watcher(1, lambda: found.append(float(diagnostics.wall_forces(sim)[:, 0].sum()))))
+    properties.prop(sim, xv=far / n / sim.clock.dt)
+    cycles.cycle(sim, n)
+    return sim, np.array(found)
+
+
+@pytest.mark.parametrize("which", [k for k in JOINED if "inside" not in k])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_friction_goes_on_from_wall_to_wall(tmp_path, which, way):
+    """The shear force that has built up on one piece of a floor is that of the next one."""
+    one, whole = dragged(tmp_path / "one", ((-5.0, 0.0), (5.0, 0.0)), x=-0.02 * way, far=0.04 * way)
+    two, pieces = dragged(tmp_path / "two", *JOINED[which], x=-0.02 * way, far=0.04 * way)
+    assert abs(whole[-1]) == pytest.approx(0.5 * 0.05 * K, rel=1e-9), "it slides at the end"
+    assert pieces == pytest.approx(whole, rel=1e-9)
+    assert two.lists.slot_fs.sum() == pytest.approx(one.lists.slot_fs.sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("turn", [-20.0, -0.5, 0.5, 3.0])
+def test_friction_goes_on_round_a_bend(tmp_path, turn):
+    """Pieces at a small angle, as of a circle: the ball goes on at a constant distance, round the end or into the
+    corner; the shear force never falls below what it was when it came to the bend, until the ball slides."""
+    a = math.radians(turn)
+    along = np.array([math.cos(a), math.sin(a)])
+    left = np.array([-along[1], along[0]])
+    sim, before = dragged(tmp_path, ((-5.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), tuple(5.0 * along)), x=-0.08, far=0.022)
+    corner = -0.95 * math.tan(0.5 * a) if turn > 0.0 else 0.0
+    path = [np.array([x, 0.95]) for x in np.linspace(-0.058, corner, 20)]
+    path += [0.95 * np.array([math.sin(-b), math.cos(b)]) for b in np.linspace(0.0, a, 40)[1:] if turn < 0.0]
+    path += [0.95 * left + s * along for s in np.linspace(-corner, -corner + 0.06, 40)[1:]]
+    for place in path:
+        put(sim, *place)
+        assert abs(sim.lists.slot_fs).sum() > 0.99 * abs(before[-1])
+    assert np.count_nonzero(sim.lists.slot_fs) == 1
+
+
+def test_the_energy_account_follows_shear_forces_from_wall_to_wall(tmp_path):
+    """Nothing is booked where a ball comes to the next piece: work of the motion is stored, then lost by friction."""
+    sim, _ = dragged(tmp_path, *JOINED["ends meet"], energy=10**6)
+    one, _ = dragged(tmp_path / "one", ((-5.0, 0.0), (5.0, 0.0)), energy=10**6)
+    pieces, whole = sim.energy.look(sim), one.energy.look(one)
+    assert pieces.loss_friction == pytest.approx(whole.loss_friction, rel=1e-9) and pieces.loss_friction > 0.0
+    assert pieces.elastic_shear == pytest.approx(whole.elastic_shear, rel=1e-9)
+    assert abs(pieces.loss_opened) + abs(pieces.loss_stiffness) < 1e-9 * whole.loss_friction
+    assert abs(pieces.closing) < 1e-9 * whole.loss_friction
 
 
 def test_overlapping_pieces_are_two_walls(tmp_path):

@@ -393,7 +393,7 @@ class Maker:
             keys += f" tstrength {number(force / area)} sstrength {number(2 * force / area)}"
         else:
             keys = f"n_bond {number(force)} s_bond {number(force * self.pick(1, 3))}"
-        keys += self.perhaps(15, " rubber")
+        keys += self.perhaps(15, " rubber") + self.perhaps(25, " conserving")
         self.add("PROP", keys, reach, self.perhaps(30, "fric 0.5"), self.perhaps(70, self.range()))
 
     def do_break(self) -> None:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hpcdem.commands.dem.properties import chosen, prop
 from hpcdem.core.errors import CommandError
+from hpcdem.core.fields import GID, MATERIAL, RADIUS, X, Y
 from hpcdem.core.selection import Selection
 from hpcdem.physics.dem.kernels import contacts, laws, mass
 from hpcdem.physics.dem.simulation import Simulation
 
 ELASTIC = ("ebmod", "gbmod", "tstrength", "sstrength")
-KEPT = (*ELASTIC, "rubber")
+KEPT = (*ELASTIC, "rubber", "conserving")
 TOLERATE = 1e-6
 FARTHEST = 10.0
 """Widest gap that can be bonded, in radii of the largest particle. More is a slip of units, and would bond all with
@@ -32,13 +35,16 @@ def bond(
     rext: float | None = None,
     fric: float | None = None,
     rubber: bool = False,
+    conserving: bool = False,
 ) -> int:
     """Bond the pairs with both particles in `where` and d - (Ra + Rb) rext <= tolerate; returns the bonds made.
 
     Either ebmod, gbmod [Pa], tstrength, sstrength [Pa] (elastic bond) or n_bond, s_bond [N] (contact bond). Pairs in
     `where` that are bonded already get the new values; keys left out keep theirs, or are 0 in a new bond. tolerate [m]
     defaults to 1e-6, rext to 1 (it scales radii for this search only). fric is set on the particles as by PROP. rubber
-    marks the bonds as those of a membrane, without any effect on the motion.
+    marks the bonds as those of a membrane, without any effect on the motion. conserving: while the bond holds, its own
+    shear stiffness counts where the pair touches too, so that opening and closing make no energy (of a contact bond of
+    Hertz particles that at the moment of bonding).
     """
     values = dict(zip(ELASTIC, (ebmod, gbmod, tstrength, sstrength), strict=True))
     elastic = any(v is not None for v in values.values())
@@ -57,6 +63,8 @@ def bond(
         given["rubber"] = 1.0
         if sim.log is not None:
             sim.log.warn_once("rubber", "rubber: the mark is kept and written, it has no effect on the motion")
+    if conserving:
+        given["conserving"] = 1.0
     if sim.own_laws:
         raise CommandError(f"bonds are not for a model with a law of the user, {sim.own_laws.titles}")
     gap = TOLERATE if tolerate is None else tolerate
@@ -82,6 +90,10 @@ def bond(
     which = _flags_with_ghosts(sim, where)
     renewed = _renewed(sim, kind, given).astype(np.int32)
     fresh = sim.bond_types.row(kind=kind, **given)
+    made_of = sim.bond_types.rows[[fresh, *renewed]]
+    soft = (made_of["conserving"] != 0.0) & (made_of["gbmod"] == 0.0) & (made_of["kind"] == laws.ELASTIC_BOND)
+    if soft.any():
+        raise CommandError("conserving bonds have their own shear stiffness, touching or open: gbmod above 0 is needed")
     made, longest2 = 0, 0.0
     for t in range(lists.n_blocks):
         n, d2 = contacts.make_bonds(
@@ -106,7 +118,7 @@ def _warn_of_overstretched(sim: Simulation, which: np.ndarray) -> None:
     for t in range(lists.n_blocks):
         n, gap = contacts.overstretched(
             t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, lists.bond, lists.u_made, sim.pair_laws,
-            sim.bond_types.as_floats(), len(sim.materials), mass.SPHERES[sim.settings.disk], which,
+            contacts.bond_laws(sim.bond_types.rows), len(sim.materials), mass.SPHERES[sim.settings.disk], which,
         )  # fmt: skip
         number += n
         widest[0] = max(widest[0], gap)
@@ -117,6 +129,55 @@ def _warn_of_overstretched(sim: Simulation, which: np.ndarray) -> None:
             f"{number} of these bonds are past their tensile limit where they are and will break in the next step: a "
             f"gap counts as strain, tolerate or not; the widest gap at which one of them would hold is {widest[0]:g} m"
         )
+
+
+def warn_of_two_stiffnesses(sim: Simulation) -> None:
+    """Say it if there are bonds whose shear stiffness is not that of their contacts: each opening and closing under
+    shear then changes the energy. A warning where nothing damps the motion, else a line.
+    Collective."""
+    state = len(sim.bond_types), len(sim.materials), sim.bonds, sim.settings.lsm
+    if state == sim.bonds_looked_at or not sim.bonds_left():
+        return
+    sim.bonds_looked_at = state
+    lists, p, rows = sim.lists, sim.particles, sim.materials.rows
+    slots = _slots(lists)
+    mine = (lists.bond[slots] > 0) & (lists.row[slots] >= p.owned.start) & (lists.row[slots] < p.owned.stop)
+    slots = slots[mine]
+    i, j, types = lists.row[slots], lists.partner[slots], sim.bond_types.rows[lists.bond[slots]]
+    first, second = p.ihot[i, MATERIAL], p.ihot[j, MATERIAL]
+    ri, rj = p.hot[i, RADIUS], p.hot[j, RADIUS]
+    length, two_rt = ri + rj, 4.0 * ri * rj / (ri + rj)
+    law = sim.pair_laws[first * len(rows) + second]
+    hertz, elastic = law[:, contacts.MODEL] == laws.HERTZ, types["kind"] == laws.ELASTIC_BOND
+    area = 0.25 * math.pi * two_rt * two_rt if mass.SPHERES[sim.settings.disk] else two_rt
+    gap = np.hypot(p.hot[j, X] - p.hot[i, X], p.hot[j, Y] - p.hot[i, Y]) - length
+    of_contact = law[:, contacts.B] * np.where(hertz, np.sqrt(two_rt * np.maximum(-gap, 0.0)), 1.0)
+    of_bond = law[:, contacts.B] * np.where(hertz, np.sqrt(two_rt * lists.u_made[slots]), 1.0)
+    of_bond = np.where(elastic, types["gbmod"] * area / length, of_bond)
+    larger, smaller = np.maximum(of_bond, of_contact), np.minimum(of_bond, of_contact)
+    damped = (np.maximum(rows["damp"][first], rows["damp"][second]) > 0.0) | (sim.settings.lsm > 0.0)
+    some = np.flatnonzero((types["conserving"] == 0.0) & (hertz | (larger - smaller > 1e-6 * larger)))
+    number, undamped = sim.count(len(some)), sim.count(int((~damped[some]).sum()))
+    mine_worst = sorted(
+        (float(smaller[k] / larger[k]), *sorted((int(p.ihot[i[k], GID]), int(p.ihot[j[k], GID]))), float(of_bond[k]),
+         float(of_contact[k]), bool(elastic[k]), bool(hertz[k]))
+        for k in some
+    )[:1]  # fmt: skip
+    worst = sorted(one for part in sim.comm.allgather(mine_worst) for one in part)[:1]
+    if not number or sim.log is None:
+        return
+    _, a, b, bond_ks, contact_ks, by_modulus, by_hertz = worst[0]
+    text = (
+        f"{number} bonds have one shear stiffness open and another touching: particles {a} and {b} "
+        f"{bond_ks:.4g} N/m ({'G A/L of the bond' if by_modulus else 'ks at the moment of bonding'}) and "
+        f"{contact_ks:.4g} N/m (ks of the contact{', which goes to 0 with the overlap' if by_hertz else ''}). "
+        "Pairs that open and close under shear make energy from nothing; the word `conserving` in the line of the "
+        "bonds prevents it (docs/physics.md, Bonds)"
+    )
+    if undamped:
+        sim.log.warn_once("two shear stiffnesses", f"{text}. Nothing damps {undamped} of these pairs")
+    else:
+        sim.log.info(f"{text}. Damping takes energy out, but need not be enough where little load presses them")
 
 
 def break_bonds(sim: Simulation, where: Selection | None = None) -> int:

@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from hpcdem.commands.dem.bonds import warn_of_two_stiffnesses
 from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.outputs import OUTPUTS
@@ -18,7 +19,7 @@ from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.guards import NAMED
 from hpcdem.physics.dem.kernels.contacts import MODEL
-from hpcdem.physics.dem.kernels.laws import tangent_normal_stiffness
+from hpcdem.physics.dem.kernels.laws import LINEAR, tangent_normal_stiffness
 from hpcdem.physics.dem.simulation import Simulation
 
 STEPBAR = 1000
@@ -27,7 +28,12 @@ NEAR = 0.5
 """Time step over the estimate of the critical one from which the true limit is computed."""
 MOST_STEPS = 2**53
 """Steps are counted exactly up to here, in frames and histories too."""
-LATE = "contacts that began late"
+WATCH = 100
+"""Steps between two looks at the limit of the time step, while contacts form that may come near it."""
+RELAXED = 10
+"""Longest wait between two such looks, over WATCH."""
+TOUCHING = 8
+"""Contacts of one particle, no more than which are thought of where a time step is called small without a look."""
 
 
 def cycle(sim: Simulation, n: int) -> None:
@@ -82,10 +88,6 @@ def resume(sim: Simulation) -> None:
 def stop(sim: Simulation) -> None:
     """STOP: the end of the script; histories are closed."""
     output.finish(sim)
-    if sim.log is not None and sim.log.has_warned(LATE):
-        sim.log.info(
-            f"in all, particles outran the contact search {sim.rebuild_state.late} times in {sim.clock.step} steps"
-        )
 
 
 def _nearest(steps: float) -> int:
@@ -180,10 +182,11 @@ def time_step(sim: Simulation) -> float:
 
     m_min: the smallest mass of a particle with a free degree of freedom (of clumps see observe.lightest); k_max: the
     largest pair stiffness, linear: of any two materials or material and wall in use; Hertz: tangent at the largest
-    overlap (1 % of R if none is larger than a millionth of it: discs of a grid touch without pressing).
-    Source: step count published with Li et al. 2021.
+    overlap (1 % of R if none is larger than a millionth of it: discs of a grid touch without pressing); bonds: normal
+    or shear, open, whether they are or not.
+    Source: step count published with Li et al. 2021; of bonds it says nothing.
     """
-    s, p = sim.settings, sim.particles
+    s = sim.settings
     if s.dt > 0.0:
         return s.dt
     if s.frac <= 0.0:
@@ -193,12 +196,8 @@ def time_step(sim: Simulation) -> float:
         raise CommandError(
             "SET frac: no particle is free to move, so there is no mass to find a time step from; use SET DT"
         )
-    used = np.flatnonzero(sim.used(p["material"], sim.materials))
-    n = len(sim.materials)
-    pairs = sim.pair_laws.reshape(n, n, 4)[np.ix_(used, used)].reshape(-1, 4)
-    walls = sim.wall_laws.reshape(-1, n, 4)[:, used].reshape(-1, 4)
-    rows = np.concatenate([pairs, walls])
-    stiffest = float(np.max(rows[rows[:, 0] == 0.0, 1], initial=0.0))
+    rows = _laws_in_use(sim)
+    stiffest = max(float(np.max(rows[rows[:, 0] == 0.0, 1], initial=0.0)), diagnostics.stiffest_bond(sim))
     out, _ = diagnostics.contact_rows(sim)
     wout, _ = diagnostics.wall_rows(sim)
     now = np.concatenate([out[:, diagnostics.STIFFNESS], wout[:, diagnostics.STIFFNESS]])
@@ -215,6 +214,14 @@ def time_step(sim: Simulation) -> float:
     if stiffest <= 0.0:
         raise CommandError("SET frac: no stiffness is set (PROP kn, or shear with HERTZ); use SET DT")
     return s.frac * math.sqrt(light / stiffest)
+
+
+def _laws_in_use(sim: Simulation) -> np.ndarray:
+    """Rows (m, 4) of the laws of pairs and walls that particles can have. Collective."""
+    used, n = np.flatnonzero(sim.used(sim.particles["material"], sim.materials)), len(sim.materials)
+    pairs = sim.pair_laws.reshape(n, n, 4)[np.ix_(used, used)].reshape(-1, 4)
+    walls = sim.wall_laws.reshape(-1, n, 4)[:, used].reshape(-1, 4)
+    return np.concatenate([pairs, walls])
 
 
 def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str, int], final_frame: bool) -> None:
@@ -249,8 +256,9 @@ def start(
     first = sim.clock.step
     sim.progress = {
         "name": name, "first": first, "last": None if steps is None else first + steps, "origin": origin,
-        "intervals": intervals, "final_frame": final_frame, "position": sim.position, "late": sim.rebuild_state.late,
+        "intervals": intervals, "final_frame": final_frame, "position": sim.position,
     }  # fmt: skip
+    warn_of_two_stiffnesses(sim)
     _warn_about_the_time_step(sim)
     if initial_frame:
         sim.last_frame = None  # the model may have been changed since, at the same step
@@ -262,20 +270,41 @@ def start(
             output.write_energy(sim)
 
 
-def _warn_about_the_time_step(sim: Simulation) -> None:
-    """dt beside its limits where it comes near the estimate of the critical step; once, a warning if it is beyond one,
-    or if lattice-solid damping reverses a velocity."""
-    critical, dt = diagnostics.critical_dt(sim), sim.clock.dt
-    damping = sim.settings.lsm * dt / diagnostics.lightest(sim)
-    braking = 0.0 if sim.dashpots is None else 2.0 * dt * sim.dashpots.fastest(sim)
+def _is_surely_small(sim: Simulation) -> bool:
+    """Whether the time step is far below its limit whatever touches: springs are linear, and many times as stiff ones
+    could be borne. Collective."""
+    rows = _laws_in_use(sim)
+    if (rows[:, 0] != LINEAR).any():
+        return False
+    largest = max(float(np.max(rows[:, 1:3], initial=0.0)), diagnostics.stiffest_bond(sim))
+    return sim.clock.dt**2 * TOUCHING * largest <= (0.8 * NEAR) ** 2 * diagnostics.lightest(sim)
+
+
+def _watch_the_time_step(sim: Simulation) -> None:
+    """dt beside its limits while contacts form; a line whenever these have come down by a fifth. The more the stiffness
+    may grow until dt comes near them, the later the next look. Collective."""
+    step = sim.clock.step
+    if sim.step_limit > 0.0 and step >= sim.next_watch:
+        critical = diagnostics.critical_dt(sim)
+        if math.isfinite(critical):
+            sim.next_watch = step + WATCH * int(min(RELAXED, (NEAR * critical / sim.clock.dt) ** 2))
+        if sim.clock.dt > NEAR * critical and critical < 0.8 * sim.step_limit:
+            _tell_limits(sim, critical, f"step {step}: ")
+
+
+def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
+    """dt beside the estimate of the critical step and the true one where it comes near; once, a warning if it is beyond
+    one. Collective."""
+    dt = sim.clock.dt
     near = dt > NEAR * critical or (math.isinf(critical) and sim.bonds_left() > 0)
     highest = diagnostics.highest_frequency(sim) if near else 0.0
+    sim.step_limit = 0.0 if 0.5 * dt * highest > 1.0 else critical  # 0: the worst is said
     if sim.log is None:
         return
     if highest > 0.0:
         estimate = f"{dt / critical:.2f} of the estimate 0.8 min sqrt(m / sum k) = {critical:.4g} s, "
         text = (
-            f"time step {dt:g} s: {estimate if math.isfinite(critical) else ''}{0.5 * dt * highest:.2f} of "
+            f"{when}time step {dt:g} s: {estimate if math.isfinite(critical) else ''}{0.5 * dt * highest:.2f} of "
             f"2 / omega = {2.0 / highest:.4g} s, the limit of the contacts and bonds there are"
         )
         if 0.5 * dt * highest > 1.0:
@@ -290,9 +319,20 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
     elif dt > critical:
         sim.log.warn_once(
             "critical time step",
-            f"the time step {dt:g} s is {dt / critical:.2f} times the estimate 0.8 min sqrt(m / sum k) = "
+            f"{when}the time step {dt:g} s is {dt / critical:.2f} times the estimate 0.8 min sqrt(m / sum k) = "
             f"{critical:.4g} s; results may be noisy, and a run that blows up should be repeated with a smaller one",
         )
+
+
+def _warn_about_the_time_step(sim: Simulation) -> None:
+    """dt beside its limits where it comes near the estimate of the critical step; once, a warning if it is beyond one,
+    or if lattice-solid damping reverses a velocity."""
+    dt, sim.next_watch = sim.clock.dt, 0
+    _tell_limits(sim, diagnostics.critical_dt(sim))
+    damping = sim.settings.lsm * dt / diagnostics.lightest(sim)
+    braking = 0.0 if sim.dashpots is None else 2.0 * dt * sim.dashpots.fastest(sim)
+    if sim.log is None:
+        return
     if damping > 1.0:
         sim.log.warn_once("damping", f"SET damp lsm: eta dt / m is {damping:.3g} for the lightest particle, above 1")
     if braking > 1.0:
@@ -350,6 +390,8 @@ class Due:
             tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
         last = -1 if progress["last"] is None else progress["last"]
         tasks.append(Task(self._bar, progress["first"], self._report, also=last))
+        if not _is_surely_small(sim):
+            tasks.append(Task(WATCH, 0, lambda _: _watch_the_time_step(sim)))
         for kind in OUTPUTS:
             if kind != "save" and intervals.get(kind, 0) > 0:  # older checkpoints have fewer kinds
                 tasks.append(Task(intervals[kind], origin, getattr(output.Snapshot, f"write_{kind}")))
@@ -432,7 +474,6 @@ def _run(sim: Simulation) -> None:
     if progress["final_frame"]:
         output.Snapshot(sim).write_print()
     output.settle(sim)
-    warn_about_late_lists(sim, progress)
 
 
 def _calls(sim: Simulation) -> list[Task]:
@@ -480,14 +521,3 @@ def _answer(sim: Simulation, request: int) -> None:
     if sim.log is not None:
         why = "as the last one was long ago" if what == "auto" else "on request"
         sim.log.info(f"step {sim.clock.step}: checkpoint {path} written {why}")
-
-
-def warn_about_late_lists(sim: Simulation, progress: dict) -> None:
-    """At the end of a command that stepped. Only the first time; `stop` says how often it was in all."""
-    late = sim.rebuild_state.late - progress["late"]
-    if late and sim.log is not None:
-        sim.log.warn_once(
-            LATE,
-            f"between steps {progress['first']} and {sim.clock.step} particles outran the contact search {late} times; "
-            "a contact may have begun a few steps late. A smaller time step avoids it. Later ones are counted only",
-        )

@@ -240,7 +240,8 @@ def _bond_types(sim: Simulation, t: dict[str, np.ndarray]) -> np.ndarray:
         columns = {"kind": np.full(n, float(laws.CONTACT_BOND))}
         columns |= {name: np.nan_to_num(t.get(word, np.zeros(n))) for name, word in _FORCES.items()}
         columns["kind"][(columns["tstrength"] <= 0.0) & (columns["sstrength"] <= 0.0)] = 0.0
-    columns["rubber"] = np.nan_to_num(np.asarray(t.get("rubber", np.zeros(n)), float))
+    for mark in ("rubber", "conserving"):
+        columns[mark] = np.nan_to_num(np.asarray(t.get(mark, np.zeros(n)), float))
     table = np.stack([*columns.values()], axis=1)
     return _rows(sim.comm, table, lambda v: sim.bond_types.row(**dict(zip(columns, v))) if v[0] > 0.0 else 0)
 

@@ -162,7 +162,6 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
             sim.log.command_finished()
     if sim.energy is not None:
         sim.energy.pause(sim)
-    cycles.warn_about_late_lists(sim, progress)
     if both.late > late and sim.log is not None:
         sim.log.warn(
             f"{both.late - late} times particles and faces outran the search for contacts between them; a contact may "

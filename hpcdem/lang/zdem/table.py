@@ -365,6 +365,8 @@ _PROPERTIES = (
     Option("sstrength", "model 1 bond: cohesion", kind=NOT_NEGATIVE, unit="Pa"),
     Option("rubber", "marks the bonds as those of a membrane: kept and written, without any effect on the motion",
            source="P"),
+    Option("conserving", "the bonds have one shear stiffness, touching or open, so that opening and closing make no "
+           "energy (docs/physics.md, Bonds)", source="X"),
     Option("n_bond", "model 2 bond: tensile strength", kind=NOT_NEGATIVE, unit="N"),
     Option("s_bond", "model 2 bond: shear strength", kind=NOT_NEGATIVE, unit="N"),
     Option("tolerate", "largest gap that is bonded, up to 10 of the largest radius; the word alone keeps the default",

@@ -101,9 +101,10 @@ class Totals:
 
     kinetic [J]; unbalanced: largest unbalanced force of a free particle over the mean normal contact force, 0 without
     contacts; contacts: pairs that touch or are bonded; critical_dt: 0.8 min sqrt(m / sum k) over the particles that are
-    free to move [s], inf without contacts, k being the tangent normal stiffness of each touching contact of the
-    particle (PFC's estimate); of a clump sum k (1/m + a^2/I) takes the place of sum k / m, a being the distance of the
-    member from the centre; deepest: the largest overlap of a pair or a wall contact over the (smaller) radius.
+    free to move [s], inf without contacts, k being the tangent stiffness of each contact and bond of the particle
+    (PFC's estimate), the normal or the shear one, whichever is larger, of bonds that of their stiffer state; of a clump
+    sum k (1/m + a^2/I) takes the place of sum k / m, a being the distance of the member from the centre; deepest: the
+    largest overlap of a pair or a wall contact over the (smaller) radius.
     """
 
     kinetic: float
@@ -118,21 +119,16 @@ def survey(sim: Simulation) -> Totals:
     """One look at all particles and contacts. Sums are exact. Collective."""
     p, lists, comm, s = sim.particles, sim.lists, sim.comm, sim.settings
     bins = np.zeros((2, *BINS_SHAPE), np.int64)
-    stiffness = np.zeros(len(p))
     counts = np.array([len(p), 0], np.int64)
     deepest = 0.0
     for t in range(lists.n_blocks):
         touching, deep = totals.pairs(
             t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, lists.bond, lists.u_made, sim.pair_laws,
-            sim.bond_laws, len(sim.materials), mass.SPHERES[s.disk], p.n_left, bins[0], stiffness,
+            sim.bond_laws, len(sim.materials), mass.SPHERES[s.disk], bins[0],
         )  # fmt: skip
         counts[1] += touching
         deepest = max(deepest, deep)
-    out, iout = wall_rows(sim)
-    deep = totals.add_wall_stiffness(
-        len(out), iout, out[:, STIFFNESS].copy(), out[:, OVERLAP].copy(), p.hot, p.ihot, lists.slot_row,
-        lists.slot_wall, p.n_left, stiffness,
-    )  # fmt: skip
+    stiffness, deep = _stiffnesses(sim)
     _kinetic(sim, bins[1])
     largest, shortest = totals.extremes(p.icold, sim.body, lists.owned_forces(), s.gx, s.gy, stiffness)
     if sim.clumps:
@@ -150,6 +146,24 @@ def survey(sim: Simulation) -> Totals:
     if normal > 0.0:
         ratio = math.nan if broken else largest / (normal / max(touching, 1))
     return Totals(kinetic, ratio, particles, touching, 0.8 * math.sqrt(-shortest), deepest)
+
+
+def _stiffnesses(sim: Simulation) -> tuple[np.ndarray, float]:
+    """Sum of the stiffness of the contacts and bonds of each owned particle (n_own,) [N/m]; the largest overlap with a
+    wall over the radius."""
+    p, lists = sim.particles, sim.lists
+    out = np.zeros(len(p))
+    for t in range(lists.n_blocks):
+        totals.stiffness(
+            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, lists.bond, lists.u_made, sim.pair_laws,
+            sim.bond_laws, len(sim.materials), mass.SPHERES[sim.settings.disk], p.n_left, out,
+        )  # fmt: skip
+    rows, contacts_of = wall_rows(sim)
+    deepest = totals.add_wall_stiffness(
+        len(rows), contacts_of, rows[:, STIFFNESS].copy(), rows[:, OVERLAP].copy(), p.hot, p.ihot, lists.slot_row,
+        lists.slot_wall, p.n_left, out,
+    )  # fmt: skip
+    return out, deepest
 
 
 def _extremes_of_clumps(sim: Simulation, stiffness: np.ndarray) -> tuple[float, float]:
@@ -240,7 +254,24 @@ def _place_of(row: np.ndarray) -> tuple[float, float, float]:
 
 def critical_dt(sim: Simulation) -> float:
     """The largest time step that is thought stable [s], see `Totals`; inf without contacts. Collective."""
-    return survey(sim).critical_dt
+    p, s = sim.particles, sim.settings
+    stiffness, _ = _stiffnesses(sim)
+    _, shortest = totals.extremes(p.icold, sim.body, sim.lists.owned_forces(), s.gx, s.gy, stiffness)
+    if sim.clumps:
+        shortest = min(shortest, _extremes_of_clumps(sim, stiffness)[1])
+    return 0.8 * math.sqrt(float(sim.comm.min_into(np.array([shortest]))[0]))
+
+
+def stiffest_bond(sim: Simulation) -> float:
+    """The largest stiffness of the bonds there are, normal or shear [N/m]; 0 without any. Collective."""
+    p, lists = sim.particles, sim.lists
+    found = np.zeros(1)
+    for t in range(lists.n_blocks if sim.bonds else 0):
+        found[0] = max(found[0], contacts.stiffest_bond(
+            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, lists.bond, lists.u_made, sim.pair_laws,
+            sim.bond_laws, len(sim.materials), mass.SPHERES[sim.settings.disk],
+        ))  # fmt: skip
+    return float(sim.comm.max_into(found)[0])
 
 
 MOST_LANCZOS, EVERY_LANCZOS = 60, 5
@@ -389,7 +420,10 @@ def _pair_laws(
     columns["law_realks"] = np.where(use, in_tension, columns["law_realks"])
     ra, rb = p.hot[a, RADIUS], p.hot[b, RADIUS]
     mean = 2.0 * ra * rb / (ra + rb)
-    area = np.where(elastic, math.pi * mean * mean if mass.SPHERES[sim.settings.disk] else 2.0 * mean, 1.0)
+    keep = bonded & (types["conserving"] != 0.0) & elastic
+    section = math.pi * mean * mean if mass.SPHERES[sim.settings.disk] else 2.0 * mean
+    columns["law_realks"] = np.where(keep, types["gbmod"] * section / (ra + rb), columns["law_realks"])
+    area = np.where(elastic, section, 1.0)
     return columns, {"law_tension": types["tstrength"] * area, "law_shear": types["sstrength"] * area}
 
 
@@ -430,6 +464,8 @@ def frame(sim: Simulation) -> Frame:
     touching, bonded = np.flatnonzero(out[:, OVERLAP] >= 0.0), np.flatnonzero(iout[:, 2] > 0)
     types = sim.bond_types.rows[iout[:, 2]]
     bond_columns = pair_columns | {"kind": types["kind"].astype(np.int8), "rubber": types["rubber"].astype(np.int8)}
+    if sim.bond_types.rows["conserving"].any():
+        bond_columns["conserving"] = types["conserving"].astype(np.int8)
     pair_laws, bond_laws = _pair_laws(sim, out, iout, types)
     pair_columns |= pair_laws
     bond_columns |= pair_laws | bond_laws

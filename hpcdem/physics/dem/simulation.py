@@ -25,7 +25,7 @@ from hpcdem.core.rebuild import LONGEST_WAIT, RebuildState
 from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration, Trail
-from hpcdem.physics.dem import guards
+from hpcdem.physics.dem import guards, missed
 from hpcdem.physics.dem.clumps import Clumps
 from hpcdem.physics.dem.kernels import contacts, fast, mass, motion, neighbours, pair_forces, slips
 from hpcdem.physics.dem.kernels import walls as wall_kernels
@@ -41,6 +41,8 @@ from hpcdem.runtime.run_folder import Retention
 
 NARROW, WIDE = 0.3, 0.6
 """Skin over the largest radius, at rest and in fast motion."""
+GLANCE = 10
+"""Steps between two looks at the motion at which nothing is changed unless somebody has sped up since the last one."""
 SHORT_LIVED, LONG_LIVED = 60, 200
 """Lists that lasted fewer steps call for the wide skin, more steps for the narrow one."""
 EVERYWHERE = (-math.inf, math.inf, -math.inf, math.inf)
@@ -148,6 +150,9 @@ class Simulation(Model):
         self.streams = 0
         self.breaks = np.zeros(2, np.int64)
         self.bonds = 0
+        self.bonds_looked_at: tuple[float, ...] = ()  # state of the last look for bonds of two shear stiffnesses
+        self.step_limit = math.inf  # the lowest estimate of the critical time step that was told
+        self.next_watch = 0  # the step from which on it is looked at again
         self.lost = 0
         self.rows: list[tuple[int, int]] = []
         self._named: set[int] = set()
@@ -199,10 +204,10 @@ class Simulation(Model):
             if self._walls_move:
                 self.walls.move(self.clock.dt)
         self.rebuild_state.age += 1
-        stale = False
-        if self.rebuild_state.passed():
+        stale, look = False, self.rebuild_state.passed()
+        if look or self.rebuild_state.countdown % GLANCE == 0:
             with timers("reduce"):
-                stale, request = self._check_rebuild()
+                stale, request = self._check_rebuild(glance=not look)
         with timers("halo"):
             halo.finish()
         if stale:
@@ -246,8 +251,9 @@ class Simulation(Model):
         if self.clumps:
             self.clumps.sum_forces(self.particles, self.halo, lists)
 
-    def _check_rebuild(self) -> tuple[bool, int]:
-        """How far has anyone gone since the lists were built? Sets the step of the next look.
+    def _check_rebuild(self, glance: bool = False) -> tuple[bool, int]:
+        """How far has anyone gone since the lists were built? Sets the step of the next look. glance: between two
+        looks; it becomes one if somebody has sped up so much that the next might come too late, else nothing changes.
 
         Returns (lists must be rebuilt now, request from outside). One reduction; only global maxima enter.
         """
@@ -267,9 +273,13 @@ class Simulation(Model):
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
         stride = max(math.sqrt(found[motion.SPEED2]), self._wall_speed()) * dt
         room = 0.5 * rebuild_state.skin - path
-        if room < 0.0 and self.largest_radius > 0.0:  # without particles nothing can be late
-            rebuild_state.late += 1
-        rebuild_state.late += int(found[5 + fast.DUE] == fast.LATE)
+        if glance:
+            ahead = min(GLANCE, rebuild_state.countdown)
+            if stride * ahead <= room and found[5 + fast.DUE] == 0.0 and found[5 + fast.HURRY] * ahead <= 2.0:
+                return False, 0
+        if (room < 0.0 and self.largest_radius > 0.0) or found[5 + fast.DUE] == fast.LATE:
+            with self.timers("neighbour"):
+                missed.stop_on_missed(self)
         stale = room < stride or found[5 + fast.DUE] > 0.0
         if stale:
             room = 0.5 * rebuild_state.skin
@@ -683,7 +693,7 @@ class Simulation(Model):
         self.own_table, bounds = self.own_laws.tables(rows) if self.own_laws else (None, None)
         self.pair_laws = contacts.pair_table(rows, self.own_laws.which(rows), bounds)
         self.wall_laws = wall_kernels.wall_table(rows, self.walls.kn, self.walls.ks, self.walls.fric)
-        self.bond_laws = self.bond_types.as_floats()
+        self.bond_laws = contacts.bond_laws(self.bond_types.rows)
         self._pushed, self._push = self._pressures()
         self._wall_table = self.walls.table()
         self._walls_move = bool(self.walls.v.any())

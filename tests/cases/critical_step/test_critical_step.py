@@ -15,7 +15,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import bonds, cycles, particles, properties, walls
+from hpcdem.commands.dem import bonds, cycles, particles, properties, settings, walls
 from hpcdem.core.selection import Ids
 from hpcdem.physics.dem import diagnostics
 from hpcdem.runtime.progress import Log
@@ -116,11 +116,9 @@ def by_matrix(sim) -> float:
             way = place[b] - place[a]
             d = math.hypot(*way)
             u, two_rt = radius[a] + radius[b] - d, 4.0 * radius[a] * radius[b] / (radius[a] + radius[b])
-            if u >= 0.0:
-                add(a, b, way / d, u, *hertz(two_rt, u))
-            elif u > -0.2:
+            if u > -0.2:  # bonded, all of them: the stiffer of contact and bond, as it may open or close in any step
                 area = math.pi * (0.5 * two_rt) ** 2 / (radius[a] + radius[b])
-                add(a, b, way / d, u, 4e8 * area, 3e8 * area)
+                add(a, b, way / d, u, *map(max, hertz(two_rt, max(u, 0.0)), (4e8 * area, 3e8 * area)))
         u = radius[a] - place[a, 1]
         if u >= 0.0:
             add(a, None, np.array([0.0, -1.0]), u, *hertz(2.0 * radius[a], u))
@@ -162,6 +160,46 @@ def test_it_is_the_limit_of_stability(tmp_path, factor, n, stable):
         properties.prop(sim, only(gid), xv=1e-6 * (-1) ** gid)
     steps(sim, n)
     assert (max(abs(value(sim, "vx", gid)) for gid in range(5)) < 1e-5) == stable
+
+
+def test_the_limit_of_contacts_that_form_is_watched(tmp_path):
+    """A cycle begins without contacts, with a larger step than the discs will bear that fall on the floor: it is said
+    while they do. A step that is small for any contacts is not looked at again."""
+    for factor, says in ((1.02, True), (0.02, False)):
+        sim = model(tmp_path, gravity=(0.0, -0.1))
+        walls.wall(sim, 0, ((-9.0, 0.0), (199.0, 0.0)), kn=KN)
+        for gid in range(40):
+            particles.ball(sim, gid, 3.0 * gid, R + 0.01 * (1 + gid), R)
+        properties.prop(sim, density=1000.0, kn=KN, damp=0.5)
+        cycles.prepare(sim)
+        sim.settings.dt = factor * 2.0 / math.sqrt(K / body(sim)[0])
+        sim.log = Log(stream=io.StringIO())
+        cycles.cycle(sim, 0)
+        assert "2 / omega" not in sim.log._stream.getvalue()
+        cycles.cycle(sim, 4 * cycles.WATCH)
+        said = sim.log._stream.getvalue()
+        assert ("warning: step " in said and "the undamped step is unstable" in said) == says
+        assert cycles._is_surely_small(sim) != says
+
+
+@pytest.mark.parametrize("shear", [False, True])
+def test_bonds_count_in_frac_and_in_what_is_said(tmp_path, shear):
+    """Bonds much stiffer than their contacts, which touch when the step is chosen: the step is theirs, and the chain
+    stays; the step of the contacts is told to be too large."""
+    sim = chain(tmp_path, 5)
+    modulus = 100.0 * K  # E A/L of equal discs is E
+    more = {"gbmod": modulus, "ebmod": K} if shear else {"ebmod": modulus, "gbmod": K}
+    bonds.bond(sim, tstrength=1e30, sstrength=1e30, **more)
+    settings.set_option(sim, "frac", 0.2)
+    properties.prop(sim, only(2), xv=1e-3, yv=1e-3)
+    cycles.prepare(sim)
+    assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(body(sim)[0] / modulus))
+    steps(sim, 400)
+    assert max(abs(value(sim, "vx", gid)) for gid in range(5)) < 1e-2
+    settings.set_option(sim, "dt", 0.2 * math.sqrt(body(sim)[0] / K))
+    sim.log = Log(stream=io.StringIO())
+    cycles.cycle(sim, 0)
+    assert "the undamped step is unstable" in sim.log._stream.getvalue()
 
 
 def test_what_the_log_says(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 
 import numpy as np
@@ -13,6 +14,7 @@ from hpcdem.core.selection import Ids
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Energy, stored_energy
 from hpcdem.physics.dem.simulation import Watcher
+from hpcdem.runtime.progress import Log
 from tests.cases.elastic_bond import exact as bond
 from tests.cases.energy_budget import exact
 from tests.support import at_wall, body, held_for_a_step, model, only, pair, value
@@ -254,6 +256,67 @@ def test_a_bond_breaks_in_shear(tmp_path):
     after_the_break = limit / ks * 1.001 / 2000.0  # it broke in the last step but one
     assert budget(sim).loss_friction == pytest.approx((0.1 + after_the_break) * left, rel=1e-9)
     assert abs(budget(sim).relative) < 1e-9
+
+
+def cluster(folder, hertz: bool, kind: str, damp: float = 0.0, **more):
+    """Six bonded discs that swing by themselves, bonds that never break and have another shear stiffness than the
+    contacts; the energy after a while over that at the start, the closing error over that, and what the log said."""
+    sim = model(folder, 2e-6, energy=10**6)
+    sim.log = Log(stream=io.StringIO())
+    for row in range(2):
+        for k in range(3):
+            particles.ball(sim, 3 * row + k, 0.1 * k + 0.05 * row, 0.05 + math.sqrt(3.0) * 0.05 * row, 0.05)
+    law = {"hertz": True, "shear": 2e9, "poiss": 0.2} if hertz else {"kn": 1e8, "ks": 1e8}
+    properties.prop(sim, density=2600.0, fric=0.5, damp=damp, **law)
+    strong = {"n_bond": 1e12, "s_bond": 1e12} if kind == "contact" else {
+        "ebmod": 5e8, "gbmod": 5e8, "tstrength": 1e12, "sstrength": 1e12
+    }  # fmt: skip
+    bonds.bond(sim, tolerate=1e-6, **strong, **more)
+    rng = np.random.default_rng(1)
+    for gid in range(6):
+        properties.prop(sim, only(gid), **dict(zip(("xv", "yv"), 1e-3 * rng.standard_normal(2))))
+    cycles.cycle(sim, 0)
+    before = stored_energy(sim)
+    cycles.cycle(sim, 4000)
+    return stored_energy(sim) / before, budget(sim).closing / before, sim.log._stream.getvalue()
+
+
+@pytest.mark.parametrize("kind", ["elastic", "contact"])
+@pytest.mark.parametrize("hertz", [False, True])
+def test_conserving_bonds_make_no_energy(tmp_path, hertz, kind):
+    """Without the word it grows, and a warning says so with the two values; with it, it stays, to the error of the
+    time step."""
+    grown, _, said = cluster(tmp_path, hertz, kind)
+    kept, closing, nothing = cluster(tmp_path / "kept", hertz, kind, conserving=True)
+    assert kept == pytest.approx(1.0, abs=1e-4) and abs(closing) < 1e-4 and "shear stiffness" not in nothing
+    if hertz or kind == "elastic":
+        assert abs(grown - 1.0) > 0.05
+        assert "warning: 9 bonds have one shear stiffness open and another touching: particles 0 and 1 " in said
+        assert "Nothing damps 9 of these pairs" in said
+        assert ("5e+08 N/m (G A/L of the bond)" in said) == (kind == "elastic")
+        assert ("and 5e+07 N/m (ks of the contact)" in said) == (not hertz)
+    else:
+        assert grown == pytest.approx(1.0, abs=1e-4) and "shear stiffness" not in said
+
+
+def test_damped_bonds_of_two_stiffnesses_are_told_of(tmp_path):
+    said = cluster(tmp_path, True, "elastic", damp=0.3)[2]
+    assert "9 bonds have one shear stiffness open" in said and "warning" not in said and "Damping takes" in said
+
+
+def test_a_conserving_bond_breaks_in_shear(tmp_path):
+    """Its spring holds Fs^2/(2 ks) of the bond, that which is left Fs^2/(2 ks) of the contact; the account closes."""
+    sim = sheared(tmp_path, u=0.5, fric=bond.MU)
+    bonds.bond(sim, ebmod=bond.E, gbmod=2.0 * bond.G, tstrength=bond.T, sstrength=bond.C, conserving=True)
+    cycles.cycle(sim, 1)
+    limit = bond.C * bond.AREA + bond.MU * bond.normal_force(0.5)
+    own, left = 2.0 * bond.G * bond.AREA / bond.LENGTH, bond.MU * bond.normal_force(0.5)
+    move(sim, slide=limit / own * 1.001, n=2000)
+    seen = budget(sim)
+    assert sim.broken() == (0, 1) and pair(sim).fs == pytest.approx(left, rel=1e-12)
+    of_contact = 0.5 * left**2 / bond.shear_stiffness(0.5)
+    assert seen.loss_bonds == pytest.approx(0.5 * limit**2 / own - of_contact, rel=3e-3)
+    assert seen.elastic_shear == pytest.approx(of_contact, rel=1e-9) and abs(seen.relative) < 1e-9
 
 
 def test_commands_are_booked_as_such(tmp_path):

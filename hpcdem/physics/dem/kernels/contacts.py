@@ -66,6 +66,36 @@ def pair_state(i, j, row, u_made, hot, ihot, pairs, bonds, n_mat, spheres):
     return PairState(True, nx, ny, u, two_rt, fn, ks, kn, energy)
 
 
+@njit(cache=True, error_model="numpy")
+def stiffest(i, j, row, u_made, at, hot, ihot, pairs, bonds, n_mat, spheres):
+    """(kn, ks) [N/m] of a pair in the state `at`; of a bonded one the larger ones of its bond and its contact, as
+    it may open or close in any step. Without friction a contact has no shear spring: it slips."""
+    if row == 0:
+        slips = pairs[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL], MU] == 0.0
+        return at.kn, 0.0 if slips else at.ks
+    _, ks_closed, kn_closed, _ = pair_law(i, j, row, u_made, hot, ihot, pairs, bonds, n_mat, spheres, at.two_rt, 0.0)
+    _, ks_open, kn_open, _ = pair_law(i, j, row, u_made, hot, ihot, pairs, bonds, n_mat, spheres, at.two_rt, -1.0)
+    return max(at.kn, kn_closed, kn_open), max(at.ks, ks_closed, ks_open)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def stiffest_bond(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, bonds, n_mat, spheres):
+    """The largest stiffness [N/m], normal or shear, of the bonds of block t; 0 without any."""
+    cut, lo, _, poff, _ = blocks
+    largest = 0.0
+    p = poff[t] - lo[t]
+    for i in range(cut[t], cut[t + 1]):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            if bond[k] != 0:
+                j = partner[k]
+                at = pair_state(i, j, bond[k], u_made[k], hot, ihot, pairs, bonds, n_mat, spheres)
+                _, ks, kn, _ = pair_law(
+                    i, j, bond[k], u_made[k], hot, ihot, pairs, bonds, n_mat, spheres, at.two_rt, -1.0
+                )
+                largest = max(largest, kn, ks)
+    return largest
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def report(t, hot, ihot, blocks, ptr, partner, fs, bond, u_made, pairs, bonds, n_mat, spheres, out, iout):
     """Touching or bonded pairs of block t as rows, each pair once in the whole model; returns the number of rows.
@@ -169,10 +199,19 @@ def overstretched(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, bonds
     return number, widest
 
 
+def bond_laws(types: np.ndarray) -> np.ndarray:
+    """Bond types (materials.BOND_TYPE) for the kernels: (types, 5) f8, columns KIND to SHEAR. A shear modulus below 0
+    says "conserving"."""
+    table = np.column_stack([types[name] for name in ("kind", "ebmod", "gbmod", "tstrength", "sstrength")])
+    keep = types["conserving"] != 0.0
+    table[keep, G_MOD] = np.where(types["kind"] == laws.CONTACT_BOND, -1.0, -types["gbmod"])[keep]
+    return table
+
+
 def bond_table(bonds: np.ndarray) -> np.ndarray:
     """Bond types for the force loop: (types, 4) f8 [E, G, tensile, shear].
 
-    bonds (types, 5) f8: columns KIND to SHEAR. A negative tensile strength says "no bond" (row 0), a negative modulus
+    bonds (types, 5) f8: see `bond_laws`. A negative tensile strength says "no bond" (row 0), a negative modulus
     "contact bond", so that a row is as wide as four lanes.
     """
     table = bonds[:, E_MOD : SHEAR + 1].copy()

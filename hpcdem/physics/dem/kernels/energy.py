@@ -14,6 +14,7 @@ is what a leap-frog keeps constant together with the energy of linear springs.)
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
@@ -22,7 +23,19 @@ from hpcdem.numerics.lanes import as_bits
 from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.dem.kernels.contacts import MODEL, USER, A, B, pair_law, pair_state
 from hpcdem.physics.dem.kernels.motion import ALPHA, CLUMPED, INERTIA, KICK_SPIN, KICK_X, KICK_Y, MASS
-from hpcdem.physics.dem.kernels.walls import NONE, P1X, P1Y, P2X, P2Y, WVX, WVY, end_of_slots, meeting, wall_state
+from hpcdem.physics.dem.kernels.walls import (
+    NONE,
+    P1X,
+    P1Y,
+    P2X,
+    P2Y,
+    WVX,
+    WVY,
+    end_of_slots,
+    heir,
+    meeting,
+    wall_state,
+)  # fmt: skip
 
 # Flows [J], the rows of bins (10, 2, 2112): work done on the model, then what it loses; LAWS: in pairs with a law of
 # the user (user_pairs.py).
@@ -149,6 +162,9 @@ def pair_losses(
                 loss = 0.5 * (before + now) * slip
                 if tied != 0 and u < 0.0:  # strained up to now; its force has not pulled in the rest of the last step
                     loss += energy - 0.5 * fn * (u - u_before)
+                elif tied != 0:  # from now on the spring is that of the contact
+                    _, left, _, _ = pair_law(i, j, 0, made, hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u)
+                    loss += laws.shear_energy(now, ks) - laws.shear_energy(now, left)
                 book(bins, FRICTION if tied == 0 else BONDS, loss)
             book(bins, STIFFNESS, laws.shear_energy(before, ks_before) - laws.shear_energy(before, ks))
 
@@ -215,7 +231,8 @@ def _jump(where, u, way, law, two_r, was, u_before, way_before):
 def wall_losses(
     hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, fs_before, side_before, laws_table, n_mat, dt, bins
 ):  # fmt: skip
-    """The same as pair_losses for the contacts with walls; fs_before and side_before: histories before the forces."""
+    """The same as pair_losses for the contacts with walls; fs_before and side_before: histories before the forces, of
+    which those that went from wall to wall go with them here."""
     before_walls = walls.copy()
     for w in range(len(walls)):
         before_walls[w, P1X] -= walls[w, WVX] * dt
@@ -223,16 +240,32 @@ def wall_losses(
         before_walls[w, P2X] -= walls[w, WVX] * dt
         before_walls[w, P2Y] -= walls[w, WVY] * dt
     first = 0
+    stored = np.zeros(len(slot_row))
     while first < len(slot_row):
         last = end_of_slots(slot_row, first, len(slot_row))
         i = slot_row[first]
         x, y, r = hot[i, X], hot[i, Y], hot[i, RADIUS]
+        x_before, y_before = x - hot[i, VX] * dt, y - hot[i, VY] * dt
+        for k in range(first, last):
+            if fs_before[k] != 0.0:
+                law = laws_table[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
+                was, _, _, _, u_before = meeting(
+                    k, first, last, x_before, y_before, r, before_walls, slot_wall, side_before
+                )
+                if was != NONE:
+                    ks = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u_before)[1]
+                    stored[k] = laws.shear_energy(fs_before[k], ks)
+        for k in range(first, last):
+            q = heir(k, first, last, x, y, r, walls, slot_wall, side_before) if fs_before[k] != 0.0 else k
+            if q != k:
+                fs_before[q], stored[q] = fs_before[q] + fs_before[k], stored[q] + stored[k]
+                fs_before[k] = stored[k] = 0.0
         for k in range(first, last):
             before, now, wall = fs_before[k], slot_fs[k], walls[slot_wall[k]]
             vx, vy = hot[i, VX] - wall[WVX], hot[i, VY] - wall[WVY]
             law = laws_table[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
             was, _, mx, my, u_before = meeting(
-                k, first, last, x - hot[i, VX] * dt, y - hot[i, VY] * dt, r, before_walls, slot_wall, side_before
+                k, first, last, x_before, y_before, r, before_walls, slot_wall, side_before
             )
             where, _, nx, ny, u = meeting(k, first, last, x, y, r, walls, slot_wall, side_before)
             if was == NONE and where == NONE:
@@ -241,16 +274,15 @@ def wall_losses(
             book(bins, OPENED, _jump(where, u, way, law, 2.0 * r, was, u_before, way_before))
             if before == 0.0 and now == 0.0:
                 continue
-            ks_before = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u_before)[1] if was != NONE else 0.0
             if where == NONE:
                 sliding = my * vx - mx * vy - hot[i, SPIN] * r
-                book(bins, OPENED, laws.shear_energy(before, ks_before) + 0.5 * before * sliding * dt)
+                book(bins, OPENED, stored[k] + 0.5 * before * sliding * dt)
                 continue
             _, ks = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u)
             sliding = ny * vx - nx * vy - hot[i, SPIN] * (r - 0.5 * u)
             slip = (before + ks * sliding * dt - now) / ks if ks > 0.0 else sliding * dt
             book(bins, FRICTION, 0.5 * (before + now) * slip)
-            book(bins, STIFFNESS, laws.shear_energy(before, ks_before) - laws.shear_energy(before, ks))
+            book(bins, STIFFNESS, stored[k] - laws.shear_energy(before, ks))
         first = last
 
 

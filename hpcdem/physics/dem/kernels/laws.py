@@ -149,20 +149,22 @@ def pair_state(kind, model, a, b, e, g, two_rt, length, spheres, u_made, u):
     """The same of any pair at overlap u: of its contact if it touches, else of its bond, zeros if there is neither.
 
     kind: of the bond, 0: none; model, a, b: see `contact`; e, g, length (Ra + Rb) and spheres: see `elastic_bond` and
-    `bond_area`; u_made: see `contact_bond`. Everything that asks for the state of a pair asks here.
+    `bond_area`; u_made: see `contact_bond`. g below 0: of a conserving bond, which has its own shear stiffness where
+    the pair touches too. Everything that asks for the state of a pair asks here.
     """
-    if u >= 0.0:
-        return contact_state(model, a, b, two_rt, u)
-    if kind == ELASTIC_BOND:
-        area = bond_area(two_rt, spheres)
-        fn, ks = elastic_bond(e, g, area, length, u)
-        kn = e * area / length
-    elif kind == CONTACT_BOND:
-        fn, ks = contact_bond(model, a, b, two_rt, u_made, u)
-        kn = tangent_normal_stiffness(model, a, two_rt, u_made)
+    if kind == CONTACT_BOND:
+        tension, shear = contact_bond(model, a, b, two_rt, u_made, u)
+        stiffness = tangent_normal_stiffness(model, a, two_rt, u_made)
     else:
+        area = bond_area(two_rt, spheres)
+        tension, shear = elastic_bond(e, abs(g), area, length, u)
+        stiffness = e * area / length
+    if u >= 0.0:
+        fn, ks, kn, energy = contact_state(model, a, b, two_rt, u)
+        return fn, shear if g < 0.0 else ks, kn, energy
+    if kind == 0:
         return 0.0, 0.0, 0.0, 0.0
-    return fn, ks, kn, normal_energy(LINEAR, fn, u)
+    return tension, shear, stiffness, normal_energy(LINEAR, tension, u)
 
 
 @njit(cache=True, error_model="numpy")

@@ -12,9 +12,9 @@ import math
 
 from numba import njit
 
-from hpcdem.core.fields import GID, MATERIAL, RADIUS
+from hpcdem.core.fields import GID, RADIUS
 from hpcdem.numerics.rng import uniform
-from hpcdem.physics.dem.kernels.contacts import MU, pair_state
+from hpcdem.physics.dem.kernels.contacts import pair_state, stiffest
 from hpcdem.physics.dem.kernels.motion import INERTIA, KICK_X, MASS
 from hpcdem.physics.dem.kernels.walls import NONE, end_of_slots, wall_state
 
@@ -52,7 +52,7 @@ def pairs(
     """K u of the pairs of block t, into its rows of force (k, 3) f8, as in the force loop: the same terms in the same
     order for each owned particle on any number of blocks and ranks. u (n, 3) f8 per storage row.
 
-    A contact without friction has no shear spring: it slips.
+    Stiffnesses are those of contacts.stiffest.
     """
     shift, p = foff[t] - lo[t], poff[t] - lo[t]
     for r in range(foff[t], foff[t] + hi[t] - lo[t]):
@@ -63,10 +63,9 @@ def pairs(
             at = pair_state(i, j, bond[k], u_made[k], hot, ihot, pair_laws, bonds, n_mat, spheres)
             if not at.active:
                 continue
-            slips = bond[k] == 0 and pair_laws[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL], MU] == 0.0
+            kn, ks = stiffest(i, j, bond[k], u_made[k], at, hot, ihot, pair_laws, bonds, n_mat, spheres)
             arm_i, arm_j = hot[i, RADIUS] - 0.5 * at.u, hot[j, RADIUS] - 0.5 * at.u
-            ks = 0.0 if slips else at.ks
-            _spring(force, i, j, at.nx, at.ny, at.kn, ks, arm_i, arm_j, u, shift + i, shift + j)
+            _spring(force, i, j, at.nx, at.ny, kn, ks, arm_i, arm_j, u, shift + i, shift + j)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -10,7 +10,7 @@ from numba import njit
 
 from hpcdem.core.fields import FIX, FIX_X, FIX_Y, GID, RADIUS, SPIN, VX, VY
 from hpcdem.numerics.exact_sum import add_to_bins
-from hpcdem.physics.dem.kernels.contacts import pair_state
+from hpcdem.physics.dem.kernels.contacts import pair_state, stiffest
 from hpcdem.physics.dem.kernels.motion import CLUMPED, INERTIA, MASS
 
 _ROOM = 256
@@ -23,38 +23,50 @@ def _empty_into(bins, n, bits):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def pairs(t, hot, ihot, blocks, ptr, partner, bond, u_made, pair_laws, bonds, n_mat, spheres, n_left, bins, stiffness):
-    """Block t: the sizes of its normal forces |Fn| into bins (2, 2112) i8, the tangent normal stiffness of touching
-    pairs added to its owned particles, stiffness (n_own,) f8 [N/m].
-
-    Returns how many pairs touch or are bonded, and the largest overlap over the smaller radius; each pair counts once
-    in the whole model, in the sum too.
-    """
+def stiffness(t, hot, ihot, blocks, ptr, partner, bond, u_made, pair_laws, bonds, n_mat, spheres, n_left, out):
+    """Add the stiffness of the pairs of block t that touch or are bonded to its owned particles, out (n_own,) f8 [N/m]:
+    the larger of the normal and the shear one, see contacts.stiffest."""
     cut, lo, _, poff, _ = blocks
     a, b = cut[t], cut[t + 1]
     p = poff[t] - lo[t]
-    forces = np.empty(_ROOM)
-    bits = forces.view(np.int64)
-    n, count, deepest = 0, 0, 0.0
     for i in range(lo[t], b):
         for k in range(ptr[p + i], ptr[p + i + 1]):
             j = partner[k]
             at = pair_state(i, j, bond[k], u_made[k], hot, ihot, pair_laws, bonds, n_mat, spheres)
             if not at.active:
                 continue
-            if at.u >= 0.0:
-                if a <= i:
-                    stiffness[i - n_left] += at.kn
-                if a <= j < b:
-                    stiffness[j - n_left] += at.kn
+            kn, ks = stiffest(i, j, bond[k], u_made[k], at, hot, ihot, pair_laws, bonds, n_mat, spheres)
             if a <= i:
-                if n == _ROOM:
-                    _empty_into(bins, n, bits)
-                    n = 0
-                forces[n] = abs(at.fn)
-                n += 1
-                count += 1
-                deepest = max(deepest, at.u / min(hot[i, RADIUS], hot[j, RADIUS]))
+                out[i - n_left] += max(kn, ks)
+            if a <= j < b:
+                out[j - n_left] += max(kn, ks)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pairs(t, hot, ihot, blocks, ptr, partner, bond, u_made, pair_laws, bonds, n_mat, spheres, bins):
+    """Block t: the sizes of its normal forces |Fn| into bins (2, 2112) i8.
+
+    Returns how many pairs touch or are bonded, and the largest overlap over the smaller radius; each pair counts once
+    in the whole model, in the sum too.
+    """
+    cut, lo, _, poff, _ = blocks
+    p = poff[t] - lo[t]
+    forces = np.empty(_ROOM)
+    bits = forces.view(np.int64)
+    n, count, deepest = 0, 0, 0.0
+    for i in range(cut[t], cut[t + 1]):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            j = partner[k]
+            at = pair_state(i, j, bond[k], u_made[k], hot, ihot, pair_laws, bonds, n_mat, spheres)
+            if not at.active:
+                continue
+            if n == _ROOM:
+                _empty_into(bins, n, bits)
+                n = 0
+            forces[n] = abs(at.fn)
+            n += 1
+            count += 1
+            deepest = max(deepest, at.u / min(hot[i, RADIUS], hot[j, RADIUS]))
     _empty_into(bins, n, bits)
     return count, deepest
 

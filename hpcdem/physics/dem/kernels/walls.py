@@ -72,18 +72,37 @@ def geometry(wall, x, y, r, side):
 
 
 @njit(cache=True, error_model="numpy")
-def _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py):
-    """True if the particle meets the end point (px, py) of slot k by another wall as well: by the face of one that
-    passes through this point, or by an end there that comes earlier."""
+def _cover(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py):
+    """The slot by which the particle meets the end point (px, py) of slot k as well: by the face of a wall that passes
+    through this point, else by an end there that comes earlier; -1 if there is none."""
+    found = -1
     for q in range(first, last):
         if q == k:
             continue
         where, _, _, _, _, qx, qy = geometry(walls[slot_wall[q]], x, y, r, slot_side[q])
         if where == FACE:
             _, _, qx, qy = closest(walls[slot_wall[q]], px, py)
-        if where != NONE and abs(qx - px) <= 1e-9 * r and abs(qy - py) <= 1e-9 * r and (where == FACE or q < k):
-            return True
-    return False
+        if where == NONE or abs(qx - px) > 1e-9 * r or abs(qy - py) > 1e-9 * r:
+            continue
+        if where == FACE:
+            return q
+        if q < k and found < 0:
+            found = q
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def heir(k, first, last, x, y, r, walls, slot_wall, slot_side):
+    """The slot that goes on with the shear force of slot k, of a particle with the slots first : last: where the
+    particle has come to an end of its wall, that of the wall by which it meets this end as well; else k itself.
+
+    The number means the same at the new wall: the tangent belongs to the normal from the particle to the wall.
+    """
+    where, _, px, py = closest(walls[slot_wall[k]], x, y)
+    if where == FACE:
+        return k
+    q = _cover(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py)
+    return q if q >= 0 else k
 
 
 @njit(cache=True, error_model="numpy")
@@ -91,7 +110,7 @@ def meeting(k, first, last, x, y, r, walls, slot_wall, slot_side):
     """Geometry of wall slot k, of a particle with the slots first : last and this place and radius: (where, side, n_x,
     n_y, U)."""
     where, side, nx, ny, u, qx, qy = geometry(walls[slot_wall[k]], x, y, r, slot_side[k])
-    if where > FACE and _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, qx, qy):
+    if where > FACE and _cover(k, first, last, walls, slot_wall, slot_side, x, y, r, qx, qy) >= 0:
         where = NONE
         side = 0.0
     return where, side, nx, ny, u
@@ -149,6 +168,13 @@ def _block(
         i = slot_row[k]
         first, last = k, end_of_slots(slot_row, k, wptr[t + 1])
         vx, vy, w, r = hot[i, VX], hot[i, VY], hot[i, SPIN], hot[i, RADIUS]
+        if last - first > 1:
+            for k in range(first, last):
+                if slot_fs[k] != 0.0:
+                    q = heir(k, first, last, hot[i, X], hot[i, Y], r, walls, slot_wall, slot_side)
+                    if q != k:
+                        slot_fs[q] += slot_fs[k]
+                        slot_fs[k] = 0.0
         for k in range(first, last):
             at = wall_state(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat)
             new_side[k] = at.side
