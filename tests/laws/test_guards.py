@@ -88,8 +88,8 @@ def test_who_runs_away_through_the_box_between_two_looks_stops_the_run(tmp_path,
     cycles.cycle(sim, 1)
     sim.particles["vx"][sim.particles["gid"] == 0], sim.rebuild_state.countdown = (
         speed,
-        64,
-    )  # nobody has told it to look
+        simulation.GLANCE - 1,
+    )  # nobody has told it to look, or to glance
     for _ in range(5):
         sim.step()
     sim.open()
