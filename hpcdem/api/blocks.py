@@ -207,10 +207,10 @@ class Geometry(Words):
         }  # fmt: skip
         self._do("geometry create fractures", given)
 
-    def import_file(self, file: File, as_layer: str, dxf_layer: str | None = None) -> None:
+    def import_file(self, file: File, as_layer: str, dxf_layer: str | None = None, scale: float | None = None) -> None:
         """Lines of a DXF file, or of one of its layers; in three dimensions the solids of a STEP or BREP file, or what
-        the triangles of an STL or DXF file enclose."""
-        given = {"file": file, "as_layer": as_layer, "dxf_layer": dxf_layer}
+        the triangles of an STL or DXF file enclose; scale: metres in a unit of the file."""
+        given = {"file": file, "as_layer": as_layer, "dxf_layer": dxf_layer, "scale": scale}
         self._do("geometry import", given)
 
     def transform(

@@ -777,6 +777,7 @@ PCDC_KEYWORDS = {
 """Meanings of keywords of PCDC, and of their properties, by their English."""
 
 PCDC_DEFAULTS = {
+    "as STEP and DXF files say, else 1": "按 STEP、DXF 文件所写,否则为 1",
     "static runs: ten times as many as a wave takes there and back, at least 20 000; dynamic ones, and beside cycles "
     "or time: 0":
     "静力计算:波往返所需步数的十倍,至少 20 000;动力计算,或同时给出 cycles、time 时:0",

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 
+from hpcdem.commands.fdem import Project
+from hpcdem.commands.fdem import geometry as commands
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.dxf import read_dxf
 from hpcdem.pre.mesh.geometry import Layers, distance, enclosed_area, sampled, transformed
+from tests.pcdc.fake import FakeBlocks
 
 
 def test_lengths_and_areas():
@@ -177,7 +181,7 @@ def test_drawing(drawing):
             r"3DFACE \(handle \w+, layer 'top'\)",
         ),
         (lambda s, d: s.add_polyline3d([(0, 0, 0), (1, 0, 3)]), "two-dimensional"),
-        (lambda s, d: s.add_circle((0, 0), 1, dxfattribs={"extrusion": (0, 0, -1)}), "plane of its own"),
+        (lambda s, d: s.add_circle((0, 0), 1, dxfattribs={"extrusion": (0, 1, 0)}), "plane of its own"),
         (lambda s, d: s.add_line((1, 1), (1, 1)), r"LINE .* points 1 and 2 are the same"),
         (lambda s, d: s.add_text("only a note"), "contains no line"),
     ],
@@ -187,6 +191,66 @@ def test_what_cannot_be_drawn_in_the_plane_is_refused(drawing, draw, message):
     with pytest.raises(HpcdemError, match=message) as error:
         read_dxf(path)
     assert str(error.value).startswith(str(path))
+
+
+def test_blocks_that_are_mirrored_or_repeated(drawing):
+    """A block at (10, 5), mirrored in x: x becomes 10 - x. What it has in layer 0 is in the layer of the insertion."""
+
+    def draw(space, document):
+        block = document.blocks.new("part")
+        block.add_arc((2, 0), 1, 0, 90, dxfattribs={"layer": "arc"})
+        block.add_circle((3, 1), 0.5, dxfattribs={"layer": "circle"})
+        block.add_lwpolyline([(0, 0, 0), (4, 0, 1), (4, 2, 0), (0, 2, 1)], format="xyb", close=True)
+        block.add_ellipse((1, 0), (2, 0), 0.5, 0, math.pi / 2, dxfattribs={"layer": "lens"})
+        block.add_line((0, 0), (1, 3), dxfattribs={"layer": "line"})
+        space.add_blockref("part", (10, 5), dxfattribs={"xscale": -1, "layer": "mirrored"})
+        outer = document.blocks.new("outer")
+        outer.add_blockref("part", (0, 0), dxfattribs={"yscale": -1})
+        space.add_blockref("outer", (0, 0), dxfattribs={"rotation": 180, "layer": "nested"})
+        bolt = document.blocks.new("bolt")
+        bolt.add_circle((0, 0), 0.1)
+        rows = {"row_count": 2, "column_count": 3, "row_spacing": 2, "column_spacing": 5, "layer": "bolts"}
+        space.add_blockref("bolt", (0, 0), dxfattribs=rows)
+
+    found = read_dxf(drawing(draw))
+    arc, turned = found["arc"]
+    h = math.sqrt(0.5)
+    assert sorted(map(tuple, np.round(arc.points[[0, -1]], 9).tolist())) == [(7, 5), (8, 6)]
+    np.testing.assert_allclose(arc.points[1], (8 - h, 5 + h), atol=1e-9)
+    # Mirrored in y and turned by 180 degrees is mirrored in x.
+    np.testing.assert_allclose(turned.points[1], (-2 - h, h), atol=1e-9)
+    np.testing.assert_allclose(found["circle"][0].points.mean(axis=0), (7, 6), atol=1e-9)
+    (stadium,), (other,) = found["mirrored"], found["nested"]
+    assert math.isclose(abs(enclosed_area(stadium)), 8.0 + math.pi) and math.isclose(
+        abs(enclosed_area(other)), 8 + math.pi
+    )
+    assert sorted(map(tuple, np.round(stadium.points, 9).tolist())) == [(6, 5), (6, 7), (10, 5), (10, 7)]
+    np.testing.assert_allclose(sorted(found["lens"][0].points[[0, -1]].tolist()), [(7, 5), (9, 6)], atol=1e-6)
+    np.testing.assert_allclose(found["line"][0].points, [(10, 5), (9, 8)], atol=1e-9)
+    at = sorted(tuple(np.round(one.points.mean(axis=0), 9).tolist()) for one in found["bolts"])
+    assert at == [(0, 0), (0, 2), (5, 0), (5, 2), (10, 0), (10, 2)] and "0" not in found
+
+
+@pytest.mark.parametrize(
+    ("code", "scale", "factor", "said"),
+    [
+        (4, None, 1e-3, r"in millimetres \(\$INSUNITS 4\): a unit is 0.001 m, scale says otherwise"),
+        (4, 1.0, 1.0, "in millimetres .*: a unit is 1 m, as scale says"),
+        (2, None, 0.3048, "in feet"),
+        (0, None, 1.0, "names no unit .*: a unit is 1 m, taken as metres"),
+        (6, None, 1.0, "in metres"),
+    ],
+)
+def test_units_of_a_drawing(ezdxf, tmp_path, code, scale, factor, said):
+    document = ezdxf.new("R2010")
+    document.header["$INSUNITS"] = code
+    document.modelspace().add_lwpolyline([(0, 0), (2000, 0), (2000, 1000), (0, 1000)], close=True)
+    document.saveas(tmp_path / "site.dxf")
+    project = Project(FakeBlocks(), tmp_path, tmp_path / "data")
+    commands.import_file(project, "slope", "site.dxf", scale=scale)
+    assert abs(enclosed_area(project.layers["slope"][0])) == pytest.approx(2e6 * factor**2)
+    (line,) = project.log.lines
+    assert re.search(said, line) and f"to ({2000 * factor:g}, {1000 * factor:g}) m" in line
 
 
 def test_no_drawing(ezdxf, tmp_path):

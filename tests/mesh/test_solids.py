@@ -144,6 +144,33 @@ def test_a_shell_of_triangles_becomes_a_body(tmp_path: Path, gmsh: object) -> No
     assert mesh.areas().sum() == pytest.approx(1.0 - 0.036 * math.pi, rel=0.06)
 
 
+def binary(triangles: list, head: bytes = b"solid by some program", more: bytes = b"") -> bytes:
+    """A binary STL file."""
+    table = np.zeros(len(triangles), [("normal", "<f4", (3,)), ("at", "<f4", (3, 3)), ("more", "<u2")])
+    table["at"] = triangles
+    return head.ljust(80) + len(triangles).to_bytes(4, "little") + table.tobytes() + more
+
+
+def test_binary_shells_with_bytes_at_their_end_in_millimetres(tmp_path: Path) -> None:
+    """The head of a binary file may begin as text does."""
+    path, notes = tmp_path / "cube.stl", []
+    for more in (b"", b"\0" * 50, b"facet"):
+        path.write_bytes(binary(CUBE, more=more))
+        (body,) = cad.read(path, scale=1e-3, notes=notes)
+        np.testing.assert_allclose(body.bounds(), [[0, 0, 0], [1e-3] * 3], atol=1e-12)
+    assert notes[1] == notes[0] == "files *.stl name no unit: a unit is 0.001 m, as scale says"
+    assert notes[2] == "50 bytes after the last triangle are passed over" and notes[4].startswith("5 bytes")
+    path.write_bytes(binary(CUBE)[:-60])
+    with pytest.raises(HpcdemError, match=r"cube\.stl: .* of the 12 triangles that its head names it has 10"):
+        cad.read(path)
+    text = stl(path, CUBE).read_text()
+    path.write_text(text.upper() + "\n  made by some program \0\0 vertex \n")
+    assert len(cad.read(path)[0].triangles()) == 12
+    path.write_text(text[: len(text) // 2])
+    with pytest.raises(HpcdemError, match=r"cube\.stl: .* a facet is damaged, or the end is missing"):
+        cad.read(path)
+
+
 def test_faces_of_a_drawing_become_a_body(tmp_path: Path) -> None:
     ezdxf = pytest.importorskip("ezdxf")
     drawing = ezdxf.new()
@@ -155,7 +182,15 @@ def test_faces_of_a_drawing_become_a_body(tmp_path: Path) -> None:
     assert len(body.triangles()) == 12 and body.distance(np.array([[0.5, 0.5, 0.25]])) == pytest.approx([-0.25])
     with pytest.raises(HpcdemError, match=r"ore\.dxf: the shell is not closed"):
         cad.read(tmp_path / "ore.dxf")
-    with pytest.raises(HpcdemError, match=r"no 3DFACE in layer 'gold' .layers with some: 'else', 'ore'"):
+    whole = drawing.blocks.new("ore")
+    for side in SIDES:
+        whole.add_3dface([CORNERS[k] for k in side])
+    drawing.header["$INSUNITS"] = 5
+    drawing.modelspace().add_blockref("ore", (10, 0, 0), dxfattribs={"xscale": -1, "layer": "mirrored"})
+    drawing.saveas(tmp_path / "ore.dxf")
+    (body,) = cad.read(tmp_path / "ore.dxf", "mirrored")
+    np.testing.assert_allclose(body.bounds(), [[0.09, 0, 0], [0.1, 0.01, 0.01]], atol=1e-9)
+    with pytest.raises(HpcdemError, match=r"no 3DFACE in layer 'gold' .layers with some: 'else', 'mirrored', 'ore'"):
         cad.read(tmp_path / "ore.dxf", "gold")
 
 
@@ -177,7 +212,8 @@ gmsh.write(sys.argv[2])
 
 def test_solids_of_a_cad_file_hang_together_and_are_groups(tmp_path: Path, gmsh: object) -> None:
     subprocess.run([sys.executable, "-c", PARTS, tmp_path / "parts.brep", tmp_path / "flat.brep"], check=True)
-    one, other = cad.read(tmp_path / "parts.brep")
+    (small, _), (one, other) = cad.read(tmp_path / "parts.brep", scale=1e-3), cad.read(tmp_path / "parts.brep")
+    np.testing.assert_allclose(small.bounds(), 1e-3 * one.bounds(), atol=1e-9)
     found = fill.filled(fill.Wishes([one, other], 0.3, regions=[("one", [one]), ("other", [other])]), "rest")
     mesh = Mesh.of(found.points, found.cells)
     check(mesh)

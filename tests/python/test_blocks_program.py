@@ -88,8 +88,8 @@ SAME: list[tuple[str, str]] = [
      "'s'",
      "sim.geometry.fractures('s', 'out', orientation=('fixed', 3), length=('fixed', 2), p20=2, reached=True, "
      "seed=7)"),
-    ("pcdc geometry import 'a.dxf' as-layer 'l' dxf-layer 'k'",
-     "sim.geometry.import_file(Path('a.dxf'), 'l', dxf_layer='k')"),
+    ("pcdc geometry import 'a.dxf' as-layer 'l' dxf-layer 'k' scale 0.001",
+     "sim.geometry.import_file(Path('a.dxf'), 'l', dxf_layer='k', scale=0.001)"),
     ("pcdc geometry transform 'l' scale 2 rotate 30 about (0,1) move (1,0)",
      "sim.geometry.transform('l', scale=2, rotate=30, about=(0, 1), move=(1, 0))"),
     ("pcdc geometry delete 'l'", "sim.geometry.delete('l')"),

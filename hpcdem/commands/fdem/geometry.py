@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh import cad, dxf, solids
 from hpcdem.pre.mesh import geometry as shapes
@@ -59,17 +61,35 @@ def _polygons(project: Project, layer: str) -> list[solids.Polygon]:
     return found
 
 
-def import_file(project: Project, layer: str, path: str, of: str | None = None) -> None:
+def import_file(project: Project, layer: str, path: str, of: str | None = None, scale: float | None = None) -> None:
     """The lines of a DXF file, or of one of its layers; in space the solids of a STEP or BREP file, or what the
-    triangles of an STL or DXF file enclose. Collective."""
+    triangles of an STL or DXF file enclose. scale: metres in a unit of the file; None: as the file says, else 1.
+    Collective."""
     file = project.to_read(path)
-    if project.dim == 3:
-        if of is not None and file.suffix.lower() != ".dxf":
-            raise CommandError(f"{file}: layers are of DXF files")
-        project.layers.add(layer, *made_once(project.comm, lambda: cad.read(file, of)))
-        return
-    found = made_once(project.comm, lambda: dxf.read_dxf(file, {of} if of else None))
-    project.layers.add(layer, *(curve for curves in found.values() for curve in curves))
+    if project.dim == 3 and of is not None and file.suffix.lower() != ".dxf":
+        raise CommandError(f"{file}: layers are of DXF files")
+
+    def make() -> tuple[list[Any], list[str]]:
+        notes: list[str] = []
+        if project.dim == 3:
+            return cad.read(file, of, scale, notes), notes
+        drawing = dxf.opened(file)
+        unit = dxf.metres(drawing, scale, notes)
+        found = dxf.curves(drawing, file, {of} if of else None)
+        return [shapes.transformed(curve, scale=unit) for curves in found.values() for curve in curves], notes
+
+    made, notes = made_once(project.comm, make)
+    project.layers.add(layer, *made)
+    if project.log is not None:
+        bounds = [
+            one.bounds() if project.dim == 3 else (one.points.min(axis=0), one.points.max(axis=0)) for one in made
+        ]
+        low = np.min([b[0] for b in bounds], axis=0)
+        high = np.max([b[1] for b in bounds], axis=0)
+        first, last = (", ".join(f"{c:g}" for c in at) for at in (low, high))
+        project.log.info(
+            f"layer '{layer}': from ({first}) to ({last}) m; {file.name}: {'; '.join(notes) or 'in metres'}"
+        )
 
 
 def transform(

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 
 from hpcdem.pre.mesh import optional
 
+EXTRA = optional.EXTRA
+"""What brings all of them."""
 NEEDED: Mapping[str, Callable[[str], tuple[optional.Load, ...]]] = {
     "mesh create": lambda file: (optional.gmsh, optional.shapely),
     "mesh import": optional.of_mesh,

@@ -412,7 +412,9 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "geometry create revolve": lambda c: fdem.geometry.revolve(
         c.project, c["as-layer"], c["layer"], **c.given("as-layer", "layer")
     ),
-    "geometry import": lambda c: fdem.geometry.import_file(c.project, c["as-layer"], c["file"], c.get("dxf-layer")),
+    "geometry import": lambda c: fdem.geometry.import_file(
+        c.project, c["as-layer"], c["file"], c.get("dxf-layer"), c.get("scale")
+    ),
     "geometry transform": lambda c: fdem.geometry.transform(c.project, **c.given()),
     "geometry delete": lambda c: fdem.geometry.delete(c.project, c["layer"]),
     "mesh create": _mesh_create,

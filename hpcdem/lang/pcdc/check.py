@@ -5,14 +5,13 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 
-from hpcdem.commands.fdem.packages import NEEDED
+from hpcdem.commands.fdem.packages import EXTRA, NEEDED
 from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.pcdc import source
 from hpcdem.lang.pcdc.kinds import Pending, TableName
 from hpcdem.lang.pcdc.source import Source
 from hpcdem.lang.pcdc.statement import Statement
 from hpcdem.physics.fdem.tables import Drawn, Over
-from hpcdem.pre.mesh.optional import EXTRA
 
 
 def read(text: str, file: str) -> Source:

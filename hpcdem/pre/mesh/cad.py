@@ -8,6 +8,7 @@ picture of it.
 from __future__ import annotations
 
 import json
+import math
 import sys
 import tempfile
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.pre.mesh import apart, optional
+from hpcdem.pre.mesh import apart, dxf, optional
 from hpcdem.pre.mesh import occ as shapes
 from hpcdem.pre.mesh.solids import Brep, Shell
 
@@ -31,16 +32,29 @@ TURN = 24
 KINDS = (".step", ".stp", ".brep", ".stl", ".dxf")
 
 
-def read(path: Path, layer: str | None = None) -> list[Any]:
-    """The bodies of a file [m]; layer: only this one of a DXF file. HpcdemError, with its name, for what it lacks."""
+def read(path: Path, layer: str | None = None, scale: float | None = None, notes: list[str] | None = None) -> list[Any]:
+    """The bodies of a file [m]; layer: only this one of a DXF file; scale: metres in a unit of the file (STEP and DXF
+    files name theirs); notes: what is to be told goes there. HpcdemError, with its name, for what it lacks."""
+    notes = [] if notes is None else notes
     kind = path.suffix.lower()
     if not path.is_file():
         raise CommandError(f"{path}: there is no such file")
     if kind not in KINDS:
         raise CommandError(f"{path}: bodies are read from files {', '.join('*' + one for one in KINDS)}")
-    if kind in (".stl", ".dxf"):
-        return [_shell(path, _triangles(path) if kind == ".stl" else _faces(path, layer))]
-    return _solids(path)
+    if scale is not None and not 0.0 < scale < math.inf:
+        raise CommandError(f"a scale is above 0, got {scale:g}")
+    if kind in (".step", ".stp"):
+        if scale is not None:
+            raise CommandError(f"{path}: STEP files name their unit, and come in metres; scale is for other files")
+        return _solids(path, 1.0)
+    if kind == ".dxf":
+        return [_shell(path, _faces(path, layer, scale, notes))]
+    taken = 1.0 if scale is None else scale
+    notes.append(
+        f"files *{kind} name no unit: a unit is {taken:g} m, "
+        + ("as scale says" * (scale is not None) or "taken as metres")
+    )
+    return [_shell(path, taken * _triangles(path, notes))] if kind == ".stl" else _solids(path, taken)
 
 
 def _shell(path: Path, triangles: np.ndarray) -> Shell:
@@ -100,29 +114,51 @@ def outwards(of: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, int]:
     return of, pieces
 
 
-def _triangles(path: Path) -> np.ndarray:
-    """(k, 3, 3) of an STL file, text or binary."""
-    meshio = optional.meshio()
-    try:
-        found = meshio.read(path, file_format="stl")
-    except Exception as error:  # whatever a damaged file makes of the reader
-        raise HpcdemError(f"{path}: this is not an STL file that can be read ({error})") from None
-    parts = [np.asarray(block.data) for block in found.cells if block.type == "triangle"]
-    return np.asarray(found.points, np.float64)[np.concatenate(parts)] if parts else np.empty((0, 3, 3))
+def _triangles(path: Path, notes: list[str]) -> np.ndarray:
+    """(k, 3, 3) of an STL file, text or binary; bytes after the last triangle are passed over, with a note."""
+    content = path.read_bytes()
+    count = int.from_bytes(content[80:84], "little") if len(content) >= 84 else 0
+    whole = 84 + 50 * count
+    before, facet, _ = content.lower().partition(b"facet")
+    text = before.lstrip()[:5] == b"solid" and bool(facet) and b"\0" not in before
+    if text and len(content) != whole:  # binary files may begin with the same word
+        words = content[: content.lower().rfind(b"endsolid") + 8].decode("ascii", "replace").lower().split()
+        rows = [words[k + 1 : k + 4] for k, word in enumerate(words) if word == "vertex"]
+        ends = "endsolid" in words and len(rows) == 3 * words.count("endfacet")
+        try:
+            corners = np.array(rows, np.float64).reshape(-1, 3, 3)
+        except ValueError:
+            ends, corners = False, np.empty((0, 3, 3))
+        if not ends:
+            raise HpcdemError(
+                f"{path}: this is not an STL file that can be read: a facet is damaged, or the end is missing"
+            )
+        return corners
+    if len(content) < whole or not count:
+        held = max(len(content) - 84, 0) // 50
+        raise HpcdemError(
+            f"{path}: this is not an STL file that can be read: it is no text with facets, and of the {count} "
+            f"triangles that its head names it has {held}"
+        )
+    if len(content) > whole:
+        notes.append(f"{len(content) - whole} bytes after the last triangle are passed over")
+    table = np.frombuffer(
+        content, np.dtype([("normal", "<f4", (3,)), ("at", "<f4", (3, 3)), ("more", "<u2")]), count, 84
+    )
+    return table["at"].astype(np.float64)
 
 
-def _faces(path: Path, layer: str | None) -> np.ndarray:
-    """(k, 3, 3) of the 3DFACE entities of a DXF file; quads as two triangles."""
-    ezdxf = optional.ezdxf()
-    try:
-        document = ezdxf.readfile(path)
-    except (OSError, ezdxf.DXFError, UnicodeError, ValueError, KeyError, IndexError) as error:
-        raise HpcdemError(f"{path}: this is not a DXF drawing that can be read ({error})") from None
+def _faces(path: Path, layer: str | None, scale: float | None, notes: list[str]) -> np.ndarray:
+    """(k, 3, 3) [m] of the 3DFACE entities of a DXF file, in blocks too; quads as two triangles."""
+    document = dxf.opened(path)
+    unit = dxf.metres(document, scale, notes)
     rows = []
     layers = set()
-    for entity in document.modelspace().query("3DFACE"):
-        layers.add(str(entity.dxf.layer))
-        if layer is not None and str(entity.dxf.layer) != layer:
+    for entity, own in dxf.flat(document.modelspace(), str(path)):
+        if entity.dxftype() != "3DFACE":
+            continue
+        layers.add(own)
+        if layer is not None and own != layer:
             continue
         a, b, c, d = (tuple(map(float, entity.dxf.get(f"vtx{k}"))) for k in range(4))
         rows.append((a, b, c))
@@ -132,14 +168,16 @@ def _faces(path: Path, layer: str | None) -> np.ndarray:
         known = ", ".join(f"'{name}'" for name in sorted(layers)) or "none"
         raise HpcdemError(f"{path}: there is no 3DFACE in layer '{layer}' (layers with some: {known})" if layer else
                           f"{path}: the drawing contains no 3DFACE")  # fmt: skip
-    return np.array(rows)
+    return unit * np.array(rows)
 
 
-def _solids(path: Path) -> list[Brep]:
+def _solids(path: Path, scale: float) -> list[Brep]:
     optional.gmsh()
     with tempfile.TemporaryDirectory(prefix="hpcdem-") as folder:
         into = Path(folder) / "bodies.json"
-        apart.run("hpcdem.pre.mesh.cad", str(path), str(into), failed=f"{path}: no solid can be read from it")
+        apart.run(
+            "hpcdem.pre.mesh.cad", str(path), str(into), repr(scale), failed=f"{path}: no solid can be read from it"
+        )
         given = json.loads(into.read_text(encoding="utf-8"))
     if any(len(one["text"]) > MOST_TEXT for one in given):
         raise HpcdemError(f"{path}: a solid has more than {MOST_TEXT} characters")
@@ -148,12 +186,14 @@ def _solids(path: Path) -> list[Brep]:
     ]  # fmt: skip
 
 
-def _main(path: str, into: str) -> None:
+def _main(path: str, into: str, scale: float) -> None:
     gmsh = shapes.begun()
     gmsh.option.setString("Geometry.OCCTargetUnit", "M")
     gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
     occ = gmsh.model.occ
     found = occ.importShapes(path, highestDimOnly=True)
+    if scale != 1.0:
+        occ.dilate(found, 0.0, 0.0, 0.0, scale, scale, scale)
     occ.synchronize()
     volumes = gmsh.model.getEntities(3)
     if not volumes or any(dim != 3 for dim, _ in found):
@@ -200,4 +240,4 @@ def _picture(gmsh: Any) -> tuple[list[list[float]], list[int]]:
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1], sys.argv[2])
+    _main(sys.argv[1], sys.argv[2], float(sys.argv[3]))

@@ -17,8 +17,37 @@ NOTES = frozenset(
     "TEXT MTEXT DIMENSION ARC_DIMENSION LEADER MULTILEADER TOLERANCE ATTDEF ATTRIB HATCH VIEWPORT IMAGE WIPEOUT".split()
 )
 """What a drawing says about itself; left out without complaint."""
+UNITS = {
+    1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 1e-3),
+    5: ("centimetres", 1e-2), 6: ("metres", 1.0), 7: ("kilometres", 1e3), 8: ("microinches", 2.54e-8),
+    9: ("mils", 2.54e-5), 10: ("yards", 0.9144), 14: ("decimetres", 0.1), 15: ("decametres", 10.0),
+    16: ("hectometres", 100.0), 21: ("US survey feet", 1200.0 / 3937.0),
+}  # fmt: skip
+"""Name and metres of the codes of $INSUNITS."""
 FLATTENING = 1e-4
 """Splines and ellipses become polylines that deviate by this part of their size at most."""
+
+
+def opened(path: Path) -> Any:
+    """The drawing; HpcdemError for what is none."""
+    ezdxf = optional.ezdxf()
+    try:
+        return ezdxf.readfile(path)
+    except FileNotFoundError:
+        raise CommandError(f"{path}: there is no such file") from None
+    except (OSError, ezdxf.DXFError, UnicodeError, ValueError, KeyError, IndexError) as error:
+        raise HpcdemError(f"{path}: this is not a DXF drawing that can be read ({error})") from None
+
+
+def metres(document: Any, scale: float | None, notes: list[str]) -> float:
+    """Metres in a unit of the drawing: as given, else by its header ($INSUNITS), else 1; notes: gets what was taken."""
+    code = int(document.header.get("$INSUNITS", 0))
+    name, factor = UNITS.get(code, ("", 1.0))
+    said = f"the drawing is in {name} ($INSUNITS {code})" if name else "the drawing names no unit ($INSUNITS)"
+    taken = factor if scale is None else scale
+    how = "as scale says" if scale is not None else "scale says otherwise" if name else "taken as metres"
+    notes.append(f"{said}: a unit is {taken:g} m, {how}")
+    return taken
 
 
 def read_dxf(path: str | Path, only: set[str] | None = None) -> dict[str, list[Curve]]:
@@ -28,17 +57,14 @@ def read_dxf(path: str | Path, only: set[str] | None = None) -> dict[str, list[C
     polylines, INSERT by what its block contains. Notes (NOTES) are left out. Anything else, and what is not drawn in
     the x-y plane, is refused with its type, handle and layer. `only`: the layers wanted; HpcdemError if one is missing.
     """
-    ezdxf = optional.ezdxf()
     path = Path(path)
-    try:
-        document = ezdxf.readfile(path)
-    except FileNotFoundError:
-        raise CommandError(f"{path}: there is no such file") from None
-    except (OSError, ezdxf.DXFError, UnicodeError, ValueError, KeyError, IndexError) as error:
-        raise HpcdemError(f"{path}: this is not a DXF drawing that can be read ({error})") from None
+    return curves(opened(path), path, only)
+
+
+def curves(document: Any, path: Path, only: set[str] | None = None) -> dict[str, list[Curve]]:
+    """The same of an opened drawing."""
     found: dict[str, list[Curve]] = {}
-    for entity in _flat(document.modelspace(), str(path), depth=0):
-        layer = str(entity.dxf.layer)
+    for entity, layer in flat(document.modelspace(), str(path)):
         if only is not None and layer not in only:
             continue
         where = f"{path}: {entity.dxftype()} (handle {entity.dxf.handle}, layer '{layer}')"
@@ -56,31 +82,38 @@ def read_dxf(path: str | Path, only: set[str] | None = None) -> dict[str, list[C
     return found
 
 
-def _flat(entities: Any, path: str, depth: int) -> Iterator[Any]:
-    """Entities with inserted blocks taken apart."""
+def flat(entities: Any, path: str, depth: int = 0, layer: str = "0") -> Iterator[tuple[Any, str]]:
+    """Entities with inserted blocks taken apart, and the layer of each: what is in layer 0 of a block is in that of the
+    insertion."""
     for entity in entities:
         kind = entity.dxftype()
         if kind in NOTES:
             continue
+        own = str(entity.dxf.layer) if depth == 0 or str(entity.dxf.layer) != "0" else layer
         if kind != "INSERT":
-            yield entity
+            yield entity, own
         elif depth > 16:
             raise HpcdemError(f"{path}: INSERT (handle {entity.dxf.handle}): blocks within blocks, deeper than 16")
         else:
-            yield from _flat(entity.virtual_entities(), path, depth + 1)
+            for one in entity.multi_insert() if entity.mcount > 1 else (entity,):  # rows and columns of a block
+                yield from flat(one.virtual_entities(), path, depth + 1, own)
 
 
 def _curve(entity: Any, where: str) -> Curve:
     kind = entity.dxftype()
     if kind not in _READERS:
         raise HpcdemError(f"{where}: this type cannot be read; known are {', '.join(_READERS)} and INSERT")
+    mirrored = False
     if entity.dxf.hasattr("extrusion") and kind not in ("LINE", "POINT", "SPLINE"):
         x, y, z = entity.dxf.extrusion
-        if (round(x, 9), round(y, 9), round(z, 9)) != (0.0, 0.0, 1.0):
+        if (round(x, 9), round(y, 9), abs(round(z, 9))) != (0.0, 0.0, 1.0):
             raise HpcdemError(
                 f"{where}: it is drawn in a plane of its own (extrusion {x:g}, {y:g}, {z:g}), only the x-y plane counts"
             )
-    return _READERS[kind](entity, where)
+        mirrored = z < 0.0 and kind != "ELLIPSE"  # its points are those of the drawing already
+    curve = _READERS[kind](entity, where)
+    # What is drawn with z downwards, as mirrored blocks are, has x the other way round.
+    return geometry.transformed(curve, scale=(-1.0, 1.0)) if mirrored else curve
 
 
 def _xy(at: Any) -> tuple[float, float]:
