@@ -142,7 +142,7 @@ MODELS = {
     "thermal-fluid": "节理内流体的热:导热、对流、与两壁换热。",
     "mechanical-velocity-boundary-condition": "节点的速度或加速度;未给的分量自由。",
     "mechanical-force-boundary-condition": "每个节点上的力。",
-    "mechanical-move-boundary-constraint": "节点的自由度。",
+    "mechanical-move-boundary-constraint": "节点的自由度。新约束与节点已有的约束、给定速度同时有效:两个方向即固定;相互矛盾的拒绝执行。",
     "hydraulic-constant-flow-boundary": "节点上的流体:压力、水位或流量三者之一。",
     "hydraulic-proppant-boundary": "流动节点(包括井)进入的支撑剂。",
     "thermal-solid-boundary-condition": "节点的温度。",
@@ -625,9 +625,9 @@ PCDC_KEYWORDS = {
     "force along x": "沿 x 的力",
     "force along y": "沿 y 的力",
     "force along z": "沿 z 的力",
-    "0 free, 1 held, 2 moves along the vector only, 3 (in three dimensions) across it only (type 0 and 1 take a "
-    "vector and do not use it)":
-    "0 自由,1 固定,2 只能沿向量运动,3(三维)只能垂直于向量运动(0 和 1 可写向量,但不用)",
+    "0 free (takes constraints back), 1 held, 2 moves along the vector only, 3 (in three dimensions) across it only (type "
+    "0 and 1 take a vector and do not use it)":
+    "0 自由(撤销约束),1 固定,2 只能沿向量运动,3(三维)只能垂直于向量运动(0 和 1 可写向量,但不用)",
     "pressure, not negative": "压力,不为负",
     "level of water that stands at the nodes, against gravity: hydrostatic pressure below it; above it water can "
     "leave (seepage)":
@@ -769,8 +769,9 @@ PCDC_KEYWORDS = {
     "x, y and geometry (of elements) look at where things are at this moment":
     "x、y 和(单元的)geometry 按此刻的位置判断",
     "lies on a surface of the model": "位于模型的表面",
-    "faces, joints or nodes of the elements of the group; joints: both elements are in it":
-    "此组单元的面、节理或节点;节理:两侧单元都在组中",
+    "faces, joints or nodes of the elements of the group; joints: both elements are in it; nodes: where elements may "
+    "part, on their side": "此组单元的面、节理或节点;节理:两侧单元都在组中;节点:在单元可能分开之处,取本侧的节点",
+    "faces or nodes of the element, or of those from first to last": "此单元(或从首号到末号各单元)的面或节点",
     "joints with an element of each of the two groups": "两侧单元分属这两组的节理",
     "joints on a crack of the mesh": "网格裂纹上的节理",
 }  # fmt: skip

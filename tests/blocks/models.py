@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.physics.fdem import changes, creep, diagnostics, user_functions, user_laws
+from hpcdem.physics.fdem import changes, creep, diagnostics, sides, user_functions, user_laws
 from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
@@ -286,6 +286,58 @@ def shake_more(sim: Blocks) -> None:
         FreeField.create(sim, right)
 
 
+def upper_side(sim: Blocks) -> np.ndarray:
+    """Nodes on the seam of the model below as its upper elements have them."""
+    mesh = sim.the_mesh()
+    above = mesh.centroids()[:, 1] > 0.3
+    chosen = (mesh.cells >= 0) & above[:, None] & (np.abs(mesh.points[mesh.cells][:, :, 1] - 0.3) < 1e-9)
+    return sides.numbers(mesh.cells, chosen.reshape(-1), np.ones(len(mesh.cells), bool))
+
+
+def parting(sim: Blocks) -> None:
+    """A body with a seam, half of it joints and half a crack, of which both sides are led and pushed by themselves."""
+    mesh = rectangle(20, 6, 2.0, 0.6, kind="mixed")
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
+    edges = mesh.edges()
+    ends = mesh.points[edges.points]
+    seam = edges.inner & (np.abs(ends[:, :, 1] - 0.3) < 1e-9).all(axis=1)
+    left = ends[:, :, 0].mean(axis=1) < 1.2
+    upper = upper_side(sim)
+    sim.velocity_condition(upper[::3], vx=0.0)
+    sim.force_condition(upper[1::3], fy=4e5)
+    sim.joint_model(edges.faces[seam & left, 0], COHESIVE, WEAK)
+    changes.crack(sim, edges.faces[seam & ~left, 0])
+    sim.velocity_condition(np.flatnonzero(mesh.points[:, 1] < 1e-9), vy=0.0)
+    sim.move_constraint(upper[2::3], 2, (0.1, 1.0))
+    sim.move_constraint(upper[1:2], 2, (0.0, 1.0))
+    sim.velocity_condition(np.flatnonzero(mesh.points[:, 1] > 0.6 - 1e-9), vy=0.4)
+    diagnostics.account_energy(sim)
+
+
+def part_more(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 350:
+        sim.force_condition(upper_side(sim)[1::3], fy=0.0)
+        sim.remove_conditions(upper_side(sim)[2::3])
+
+
+def parted(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """Besides what both sides do."""
+    upper, mesh = upper_side(sim), sim.the_mesh()
+    of_sides = {f"side_{name}": diagnostics.values(sim, name, upper) for name in ("position_y", "reaction_x")}
+    seam = mesh.edges().faces[mesh.edges().inner, 0]
+    return {**result(sim, notes), **of_sides, "gap": diagnostics.values(sim, "opening", seam)}
+
+
+def sides_part(found: Found) -> None:
+    gap = found["gap"][~np.isnan(found["gap"])]
+    assert found["counts"][2] > 3 and (gap > 1e-5).sum() > 5  # joints that broke; cracks that opened
+    lower = found["position_y"][np.abs(found["position_y"] - 0.3) < 1e-2]
+    assert found["side_position_y"].mean() > lower.mean() + 1e-5
+    assert np.abs(found["side_reaction_x"]).max() > 0.0
+
+
 def result(sim: Blocks, notes: dict[str, Any]) -> Found:
     """All that may not depend on ranks, and in `about` rebuilds, late ones, contact pairs, elements that came from
     another rank."""
@@ -371,5 +423,6 @@ MODELS = {
     "opening": Model(opening, result, a_hole_is_made, open_up, slow=True),
     "backfill": Model(backfill, result, the_fill_carries, fill_up, steps=1100),
     "creeping": Model(creeping, result, much_creeps, creep_more, steps=1400),
+    "parting": Model(parting, parted, sides_part, part_more, steps=600, middle=300),
     "shaking": Model(shaking, result, the_ground_shakes, shake_more, steps=700, middle=401),
 }

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, jointed, model, rectangle, shaken
@@ -229,7 +230,7 @@ def test_null_elements_leave_free_faces_and_joints():
 
 
 def test_conditions_act_in_their_order():
-    """Constraint before velocity before acceleration before force; along a vector only; acceleration integrates."""
+    """Velocity before acceleration before force; with a constraint along a vector only; acceleration integrates."""
     sim = model(rectangle(1, 1, 1.0, 1.0, kind="quad"))
     sim.time_step(value=1e-5)
     sim.velocity_condition(None, vx=1.0, ay=100.0)
@@ -237,9 +238,16 @@ def test_conditions_act_in_their_order():
     convergence.advance(sim, 10)
     assert diagnostics.values(sim, "velocity_x") == pytest.approx(1.0, abs=1e-15)
     assert diagnostics.values(sim, "velocity_y") == pytest.approx(100.0 * 1e-5 * 10, rel=1e-12)
+    with pytest.raises(CommandError, match="velocity-x 1 and acceleration-y 100: along an oblique line"):
+        sim.move_constraint(None, 2, (1.0, 1.0))
+    sim.remove_conditions(None)
+    sim.velocity_condition(None, vx=1.0)
     sim.move_constraint(None, 2, (1.0, 1.0))
     sim.step()
-    assert diagnostics.values(sim, "velocity_x") == pytest.approx(diagnostics.values(sim, "velocity_y"), rel=1e-12)
+    assert diagnostics.values(sim, "velocity_y") == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(CommandError, match=r"node 0 at \(0, 0\): held \(type 1\) and velocity-x 1"):
+        sim.move_constraint([0], 1)
+    sim.remove_conditions([0])
     sim.move_constraint([0], 1)
     sim.step()
     assert diagnostics.values(sim, "velocity_x", [0])[0] == 0.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.fdem import meshes
-from hpcdem.commands.fdem.choices import chosen
+from hpcdem.commands.fdem.choices import chosen, points
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.groups import Groups
@@ -17,7 +17,7 @@ BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right group 'rock' se
 
 
 def numbers(bench, kind: str, *terms: g.Term) -> list[int]:
-    found = chosen(bench.project, kind, terms)
+    found = points(bench.project, terms) if kind == g.NODE else chosen(bench.project, kind, terms)
     return [] if found is None else found.tolist()
 
 

@@ -11,7 +11,7 @@ from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import changes, user_functions, user_laws
+from hpcdem.physics.fdem import changes, sides, user_functions, user_laws
 from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
@@ -24,7 +24,17 @@ Number = float | str
 def group(project: Project, kind: str, name: str, set_name: str = DEFAULT, where: Range | None = None) -> None:
     """Put objects of a kind (model.blocks.groups) into a group, also of elements that were taken out: these may come
     back. They leave the one of the set that they were in."""
-    project.groups[kind].assign(everything(project, kind, where, null_too=True), name, set_name)
+    found, groups = everything(project, kind, where, null_too=True), project.groups[kind]
+    known = groups.sets.get(set_name, {})
+    if kind == NODE and any(map(sides.are_there, (found, *known.values()))):  # sides of a point that others have
+        mesh = project.whole_mesh()
+        every = np.ones(len(mesh.cells), bool)
+        new = sides.corners(mesh.cells, found, len(mesh.points))
+        for other, members in known.items():
+            old = sides.corners(mesh.cells, members, len(mesh.points))
+            known[other] = sides.numbers(mesh.cells, old | new if other == name else old & ~new, every)
+        found = known.get(name, found)
+    groups.assign(found, name, set_name)
 
 
 def element_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import groups as g
+from hpcdem.physics.fdem import sides
 from hpcdem.physics.fdem.mesh import centres
 from hpcdem.physics.flow.model import Flow
 from hpcdem.pre.mesh import geometry
@@ -32,13 +33,19 @@ def chosen(project: Project, kind: str, where: g.Range | None, null_too: bool = 
     mask = objects.all_of(where)
     if not mask.any():
         raise CommandError(f"the range chooses no {kind}" + _why(objects, where))
-    return objects.numbers[mask]
+    return objects.on_sides(mask) if kind == g.NODE else objects.numbers[mask]
 
 
 def everything(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray:
     """The same as numbers in any case."""
     found = chosen(project, kind, where, null_too)
     return _Objects(project, kind, null_too).numbers if found is None else found
+
+
+def points(project: Project, where: g.Range | None) -> np.ndarray | None:
+    """Nodes that a range chooses, by points: for what both sides of a joint have together."""
+    found = chosen(project, g.NODE, where)
+    return found if found is None else sides.points(project.whole_mesh().cells, found)
 
 
 def places(project: Project, kind: str) -> np.ndarray:
@@ -61,7 +68,7 @@ def _why(objects: _Objects, where: g.Range) -> str:
 
 
 _ONLY_JOINTS = (g.Between, g.OnCrack)
-_NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
+_NOT_ELEMENTS = (g.OnBoundary, g.OfElements, g.OfElement)
 _NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer)
 
 
@@ -75,6 +82,7 @@ class _Objects:
         self.mesh = mesh = project.whole_mesh()
         self.groups = project.groups
         self.now = False
+        self.corners_of_terms: list[np.ndarray] = []
         if kind in g.SUPPORTS:
             self.support = supports.of(project.blocks, kind)
             there = self.support.alive(kind)
@@ -87,7 +95,7 @@ class _Objects:
                 raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
             some, null_too = flow.numbers(kind), False
             self.kind = kind = g.FLOW[kind]
-        there = np.ones(len(mesh.cells), bool) if null_too else project.alive
+        self.there = there = np.ones(len(mesh.cells), bool) if null_too else project.alive
         if kind == g.ELEMENT:
             self.numbers = np.flatnonzero(there)
         elif kind == g.NODE:
@@ -135,6 +143,33 @@ class _Objects:
             mask &= self.mask(term)
         return mask
 
+    def on_sides(self, mask: np.ndarray) -> np.ndarray:
+        """Numbers of these nodes (sides.py), on the sides that terms of elements and groups name. Where no corner at a
+        point is meant by all of them, as between two groups, those count that any of them means."""
+        if not self.corners_of_terms:
+            return self.numbers[mask]
+        cells = self.mesh.cells
+        at = np.zeros(len(self.mesh.points) + 1, bool)  # the last one is for the fourth corner of triangles
+        at[self.numbers[mask]] = True
+        at = at[cells].reshape(-1) & np.repeat(self.there, 4)
+        every, some = (at & how(self.corners_of_terms, axis=0) for how in (np.all, np.any))
+        met = np.zeros(len(self.mesh.points), bool)
+        met[cells.reshape(-1)[every]] = True
+        return sides.numbers(cells, every | (some & ~met[cells.reshape(-1)]), self.there)
+
+    def _of_corners(self, corners: np.ndarray) -> np.ndarray:
+        """(n,) bool: nodes with one of these corners (4 ne,) bool, which are those that are meant."""
+        self.corners_of_terms.append(corners)
+        some = np.zeros(len(self.mesh.points), bool)
+        some[self.mesh.cells.reshape(-1)[corners & np.repeat(self.there, 4)]] = True
+        return some[self.numbers]
+
+    def _in(self, members: np.ndarray) -> np.ndarray:
+        """(n,) bool: those with these numbers."""
+        if self.kind == g.NODE and sides.are_there(members):
+            return self._of_corners(sides.corners(self.mesh.cells, members, len(self.mesh.points)))
+        return np.isin(self.numbers, members)
+
     def places(self) -> np.ndarray:
         """(n, k, dim) [m] where x, y, z and geometry look for each: the centre of an element, a node, the points of a
         face or joint (of the element that it is numbered by) or the ends of an element of a bolt or liner."""
@@ -166,10 +201,10 @@ class _Objects:
             raise CommandError(f"{term} makes no sense for elements")
         match term:
             case g.InGroup(group, set_name):
-                return np.isin(self.numbers, self._members(group, set_name))
+                return self._in(self._members(group, set_name))
             case g.InSet(set_name):
                 of = self.groups[self.kind].of_set(set_name)
-                return np.isin(self.numbers, np.concatenate([np.empty(0, np.int64), *of.values()]))
+                return self._in(np.concatenate([np.empty(0, np.int64), *of.values()]))
             case g.Ids(first, last):
                 return self._ids(first, last)
             case g.Span(axis, low, high):
@@ -180,6 +215,11 @@ class _Objects:
                 return self._boundary()
             case g.OfElements(group, set_name):
                 return self._of_elements(self.groups[g.ELEMENT].members(group, set_name))
+            case g.OfElement(first, last):
+                if self.kind == g.JOINT:
+                    raise CommandError("element chooses faces and nodes; joints of elements: face-of, with a group")
+                elements = np.flatnonzero(_Objects(self.project, g.ELEMENT, self.null_too)._ids(first, last))
+                return self._of_elements(_Objects(self.project, g.ELEMENT, self.null_too).numbers[elements])
             case g.Between(one, other, set_name):
                 groups = self.groups[g.ELEMENT]
                 a, b = (np.isin(self.sides // 4, groups.members(name, set_name)) for name in (one, other))
@@ -294,8 +334,9 @@ class _Objects:
         if self.kind == g.JOINT:
             return np.isin(self.sides // 4, elements).all(axis=1)
         if self.kind == g.NODE:
-            corners = self.mesh.cells[elements]
-            return np.isin(self.numbers, corners[corners >= 0])
+            corners = np.zeros(self.mesh.cells.shape, bool)
+            corners[elements] = self.mesh.cells[elements] >= 0
+            return self._of_corners(corners.reshape(-1))
         return np.isin(self.numbers // 4, elements)
 
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 
 from hpcdem.commands.fdem import assignments
-from hpcdem.commands.fdem.choices import chosen
+from hpcdem.commands.fdem.choices import chosen, points
 from hpcdem.commands.fdem.heat import assign
 from hpcdem.commands.fdem.heat import of_heat as heat_of
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.groups import JOINT, NODE, Range
+from hpcdem.physics.fdem.groups import JOINT, Range
 from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow import kernels
@@ -66,7 +66,7 @@ def proppant_condition(
             "proppant-volumetric-flow-rate"
         )
     kind, value = said.popitem()
-    _proppant(project).prescribe(chosen(project, NODE, where), kind, value)
+    _proppant(project).prescribe(points(project, where), kind, value)
 
 
 def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
@@ -108,14 +108,14 @@ def condition(
     if len(said) != 1:
         raise CommandError(f"a flow node has one of {', '.join(given)}, got {' and '.join(said) or 'none'}")
     name, value = said.popitem()
-    _flow(project).prescribe(chosen(project, NODE, where), _DOES[name], value)
+    _flow(project).prescribe(points(project, where), _DOES[name], value)
 
 
 def remove_conditions(project: Project, where: Range | None = None) -> None:
     """Nothing is prescribed at flow nodes any more; without fluid there is nothing to do."""
     for found in (Flow.there(project.ready()), Proppant.there(project.ready())):
         if found is not None:
-            found.remove_conditions(chosen(project, NODE, where))
+            found.remove_conditions(points(project, where))
 
 
 def initial(
@@ -127,7 +127,7 @@ def initial(
 ) -> None:
     """Fluid that flow nodes hold now: its pressure [Pa], or the part of their room that is filled; concentration of
     proppant in it."""
-    nodes = chosen(project, NODE, where)
+    nodes = points(project, where)
     grains = None if concentration is None else _proppant(project)
     if (pressure, saturation) != (None, None) or grains is None:
         _flow(project).fill(nodes, pressure, saturation)
@@ -137,7 +137,7 @@ def initial(
 
 def well(project: Project, name: str, where: Range | None = None) -> None:
     """Flow nodes are a well, see physics/flow/wells.py."""
-    _flow(project).drill(name, chosen(project, NODE, where))
+    _flow(project).drill(name, points(project, where))
 
 
 def stage(

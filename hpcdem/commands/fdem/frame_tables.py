@@ -11,7 +11,7 @@ import numpy as np
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import CONTACTS, CORNERS, FACE_CONDITIONS, FLOW_NODES, NODE_CONDITIONS
-from hpcdem.physics.fdem import diagnostics, said
+from hpcdem.physics.fdem import diagnostics, said, sides
 from hpcdem.physics.fdem.definition import TRACTIONS
 from hpcdem.physics.fdem.groups import FLOW_NODE
 from hpcdem.physics.fdem.kernels import nodes, space
@@ -25,7 +25,9 @@ def tables(blocks: Blocks) -> dict[str, Table]:
     """By name, in ascending order of numbers; without those that have no rows. Collective."""
     made = {
         CONTACTS: _slabs(blocks, ("element_1", "element_2"), _contacts(blocks)),
-        NODE_CONDITIONS: _slabs(blocks, ("number",), _on_root(blocks, _node_conditions(blocks))),
+        NODE_CONDITIONS: _slabs(
+            blocks, ("number", "element") if blocks.sided else ("number",), _on_root(blocks, _node_conditions(blocks))
+        ),
         FACE_CONDITIONS: _slabs(blocks, ("number",), _on_root(blocks, _face_conditions(blocks))),
         FLOW_NODES: _slabs(blocks, ("number",), _flow_nodes(blocks)),
     }
@@ -67,24 +69,59 @@ def _contacts(blocks: Blocks) -> Columns | None:
     return columns
 
 
-def _places(blocks: Blocks, numbers: np.ndarray) -> Columns:
-    """Where nodes are now [m], on all ranks; NaN of those without an element. Collective."""
-    axes = "xyz"[: blocks.dim]
-    return {f"position_{axis}": diagnostics.values(blocks, f"position_{axis}", numbers) for axis in axes}
+def _places(blocks: Blocks, numbers: np.ndarray, lead: np.ndarray | None = None) -> Columns:
+    """Where points are now [m], on all ranks; NaN of those without an element. lead (n,): the corner where a side of it
+    is asked for, else -1. Collective."""
+    names = [f"position_{axis}" for axis in "xyz"[: blocks.dim]]
+    columns = {name: np.empty(len(numbers)) for name in names}
+    sided = numbers if lead is None else np.where(lead >= 0, sides.SIDE + lead, numbers)
+    again = np.arange(len(numbers)) - np.searchsorted(numbers, numbers)  # a point is asked for once at a time
+    for k in range(int(again.max(initial=-1)) + 1):
+        for name in names:
+            columns[name][again == k] = diagnostics.values(blocks, name, sided[again == k])
+    return columns
+
+
+def _nodes_with_conditions(blocks: Blocks, held: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points with conditions, ascending; where its sides have different ones each with its lowest corner, else -1; and
+    the row of conditions (n,)."""
+    mesh = blocks.the_mesh()
+    cells, node = mesh.cells.reshape(-1), blocks.node.reshape(-1)
+    corner = np.flatnonzero((blocks.corner_row > 0) & (node >= 0))
+    if blocks.sided:
+        corner = np.flatnonzero((node >= 0) & np.isin(cells, cells[corner]))
+    corner = corner[np.unique(node[corner], return_index=True)[1]]
+    row = blocks.rows_of_nodes(corner, blocks.node)[0]
+    table = np.column_stack([cells[corner], row])
+    table, first = np.unique(table, axis=0, return_index=True)
+    corner = corner[first]
+    point = table[:, 0]
+    alone = np.bincount(point, minlength=len(mesh.points))[point] == 1
+    some = alone | (table[:, 1] > 0)
+    warm = np.flatnonzero(held > 0)
+    warm = warm[~np.isin(warm, point[some])]
+    number = np.concatenate([point[some], warm])
+    order = np.argsort(number, kind="stable")
+    lead = np.concatenate([np.where(alone, -1, corner)[some], np.full(len(warm), -1)])
+    return number[order], lead[order], np.concatenate([table[:, 1][some], np.zeros(len(warm), np.int64)])[order]
 
 
 def _node_conditions(blocks: Blocks) -> Columns | None:
     """fixed: bits of the components of motion that are prescribed, 1 x, 2 y, 4 z; what of them, and forces."""
     heat = Heat.there(blocks)
     held = np.zeros(1, np.int32) if heat is None else heat.held
-    numbers = np.flatnonzero((blocks.point_row > 0) | (held > 0))
+    blocks.close_model()
+    numbers, lead, row = _nodes_with_conditions(blocks, held)
     if not len(numbers):
         return None
-    columns = {"number": numbers, **_places(blocks, numbers)}
+    columns = {"number": numbers, **_places(blocks, numbers, lead)}
     there = np.isfinite(columns["position_x"])
-    columns, numbers = {name: values[there] for name, values in columns.items()}, numbers[there]
+    columns = {name: values[there] for name, values in columns.items()}
+    numbers, lead, row = numbers[there], lead[there], row[there]
+    if blocks.sided:
+        columns["element"] = np.where(lead >= 0, lead // 4, -1)
     points, time, plane = blocks.the_mesh().points[numbers], blocks.told_time(), blocks.dim == 2
-    placed = Placed(blocks.conditions, blocks.point_row[numbers].astype(np.int64), points)
+    placed = Placed(blocks.acting(), row, points)
     table = blocks.local.conditions_now(placed, time, time, 1.0)[placed.of]
     does, at, force, constraint = (
         (nodes.DOES_X, nodes.AT_X, nodes.FORCE_X, nodes.CONSTRAINT) if plane

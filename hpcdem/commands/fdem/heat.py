@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from hpcdem.commands.fdem import assignments
-from hpcdem.commands.fdem.choices import chosen
+from hpcdem.commands.fdem.choices import chosen, points
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
+from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, OnBoundary, Range
 from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.heat.model import Heat
@@ -67,12 +67,12 @@ def of_heat(project: Project) -> Heat:
 
 def condition(project: Project, temperature: Number, where: Range | None = None) -> None:
     """Temperature of nodes."""
-    of_heat(project).prescribe(chosen(project, NODE, where), temperature)
+    of_heat(project).prescribe(points(project, where), temperature)
 
 
 def fluid_condition(project: Project, temperature: Number, where: Range | None = None) -> None:
     """Temperature of the fluid at flow nodes."""
-    of_heat(project).prescribe_fluid(chosen(project, NODE, where), temperature)
+    of_heat(project).prescribe_fluid(points(project, where), temperature)
 
 
 def face_condition(
@@ -95,7 +95,7 @@ def remove_conditions(project: Project, where: Range | None = None) -> None:
     """No temperature of nodes and their fluid is prescribed any more; without heat there is nothing to do."""
     found = Heat.there(project.ready())
     if found is not None:
-        found.remove_conditions(chosen(project, NODE, where))
+        found.remove_conditions(points(project, where))
 
 
 def remove_face_conditions(project: Project, where: Range | None = None) -> None:
@@ -107,4 +107,4 @@ def remove_face_conditions(project: Project, where: Range | None = None) -> None
 
 def initial(project: Project, temperature: float, where: Range | None = None) -> None:
     """Temperature of nodes now, and of the fluid at them; elements around them are free of thermal stress."""
-    of_heat(project).initial(chosen(project, NODE, where), temperature)
+    of_heat(project).initial(points(project, where), temperature)

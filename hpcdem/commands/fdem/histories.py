@@ -19,10 +19,13 @@ from hpcdem.physics import supports
 from hpcdem.physics.fdem import connectivity, diagnostics, tetrahedra, user_laws
 from hpcdem.physics.fdem.connectivity import nearest_point
 from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids, Range
+from hpcdem.physics.fdem.sides import SIDE
 from hpcdem.physics.flow.model import Flow
 
 IN_SPACE = tuple(name for name in UNITS[MODEL] if name not in ("disc_work", "liner_work"))
 """What a history of a model in three dimensions can follow."""
+ON_IT = 1e-6
+"""A place that is no farther from a node, over the size of the model, is that of the node: of all its sides."""
 FLUSH = 500
 """Records that wait at most before they go to the file."""
 
@@ -79,7 +82,21 @@ def create(
         diagnostics.quantity(project.ready(use=False), value)
     if kind in SUPPORTS:
         supports.of(project.ready(use=False), kind).check(kind, value)
+    if kind == JOINT and value in diagnostics.QUANTITIES:
+        _warn_of_nothing(project, name, value, numbers)
     project.histories[name] = History(kind, value, numbers, well or how, every, dim=project.dim)
+
+
+def _warn_of_nothing(project: Project, name: str, value: str, joints: Sequence[int]) -> None:
+    """None of these joints has this quantity so far."""
+    blocks, at = project.blocks, np.array(joints, np.int64)
+    there = (blocks.joint_row[at] > 0) | (blocks.open[at] & (value in ("opening", "slip")))
+    if len(at) and not there.any() and project.log is not None:
+        which = f"joint {at[0]} has" if len(at) == 1 else f"none of the {len(at)} joints has"
+        project.log.warn(
+            f"history '{name}': {which} a model, so {value.replace('_', '-')} is nan until face-joint c-model gives one"
+            + (" (of cracks opening and slip are known)" if blocks.open[at].any() else "")
+        )
 
 
 def _nearest(project: Project, kind: str, at: tuple[float, ...]) -> int:
@@ -89,10 +106,10 @@ def _nearest(project: Project, kind: str, at: tuple[float, ...]) -> int:
         numbers, middles = everything(project, kind, None), places(project, kind)
         return int(numbers[nearest_point(middles, at)])
     mesh, xy = project.whole_mesh(), project.positions()
+    of = tetrahedra if mesh.dim == 3 else connectivity
     if kind == NODE:
-        return nearest_point(xy, at, np.flatnonzero(~np.isnan(xy[:, 0])))
+        return _nearest_side(project, at)
     if kind == ELEMENT:
-        of = tetrahedra if mesh.dim == 3 else connectivity
         return of.nearest_element(xy, mesh.cells, at, np.flatnonzero(project.alive))
     edges = project.edges()
     inner = np.flatnonzero(edges.inner)
@@ -102,6 +119,24 @@ def _nearest(project: Project, kind: str, at: tuple[float, ...]) -> int:
     if not len(there):
         raise CommandError("the mesh has no joints: there is no edge between two elements")
     return int(edges.faces[inner, 0][nearest_point(middles, at, there)])
+
+
+def _nearest_side(project: Project, at: tuple[float, ...]) -> int:
+    """The node nearest to a point [m]. Where elements may part, of the sides that are as near that of the element that
+    is nearest, or all of them if that is none more than another."""
+    node = project.ready(use=False).clusters()[0].reshape(-1)
+    mesh, corners = project.whole_mesh(), project.corner_positions()
+    cells, there = mesh.cells.reshape(-1), np.flatnonzero(~np.isnan(corners[:, 0]) & (node >= 0))
+    far = np.linalg.norm(corners[there] - np.asarray(at, np.float64), axis=1)
+    point = int(cells[there[far == far.min()]].min())
+    beside = there[cells[there] == point]
+    on_it = far[cells[there] == point] <= ON_IT * float(np.ptp(mesh.points, axis=0).max())
+    if len(np.unique(node[beside])) == 1 or len(np.unique(node[beside[on_it]])) > 1:
+        return point
+    own = 4 * (beside // 4)[:, None] + np.arange(4)
+    own = np.where(cells[own] >= 0, own, -1)
+    of = tetrahedra if mesh.dim == 3 else connectivity
+    return SIDE + int(beside[of.nearest_element(corners, own, at, np.arange(len(own)))])
 
 
 def delete(project: Project, name: str) -> None:

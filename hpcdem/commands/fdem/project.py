@@ -15,6 +15,7 @@ from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.connectivity import Edges
 from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, KINDS, NODE, Groups
 from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.sides import SIDE
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.runtime import launch, run_folder
 
@@ -159,12 +160,23 @@ class Project:
         before, mesh, number = self.whole_mesh(), made.mesh, made.points
         self.replace_mesh(mesh)
         self.alive = self.alive[made.parent]
+        old, parent, n = before.cells.reshape(-1), np.repeat(made.parent, 4), len(mesh.points)
+
+        def sides(numbers: np.ndarray) -> np.ndarray:
+            """Where these sides (sides.py) are now."""
+            corner = numbers - SIDE
+            return SIDE + np.flatnonzero(
+                np.isin(parent * n + mesh.cells.reshape(-1), corner // 4 * n + number[old[corner]])
+            )
+
         for sets in self.groups[NODE].sets.values():
             lowest = np.full(len(mesh.points), len(number))
             for members in sets.values():
+                members = members[members < SIDE]
                 np.minimum.at(lowest, number[members], members)
             for name, members in sets.items():
-                sets[name] = np.unique(number[members[lowest[number[members]] == members]])
+                side, members = members[members >= SIDE], members[members < SIDE]
+                sets[name] = np.append(np.unique(number[members[lowest[number[members]] == members]]), sides(side))
         edges = self.edges()
 
         def faces(numbers: np.ndarray, joints: bool) -> np.ndarray:
@@ -175,7 +187,9 @@ class Project:
             return np.unique(both[:, 0] if joints else np.where(own[:, 0], both[:, 0], both[:, 1]))
 
         moved: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-            NODE: lambda numbers: np.unique(number[numbers]),
+            NODE: lambda numbers: np.append(
+                np.unique(number[numbers[numbers < SIDE]]), sides(numbers[numbers >= SIDE])
+            ),
             ELEMENT: lambda numbers: np.flatnonzero(np.isin(made.parent, numbers)),
             FACE: lambda numbers: faces(numbers, False),
             JOINT: lambda numbers: faces(numbers, True),

@@ -10,8 +10,8 @@ from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics import supports
-from hpcdem.physics.fdem import diagnostics
-from hpcdem.physics.fdem.groups import FLOW, SUPPORTS, Range
+from hpcdem.physics.fdem import diagnostics, sides
+from hpcdem.physics.fdem.groups import FLOW, NODE, SUPPORTS, Range
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
 from hpcdem.physics.heat.model import Heat
@@ -19,12 +19,14 @@ from hpcdem.physics.proppant.model import Proppant
 
 
 def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarray:
-    """Ascending numbers of the objects of a kind that a range chooses. Collective."""
-    return everything(project, kind, where)
+    """Ascending numbers of the objects of a kind that a range chooses, of nodes their points. Collective."""
+    found = everything(project, kind, where)
+    return sides.points(project.whole_mesh().cells, found) if kind == NODE else found
 
 
 def values(project: Project, kind: str, name: str, where: Range | None = None) -> np.ndarray:
-    """A quantity of these objects, in the order of their numbers (`numbers`); NaN where there is none. Collective."""
+    """A quantity of these objects, in the order of their numbers (`numbers`), of nodes on the side that the range
+    means; NaN where there is none. Collective."""
     if kind in SUPPORTS:
         return _of_supports(project, kind, name, where)
     if kind in FLOW:
@@ -33,7 +35,7 @@ def values(project: Project, kind: str, name: str, where: Range | None = None) -
 
 
 def total(project: Project, kind: str, name: str, where: Range | None = None) -> float:
-    """Exact sum of a quantity; of nodes over all corners there. Collective."""
+    """Exact sum of a quantity; of nodes over all corners there that the range means. Collective."""
     if kind in SUPPORTS:
         return math.fsum(_of_supports(project, kind, name, where).tolist())
     if kind in FLOW:

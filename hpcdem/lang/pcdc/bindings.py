@@ -100,6 +100,7 @@ _TERMS: dict[str, Callable[[Any], g.Term]] = {
     "geometry": g.OnLayer,
     "boundary": lambda v: g.OnBoundary(),
     "face-of": lambda v: g.OfElements(v["value"], v.get("set", g.DEFAULT)),
+    "element": lambda v: g.OfElement(v[0], v[-1]),
     "between": lambda v: g.Between(v["value"][0], v["value"][1], v.get("set", g.DEFAULT)),
     "crack": lambda v: g.OnCrack(),
     "present": lambda v: g.Present(),

@@ -289,10 +289,12 @@ FORCE = Model(
     any_of=True, dims=BOTH,
 )  # fmt: skip
 MOVE = Model(
-    "mech{anical}-m{ove}-b{oundary}-c{onstraint}", "7", "Freedom of nodes.",
+    "mech{anical}-m{ove}-b{oundary}-c{onstraint}", "7",
+    "Freedom of nodes. A constraint holds beside those that a node has already, and beside prescribed velocities: two "
+    "directions hold it, a direction and a velocity say how fast it goes along. What contradicts is refused.",
     (Option("t{ype}", (FREEDOM, OPTIONAL_VECTOR),
-            "0 free, 1 held, 2 moves along the vector only, 3 (in three dimensions) across it only (type 0 and 1 take "
-            "a vector and do not use it)", required=True),), dims=BOTH,
+            "0 free (takes constraints back), 1 held, 2 moves along the vector only, 3 (in three dimensions) across it "
+            "only (type 0 and 1 take a vector and do not use it)", required=True),), dims=BOTH,
 )  # fmt: skip
 STRESS = Model(
     "m{echanical}-s{tress}-b{oundary}-c{ondition}", "6",
@@ -492,8 +494,10 @@ RANGE_TERMS = (
            "elements: their centre is inside of it; in the mesh", only=("element", *_FACES)),
     Option("pres{ent}", (), "x, y and geometry (of elements) look at where things are at this moment"),
     Option("boundary", (), "lies on a surface of the model", only=("element-face", "node")),
-    Option("face-of", (STRING,), "faces, joints or nodes of the elements of the group; joints: both elements are in it",
-           more=(SET,), only=_FACES),
+    Option("face-of", (STRING,), "faces, joints or nodes of the elements of the group; joints: both elements are in "
+           "it; nodes: where elements may part, on their side", more=(SET,), only=_FACES),
+    Option("element", (ZERO_OR_MORE, LAST_ID), "faces or nodes of the element, or of those from first to last",
+           only=("element-face", "node")),
     Option("between", (STRING, STRING), "joints with an element of each of the two groups", more=(SET,),
            only=("face-joint",)),
     Option("crack", (), "joints on a crack of the mesh", only=("face-joint",)),

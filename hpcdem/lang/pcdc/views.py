@@ -111,12 +111,13 @@ class Model:
 
     def numbers(self, kind: str, **where: Any) -> np.ndarray:
         """Numbers of the elements, nodes, joints, faces, elements and nodes of bolts and liners, flow-nodes or
-        flow-channels that are there: of a group (group=, set=), of a layer (geometry=), or x=(from, to), y= in the
-        mesh; with present=True by where they are now."""
+        flow-channels that are there: of a group (group=, set=), of a layer (geometry=), or x=(from, to), y=, z= in the
+        mesh, with present=True by where they are now; of a group of elements (face_of=), of elements by number
+        (element=), or as RANGE has it between=, boundary=True, crack=True."""
         return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)))
 
     def values(self, kind: str, name: str, **where: Any) -> np.ndarray:
-        """A quantity by name, in the order of numbers."""
+        """A quantity by name, in the order of numbers; of nodes with face_of= or element= on their side."""
         return self._look(lambda: fdem.queries.values(self._project, _kind(kind), _name(name), _range(where)))
 
     def total(self, kind: str, name: str, **where: Any) -> float:
@@ -168,17 +169,28 @@ def _range(where: dict[str, Any]) -> g.Range | None:
     set_name = where.pop("set", None)
     if where.pop("present", False):
         terms.append(g.Present())
+    of_set = set_name or g.DEFAULT
     for word, value in where.items():
         if word == "group":
-            terms.append(g.InGroup(value, set_name or g.DEFAULT))
+            terms.append(g.InGroup(value, of_set))
+        elif word == "face_of":
+            terms.append(g.OfElements(value, of_set))
+        elif word == "between":
+            terms.append(g.Between(value[0], value[1], of_set))
         elif word == "geometry":
             terms.append(g.OnLayer(value))
-        elif word == "id":
-            terms.append(g.Ids(int(value), int(value)))
-        elif word in ("x", "y"):
-            terms.append(g.Span("xy".index(word), float(value[0]), float(value[1])))
+        elif word in ("id", "element"):
+            first, last = value if isinstance(value, (tuple, list)) else (value, value)
+            terms.append((g.Ids if word == "id" else g.OfElement)(int(first), int(last)))
+        elif word in ("x", "y", "z"):
+            terms.append(g.Span("xyz".index(word), float(value[0]), float(value[1])))
+        elif word in ("boundary", "crack"):
+            terms += [g.OnBoundary() if word == "boundary" else g.OnCrack()] * bool(value)
         else:
-            raise CommandError(f"'{word}' is none of group, set, geometry, id, x, y and present")
-    if set_name is not None and "group" not in where:
+            raise CommandError(
+                f"'{word}' is none of group, face_of, between, set, geometry, id, element, x, y, z, boundary, crack "
+                "and present"
+            )
+    if set_name is not None and not where.keys() & {"group", "face_of", "between"}:
         terms.append(g.InSet(set_name))
     return tuple(terms) or None

@@ -354,9 +354,8 @@ def _chosen_corners(sim: Blocks, nodes: Numbers) -> np.ndarray:
     """(n_own, 3 or 4) bool: corners of the owned elements at these nodes, as they are when the model is open."""
     sim.before_change()
     mesh = sim.the_mesh()
-    flags = np.zeros(len(mesh.points) + 1, bool)  # the last one is for the fourth corner of triangles
-    flags[sim.numbers_of_nodes(nodes)] = True
-    return flags[mesh.cells[sim.number, : 4 if sim.wide or sim.dim == 3 else 3]]
+    chosen = sim.corners_of_nodes(nodes, whole=True).reshape(mesh.cells.shape)
+    return chosen[sim.number, : 4 if sim.wide or sim.dim == 3 else 3]
 
 
 def repeat(sim: Blocks, rows: np.ndarray) -> None:

@@ -87,12 +87,14 @@ def check(sim: Blocks, time: float) -> None:
         raise CommandError("static runs need the length of a creep step: model creep on dt")
     if not time > 0.0:
         raise CommandError(f"time must be positive, got {time}")
-    for row in np.unique(sim.point_row[sim.node_exists()]).tolist():
-        one = sim.conditions[row]
+    cells = sim.the_mesh().cells.reshape(-1)
+    of = np.where(np.repeat(sim.alive, 4) & (cells >= 0), sim.corner_row, 0)
+    for row in np.unique(of).tolist():
+        one = sim.acting()[row]
         for axis in "xyz"[: sim.dim]:
             does, at = getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")
             if does != moving.FREE and at != 0.0 and one.constraint != moving.FIXED:
-                point = int(np.flatnonzero(sim.point_row == row)[0])
+                point = int(cells[of == row].min())
                 raise CommandError(f"node {point} has a prescribed motion in {axis}{PER_STEP}")
     for load in sim.surface_loads:
         if isinstance(load, Structure) and (node := load.driven()) is not None:

@@ -16,11 +16,12 @@ import numpy as np
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.core.memory import sparse_zeros
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import hexahedra, properties, user_functions
+from hpcdem.physics.fdem import hexahedra, node_conditions, properties, sides, user_functions
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.node_conditions import Contradiction, NodeCondition, Number
 from hpcdem.physics.fdem.properties import (
     COHESIVE,
     ELEMENT,
@@ -40,10 +41,6 @@ from hpcdem.physics.fdem.user_functions import FUNCTIONS
 
 Numbers = np.ndarray | Sequence[int] | None
 """Numbers of elements, nodes, faces or joints; None: all."""
-Number = float | str
-"""A value of a boundary condition: a number, the name of a table of values over model time, or of a function of place
-and time (user_functions.py)."""
-
 SAFETY = 0.8
 """Part of the stability limit that is used as time step."""
 OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
@@ -55,24 +52,6 @@ AGAIN, CRACK = 2, 3
 """In `broken`: a joint that broke before, or never was whole, and is a joint again for so long (pressed.py)."""
 RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
 """Parts of Rayleigh damping, and the factors of both that make its ratio what was said at its frequency."""
-
-
-@dataclass(frozen=True)
-class NodeCondition:
-    """What is prescribed at nodes. does_x, _y, _z: moving.FREE, VELOCITY, ACCELERATION; at_x, _y, _z: its value; force;
-    constraint (moving.UNBOUND, ..., in space space.ACROSS too) and its unit vector."""
-
-    does_x: int = moving.FREE
-    at_x: Number = 0.0
-    does_y: int = moving.FREE
-    at_y: Number = 0.0
-    force_x: Number = 0.0
-    force_y: Number = 0.0
-    constraint: int = moving.UNBOUND
-    way: tuple[float, ...] = (0.0, 0.0)
-    does_z: int = moving.FREE
-    at_z: Number = 0.0
-    force_z: Number = 0.0
 
 
 @dataclass(frozen=True)
@@ -186,9 +165,12 @@ class ModelDefinition:
         """Where their corners were then [m]."""
         self._reference: Reference | None = None
         self._closed: np.ndarray | None = None
-        self._make_arrays(0, 0)
+        self.sided = False
+        """Conditions were said of single sides of points: corners of one node may have different rows."""
+        self._acting: list[NodeCondition] | None = None
+        self._make_arrays(0)
 
-    def _make_arrays(self, elements: int, points: int) -> None:
+    def _make_arrays(self, elements: int) -> None:
         self.partner = np.full(4 * elements, -1, np.int64)
         self.alive = np.ones(elements, bool)
         """Elements that were not taken out."""
@@ -202,7 +184,8 @@ class ModelDefinition:
         self.slid: dict[int, tuple[float, ...]] = {}
         """By face what broken joints remember of their slip at three points [m], see pressed.py."""
         self.face_row = sparse_zeros(4 * elements, np.int32)
-        self.point_row = np.zeros(points, np.int32)
+        self.corner_row = sparse_zeros(4 * elements, np.int32)
+        """Of conditions of nodes; corners that are one node have what theirs come to (`rows_of_nodes`)."""
         self.load_row = sparse_zeros(4 * elements, np.int32)
         self.stress0: np.ndarray | None = None
         """(elements, 4), in space (elements, 6): `COMPONENTS` [Pa] at zero strain, as it was said, if there is any."""
@@ -217,6 +200,9 @@ class ModelDefinition:
     def changed(self, topology: bool = False, stiffness: bool = True) -> None:
         """Assignments have changed; topology: also who hangs together with whom; stiffness: perhaps the stable time
         step too."""
+
+    def note(self, text: str) -> None:
+        """A line for the log."""
 
     # ---- numbers -------------------------------------------------------------------------------------------------
 
@@ -251,8 +237,43 @@ class ModelDefinition:
         return at
 
     def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
-        """Checked node numbers (points of the mesh) with an element that is there; None: all of them."""
-        return self.existing(nodes, self.node_exists(), "node")
+        """Checked numbers of points of the mesh with an element that is there; None: all of them. Of sides (sides.py)
+        their points."""
+        asked = None if nodes is None else np.asarray(nodes)
+        if asked is not None and np.issubdtype(asked.dtype, np.integer):
+            asked = sides.points(self._mesh().cells, asked.reshape(-1))
+        return self.existing(asked, self.node_exists(), "node")
+
+    def corners_of_nodes(self, nodes: Any, whole: bool = False) -> np.ndarray:
+        """(4 ne,) bool: corners at these nodes (sides.py), those of elements that were taken out too; None: all. whole:
+        and those that are one node with them."""
+        mesh = self._mesh()
+        self.numbers_of_nodes(nodes)
+        if nodes is None:
+            return mesh.cells.reshape(-1) >= 0
+        given = np.asarray(nodes, np.int64).reshape(-1)
+        found = sides.corners(mesh.cells, given, len(mesh.points))
+        if whole and sides.are_there(given):
+            found = self.with_nodes(found, self.clusters()[0].reshape(-1))
+        return found
+
+    @staticmethod
+    def with_nodes(corners: np.ndarray, node: np.ndarray) -> np.ndarray:
+        """Corners (4 ne,) bool, and those that are one of the nodes (4 ne,) with them."""
+        of = np.zeros(int(node.max(initial=-1)) + 2, bool)  # the last one: of none
+        of[node[corners]] = True
+        of[-1] = False
+        return corners | of[node]
+
+    def clusters(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes of corners (ne, 4), as faces hang together now, -1 of elements that were taken out, and their lowest
+        corners."""
+        mesh = self._mesh()
+        apart = (self.joint_row > 0) | self.open
+        apart |= np.repeat(~self.alive, 4)
+        node, lead = mesh.corner_clusters(self.partner, apart)
+        node[~self.alive] = -1
+        return node, lead
 
     def node_exists(self) -> np.ndarray:
         """(np,) bool."""
@@ -314,7 +335,7 @@ class ModelDefinition:
         self.clear_definition()
         self.options, self.tables, self.fields = kept
         self.mesh = mesh
-        self._make_arrays(len(mesh.cells), len(mesh.points))
+        self._make_arrays(len(mesh.cells))
         self.partner = mesh.face_partners()
         if len(mesh.cracks):
             rows = meshes.crack_rows(mesh, mesh.edges())
@@ -666,7 +687,7 @@ class ModelDefinition:
         """Delete a table; CommandError while a condition uses it."""
         if name not in self.tables:
             raise CommandError(f"there is no table '{name}'")
-        used_conditions = {self.conditions[r] for r in np.unique(self.point_row)}
+        used_conditions = {self.conditions[r] for r in np.unique(self.corner_row)}
         used_loads = {self.loads[r] for r in np.unique(self.load_row)}
         for one in (*used_conditions, *used_loads):
             if name in asdict(one).values():
@@ -674,6 +695,7 @@ class ModelDefinition:
         # Rows that nothing follows any more are evaluated with the others.
         self.conditions = [NodeCondition() if name in asdict(one).values() else one for one in self.conditions]
         self.loads = [Traction() if name in asdict(one).values() else one for one in self.loads]
+        self._acting = None
         del self.tables[name]
 
     def random_field(self, name: str, field: RandomField) -> None:
@@ -711,7 +733,7 @@ class ModelDefinition:
     ) -> None:
         """Prescribe velocity [m/s] or acceleration [m/s2] of components; the others stay as they are (free or not).
 
-        Precedence at one node: move constraint, velocity, acceleration, force."""
+        Of one component the last one said counts; CommandError if it contradicts a move constraint of the node."""
         changes: dict[str, Any] = {}
         self._only_in_space("velocity or acceleration in z", vz, az)
         for axis, speed, push in (("x", vx, ax), ("y", vy, ay), ("z", vz, az)):
@@ -738,7 +760,8 @@ class ModelDefinition:
         self._condition(nodes, changes)
 
     def move_constraint(self, nodes: Numbers, kind: int, direction: tuple[float, ...] = (0.0, 0.0)) -> None:
-        """0: free, 1: fixed, 2: moves along `direction` only, 3 (in space): only across it."""
+        """1: fixed, 2: moves along `direction` only, 3 (in space): only across it; besides constraints that are there
+        already. 0: takes them back."""
         if kind == space.ACROSS and self.dim == 2:
             raise CommandError("a move constraint of type 3 (across a vector) is for three dimensions")
         if kind not in (moving.UNBOUND, moving.FIXED, moving.ALONG, space.ACROSS):
@@ -762,13 +785,163 @@ class ModelDefinition:
             raise CommandError(f"in two dimensions there is no {what}")
 
     def _condition(self, nodes: Any, changes: dict[str, Any]) -> None:
-        at = self.numbers_of_nodes(nodes)
+        chosen = self.corners_of_nodes(nodes)
+        mesh, at = self._mesh(), np.flatnonzero(chosen)
+        points = np.unique(mesh.cells.reshape(-1)[at])
         self._refuse_functions(changes)
         for name, value in changes.items():
-            user_functions.check(name, value, self._mesh().points[at], self.time_now())
+            user_functions.check(name, value, mesh.points[points], self.time_now())
+        some = nodes is not None and sides.are_there(np.asarray(nodes).reshape(-1))
+        node = self.clusters()[0].reshape(-1) if some or self.sided else None
+        if some and node is not None and _takes_back(changes):
+            at = np.flatnonzero(self.with_nodes(chosen, node))
+        rows, column, sided = self.conditions.copy(), self.corner_row[at], self.sided
+        others = np.flatnonzero(self.with_nodes(chosen, node) & ~chosen) if node is not None else at[:0]
+        others = others[self.corner_row[others] > 0]
+        before = self.corner_row[others]
         self.before_change()
-        self._change_rows(self.conditions, self.point_row, at, changes)
+        try:
+            self._say(at, changes, some)
+            self._make_older(others, changes)
+            self.sided |= some
+            self._acting = None
+            if node is not None:
+                self._together(np.unique(node[at]), node)
+        except CommandError:
+            self.conditions, self.sided, self._acting = rows, sided, None
+            self.corner_row[at], self.corner_row[others] = column, before
+            raise
         self.changed(stiffness=False)
+
+    def _say(self, at: np.ndarray, changes: dict[str, Any], some: bool) -> None:
+        """Corners (n,) get these conditions; some: sides of points."""
+        forces = [name[-1] for name in changes if name.startswith("force")]
+        clear = sum(
+            (1 << k) * (f"does_{axis}" in changes) | (8 << k) * (axis in forces) for k, axis in enumerate("xyz")
+        )
+        old, side = self.corner_row[at], np.zeros(len(at), np.int64)
+        if some and forces:
+            side = self._new_sides(at, forces)
+        more = np.zeros(len(at), bool)
+        for row, number in np.unique(np.column_stack([old, side]), axis=0).tolist():
+            one, mine = self.conditions[row], (old == row) & (side == number)
+            wanted = replace(one, **changes, older=one.older & ~clear, **{f"side_{axis}": number for axis in forces})
+            if changes.get("constraint"):
+                kind, way = node_conditions.bound(one.constraint, one.way, wanted.constraint, wanted.way, self.dim)
+                more |= mine & ((kind, way) != (wanted.constraint, wanted.way))
+                wanted = replace(wanted, constraint=kind, way=way)
+            self._checked(wanted, at[mine])
+            self.corner_row[at[mine]] = _row_of(self.conditions, wanted)
+        if more.any():
+            count = len(np.unique(self._mesh().cells.reshape(-1)[at[more]]))
+            self.note(
+                f"{count} of these nodes have a move constraint already, which holds besides the new one (type 0 takes "
+                "constraints back)"
+            )
+
+    def _new_sides(self, at: np.ndarray, forces: Sequence[str]) -> np.ndarray:
+        """(n,) numbers of the side that corners are for forces along axes, which they share: one that no other corner
+        at the point has."""
+        cells = self._mesh().cells.reshape(-1)
+        has = self.corner_row > 0
+        has[at] = False
+        others = np.flatnonzero(has)
+        said = np.array([max(getattr(one, f"side_{axis}") for axis in forces) for one in self.conditions])
+        most = np.zeros(len(self._mesh().points), np.int64)
+        np.maximum.at(most, cells[others], said[self.corner_row[others]])
+        return 1 + most[cells[at]]
+
+    def _make_older(self, others: np.ndarray, changes: dict[str, Any]) -> None:
+        """What was said before of other corners of these nodes gives way, as long as they are one node."""
+        for row in np.unique(self.corner_row[others]).tolist():
+            one, older = self.conditions[row], 0
+            for k, axis in enumerate("xyz"):
+                if changes.get(f"does_{axis}") and getattr(one, f"does_{axis}"):
+                    older |= 1 << k
+                if f"force_{axis}" in changes and getattr(one, f"force_{axis}") != 0.0:
+                    older |= 8 << k
+            if older & ~one.older:
+                new = _row_of(self.conditions, replace(one, older=one.older | older))
+                self.corner_row[others[self.corner_row[others] == row]] = new
+
+    def _checked(self, one: NodeCondition | Sequence[NodeCondition], at: np.ndarray) -> NodeCondition:
+        """What this condition, or those of one node, come to. CommandError, with the place of the first of these
+        corners, if no motion fulfils them."""
+        try:
+            one = one if isinstance(one, NodeCondition) else node_conditions.together(one, self.dim)
+            return node_conditions.acting(one, self.dim)
+        except Contradiction as error:
+            mesh = self._mesh()
+            point = int(mesh.cells.reshape(-1)[at[0]])
+            raise CommandError(
+                f"conditions contradict each other at node {point} at {place(mesh.points[point])}: {error}. One of "
+                "them is taken back first (node boundary remove, or type 0 of a move constraint), or the range leaves "
+                "the node out"
+            ) from None
+
+    def acting(self) -> list[NodeCondition]:
+        """What rows of conditions come to, by row (`rows_of_nodes`). Not to be changed."""
+        if self._acting is None:
+            self._acting = [node_conditions.acting(one, self.dim) for one in self.conditions]
+            self._of_sides: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        return self._acting
+
+    def rows_of_nodes(self, corners: np.ndarray, node: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of `acting` of the nodes of corners (n,), and what part of a force falls on each (n,), NaN where that is
+        the part of the corners at the point. node (ne, 4): of all corners. CommandError if conditions of corners that
+        are one node contradict each other."""
+        self.acting()
+        row, part = self.corner_row[corners].astype(np.int64), np.full(len(corners), np.nan)
+        if self.sided:
+            node = node.reshape(-1)
+            if self._of_sides is None:
+                held = np.flatnonzero((self.corner_row > 0) & (node >= 0))
+                self._of_sides = self._together(np.unique(node[held]), node)
+            numbers, rows, parts = self._of_sides
+            if len(numbers):
+                at = np.minimum(np.searchsorted(numbers, node[corners]), len(numbers) - 1)
+                found = numbers[at] == node[corners]
+                row[found], part[found] = rows[at[found]], parts[at[found]]
+        return row, part
+
+    def _together(self, nodes: np.ndarray, node: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of these nodes, rows of `acting` and parts, see `rows_of_nodes`; node (4 ne,): of all corners."""
+        acting, cells = self.acting(), self._mesh().cells.reshape(-1)
+        some = np.zeros(int(node.max(initial=-1)) + 2, bool)
+        some[nodes[nodes >= 0]] = True
+        at = np.flatnonzero(some[node])
+        at = at[np.argsort(node[at], kind="stable")]
+        nodes, begin = np.unique(node[at], return_index=True)
+        if not len(nodes):
+            return nodes, nodes, np.empty(0)
+        of = self.corner_row[at]
+        rows, part = np.minimum.reduceat(of, begin).astype(np.int64), np.full(len(nodes), np.nan)
+        of_side = np.array([bool(one.side_x or one.side_y or one.side_z) for one in self.conditions])
+        several = np.flatnonzero((rows != np.maximum.reduceat(of, begin)) | of_side[rows])
+        beside = np.zeros(len(self._mesh().points), bool)
+        beside[cells[at[begin[several]]]] = True
+        beside = np.flatnonzero((node >= 0) & beside[cells])
+        beside = beside[np.argsort(cells[beside], kind="stable")]
+        end = np.append(begin[1:], len(at))
+        for i in several.tolist():
+            mine = at[begin[i] : end[i]]
+            point = cells[mine[0]]
+            peers = beside[np.searchsorted(cells[beside], point) : np.searchsorted(cells[beside], point, "right")]
+            conditions = [self.conditions[row] for row in np.unique(self.corner_row[mine]).tolist()]
+            one = self._checked(conditions, mine)
+            parts: dict[str, Any] = {}
+            for axis in "xyz"[: self.dim]:
+                if getattr(one, f"force_{axis}") != 0.0:
+                    share = [self._shares(corners, axis, one) for corners in (mine, peers)]
+                    parts[f"part_{axis}"] = share[0] / share[1]
+            rows[i], part[i] = _row_of(acting, replace(one, older=0, **parts)), 1.0
+        return nodes, rows, part
+
+    def _shares(self, corners: np.ndarray, axis: str, one: NodeCondition) -> int:
+        """How many of these corners share the force that a node has along an axis."""
+        rows = [self.conditions[row] for row in self.corner_row[corners].tolist()]
+        wanted = getattr(one, f"force_{axis}"), getattr(one, f"side_{axis}")
+        return sum((getattr(of, f"force_{axis}"), getattr(of, f"side_{axis}")) == wanted for of in rows)
 
     def stress_condition(
         self,
@@ -823,17 +996,15 @@ class ModelDefinition:
     def _change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
         old = column[at]
         for row in np.unique(old).tolist():
-            wanted = replace(rows[row], **changes)
-            if wanted not in rows:
-                rows.append(wanted)
-            column[at[old == row]] = rows.index(wanted)
+            column[at[old == row]] = _row_of(rows, replace(rows[row], **changes))
 
     def remove_conditions(self, nodes: Numbers = None) -> None:
         """Take back velocities, accelerations, forces and constraints of nodes; None: of all, those too that have no
         element at this moment."""
-        at = np.arange(len(self._mesh().points)) if nodes is None else self.numbers_of_nodes(nodes)
+        at = self.corners_of_nodes(nodes, whole=True) if nodes is not None else slice(None)
         self.before_change()
-        self.point_row[at] = 0
+        self.corner_row[at] = 0
+        self._acting = None
         self.changed(stiffness=False)
 
     def remove_stress_conditions(self, faces: Numbers = None) -> None:
@@ -995,16 +1166,16 @@ class ModelDefinition:
     # ---- tables of the kernels -----------------------------------------------------------------------------------
 
     def conditions_at(self, time: float, middle: float, dt: float) -> np.ndarray:
-        """The table of node conditions (rows, 9), in space (rows, 13), at a moment: forces at `time`, velocities in the
-        middle of the step; accelerations as change of velocity over dt."""
+        """The table of what node conditions come to (rows, 9), in space (rows, 13), at a moment: forces at `time`,
+        velocities in the middle of the step; accelerations as change of velocity over dt."""
         plane = self.dim == 2
-        out = np.zeros((len(self.conditions), moving.CONDITION if plane else space.CONDITION))
+        out = np.zeros((len(self.acting()), moving.CONDITION if plane else space.CONDITION))
         does = (moving.DOES_X, moving.DOES_Y) if plane else range(space.DOES, space.DOES + 3)
         at = (moving.AT_X, moving.AT_Y) if plane else range(space.AT, space.AT + 3)
         force, constraint, way = (
             (moving.FORCE_X, moving.CONSTRAINT, moving.WAY_X) if plane else (space.FORCE, space.CONSTRAINT, space.WAY)
         )
-        for row, one in enumerate(self.conditions):
+        for row, one in enumerate(self.acting()):
             for k, axis in enumerate("xyz"[: self.dim]):
                 kind, value = getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")
                 out[row, does[k]] = kind
@@ -1012,14 +1183,14 @@ class ModelDefinition:
                     out[row, at[k]] = self._now(value, middle)
                 elif kind == moving.ACCELERATION:
                     out[row, at[k]] = self._now(value, time) * dt
-                out[row, force + k] = self._now(getattr(one, f"force_{axis}"), time)
+                out[row, force + k] = self._now(getattr(one, f"force_{axis}"), time) * getattr(one, f"part_{axis}")
             out[row, constraint] = one.constraint
             out[row, way : way + len(one.way)] = one.way
         return out
 
     def conditions_vary(self) -> bool:
         """Whether a node condition follows a table or a function."""
-        return any(isinstance(value, str) for one in self.conditions for value in asdict(one).values())
+        return any(isinstance(value, str) for one in self.acting() for value in asdict(one).values())
 
     def loads_at(self, time: float) -> np.ndarray:
         """The table of tractions at a moment, columns `TRACTIONS`."""
@@ -1056,6 +1227,7 @@ class ModelDefinition:
             "face_rows": self.face_rows.state(),
             "joint_rows": self.joint_rows.state(),
             "conditions": [asdict(one) for one in self.conditions],
+            "sided": self.sided,
             "loads": [asdict(one) for one in self.loads],
             "fading": [
                 {**asdict(one), "corner": one.corner.tolist(), "force": one.force.tolist()} for one in self.relaxations
@@ -1075,6 +1247,9 @@ class ModelDefinition:
         self.face_rows = Rows.restored(state["face_rows"])
         self.joint_rows = Rows.restored(state["joint_rows"])
         self.conditions = [NodeCondition(**{**one, "way": tuple(one["way"])}) for one in state["conditions"]]
+        if "sided" not in state:
+            self.conditions = [node_conditions.as_before(one, self.dim) for one in self.conditions]
+        self.sided, self._acting = state.get("sided", False), None
         self.loads = [Traction(**one) for one in state["loads"]]
         self.relaxations = [
             Relaxation(
@@ -1083,6 +1258,25 @@ class ModelDefinition:
             )
             for one in state["fading"]
         ]  # fmt: skip
+
+
+def _row_of(rows: list, wanted: Any) -> int:
+    """The row of this one, a new one if there is none."""
+    if wanted not in rows:
+        rows.append(wanted)
+    return rows.index(wanted)
+
+
+def _takes_back(changes: Mapping[str, Any]) -> bool:
+    """Nothing is prescribed any more by such a condition: that is so of the whole node."""
+    return changes.get("constraint") == moving.UNBOUND or any(
+        name.startswith("force") and value == 0.0 for name, value in changes.items()
+    )
+
+
+def place(at: np.ndarray) -> str:
+    """As messages say it."""
+    return f"({', '.join(f'{c:g}' for c in at)})"
 
 
 def _is_number(value: Value) -> bool:

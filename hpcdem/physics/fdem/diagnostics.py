@@ -11,7 +11,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import PER_METRE
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import by_temperature, connectivity, user_laws
+from hpcdem.physics.fdem import by_temperature, connectivity, sides, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
 from hpcdem.physics.fdem.kernels import plasticity, tets
@@ -109,8 +109,8 @@ QUANTITIES: dict[str, Quantity] = {
         "joint", "J/m", "kinetic energy of its two elements when it broke; NaN if it is not", dims=BOTH
     ),
     "damage": Quantity("joint", "1", "largest damage of its points, 0 to 1", dims=BOTH),
-    "opening": Quantity("joint", "m", "mean opening", dims=BOTH),
-    "slip": Quantity("joint", "m", "mean slip, in space its size", dims=BOTH),
+    "opening": Quantity("joint", "m", "mean opening, of broken joints and cracks too", dims=BOTH),
+    "slip": Quantity("joint", "m", "mean slip, in space its size, of broken joints and cracks too", dims=BOTH),
     "normal_stress": Quantity("joint", "Pa", "mean normal stress, tension positive", dims=BOTH),
     "shear_stress": Quantity("joint", "Pa", "mean shear stress, in space its size", dims=BOTH),
     "normal_stress_largest": Quantity(
@@ -177,7 +177,8 @@ def probe(sim: Blocks, name: str, numbers: Numbers = None) -> Probe:
 def values(sim: Blocks, name: str, numbers: Numbers = None) -> np.ndarray:
     """A quantity of `QUANTITIES` for these elements, nodes or joints (None: all, in ascending order), on all ranks.
 
-    A node shows what the lowest of its corners has; forces are those of all its corners. NaN for what is not there
+    A point shows what the lowest of its corners has, a side what its corner has (of several at a point the lowest);
+    forces are those of all its corners. One value for each point. NaN for what is not there
     (null elements, edges without joint). Collective."""
     return probe(sim, name, numbers).values()
 
@@ -200,11 +201,14 @@ def quantity(sim: Blocks, name: str) -> Quantity:
 
 
 def numbers_on(sim: Blocks, on: str, numbers: Numbers) -> np.ndarray:
-    """Checked numbers of elements, nodes or joints; None: all. Not collective."""
+    """Checked numbers of elements, nodes (or their sides, sides.py) or joints; None: all. Not collective."""
     sizes = {"element": len(sim.alive), "node": len(sim.the_mesh().points), "joint": len(sim.partner)}
     if numbers is not None:
         asked = np.asarray(numbers, np.int64).reshape(-1)
         there = sizes[on]
+        if on == "node" and sides.are_there(asked):
+            sim.numbers_of_nodes(asked[asked >= sides.SIDE])
+            there = sides.SIDE + sizes["joint"]
         bad = asked[(asked < 0) | (asked >= there)]
         if len(bad):
             raise CommandError(f"there is no {on} {bad[0]}")
@@ -240,15 +244,34 @@ def rows_of(sim: Blocks, on: str, numbers: np.ndarray) -> tuple[np.ndarray, np.n
     """Which of these numbers (n,) this rank has, and how `columns_of` calls them. Not collective."""
     own = sim.owned
     if on == "node":
-        lead = sim.local.leads[numbers]
+        lead = leads_of(sim, numbers)
         row = np.where(lead >= 0, sim.where[lead // 4], -1)
     elif on == "joint":
         row = sim.where[numbers // 4]
-        row = np.where(sim.joint_exists()[numbers] & (sim.joint_row[numbers] > 0), row, -1)
+        row = np.where(sim.joint_exists()[numbers] & ((sim.joint_row[numbers] > 0) | sim.open[numbers]), row, -1)
     else:
         row = sim.where[numbers]
     mine = np.flatnonzero((row >= own.start) & (row < own.stop))
     return mine, row[mine] - own.start if on == "element" else numbers[mine]
+
+
+def leads_of(sim: Blocks, numbers: np.ndarray) -> np.ndarray:
+    """The lowest corner of elements that are there (n,) at each of these points, -1: none; of a side its corner. Not
+    collective."""
+    side = numbers >= sides.SIDE
+    return np.where(side, numbers - sides.SIDE, sim.local.leads[np.where(side, 0, numbers)])
+
+
+def one_each(sim: Blocks, numbers: np.ndarray) -> np.ndarray:
+    """One number for each point of these nodes, ascending by point: of several sides the lowest that is there. Not
+    collective."""
+    if not sides.are_there(numbers):
+        return numbers
+    cells = sim.the_mesh().cells.reshape(-1)
+    numbers = np.sort(sides.present(cells, numbers, sim.alive))
+    side = numbers >= sides.SIDE
+    point = np.where(side, cells[np.where(side, numbers - sides.SIDE, 0)], numbers)
+    return numbers[np.unique(point, return_index=True)[1]]
 
 
 def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
@@ -329,9 +352,11 @@ def _creep_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarra
 
 
 def _node_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
-    own, lead = sim.owned, sim.local.leads
-    points = rows_of(sim, "node", np.arange(len(lead)))[1] if at is None else at
-    row, k = sim.where[lead[points] // 4], lead[points] % 4
+    own = sim.owned
+    points = rows_of(sim, "node", np.arange(len(sim.local.leads)))[1] if at is None else at
+    lead = leads_of(sim, points)
+    row, k = sim.where[lead // 4], lead % 4
+    points = sim.the_mesh().cells.reshape(-1)[lead]
     columns: dict[str, np.ndarray] = {"number": points}
     home = sim.cold.get("home")
     stride = sim.local.stride
@@ -413,6 +438,9 @@ def _joint_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = No
     if set(_MEANS) & wanted:
         seen = np.full((len(lower), len(_MEANS)), np.nan)
         seen[held] = local.joint_means(slot[held])
+        free = np.flatnonzero(sim.open[lower] & (now == NONE))
+        if {"opening", "slip"} & wanted:
+            seen[free, :2] = _gaps(sim, lower[free])
         columns |= {name: seen[:, k].copy() for k, name in enumerate(_MEANS)}
     if {*_AT_POINTS, "normal_stress_largest", "shear_stress_largest"} & wanted:
         seen = np.full((len(lower), len(_AT_POINTS)), np.nan)
@@ -430,7 +458,51 @@ def _joint_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = No
         row = sim.where[corners // 4]
         for name, c in places.items():
             columns[name] = sim.x[row, sim.stride * (corners % 4) + c].mean(axis=1)
+    bare = sim.joint_row[lower] == 0
+    for name in columns.keys() - {"number", "opening", "slip", *places} if bare.any() else ():
+        columns[name] = np.where(bare, np.nan, columns[name])
     return columns
+
+
+def _gaps(sim: Blocks, lower: np.ndarray) -> np.ndarray:
+    """Mean opening and slip (n, 2) [m] of edges of which the faces do not hang together, as joints have them
+    (`joints.openings`, in space `joints_space.faces_now`): between the corners of one point. Collective."""
+    mesh, flat = sim.the_mesh(), sim.the_mesh().cells.reshape(-1)
+    mine, over = mesh.face_corners(lower), mesh.face_corners(sim.partner[lower])
+    opposite = np.argmax(flat[mine][:, :, None] == flat[over][:, None, :], axis=2)
+    here = _places_of(sim, mine)
+    there = _places_of(sim, np.take_along_axis(over, opposite, axis=1))
+    u, middle = (there - here).mean(axis=1), 0.5 * (here + there)
+    t = middle[:, 1] - middle[:, 0]
+    if sim.dim == 2:
+        h = np.hypot(*t.T)
+        return (
+            np.column_stack([u[:, 0] * t[:, 1] - u[:, 1] * t[:, 0], u[:, 0] * t[:, 0] + u[:, 1] * t[:, 1]]) / h[:, None]
+        )
+    n = np.cross(t, middle[:, 2] - middle[:, 0])
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    opening = (u * n).sum(axis=1)
+    return np.column_stack([opening, np.linalg.norm(u - opening[:, None] * n, axis=1)])
+
+
+def _places_of(sim: Blocks, corners: np.ndarray) -> np.ndarray:
+    """Where these corners (element * 4 + k) of elements that are there are now, one more axis: dim [m]; of other ranks
+    too. Collective."""
+    row, dim = sim.where[corners // 4], sim.dim
+    at = sim.stride * (corners % 4)[..., None] + np.arange(dim)
+    found = sim.x[row[..., None], at]
+    lost = np.unique(corners[row < 0])
+    if sim.comm.any(bool(len(lost))):
+        asked = np.unique(np.concatenate(sim.comm.allgather(lost)))
+        row = sim.where[asked // 4]
+        mine = (row >= sim.owned.start) & (row < sim.owned.stop)
+        known = sim.x[row[mine][:, None], sim.stride * (asked[mine] % 4)[:, None] + np.arange(dim)]
+        places = np.empty((len(asked), dim))
+        for number, values in sim.comm.allgather((asked[mine], known)):
+            places[np.searchsorted(asked, number)] = values
+        away = sim.where[corners // 4] < 0
+        found[away] = places[np.searchsorted(asked, corners[away])]
+    return found
 
 
 def _last_events(sim: Blocks, lower: np.ndarray, broken: np.ndarray) -> dict[str, np.ndarray]:
@@ -642,8 +714,9 @@ class _ColumnProbe(Probe):
         self._rows = np.empty(0, np.int64)
 
     def _find(self) -> None:
-        self._at, self._rows = rows_of(self.sim, self.on, self.numbers)
-        self._n = len(self.numbers)
+        numbers = one_each(self.sim, self.numbers) if self.on == "node" else self.numbers
+        self._at, self._rows = rows_of(self.sim, self.on, numbers)
+        self._n = len(numbers)
 
     def _mine(self, seen: Evaluation | Local | None) -> np.ndarray:
         return columns_of(self.sim, self.on, [self.name], self._rows)[self.name]

@@ -261,21 +261,23 @@ def forces_of_heat(sim: Blocks) -> float:
 
 def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
     """CommandError for conditions that have no equilibrium."""
-    for row in np.unique(sim.point_row).tolist():
+    for row in np.unique(sim.corner_row).tolist():
         for function in user_functions.used(sim.conditions[row]).values():
             raise CommandError(
                 f"a condition of nodes follows the function {function.title}: the static solve takes numbers and tables"
             )
+    there = nodes.lead >= 0
+    of_nodes = np.zeros(len(nodes.lead), np.int64)
+    of_nodes[there] = sim.rows_of_nodes(nodes.lead[there], sim.node)[0]
     table = sim.conditions_at(sim.clock.time, sim.clock.time, 1.0)
     dim = sim.dim
     free, way, step = (np.empty((len(table), *shape)) for shape in ((dim,), (dim, dim), (dim,)))
     for row, one in enumerate(table):
-        points = np.flatnonzero(sim.point_row == row)
+        points = nodes.point[there & (of_nodes == row)]
         free[row], way[row], step[row] = 1.0, np.eye(dim), 0.0
         if row and len(points):
-            free[row], way[row], step[row] = _freedom(sim, one, int(points[0]))
-    row = sim.point_row[nodes.point]
-    free, way, step = free[row], way[row], step[row]
+            free[row], way[row], step[row] = _freedom(sim, one, int(points.min()))
+    free, way, step = free[of_nodes], way[of_nodes], step[of_nodes]
     free[nodes.lead < 0] = step[nodes.lead < 0] = 0.0
     number = np.full(free.shape, -1, np.int64)
     number[free > 0.0] = np.arange(int((free > 0.0).sum()))

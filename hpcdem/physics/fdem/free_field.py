@@ -229,11 +229,22 @@ class FreeField(SurfaceLoad):
         points = self.nodes["point"][:, 0]
         base = np.setdiff1d(self.faces["low"], self.faces["low"] + 1)
         above = np.setdiff1d(np.arange(len(points)), base)
+        rows = self._rows()
         for point in points[above].tolist():
-            one = blocks.conditions[blocks.point_row[point]]
+            one = blocks.acting()[rows[point]]
             if one.does_x != moving.FREE or one.constraint == moving.FIXED:
                 return f"node {point} of a free-field side is held in x: node boundary remove comes first"
         return self._drive(base, points[base])
+
+    def _rows(self) -> np.ndarray:
+        """(np,) rows of conditions of the nodes of the sides, by points."""
+        cells = self.blocks.the_mesh().cells.reshape(-1)
+        element = self.faces["face"][:, 0] // 4
+        corner = (4 * element[:, None] + np.arange(4)).reshape(-1)
+        corner = corner[cells[corner] >= 0]
+        out = np.zeros(len(self.blocks.the_mesh().points), np.int64)
+        out[cells[corner]] = self.blocks.rows_of_nodes(corner, self.blocks.node)[0]
+        return out
 
     def _drive(self, base: np.ndarray, points: np.ndarray) -> str | None:
         """What the lowest nodes follow: per component a condition of the node of the model there, else the quiet face
@@ -244,8 +255,9 @@ class FreeField(SurfaceLoad):
         quiet = np.flatnonzero(blocks.quiet_faces() & ~np.isin(np.arange(len(blocks.load_row)), self.faces["face"]))
         ends = connectivity.face_points(mesh.cells, quiet)
         below = np.zeros(k, np.int64)
+        rows = self._rows()
         for i, point in enumerate(points.tolist()):
-            one = blocks.conditions[blocks.point_row[point]]
+            one = blocks.acting()[rows[point]]
             held = one.constraint == moving.FIXED
             self._given[i] = held or one.does_x != moving.FREE, held or one.does_y != moving.FREE
             if one.constraint == moving.ALONG:
@@ -260,9 +272,9 @@ class FreeField(SurfaceLoad):
                     f"the column of the free-field side above node {point} has no base in {axis}: that node needs a "
                     "velocity there, or a quiet face"
                 )
-        rows = np.where(below >= 0, blocks.load_row[below], 0).astype(np.int64)
-        self._loads = Placed(blocks.loads, rows, mesh.points[points])
-        self._conditions = Placed(blocks.conditions, blocks.point_row[points].astype(np.int64), mesh.points[points])
+        loads = np.where(below >= 0, blocks.load_row[below], 0).astype(np.int64)
+        self._loads = Placed(blocks.loads, loads, mesh.points[points])
+        self._conditions = Placed(blocks.acting(), rows[points], mesh.points[points])
         self._first_face = np.searchsorted(self.faces["low"][:, 0], base)
         return None
 

@@ -2,6 +2,7 @@
 
 A group belongs to a set; an object is in one group of each set at most. Objects are numbered for the whole model
 (`connectivity`): a group is an ascending array of numbers, and knows neither ranks nor how many objects there are.
+Nodes may be sides of points (sides.py).
 """
 
 from __future__ import annotations
@@ -139,10 +140,18 @@ class OnBoundary:
 
 @dataclass(frozen=True)
 class OfElements:
-    """Faces, joints and nodes of the elements of a group; joints: both elements are in it."""
+    """Faces, joints and nodes of the elements of a group; joints: both elements are in it; nodes: on their side."""
 
     group: str
     set_name: str = DEFAULT
+
+
+@dataclass(frozen=True)
+class OfElement:
+    """Faces and nodes of the elements from first to last; nodes: on their side."""
+
+    first: int
+    last: int
 
 
 @dataclass(frozen=True)
@@ -164,6 +173,6 @@ class Present:
     """Other terms of the range look at where things are now, not at where they are in the mesh."""
 
 
-Term = InGroup | InSet | Ids | Span | OnLayer | OnBoundary | OfElements | Between | OnCrack | Present
+Term = InGroup | InSet | Ids | Span | OnLayer | OnBoundary | OfElements | OfElement | Between | OnCrack | Present
 Range = tuple[Term, ...]
 """All terms must hold."""

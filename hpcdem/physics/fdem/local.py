@@ -606,7 +606,7 @@ class Local:
         number = sim.number[own]
         cells, node = mesh.cells[number], sim.node[number]
         real = node >= 0
-        self.special[real] |= sim.shared_nodes[node[real]] | (sim.point_row[cells[real]] > 0)
+        self.special[real] |= sim.shared_nodes[node[real]] | (sim.corner_row.reshape(-1, 4)[number][real] > 0)
         if self.dim == 2:  # quads
             self.special[cells[:, 3] >= 0] = True
         self.special &= real
@@ -627,9 +627,10 @@ class Local:
         rows = self.node_corner // self.force_width
         self.shared = sim.comm.any(bool(((rows < own.start) | (rows >= own.stop)).any()))
         lead = mesh.cells[self.node_lead // 4, self.node_lead % 4]
-        self.node_functions = Placed(sim.conditions, sim.point_row[lead].astype(np.int64), mesh.points[lead])
+        row, part = sim.rows_of_nodes(self.node_lead, sim.node)
+        self.node_functions = Placed(sim.acting(), row, mesh.points[lead])
         self.node_condition = self.node_functions.of
-        self.node_share = self._one / np.maximum(sim.point_corners[lead], 1)
+        self.node_share = np.where(np.isnan(part), self._one / np.maximum(sim.point_corners[lead], 1), part)
         self.outside, self.felt = np.zeros((n, self.dim)), np.zeros((n, 2 * self.dim))
         total = len(sim.number)
         self.force = np.zeros((total if self.some_special or self.shared else 1, self.force_width))
@@ -1101,7 +1102,11 @@ class Local:
 
         def how(one: NodeCondition, field: str) -> tuple[int, float, float]:
             if field in ("force_x", "force_y"):
-                return (moving.FORCE_X if field == "force_x" else moving.FORCE_Y), time, 1.0
+                return (
+                    (moving.FORCE_X if field == "force_x" else moving.FORCE_Y),
+                    time,
+                    getattr(one, f"part_{field[-1]}"),
+                )
             column, does = (moving.AT_X, one.does_x) if field == "at_x" else (moving.AT_Y, one.does_y)
             return (column, middle, 1.0) if does == moving.VELOCITY else (column, time, dt)
 

@@ -385,7 +385,7 @@ class LocalSpace(LawsSpace):
             kind, _, axis = field.partition("_")
             k = "xyz".index(axis)
             if kind == "force":
-                return space.FORCE + k, time, 1.0
+                return space.FORCE + k, time, getattr(one, f"part_{axis}")
             velocity = getattr(one, f"does_{axis}") == moving.VELOCITY
             return (space.AT + k, middle, 1.0) if velocity else (space.AT + k, time, dt)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from hpcdem.halo.comm import SerialComm
 from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem import sides
 from hpcdem.physics.fdem.simulation import Blocks
 
 if TYPE_CHECKING:
@@ -105,16 +106,22 @@ class ForceProbe(Probe):
         """The nodes that have these points, each with the owner of its lowest corner, in the order of corners."""
         sim, local = self.sim, self.sim.local
         cells = sim.the_mesh().cells
+        points = sides.points(cells, self.numbers)
         place = np.full(len(sim.the_mesh().points), -1, np.int64)
-        place[self.numbers] = np.arange(len(self.numbers))
+        place[points] = np.arange(len(points))
         lead = local.first_corners()
         point = cells[lead // 4, lead % 4]
-        self._nodes = np.flatnonzero(local.my_nodes & (place[point] >= 0))
+        wanted = (place >= 0)[cells]
+        if sides.are_there(self.numbers):
+            some = sides.present(cells, self.numbers, sim.alive)
+            chosen = sides.corners(cells, some, len(place)) & np.repeat(sim.alive, 4)
+            wanted = sim.with_nodes(chosen, sim.node.reshape(-1)).reshape(cells.shape)
+        self._nodes = np.flatnonzero(local.my_nodes & wanted.reshape(-1)[lead])
         corner, point = lead[self._nodes], point[self._nodes]
         if self.name.startswith("unbalanced"):
             number = sim.number[sim.owned]
             i, k = np.nonzero(local.alone())
-            some = place[cells[number[i], k]] >= 0
+            some = wanted[number[i], k]
             self._corners = i[some], k[some]
             corner = np.concatenate([corner, 4 * number[i[some]] + k[some]])
             point = np.concatenate([point, cells[number[i[some]], k[some]]])
@@ -123,7 +130,7 @@ class ForceProbe(Probe):
         order = np.argsort(every)
         self._place = np.concatenate([part[1] for part in parts])[order]
         self._at, self._n = np.searchsorted(every[order], corner), len(every)
-        self._nothing = np.where(sim.node_exists()[self.numbers], 0.0, np.nan)
+        self._nothing = np.where(sim.node_exists()[points], 0.0, np.nan)
 
     def _mine(self, seen: Evaluation | Local | None) -> np.ndarray:
         sim = self.sim

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 KIND = checkpoint.BLOCKS
 ARRAYS = {
     "elements": ("alive", "element_row"),
-    "faces": ("partner", "joint_row", "open", "broken", "face_row", "load_row"),
-    "points": ("point_row",),
+    "faces": ("partner", "joint_row", "open", "broken", "face_row", "load_row", "corner_row"),
 }
 """Assignments, known to all ranks; rank 0 writes them."""
 
@@ -185,6 +184,9 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
         sim.place_mesh(mesh)
         for kind, names in ARRAYS.items():
             for name in names:
+                if name == "corner_row" and "points" in tables:  # of versions that had conditions by points
+                    sim.corner_row[:] = np.append(tables["points"]["point_row"], 0)[mesh.cells.reshape(-1)]
+                    continue
                 array = getattr(sim, name)
                 array[:] = tables[kind][name].astype(array.dtype)
         if "stress0" in tables:

@@ -131,6 +131,10 @@ class Blocks(State):
         self.cold = {}
         self.histories = Histories.empty(len(self.number))
 
+    def note(self, text: str) -> None:
+        if self.log is not None:
+            self.log.info(text)
+
     def before_change(self) -> None:
         if self.budget is not None and self.closed:
             if self.comm.any(bool(self.local.tally[:, elements.NEW_BROKEN].any())):
@@ -412,7 +416,7 @@ class Blocks(State):
 
     def _of_users(self) -> list[str]:
         """Laws and functions of the user that act. Not collective."""
-        rows = [self.conditions[k] for k in np.unique(self.point_row)] + [
+        rows = [self.conditions[k] for k in np.unique(self.corner_row)] + [
             self.loads[k] for k in np.unique(self.load_row)
         ]
         functions = [one.title for row in rows for one in user_functions.used(row).values()]
@@ -649,11 +653,8 @@ class Blocks(State):
     def renew_topology(self) -> None:
         """Which corners are one node."""
         mesh = self.the_mesh()
-        apart = (self.joint_row > 0) | self.open
-        dead = np.repeat(~self.alive, 4)
-        apart |= dead
-        node, lead = mesh.corner_clusters(self.partner, apart)
-        node[~self.alive] = -1
+        node, lead = self.clusters()
+        self._acting = None
         self.node = node.astype(np.int32, copy=False)
         sizes = np.bincount(node[node >= 0], minlength=len(lead))
         self.shared_nodes = sizes > 1

@@ -1,0 +1,243 @@
+"""What is prescribed at nodes, and what several such things come to at one node.
+
+A move constraint leaves a subspace of motions: all, a plane (across a vector), a line (along one), none. Constraints of
+one node meet in their common part; components of motion that are prescribed besides must lie in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hpcdem.physics.fdem.kernels import nodes as moving
+from hpcdem.physics.fdem.kernels import space
+from hpcdem.physics.user_files import MARK
+
+Number = float | str
+"""A value of a condition: a number, the name of a table of values over model time, or of a function of place and time
+(user_functions.py)."""
+STRAIGHT = 1e-9
+"""Sine of the angle below which directions are the same."""
+
+
+class Contradiction(Exception):
+    """Conditions that no motion fulfils: the two that contradict, in words."""
+
+
+@dataclass(frozen=True)
+class NodeCondition:
+    """What is prescribed at nodes. does_x, _y, _z: moving.FREE, VELOCITY, ACCELERATION; at_x, _y, _z: its value; force;
+    constraint (moving.UNBOUND, ..., in space space.ACROSS too) and its unit vector. older: bits of the components of
+    motion (1, 2, 4) and force (8, 16, 32) that were said anew of other corners of the node: they count once these are
+    nodes of their own. side_x, _y, _z: of the force, 0: shared by all corners at the point, else by those there with
+    the same number. part_x, _y, _z: factors of the force."""
+
+    does_x: int = moving.FREE
+    at_x: Number = 0.0
+    does_y: int = moving.FREE
+    at_y: Number = 0.0
+    force_x: Number = 0.0
+    force_y: Number = 0.0
+    constraint: int = moving.UNBOUND
+    way: tuple[float, ...] = (0.0, 0.0)
+    does_z: int = moving.FREE
+    at_z: Number = 0.0
+    force_z: Number = 0.0
+    older: int = 0
+    side_x: int = 0
+    side_y: int = 0
+    side_z: int = 0
+    part_x: float = 1.0
+    part_y: float = 1.0
+    part_z: float = 1.0
+
+    def motion(self, axis: str) -> str:
+        """Of a component that is prescribed, in words."""
+        kind = "velocity" if getattr(self, f"does_{axis}") == moving.VELOCITY else "acceleration"
+        return f"{kind}-{axis} {_told(getattr(self, f'at_{axis}'))}"
+
+    def push(self, axis: str) -> str:
+        """Of a force, in words."""
+        return f"force-{axis} {_told(getattr(self, f'force_{axis}'))}"
+
+
+_CONSTRAINTS = {
+    moving.FIXED: "held (type 1)",
+    moving.ALONG: "bound to the direction {} (type 2)",
+    space.ACROSS: "bound to the plane across {} (type 3)",
+}
+
+
+def _told(value: Number) -> str:
+    return f"'{value.partition(MARK)[0]}'" if isinstance(value, str) else format(value, "g")
+
+
+def _vector(way: Sequence[float]) -> str:
+    return f"({', '.join(f'{c:g}' for c in way)})"
+
+
+def bound(
+    kind: int, way: tuple[float, ...], other: int, other_way: tuple[float, ...], dim: int
+) -> tuple[int, tuple[float, ...]]:
+    """The constraint of a node that has both of these."""
+    if other == moving.UNBOUND or kind == moving.FIXED:
+        return kind, way
+    if kind == moving.UNBOUND or other == moving.FIXED:
+        return other, other_way
+    one, two = np.array(way), np.array(other_way)
+    across, same = _cross(one, two), abs(float(one @ two))
+    if kind == other:
+        if math.sqrt(float(across @ across)) <= STRAIGHT:
+            return kind, way
+        return (moving.FIXED, (0.0, 0.0)) if kind == moving.ALONG else (moving.ALONG, _unit(across))
+    line = way if kind == moving.ALONG else other_way
+    return (moving.ALONG, line) if same <= STRAIGHT else (moving.FIXED, (0.0, 0.0))
+
+
+def _cross(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    if len(one) == 2:
+        return np.array([one[0] * two[1] - one[1] * two[0]])
+    return np.array([one[k - 2] * two[k - 1] - one[k - 1] * two[k - 2] for k in range(3)])
+
+
+def _unit(vector: np.ndarray) -> tuple[float, ...]:
+    vector = np.where(np.abs(vector) <= STRAIGHT * np.abs(vector).max(), 0.0, vector)
+    return tuple((vector / math.sqrt(float(vector @ vector))).tolist())
+
+
+def acting(one: NodeCondition, dim: int) -> NodeCondition:
+    """What a node with this condition does: components that are prescribed, or a constraint, or both where they do not
+    touch each other. Contradiction if no motion fulfils it."""
+    axes = "xyz"[:dim]
+    given = [axis for axis in axes if getattr(one, f"does_{axis}") != moving.FREE]
+    if one.constraint == moving.UNBOUND or not given:
+        return one
+    if one.constraint == moving.FIXED:
+        for axis in given:
+            if getattr(one, f"at_{axis}") != 0.0:
+                raise Contradiction(f"{_constraint(one)} and {one.motion(axis)}")
+        return _moved(one, {}, keep=True)
+    return _on_a_line(one, given) if one.constraint == moving.ALONG else _in_a_plane(one, given)
+
+
+def _constraint(one: NodeCondition) -> str:
+    return _CONSTRAINTS[one.constraint].format(_vector(one.way))
+
+
+def _moved(one: NodeCondition, values: dict[str, tuple[int, Number]], keep: bool = False) -> NodeCondition:
+    """With these components (kind, value) prescribed and no others; keep: the constraint too."""
+    changes: dict[str, object] = {}
+    for axis in "xyz":
+        changes[f"does_{axis}"], changes[f"at_{axis}"] = values.get(axis, (moving.FREE, 0.0))
+    if not keep:
+        changes |= {"constraint": moving.UNBOUND, "way": (0.0, 0.0)}
+    return replace(one, **changes)  # type: ignore[arg-type]
+
+
+def _on_a_line(one: NodeCondition, given: list[str]) -> NodeCondition:
+    way = dict(zip("xyz", one.way))
+    said = {axis: (getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")) for axis in given}
+    for axis, (_, value) in said.items():
+        if way[axis] == 0.0 and value != 0.0:
+            raise Contradiction(f"{_constraint(one)} and {one.motion(axis)}")
+    leading = [axis for axis in given if way[axis] != 0.0]
+    if not leading:
+        return _moved(one, {}, keep=True)
+    kinds = {said[axis][0] for axis in leading}
+    alone = [axis for axis in way if way[axis] != 0.0]
+    if len(alone) == 1:  # along an axis
+        return _moved(one, {axis: said.get(axis, (said[leading[0]][0], 0.0)) for axis in way})
+    if len(kinds) > 1 or any(isinstance(said[axis][1], str) for axis in leading):
+        if all(value == 0.0 for _, value in said.values()):
+            return _moved(one, {axis: (moving.VELOCITY, 0.0) for axis in way})
+        raise Contradiction(
+            f"{_constraint(one)} and {' and '.join(map(one.motion, leading))}: along an oblique line numbers of one "
+            "kind are prescribed"
+        )
+    first = max(leading, key=lambda axis: abs(way[axis]))
+    speed = float(said[first][1]) / way[first]  # type: ignore[arg-type]
+    for axis in leading:
+        if abs(float(said[axis][1]) - speed * way[axis]) > STRAIGHT * abs(speed):  # type: ignore[arg-type]
+            raise Contradiction(f"{_constraint(one)} and {' and '.join(map(one.motion, given))}")
+    kind = said[first][0]
+    return _moved(one, {axis: (kind, said[axis][1] if axis in said else speed * way[axis]) for axis in way})
+
+
+def _in_a_plane(one: NodeCondition, given: list[str]) -> NodeCondition:
+    normal = dict(zip("xyz", one.way))
+    said = {axis: (getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")) for axis in given}
+    touched = [axis for axis in normal if normal[axis] != 0.0]
+    if len(touched) == 1:  # across an axis
+        (axis,) = touched
+        if said.get(axis, (moving.FREE, 0.0))[1] != 0.0:
+            raise Contradiction(f"{_constraint(one)} and {one.motion(axis)}")
+        return _moved(one, {**said, axis: (moving.VELOCITY, 0.0)})
+    known = [axis for axis in given if normal[axis] != 0.0]
+    if not known:
+        return one
+    still = all(said[axis][1] == 0.0 for axis in known)
+    kinds = {said[axis][0] for axis in known}
+    if not still and (len(kinds) > 1 or any(isinstance(said[axis][1], str) for axis in known)):
+        raise Contradiction(
+            f"{_constraint(one)} and {' and '.join(map(one.motion, known))}: across an oblique vector numbers of one "
+            "kind are prescribed"
+        )
+    kind = said[known[0]][0]
+    out = 0.0 if still else sum(normal[axis] * float(said[axis][1]) for axis in known)  # type: ignore[arg-type]
+    left = [axis for axis in touched if axis not in said]
+    if not left:
+        size = max(abs(normal[axis] * float(said[axis][1])) for axis in known) if not still else 0.0  # type: ignore[arg-type]
+        if abs(out) > STRAIGHT * size:
+            raise Contradiction(f"{_constraint(one)} and {' and '.join(map(one.motion, known))}")
+        return _moved(one, said)
+    if len(left) == 1:
+        return _moved(one, {**said, left[0]: (kind, -out / normal[left[0]] if out else 0.0)})
+    if not still:
+        raise Contradiction(
+            f"{_constraint(one)} and {one.motion(known[0])}: beside a plane that is oblique to it a component is 0, or "
+            "two are prescribed"
+        )
+    # One component is zero and the others lie in a plane: a line.
+    along = _cross(np.array([float(axis == known[0]) for axis in "xyz"]), np.array(one.way))
+    rest = {axis: of for axis, of in said.items() if axis != known[0]}
+    line = replace(_moved(one, rest, keep=True), constraint=moving.ALONG, way=_unit(along))
+    return acting(line, 3) if rest else line
+
+
+def as_before(one: NodeCondition, dim: int) -> NodeCondition:
+    """Of files of versions in which a constraint came before all else: what acted then."""
+    try:
+        acting(one, dim)
+    except Contradiction:
+        given = [getattr(one, f"at_{axis}") for axis in "xyz"[:dim]]
+        if one.constraint == moving.ALONG and all(isinstance(value, float) for value in given):
+            speed = sum(way * value for way, value in zip(one.way, given))
+            return _moved(one, {axis: (moving.VELOCITY, speed * way) for axis, way in zip("xyz", one.way)})
+        return _moved(one, {}, keep=True)
+    return one
+
+
+def together(rows: Sequence[NodeCondition], dim: int) -> NodeCondition:
+    """What the conditions of its corners come to at one node; Contradiction if no motion fulfils them."""
+    found, kind, way = NodeCondition(), moving.UNBOUND, (0.0, 0.0)
+    for k, axis in enumerate("xyz"[:dim]):
+        motion = _latest([one for one in rows if getattr(one, f"does_{axis}") != moving.FREE], 1 << k)
+        force = _latest([one for one in rows if getattr(one, f"force_{axis}") != 0.0], 8 << k)
+        for several, names in ((motion, ("does", "at")), (force, ("force", "side"))):
+            values = [{f"{name}_{axis}": getattr(one, f"{name}_{axis}") for name in names} for one in several]
+            told_by = names if names[0] == "does" else names[:1]  # sides may share one force
+            if len({tuple(one[f"{name}_{axis}"] for name in told_by) for one in values}) > 1:
+                told = dict.fromkeys(one.motion(axis) if names[0] == "does" else one.push(axis) for one in several)
+                raise Contradiction(" and ".join(told))
+            found = replace(found, **values[0] if values else {})
+    for one in rows:
+        kind, way = bound(kind, way, one.constraint, one.way, dim)  # type: ignore[assignment]
+    return replace(found, constraint=kind, way=way)
+
+
+def _latest(said: list[NodeCondition], bit: int) -> list[NodeCondition]:
+    """Those that count: that are not older, else all."""
+    return [one for one in said if not one.older & bit] or said

@@ -1,0 +1,211 @@
+"""What several conditions come to at one node, and what contradicts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem.kernels import nodes, space
+from hpcdem.physics.fdem.node_conditions import Contradiction, NodeCondition, acting, bound
+from hpcdem.physics.fdem.simulation import Blocks
+from tests.blocks.support import ROCK, jointed, model, rectangle
+from tests.space.support import box
+
+V, A = nodes.VELOCITY, nodes.ACCELERATION
+ALONG, ACROSS, FIXED = nodes.ALONG, space.ACROSS, nodes.FIXED
+E = np.eye(3).tolist()
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "both"),
+    [
+        ((ALONG, (1.0, 0.0)), (ALONG, (0.0, 1.0)), (FIXED,)),
+        ((ALONG, (0.6, 0.8)), (ALONG, (-0.6, -0.8)), (ALONG, (0.6, 0.8))),
+        ((FIXED, (0.0, 0.0)), (ALONG, (0.0, 1.0)), (FIXED,)),
+        ((ACROSS, E[0]), (ACROSS, E[1]), (ALONG, (0.0, 0.0, 1.0))),
+        ((ACROSS, E[0]), (ACROSS, E[0]), (ACROSS, E[0])),
+        ((ACROSS, E[0]), (ALONG, E[1]), (ALONG, E[1])),
+        ((ACROSS, (0.6, 0.8, 0.0)), (ALONG, E[1]), (FIXED,)),
+        ((ALONG, E[0]), (ALONG, E[2]), (FIXED,)),
+    ],
+)
+def test_constraints_meet_in_what_they_leave(one, other, both):
+    for first, second in ((one, other), (other, one)):
+        kind, way = bound(first[0], tuple(first[1]), second[0], tuple(second[1]), len(one[1]))
+        assert kind == both[0]
+        if kind != FIXED:
+            assert abs(np.dot(way, both[1])) == pytest.approx(1.0)
+
+
+def moves(**given) -> NodeCondition:
+    said = {f"does_{name[-1]}": V for name in given if name.startswith("at")}
+    return NodeCondition(**{**said, **given})
+
+
+@pytest.mark.parametrize(
+    ("one", "speed"),
+    [
+        (moves(at_x=3.0, constraint=ALONG, way=(0.6, 0.8)), (3.0, 4.0)),
+        (moves(at_x=3.0, at_y=4.0, constraint=ALONG, way=(0.6, 0.8)), (3.0, 4.0)),
+        (moves(at_x=0.0, constraint=ALONG, way=(0.6, 0.8)), (0.0, 0.0)),
+        (moves(at_x="table", constraint=ALONG, way=(1.0, 0.0)), ("table", 0.0)),
+        (moves(at_y=4.0, constraint=ACROSS, way=(0.0, 0.8, 0.6)), (None, 4.0, -4.0 * 0.8 / 0.6)),
+        (moves(at_y=4.0, at_z=-4.0 * 0.8 / 0.6, constraint=ACROSS, way=(0.0, 0.8, 0.6)), (None, 4.0, -4.0 * 0.8 / 0.6)),
+        (moves(at_x=2.0, constraint=ACROSS, way=(0.0, 0.0, 1.0)), (2.0, None, 0.0)),
+    ],
+)
+def test_a_velocity_beside_a_constraint(one, speed):
+    found = acting(one, len(speed))
+    assert found.constraint == nodes.UNBOUND
+    for axis, value in zip("xyz", speed):
+        assert getattr(found, f"does_{axis}") == (nodes.FREE if value is None else V)
+        assert value is None or getattr(found, f"at_{axis}") == (
+            value if isinstance(value, str) else pytest.approx(value)
+        )
+
+
+def test_a_component_of_a_plane_that_stays_leaves_a_line():
+    found = acting(moves(at_y=0.0, constraint=ACROSS, way=(0.6, 0.64, 0.48)), 3)
+    assert found.constraint == ALONG and found.does_y == nodes.FREE
+    assert found.way[1] == 0.0 and np.dot(found.way, (0.6, 0.64, 0.48)) == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("one", "told"),
+    [
+        (moves(at_x=0.1, constraint=FIXED), r"held \(type 1\) and velocity-x 0.1"),
+        (moves(at_y="table", constraint=FIXED), r"held \(type 1\) and velocity-y 'table'"),
+        (moves(at_x=1.0, constraint=ALONG, way=(0.0, 1.0)), r"direction \(0, 1\) \(type 2\) and velocity-x 1"),
+        (moves(at_x=3.0, at_y=5.0, constraint=ALONG, way=(0.6, 0.8)), "velocity-x 3 and velocity-y 5"),
+        (moves(at_x="table", constraint=ALONG, way=(0.6, 0.8)), "numbers of one kind"),
+        (moves(at_x=3.0, at_y=4.0, does_y=A, constraint=ALONG, way=(0.6, 0.8)), "acceleration-y 4"),
+        (moves(at_z=1.0, constraint=ACROSS, way=(0.0, 0.0, 1.0)), r"across \(0, 0, 1\) \(type 3\) and velocity-z 1"),
+        (moves(at_y=1.0, at_z=1.0, constraint=ACROSS, way=(0.0, 0.8, 0.6)), "velocity-y 1 and velocity-z 1"),
+        (moves(at_x=1.0, constraint=ACROSS, way=(0.6, 0.64, 0.48)), "a component is 0, or two"),
+    ],
+)
+def test_what_contradicts(one, told):
+    with pytest.raises(Contradiction, match=told):
+        acting(one, len(one.way) if one.constraint != FIXED else 2)
+
+
+def on_rollers(how: str, sim: Blocks, x: np.ndarray, y: np.ndarray) -> Blocks:
+    """A block of 1 m under its weight between rollers on a base that is held."""
+    sides = np.flatnonzero((x < 1e-9) | (x > 1.0 - 1e-9))
+    dim = sim.dim
+    up = (0.0, 1.0) if dim == 2 else (0.0, 1.0, 0.0)
+    if how == "velocity":
+        sim.velocity_condition(sides, vx=0.0)
+    elif dim == 3:
+        sim.move_constraint(sides, 3, (1.0, 0.0, 0.0))
+    else:
+        sim.move_constraint(sides, 2, up)
+    sim.move_constraint(np.flatnonzero(y < 1e-9), 1)
+    if how == "twice":
+        sim.move_constraint(sides, *((3, (1.0, 0.0, 0.0)) if dim == 3 else (2, up)))
+    sim.gravity(0.0, -10.0)
+    sim.option(dynamic=False)
+    return sim
+
+
+@pytest.mark.parametrize("shape", ["cross", "quad", "tets"])
+def test_a_corner_between_base_and_roller_stays(shape):
+    """Rollers as velocities or as constraints, before and after the base: the same, and the corner does not sink."""
+    found = []
+    for how in ("velocity", "constraint", "twice"):
+        mesh = box((2, 2, 2), (1.0, 1.0, 1.0), 5) if shape == "tets" else rectangle(4, 4, 1.0, 1.0, kind=shape)
+        sim = model(mesh) if shape != "tets" else Blocks()
+        if shape == "tets":
+            sim.take_mesh(mesh)
+            changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+            z = mesh.points[:, 2]
+            sim.velocity_condition(np.flatnonzero((z < 1e-9) | (z > 1.0 - 1e-9)), vz=0.0)
+        x, y = mesh.points[:, 0], mesh.points[:, 1]
+        on_rollers(how, sim, x, y)
+        equilibrium.solve_elastic(sim)
+        way = diagnostics.values(sim, "displacement_y")
+        assert (way[y < 1e-9] == 0.0).all() and way.min() < -1e-8
+        assert diagnostics.total(sim, "reaction_y") == pytest.approx(ROCK["density"] * 10.0, rel=1e-9)
+        found.append((way, diagnostics.values(sim, "reaction_x")))
+    for way, reaction in found[1:]:
+        assert way == pytest.approx(found[0][0], abs=1e-18) and reaction == pytest.approx(found[0][1], abs=1e-6)
+
+
+def test_refused_by_name_and_nothing_is_changed(tmp_path):
+    sim = model(rectangle(2, 2, 1.0, 1.0))
+    sim.move_constraint([0, 1], 1)
+    before = saved_state.state_of(sim, {})["scene"]["conditions"], sim.corner_row.tolist()
+    with pytest.raises(
+        CommandError, match=r"at node 0 at \(0, 0\): held \(type 1\) and velocity-x 0.1\. One of them is"
+    ):
+        sim.velocity_condition([0, 5], vx=0.1)
+    assert (saved_state.state_of(sim, {})["scene"]["conditions"], sim.corner_row.tolist()) == before
+    sim.move_constraint([0], 0)
+    sim.velocity_condition([0, 5], vx=0.1)
+    with pytest.raises(CommandError, match=r"velocity-x 0.1"):
+        sim.move_constraint(None, 1)
+
+
+def test_a_prescribed_motion_along_a_line_has_its_reaction():
+    """A node that is led along an axis is pushed by what the rest of the model pulls with."""
+    results = []
+    for constraint in (False, True):
+        sim = model(rectangle(2, 2, 1.0, 1.0))
+        y = sim.the_mesh().points[:, 1]
+        top = np.flatnonzero(y > 1.0 - 1e-9)
+        sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
+        sim.velocity_condition(top, vy=1e-6, **({} if constraint else {"vx": 0.0}))
+        if constraint:
+            sim.move_constraint(top, 2, (0.0, 1.0))
+        sim.option(dynamic=False)
+        equilibrium.solve_elastic(sim)
+        results.append([diagnostics.total(sim, f"reaction_{axis}", top) for axis in "xy"])
+    assert results[0] == pytest.approx(results[1]) and results[0][1] > 1e3
+
+
+def test_files_of_versions_in_which_constraints_came_first():
+    sim = model(rectangle(2, 2, 1.0, 1.0))
+    state = sim.definition_state()
+    turn = (math.cos(0.5), math.sin(0.5))
+    said = [{}, {"constraint": FIXED, "does_x": V, "at_x": 1.0}, {"constraint": ALONG, "way": turn, "does_x": V,
+            "at_x": 1.0, "does_y": V, "at_y": 0.0}]  # fmt: skip
+    old = [{k: v for k, v in {**state["conditions"][0], **one}.items() if not k.startswith(("side", "part", "older"))}
+           for one in said]  # fmt: skip
+    del state["sided"]
+    sim.take_definition_state({**state, "conditions": old})
+    _, held, led = sim.acting()
+    assert held.constraint == FIXED and held.does_x == nodes.FREE
+    assert (led.at_x, led.at_y) == pytest.approx((turn[0] ** 2, turn[0] * turn[1])) and led.constraint == nodes.UNBOUND
+
+
+def test_a_file_with_conditions_by_points_goes_on():
+    """Of versions in which both sides of a joint had one condition: the same steps as the model that wrote it."""
+
+    def made() -> Blocks:
+        sim = jointed(model(rectangle(3, 2, 1.0, 1.0, kind="mixed")))
+        y = sim.the_mesh().points[:, 1]
+        sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
+        sim.velocity_condition(np.flatnonzero(np.abs(y - 0.5) < 1e-9), vx=0.1)
+        sim.force_condition(np.flatnonzero(y > 1.0 - 1e-9), fy=-1e4)
+        convergence.advance(sim, 5)
+        return sim
+
+    sim = made()
+    state = saved_state.state_of(sim, {})
+    tables = {name: dict(table.columns) for name, table in saved_state.tables(sim).items()}
+    row, cells = tables["faces"].pop("corner_row"), sim.the_mesh().cells.reshape(-1)
+    points = np.zeros(len(sim.the_mesh().points), np.int64)
+    points[cells[cells >= 0]] = row[cells >= 0]
+    tables["points"] = {"point_row": points}
+    del state["scene"]["sided"]
+    other = Blocks()
+    saved_state.put(other, state, tables)
+    for one in (sim, other):
+        convergence.advance(one, 5)
+    for name in ("position_y", "velocity_x", "reaction_x"):
+        assert np.array_equal(diagnostics.values(sim, name), diagnostics.values(other, name))
+    assert not other.sided and np.array_equal(sim.corner_row[cells >= 0], other.corner_row[cells >= 0])
