@@ -73,6 +73,23 @@ def test_a_sub_step_against_plain_sums(second: float) -> None:
     assert fluid.wall_heat.sum() == pytest.approx(to_rock, rel=1e-10)
 
 
+@pytest.mark.parametrize("saturation", [1e-6, 1e-22])
+def test_a_node_that_is_nearly_dry_needs_no_sub_steps_of_its_own(saturation: float) -> None:
+    """Water at 50 degrees that flows on into it, as it did when flow was switched off: the node has the temperature of
+    what passes, and the account closes."""
+    sim, flow = line(6, 1.0, aperature_initial=1e-3, fluid_bulk=1e6, viscosity=1e-6)
+    flow.fill(None, saturation=saturation)
+    first = at(sim, 0.0, 0.0)
+    flow.fill(first, pressure=1e3)
+    heat, fluid = with_heat(sim, {})
+    fluid.initial(first, 50.0)
+    heat.prescribe_fluid(first, 50.0)
+    step(sim, 0.02, 20)
+    found = of_nodes(flow)
+    assert fluid.sub_steps < 5 and found[:2] == pytest.approx(50.0, abs=1e-3)
+    assert found.min() >= 0.0 and found.max() <= 50.0 and heat.account()["relative"] < 1e-12
+
+
 @pytest.mark.parametrize(("before", "after"), [(0.0, 1e-12), (1e-9, 1e-12), (1e-6, 5e-7), (3e-7, 9e-7)])
 def test_a_node_that_hands_what_comes_to_the_rock(before: float, after: float) -> None:
     """1e-6 m2 at 200 degrees flow into a node at 20: what leaks off mixes with them first, so the temperature is that

@@ -46,6 +46,8 @@ class Rock(Protocol):
 
 SAFETY = 0.9
 """Part of the stability limit that a sub-step may be."""
+SCANT = 1e-4
+"""Part of its room below which the fluid of a node does not limit sub-steps: it has the temperature of what passes."""
 MANY = 100_000
 """Sub-steps in one of the rock that are too many to be meant."""
 FACING = {2: [1, 0], 3: [0, 2, 1]}
@@ -361,11 +363,12 @@ class FluidHeat:
             counts = np.abs(into) if self._second else np.maximum(into, 0.0)
             passes += np.bincount(ends[:, end], counts, total)[: len(w)]
         more = (np.maximum(w - w0, 0.0) + self._leaked) / period if period > 0.0 else 0.0
-        there = least > 0.0
+        scant = SCANT * self.flow.nodes[:, flowing.V]
+        there = least > scant
         most = np.where(there, least, w)
         rate = np.divide(np.where(there, np.maximum(passes - more, 0.0), 0.0), most, out=np.zeros(len(w)),
                          where=most > 0.0)  # fmt: skip
-        drained = ~there & (w > 0.0)  # filled just now: what has come in is all that is there
+        drained = ~there & (w > scant)  # filled just now: what has come in is all that is there
         rate[drained] = np.maximum(passes[drained] / (w + self._leaked)[drained] - 1.0 / period, 0.0)
         conduct = self._conduct if self.links == 1 else np.maximum(self._conduct, 0.0)
         for end in range(2):

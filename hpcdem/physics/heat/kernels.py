@@ -334,19 +334,22 @@ def carry(
     """Temperatures out (n,) of own flow nodes after dt [s], with fluid before, after, and leaked to the rock (n,) [m2]
     of heat capacity rho_c [J/(m3 K)]; the walls (m, 4) in t, flat, two at each end, count with the new temperature of
     the node, and so does what leaks: a node that hands all that comes to the rock stays between the temperatures
-    around it.
+    around it. A node that more passes than it holds has the temperature of that; the heat that it lacks, as good as
+    none, counts as given.
 
     face (m,): temperatures of what flows; conduct, exchange (m,) [W/(m K)]; held (n,): row of the table of prescribed
     temperatures, -1: free; given (n,) [J/m]: heat by conditions is booked.
     """
     for i in range(len(out)):
         old = state[i, T]
-        net = carried = conducted = wall = passes = 0.0
+        net = comes = carried = conducts = conducted = wall = passes = 0.0
         for m in range(begin[i], begin[i + 1]):
             c, end = channel[m], 0 if side[m] < 0.0 else 1
             into = side[m] * q[c]
             net += into
+            comes += max(into, 0.0)
             carried += into * (face[c] - old)
+            conducts += max(conduct[c], 0.0)
             conducted += conduct[c] * (state[ends[c, 1 - end], T] - old)
             a = exchange[c] * state[i, X]
             for k in range(2 * end, 2 * end + 2):
@@ -356,8 +359,10 @@ def carry(
         gone = min(max(-came, 0.0), LITTLE_MORE * leaked[i])  # it mixes with what flows in before it goes
         capacity = rho_c * after[i]
         new, whole = old, rho_c * (after[i] + gone) + dt * passes
-        if held[i] >= 0:
-            new = table[held[i]]
+        most = dt * (rho_c * comes + conducts + passes)
+        scant = most > LITTLE_MORE * whole
+        if held[i] >= 0 or scant:
+            new = old + dt * (rho_c * carried + conducted + wall) / most if held[i] < 0 else table[held[i]]
             brought = rho_c * old * came
             brought += capacity * (new - old) - dt * (rho_c * carried + conducted + wall - passes * (new - old))
         else:
