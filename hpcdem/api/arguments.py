@@ -10,12 +10,12 @@ from typing import Any, get_args
 import numpy as np
 
 from hpcdem.core.errors import CommandError, ScriptError
+from hpcdem.core.nearest import hint
 from hpcdem.lang.pcdc import bindings, parser, rules, trial
 from hpcdem.lang.pcdc.keywords import matching
 from hpcdem.lang.pcdc.kinds import FunctionName, Kind, TableName, fitting
 from hpcdem.lang.pcdc.lexer import short
 from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
-from hpcdem.lang.zdem.nearest import hint
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 

@@ -21,6 +21,7 @@ from hpcdem.commands import dem, fdem
 from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.core.fields import FIELDS, FIX_BITS
 from hpcdem.core.material import Material
+from hpcdem.core.nearest import hint
 from hpcdem.core.selection import Selection
 from hpcdem.io import checkpoint
 from hpcdem.lang.zdem.execute import Interpreter, find, look_at_units, tell_warnings
@@ -399,10 +400,49 @@ class Simulation(BlockCommands):
         dem.physics.add(self.engine, name, **parameters)
 
     @_command
-    def set(self, **options: Any) -> None:
-        """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, restitution, seed, gentry, thickness,
-        wallside, units, outdir, and the steps between outputs: print, ps, vtk, save, stepbar, energy."""
-        for name, value in options.items():
+    def set(
+        self,
+        *,
+        units: str | None = None,
+        outdir: str | Path | None = None,
+        disk: str | None = None,
+        dt: float | None = None,
+        frac: float | None = None,
+        gravity: tuple[float, float] | None = None,
+        lsm: float | None = None,
+        restitution: float | None = None,
+        seed: int | None = None,
+        gentry: float | None = None,
+        thickness: float | None = None,
+        wallside: str | None = None,
+        print: int | None = None,
+        save: int | None = None,
+        ps: int | None = None,
+        vtk: int | None = None,
+        stepbar: int | None = None,
+        energy: int | None = None,
+        **others: Any,
+    ) -> None:
+        """SET: choose settings of the model. What is left out stays as it is.
+
+        Parameters
+        ----------
+        units, outdir : system of units of the input; folder of the results.
+        disk : "on" (discs of unit thickness), "off" (spheres) or "hex".
+        dt, frac : time step [s]; or part of the critical time step.
+        gravity : (gx, gy) [m/s2].
+        lsm, restitution : damping of the old manual; coefficient of restitution of contacts, 0 to 1.
+        seed, gentry : first number of random places; tries of GEN for each particle.
+        thickness : of the model across the plane [m], for stress.
+        wallside : "left" or "both": the sides of walls that push.
+        print, save, ps, vtk, stepbar, energy : steps between frames, checkpoints, vector pictures, .vtk files, lines of
+            progress and rows of the energy account; 0 turns one off.
+        others : outputs of a kind that was added.
+        """
+        said = {name: value for name, value in locals().items() if name not in ("self", "others")} | others
+        for name, value in said.items():
+            if value is None:
+                continue
             if name == "outdir":
                 self._write_into(value)
             else:
@@ -423,13 +463,28 @@ class Simulation(BlockCommands):
         wall: int,
         xmove: float | None = None,
         ymove: float | None = None,
-        **every: float,
+        *,
+        print: float | None = None,
+        save: float | None = None,
+        ps: float | None = None,
+        vtk: float | None = None,
+        **others: float,
     ) -> None:
-        """IMPLE: step until the wall has gone this far [m]; every: distance that it goes between two outputs [m] of a
-        kind: save, print, ps, vtk."""
+        """IMPLE: step until the wall has gone this far.
+
+        Parameters
+        ----------
+        wall : its id.
+        xmove, ymove : distance along x or y [m]; one of the two.
+        print, save, ps, vtk : distance that the wall goes between two frames, checkpoints, vector pictures, .vtk files
+            [m]; left out, there is none until the end.
+        others : the same for outputs of a kind that was added.
+        """
         self._refuse_only_blocks()
         engine = self.engine
-        dem.cycles.imple(engine, wall, xmove, ymove, **every)
+        every = {"print": print, "save": save, "ps": ps, "vtk": vtk}
+        every = {name: distance for name, distance in every.items() if distance is not None}
+        dem.cycles.imple(engine, wall, xmove, ymove, **every, **others)
 
     def every(self, steps: int, function: Callable[[Simulation], object]) -> Call:
         """Call ``function(sim)`` after each step whose number is a multiple of `steps`, before anything is written.
@@ -613,9 +668,14 @@ class Simulation(BlockCommands):
             self._ready()
             values = engine.body[:, ("mass", "inertia").index(name)].view()
         else:
-            raise ScriptError(*_place(), f"there is no field '{name}'; fields are {', '.join((*FIELDS, *p.extra))}")
+            fields = (*FIELDS, *p.extra)
+            near = hint(name, fields)
+            raise ScriptError(*_place(), f"there is no field '{name}'{near}; fields are {', '.join(fields)}")
         values.flags.writeable = False
         return values
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*FIELDS, *MATERIAL_FIELDS, "mass", "inertia", "clump", *self.engine.particles.extra]
 
     def __setitem__(self, name: str, values: Any) -> None:
         """Set a field of this rank's own particles: ``sim["vx"] = 0.0``. Collective.

@@ -8,7 +8,6 @@ variables.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import shlex
 import sys
@@ -20,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 from pydantic.fields import FieldInfo
 
 from hpcdem.core.errors import CommandError, ScriptError
+from hpcdem.core.nearest import hint
 
 PACKAGE = str(Path(__file__).resolve().parent.parent)
 DIVIDER = "# ---- {} "
@@ -164,9 +164,7 @@ def explained(kind: type[Case], error: ValidationError) -> str:
     name = str(first["loc"][0])
     known = kind.model_fields
     if name not in known:
-        near = difflib.get_close_matches(name, known, 1)
-        hint = f"; did you mean '{near[0]}'?" if near else ""
-        return f"{kind.__name__} has no parameter '{name}'{hint} There are {', '.join(known)}"
+        return f"{kind.__name__} has no parameter '{name}'{hint(name, known)} There are {', '.join(known)}"
     unit = unit_of(known[name])
     what = known[name].description if unit in ("", "1") else f"{known[name].description}, {unit}"
     expected = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ").split(", unable")[0]

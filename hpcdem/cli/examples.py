@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import shutil
 import sys
@@ -15,6 +14,7 @@ from rich.table import Table
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
 from hpcdem.core.errors import EXIT_OK, UsageError
+from hpcdem.core.nearest import hint
 
 SUFFIXES = (".py", ".sc")
 PLACES = (Path(__file__).resolve().parents[2] / "examples", Path(sys.prefix) / "share" / "hpcdem" / "examples")
@@ -81,9 +81,7 @@ def copied(name: str, into: Path) -> list[Path]:
     known = scripts()
     path = known.get(Path(name).stem)
     if path is None:
-        near = difflib.get_close_matches(name, known, 1, 0.5)
-        meant = f"did you mean {near[0]}? " if near else ""
-        raise UsageError(f"{name}: no such example; {meant}There are {', '.join(known)}")
+        raise UsageError(f"{name}: no such example{hint(name, known)} There are {', '.join(known)}")
     text = path.read_text(encoding="utf-8")
     others = [other for other in folder().iterdir() if other.is_file() and other.suffix not in SUFFIXES]
     files = [path, *(other for other in sorted(others) if other.name in text)]

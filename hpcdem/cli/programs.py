@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import NamedTuple
+
+from hpcdem.core.nearest import nearest
 
 
 class Program(NamedTuple):
@@ -52,7 +53,5 @@ def suggestion(word: str) -> str:
     """What to add to a message that `word` is no script and no command; empty if it looks like a file."""
     if "." in word or "/" in word:
         return ""
-    near = difflib.get_close_matches(word, BY_NAME, 1, 0.5)
-    return (
-        f" and no such command; did you mean hpcdem {near[0]}?" if near else " and no such command; see hpcdem --help"
-    )
+    near = nearest(word, BY_NAME)
+    return f" and no such command; did you mean hpcdem {near}?" if near else " and no such command; see hpcdem --help"

@@ -14,10 +14,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from hpcdem.core.errors import ScriptError, UsageError
+from hpcdem.core.nearest import hint
 from hpcdem.lang import detect
 from hpcdem.lang.pcdc import source as pcdc
 from hpcdem.lang.zdem import lexer, parser
-from hpcdem.lang.zdem.nearest import hint
 
 Value = bool | int | float | str
 _ENDS = re.compile(rb"(\r\n|\n|\r)")

@@ -40,6 +40,8 @@ WRONG = {
     "no RANGE at all": ("sim.delete(3.0)", "delete: where: expected the text of a RANGE"),
     "wrong command": ("sim.command('PROPP fric 0.3')", "command: read 'PROPP'"),
     "wrong value in a command": ("sim.command('SET dt 0.1\\nSET dt -1')", "command: SET"),
+    "mistyped field": ("sim['radus']", "there is no field 'radus'; did you mean 'radius'\\?"),
+    "mistyped setting": ("sim.set(gravty=(0.0, -9.8))", "set: SET has no option gravty; did you mean 'gravity'\\?"),
     "unknown field": ("sim['velocity']", "there is no field 'velocity'"),
     "field that is not to be set": ("sim['gid'] = 3", "field 'gid' cannot be set"),
     "wrong length": ("sim['vx'] = [1.0, 2.0, 3.0]", "field 'vx' has .* values on this rank"),

@@ -142,7 +142,7 @@ def test_examples_are_listed_and_copied(tmp_path):
     again = program("main", "examples", "specimens", "--into", str(tmp_path))
     assert again.returncode == 2 and "exists already" in again.stderr
     wrong = program("main", "examples", "puhs")
-    assert wrong.returncode == 2 and "did you mean push?" in wrong.stderr
+    assert wrong.returncode == 2 and "did you mean 'push'?" in wrong.stderr
 
 
 @pytest.mark.parametrize(

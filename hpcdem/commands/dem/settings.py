@@ -8,6 +8,7 @@ from typing import Any
 
 from hpcdem.commands import units
 from hpcdem.core.errors import CommandError
+from hpcdem.core.nearest import hint
 from hpcdem.core.outputs import OUTPUTS
 from hpcdem.physics.dem.kernels.mass import SPHERES
 from hpcdem.physics.dem.simulation import Simulation
@@ -59,5 +60,6 @@ def set_option(sim: Simulation, name: str, value: Any) -> None:
     elif name == "outdir":
         sim.outdir, sim.folder_made = Path(value), False
     else:
-        raise CommandError(f"SET knows no option {name}")
+        known = ("gravity", *CHOICES, *POSITIVE, *INTERVALS, "lsm", "restitution", "seed", "units", "outdir")
+        raise CommandError(f"SET has no option {name}{hint(name, known)}; there are {', '.join(known)}")
     sim.tables_changed()

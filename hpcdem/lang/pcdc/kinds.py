@@ -14,8 +14,8 @@ from typing import Any, NoReturn
 
 from hpcdem.core.limits import LARGEST
 from hpcdem.core.looks import EYES, eye_of, section_of
+from hpcdem.core.nearest import hint
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
-from hpcdem.lang.zdem.nearest import hint
 from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN, TEMPERATURE
 
 

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from hpcdem.core.errors import ScriptError
+from hpcdem.core.nearest import hint
 from hpcdem.lang.pcdc import kinds, lexer, rules, trial
 from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
 from hpcdem.lang.pcdc.kinds import Pending
 from hpcdem.lang.pcdc.lexer import Escape, Token, Word
 from hpcdem.lang.pcdc.statement import Statement, resolved, shown
 from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, distinct
-from hpcdem.lang.zdem.nearest import hint
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hpcdem.core.errors import ScriptError
+from hpcdem.core.nearest import hint
 from hpcdem.core.selection import VARIABLES, Expression
-from hpcdem.lang.zdem.nearest import hint
 
 SEPARATORS = "()=,"
 COMMENT = re.compile(rb"[#!;]")

@@ -13,10 +13,10 @@ from typing import Any, NoReturn
 
 from hpcdem.core import selection as sel
 from hpcdem.core.errors import ScriptError, UsageError
+from hpcdem.core.nearest import hint
 from hpcdem.lang.zdem import lexer, plan, rules
 from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.lexer import Line, Token
-from hpcdem.lang.zdem.nearest import hint
 from hpcdem.lang.zdem.parameters import Parameter, Parameters
 from hpcdem.lang.zdem.statement import Statement
 

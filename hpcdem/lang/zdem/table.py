@@ -17,9 +17,9 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from hpcdem.core.material import PROPERTIES
+from hpcdem.core.nearest import hint
 from hpcdem.core.outputs import OUTPUTS
 from hpcdem.core.units import CHOICES as UNITS
-from hpcdem.lang.zdem.nearest import hint
 
 SOURCES = {
     "R": "command reference of the manual",
