@@ -132,6 +132,8 @@ def dig(sim: Blocks) -> None:
     """What happens to it."""
     if sim.clock.step == 600:
         changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] < 0.4), relax=150.0)
+    if sim.clock.step in (690, 720):  # fluid stays as it is meanwhile, over the checkpoint
+        sim.parts(hydraulic=sim.clock.step == 720)
     if sim.clock.step == 900:
         sim.option(dynamic=True)
         sim.flow_clock(dt=0.0, every=2)
