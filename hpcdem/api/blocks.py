@@ -552,7 +552,8 @@ class Nodes(Objects):
         flow_rate: Number | None = None,
         where: Where = None,
     ) -> None:
-        """One of them at flow nodes: pressure [Pa], level of a free surface [m], rate that comes in at each [m2/s]."""
+        """One of them at flow nodes: pressure [Pa], level of a free surface [m], rate that comes in at each [m2/s].
+        With `where`, pressure and level wet the free faces whose nodes all are in it."""
         given = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
         self._carry_out("boundary", given, where, "hydraulic-constant-flow-boundary")
 
@@ -726,7 +727,8 @@ class Wells(Words):
         return found[name]
 
     def create(self, name: str, *, where: Where = None) -> None:
-        """Flow nodes of a range of nodes are a well, which is shut in."""
+        """Flow nodes of a range of nodes are a well, which is shut in; its water pushes on free faces whose nodes all
+        are in the range."""
         self._do("well create", {"name": name}, where, g.NODE)
 
     def stage(

@@ -298,7 +298,8 @@ MOVE = Model(
 )  # fmt: skip
 STRESS = Model(
     "m{echanical}-s{tress}-b{oundary}-c{ondition}", "6",
-    "Traction on surfaces: stress times the present normal. Tension is positive.",
+    "Traction on surfaces: stress times the present normal. Tension is positive. Where it is not 0 it is the total: "
+    "water before the face does not push besides.",
     (Option("s{tress}-x{x}", (TABLED,), "stress xx", "Pa"), Option("s{tress}-y{y}", (TABLED,), "stress yy", "Pa"),
      Option("s{tress}-z{z}", (TABLED,), "stress zz", "Pa", dims=SPACE),
      Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
@@ -312,7 +313,9 @@ STRESS = Model(
 )  # fmt: skip
 FLOW_CONDITION = Model(
     "hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11",
-    "Fluid at nodes, one of the three at each; times of tables are those of flow.",
+    "Fluid at nodes, one of the three at each; times of tables are those of flow. With a range, pressure and "
+    "flow-surface wet the free faces whose nodes all lie in it: water stands before them and pushes on them, whether "
+    "channels end there or not. Without one they are said of the fluid in joints alone.",
     (Option("p{ressure}", (TABLED,), "pressure, not negative", "Pa"),
      Option("f{low}-s{urface}", (TABLED,), "level of water that stands at the nodes, against gravity: hydrostatic "
             "pressure below it; above it water can leave (seepage)", "m"),
@@ -1016,7 +1019,8 @@ _OBJECTS = (
                      Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the fluid that is there", "1")),
             ranged="node", needs_option=True, dims=BOTH),
     Command("well cr{eate}", "Flow nodes of a range are a well: one room, whose pressure is that at its highest node. "
-            "Stages say what it does; without one it is shut in.",
+            "Stages say what it does; without one it is shut in. Its water pushes on free faces whose nodes all lie in "
+            "the range.",
             ("pcdc well create 'injection' range geometry 'hole'",), (_NAME,), ranged="node", dims=BOTH),
     Command("well st{age}", "One more stage of a well, after those that it has; one without time that has begun ends "
             "now. After the last the well is shut in. Times of tables are those of flow.",
