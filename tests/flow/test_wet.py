@@ -18,8 +18,8 @@ from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import PRESSURE, RATE
 from hpcdem.pre.mesh import structured
-from tests.blocks.support import JOINT, model, near
-from tests.flow.support import WATER, at, hold, over, run
+from tests.blocks.support import JOINT, model, near, rectangle
+from tests.flow.support import WATER, at, hold, inner, over, run
 from tests.flow.test_coupling import split
 from tests.pcdc.fake import Noted
 from tests.pcdc.test_time import Rock
@@ -246,6 +246,69 @@ def test_wet_faces_are_kept_by_files(tmp_path) -> None:
         assert one[name].tolist() == other[name].tolist()
     for name in ("position_x", "stress_yy"):
         assert np.array_equal(diagnostics.values(sim, name), diagnostics.values(again, name), equal_nan=True)
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_whatever_is_said_in_whatever_order(seed: int) -> None:
+    """Random meshes, channels, cracks, pits, ranges, wells and stresses, beside a plain loop over all faces: wet are
+    free ones, no sides of channels, without a stress, all of whose points a statement names that still holds."""
+    rng = np.random.default_rng(seed)
+    n = rng.integers(2, 4, 3)
+    mesh = (
+        rectangle(*n[:2], 1.0, 1.0, kind=("cross", "quad", "mixed")[seed % 3])
+        if seed % 2
+        else box(tuple(n), (1.0,) * 3)
+    )
+    sim = model(mesh) if mesh.dim == 2 else body(mesh)
+    flow, joints = Flow.of(sim), inner(mesh)
+    channels = np.sort(rng.choice(joints, len(joints) - len(joints) // 4, replace=False))
+    flow.assign(channels, SOFT)
+    changes.crack(sim, np.sort(rng.choice(joints, len(joints) // 5, replace=False)))
+    sim.option(dynamic=False, collision=False)
+    sim.flow_clock(dt=1e-9)
+    faces = [f for f in range(4 * len(mesh.cells)) if mesh.dim == 3 or mesh.cells[f // 4, f % 4] >= 0]
+    of = {f: set(mesh.face_points(np.array([f]))[0].tolist()) for f in faces}
+    held, drilled, stressed = set(), set(), set()
+    for k in range(12):
+        there = np.unique(mesh.cells[sim.alive])
+        there = there[there >= 0]
+        low = rng.uniform(-0.5, 0.6, mesh.dim)
+        chosen = there[((mesh.points[there] >= low) & (mesh.points[there] <= low + 0.9)).all(axis=1)]
+        names = set(chosen.tolist())
+        if not names:
+            continue
+        what = rng.choice(["pressure", "pressure", "rate", "remove", "well", "pit", "stress"])
+        try:
+            if what == "pressure":
+                hold(flow, chosen, 1e4)
+                held |= {f for f in faces if of[f] <= names}
+            elif what == "rate":
+                flow.prescribe(chosen, kernels.RATE, 1e-9)
+                held -= {f for f in faces if of[f] & names}
+            elif what == "remove":
+                flow.remove_conditions(chosen)
+                held -= {f for f in faces if of[f] & names}
+            elif what == "well":
+                flow.drill(f"w{k}", chosen)
+                drilled |= {f for f in faces if of[f] <= names}
+            elif what == "pit":
+                changes.null(sim, rng.choice(np.flatnonzero(sim.alive), 1))
+            else:
+                some = np.intersect1d(rng.choice(outside(mesh), 2), [f for f in faces if sim.alive[f // 4]])
+                sim.stress_condition(some, normal=-1e3)
+                stressed |= set(some.tolist())
+        except CommandError:  # no flow node in the range, or a node of a well
+            continue
+    wanted = []
+    for f in faces:
+        other = int(sim.partner[f])
+        beside = other >= 0 and bool(sim.alive[other // 4])
+        free = not beside or (bool(sim.open[f]) and min(f, other) not in channels)
+        if sim.alive[f // 4] and free and f in held | drilled and f not in stressed:
+            wanted.append(f)
+    found = flow.wet_faces()
+    assert found["number"].tolist() == (wanted if len(flow.network.channels) else [])  # with the last goes the fluid
+    assert np.isfinite(found["pressure"]).all() and (found["pressure"] >= 0.0).all()
 
 
 SCRIPT = """
