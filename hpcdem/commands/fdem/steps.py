@@ -423,6 +423,7 @@ def _run(
             project.progress["creep"] = project.blocks.creep.time + time
         elif ratio is not None:
             ends = steps is not None or time is not None
+            project.blocks.warn_of_flow()
             project.progress["watch"] = asdict(convergence.watch(project.blocks, window, limit, ends))
     first, end = project.progress["first"], project.progress["end"]  # from before a checkpoint, if it goes on from one
     alone = steps if ratio is None and time is None else None  # the number of steps, if it is known

@@ -60,8 +60,9 @@ SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
 OLDEST = 2000
 """Storage is made again at this age even if nobody moved, so that borders can follow the load."""
-OUTSIDE = 1e-6
-"""Part of its largest component by which a given stress must be beyond the strength to be spoken of."""
+OUTSIDE, MUCH = 1e-6, 1e-3
+"""Part of its largest component by which a stress must be beyond the strength to be spoken of: one that was given, one
+that relaxation begins with."""
 LOCKS = 0.45
 """Poisson's ratio above which tetrahedra are said to lock."""
 AUTO = 100
@@ -771,23 +772,38 @@ class Blocks(State):
 
     def _warn_of_given_stress(self) -> None:
         """A line in the log about elements that cannot bear the stress they were given. Collective."""
-        if self.stress0 is None or not self.local.yields:
+        if self.stress0 is not None:
+            self._tell_beyond(OUTSIDE, self.stress0_row > 0, "have an initial stress beyond their strength")
+
+    def warn_of_flow(self) -> None:
+        """A line in the log about elements that relaxation lets flow before it finds balance, as something has changed
+        since they were in balance. Collective."""
+        self.close_model()
+        if not self.options.dynamic and self.options.mechanical:
+            self._tell_beyond(
+                MUCH, self.alive, "are beyond their strength where they lie: they flow before balance is found, for "
+                "good; model solve elastic before it, or the change in small parts, finds balance first",
+            )  # fmt: skip
+
+    def _tell_beyond(self, least: float, of: np.ndarray, what: str) -> None:
+        """How many of these elements (ne,) bool are outside their strength by this part of their stress, and which one
+        is farthest; once for one state. Collective."""
+        if not self.local.yields:
             return
         beyond, stress = self.local.beyond()
         number = self.number[self.owned]
-        bad = np.flatnonzero((beyond > OUTSIDE * np.abs(stress).max(axis=1)) & (self.stress0_row[number] > 0))
+        bad = np.flatnonzero((beyond > least * np.abs(stress).max(axis=1)) & of[number])
         worst = bad[np.lexsort((number[bad], -beyond[bad]))[:1]]
         found = self.comm.allgather((len(bad), [(-beyond[i], int(number[i]), stress[i]) for i in worst]))
         count = sum(part[0] for part in found)
         if self.log is None or not count:
             return
-        far, element, of = min((one for part in found for one in part[1]), key=lambda one: one[:2])
+        far, element, stress = min((one for part in found for one in part[1]), key=lambda one: one[:2])
         place = ", ".join(f"{c:.4g}" for c in self.the_mesh().centroids(np.array([element]))[0])
         self.log.warn_once(
-            f"initial stress beyond strength {count} {element} {far}",
-            f"{count} element{'s have an initial stress' if count > 1 else ' has an initial stress'} beyond "
-            f"{'their' if count > 1 else 'its'} strength and will yield at once; farthest beyond is element {element} "
-            f"at ({place}), by {-far:.4g} Pa: {_pascals(of)}",
+            f"beyond strength {count} {element} {far}",
+            f"{count} elements {what}; farthest beyond is element {element} at ({place}), by {-far:.4g} Pa: "
+            f"{_pascals(stress)}",
         )
 
     def _warn_of_locking(self) -> None:
