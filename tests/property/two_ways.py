@@ -652,12 +652,13 @@ def _words(values: dict[str, float]) -> str:
 # ---- carrying out ----------------------------------------------------------------------------------------------------
 
 
-def carry_out(text: str, folder: Path, comm: Any = None) -> tuple[Session, str]:
-    """Run a script in this process; its session, still open, and what went wrong ("" if nothing did). Collective."""
+def carry_out(text: str, folder: Path, comm: Any = None, autosave: float | None = None) -> tuple[Session, str]:
+    """Run a script in this process, with automatic checkpoints so many seconds apart; its session, still open, and what
+    went wrong ("" if nothing did). Collective."""
     comm = comm or SerialComm()
     folder.mkdir(parents=True, exist_ok=True)
     said = io.StringIO()
-    one = Session(comm, Log(comm.rank, said), StopRequests(None, None, None), directory=folder, figure=False)
+    one = Session(comm, Log(comm.rank, said), StopRequests(None, None, autosave), directory=folder, figure=False)
     one.ready |= {"", "blocks", "coupled"}
     session.enter(one)
     project = one.project()
