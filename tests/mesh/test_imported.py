@@ -208,6 +208,47 @@ def test_sets_of_abaqus_are_read_by_numbers(read, case):
     assert np.allclose(found.mesh.areas(), 1.0)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_any_order_of_blocks_and_sets(read, seed):
+    """Decks of a strip of quads, triangles and bars in random blocks, sets and numbers, beside what they say."""
+    random = np.random.default_rng(seed)
+    n = 6
+    ids = random.permutation(np.arange(1, 60))[: 3 * n + 3].tolist()
+    number = {(x, y): int(k) for k, (x, y) in enumerate(((x, y) for y in range(3) for x in range(n + 1)), 101)}
+    lines = ["*NODE"]
+    for (x, y), k in sorted(number.items(), key=lambda item: random.random()):
+        lines += [f"{k}, {x}., {y}.", *(["*NODE", "** more"] * (random.random() < 0.2))]
+    elements = {}  # number -> label, corners
+    for x in range(n):
+        a, b, c, d, e, f = (number[at] for at in ((x, 0), (x + 1, 0), (x + 1, 1), (x, 1), (x + 1, 2), (x, 2)))
+        elements[ids.pop()] = "CPE4R", (a, b, c, d)
+        elements[ids.pop()] = "CPE3", (d, c, e)
+        elements[ids.pop()] = "CPE3H", (d, e, f)
+    elements[ids.pop()] = elements[ids.pop()] = "T2D2", (101, 102)
+    sets: dict[str, set[int]] = {}
+    order, file = random.permutation(list(elements)).tolist(), []
+    while order:
+        label = elements[order[0]][0]
+        block = [k for k in order if elements[k][0] == label][: random.integers(1, 5)]
+        order = [k for k in order if k not in block]
+        name = random.choice(["", "A", "b", "C"])
+        lines.append(f"*Element, type={label}" + f", elset={random.choice([name, name.upper()])}" * bool(name))
+        for k in block:
+            lines += [f"{k}, " + ", ".join(map(str, elements[k][1]))]
+        file += [k for k in block if label != "T2D2"]
+        if name:
+            sets.setdefault(name, set()).update(block)
+    some = random.choice(file, 5).tolist()
+    lines += ["*ELSET, ELSET=LIST", ", ".join(map(str, some)), "*ELSET, ELSET=ALSO", ", ".join(["LIST", *sets]),
+              "*ELSET, ELSET=ODD, GENERATE", "1, 59, 2"]  # fmt: skip
+    sets |= {"LIST": set(some), "ALSO": set(some).union(*sets.values()), "ODD": {k for k in elements if k % 2}}
+    found = read("\n".join(lines), "m.inp", whole=True)
+    got = {name.upper(): {file[e] for e in rows} for name, rows in names(found.mesh.groups).items()}
+    assert got == {name.upper(): whole & set(file) for name, whole in sets.items() if whole & set(file)}
+    middle = {(round(x, 6), round(y, 6)) for x, y in found.mesh.centroids()}
+    assert len(middle) == 3 * n and found.mesh.areas().sum() == pytest.approx(2 * n)
+
+
 def test_several_sections_of_nodes_and_an_included_file(read, tmp_path):
     (tmp_path / "more.inc").write_text("*NODE\n7, 2., 0.\n8, 2., 1.\n")
     text = (
@@ -217,6 +258,7 @@ def test_several_sections_of_nodes_and_an_included_file(read, tmp_path):
     )
     found = read(text, "m.inp", whole=True)
     assert len(found.mesh.points) == 6 and len(found.mesh.cells) == 2
+    assert [file.name for file in found.files] == ["m.inp", "more.inc"]  # nothing is written over these
     assert any("*MATERIAL" in note and "*BOUNDARY (2 times)" in note for note in found.notes)
     assert any("between the corners of 1 elements (CPS8R)" in note for note in found.notes)
 
@@ -357,7 +399,7 @@ def test_what_is_left_out_of_a_deck_is_named(read):
         "elements 900 of the set A",
         "nodes 900 of the set A",
         "ROUND",
-        "'BARS', which has no element that is read",
+        "sets without an element that is read: 'BARS'",
         "1 points of the set 'REF', which are of no element",
     ):
         assert any(said in note for note in found.notes), (said, found.notes)

@@ -184,6 +184,8 @@ def import_file(
     file = project.to_read(path)
     found = made_once(project.comm, lambda: imported.read(file, merge, scale, project.dim))
     mesh = found.mesh
+    for included in found.files:
+        project.to_read(str(included.absolute()))
     cells, points = (0, 0) if project.mesh is None else (len(project.mesh.cells), len(project.mesh.points))
     _add(project, mesh)
     for kind, sets, first in ((NODE, found.nodes, points), (FACE, found.faces, 4 * cells)):

@@ -98,13 +98,14 @@ class Entry:
 
 @dataclass
 class Scope:
-    """A part, an instance, or what stands outside of both (name ""). sets: by kind and name in capitals; others: the
-    elements of kinds that are left out; inner: sets that Abaqus/CAE has made for itself; turn, move: where the instance
-    has the points of its part."""
+    """A part, an instance, or what stands outside of both (name ""). seen: points of all elements so far; others: the
+    elements of kinds that are left out; sets: by kind and name in capitals; inner: sets that Abaqus/CAE has made for
+    itself; turn, move: where the instance has the points of its part."""
 
     name: str
     nodes: dict[int, tuple[float, ...]] = field(default_factory=dict)
     blocks: list[tuple[str, str, dict[int, list[int]]]] = field(default_factory=list)
+    seen: dict[int, list[int]] = field(default_factory=dict)
     others: set[int] = field(default_factory=set)
     sets: dict[tuple[str, str], list[Entry]] = field(default_factory=dict)
     spelled: dict[tuple[str, str], str] = field(default_factory=dict)
@@ -116,7 +117,14 @@ class Scope:
         """An instance of this part."""
         sets = {key: list(entries) for key, entries in self.sets.items()}
         return Scope(
-            name, dict(self.nodes), list(self.blocks), set(self.others), sets, dict(self.spelled), set(self.inner)
+            name,
+            dict(self.nodes),
+            list(self.blocks),
+            dict(self.seen),
+            set(self.others),
+            sets,
+            dict(self.spelled),
+            set(self.inner),
         )
 
     def add(self, kind: str, name: str, word: Keyword, entries: list[Entry]) -> None:
@@ -141,6 +149,7 @@ class _Reader:
         self.instances: dict[str, Scope] = {}
         self.assembled = False
         self.used: set[str] = set()
+        self.files: set[Path] = set()
         self.dropped: Counter[str] = Counter()
         self.kinds: dict[str, list[int]] = {}
         self.notes: list[str] = []
@@ -149,6 +158,7 @@ class _Reader:
 
     def read(self) -> FileMesh:
         for word in _keywords(self.path):
+            self.files |= {word.line.file, *(line.file for line in word.data[:1])}
             self._take(word)
         if not any(scope.nodes for scope in (self.root, *self.parts.values(), *self.instances.values())):
             raise HpcdemError(f"{self.path}: this is no Abaqus input file with points: nothing stands below *NODE")
@@ -220,7 +230,7 @@ class _Reader:
     def _elements(self, word: Keyword) -> None:
         label = word.get("TYPE").upper()
         kind, size = _kind(label)
-        known = {number: points for _, _, of in self.scope.blocks for number, points in of.items()}
+        known = self.scope.seen
         rows: dict[int, list[int]] = {}
         here = []
         data = iter(word.data)
@@ -240,9 +250,9 @@ class _Reader:
             points = [_whole(text, line) for text in row[1:]]
             if len(points) != size:
                 raise HpcdemError(f"{line.where}: element {number} has {len(points)} points, {label} has {size}")
-            if known.get(number, rows.get(number, points)) != points:
+            if known.setdefault(number, points) != points:
                 raise HpcdemError(f"{line.where}: element {number} is there already, with other points")
-            if number not in known:
+            if known[number] is points:
                 rows[number] = points
         if rows:
             self.scope.blocks.append((kind, label, rows))
@@ -319,6 +329,7 @@ class _Reader:
                 s.name: np.fromiter(self.numbers[s.name].values(), np.int64) for s in self.instances.values()
             }
         self._say()
+        made.files = sorted(self.files)
         return made
 
     def _name_sets(self, scopes: list[Scope], kind: str, into: dict[str, Any]) -> None:
@@ -517,7 +528,7 @@ def _kind(label: str) -> tuple[str, int]:
 
 def _number(text: str, line: Line) -> float:
     try:
-        value = float(text.upper().replace("D", "E"))
+        value = float(text if "d" not in text and "D" not in text else text.upper().replace("D", "E"))
     except ValueError:
         raise HpcdemError(f"{line.where}: a number was expected, not {text[:40]!r}") from None
     if not math.isfinite(value):
@@ -526,6 +537,8 @@ def _number(text: str, line: Line) -> float:
 
 
 def _whole(text: str, line: Line) -> int:
+    if text.isdecimal():
+        return int(text)
     value = _number(text, line)
     if value != int(value):
         raise HpcdemError(f"{line.where}: a whole number was expected, not {text[:40]}")

@@ -40,7 +40,7 @@ class FileMesh:
     """points (n, 3) in units of the file, point_ids (n,) their numbers in it; blocks; sets by name of elements
     (counted over all blocks), of points (rows) and of faces (each (m, 1 to 4) corners); notes: what was left out, in
     words; strict: its lines and surfaces are sides of its elements; parts: where the points and elements of each
-    instance of an assembly begin, and its name; instances: their elements."""
+    instance of an assembly begin, and its name; instances: their elements; files: that were read."""
 
     path: Path
     points: np.ndarray
@@ -53,6 +53,7 @@ class FileMesh:
     parts: list[tuple[int, int, str]] = field(default_factory=list)
     instances: dict[str, np.ndarray] = field(default_factory=dict)
     strict: bool = True
+    files: list[Path] = field(default_factory=list)
 
     @property
     def firsts(self) -> np.ndarray:

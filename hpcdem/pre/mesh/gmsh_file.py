@@ -31,6 +31,8 @@ TYPES = {number: (kind, points) for kind, of in _TYPES.items() for number, point
 """Kind and number of points by the number that Gmsh gives to a type of elements; corners come first."""
 READ = {"MeshFormat", "PhysicalNames", "Nodes", "ParametricNodes", "Elements", "Entities", "PartitionedEntities"}
 PASSED_OVER = {"Comments"}
+LOOK = 4096
+"""Lines that are read at once."""
 
 
 class _Text:
@@ -231,34 +233,54 @@ class _Reader:
             given.floats(dim if dim < 3 else 0)
 
     def _elements_2(self, given: _Text | _Binary, n: int) -> None:
-        known: dict[tuple, tuple[int, set[int]]] = {}
-        ids: list[int] = []
-        rows: list[tuple[int, ...]] = []
-        kind_before, done = -1, 0
+        tables: dict[int, list[np.ndarray]] = defaultdict(list)  # by type: place, number, group, entity, points
+        done = 0
         while done < n:
             if isinstance(given, _Text):
-                number, kind, n_tags = given.ints(3).tolist()
-                table = np.concatenate([[number], given.ints(n_tags + self._type(kind)[1])])[None]
+                kind, n_tags, table = self._run(given, n - done)
             else:
                 kind, follow, n_tags = given.ints(3).tolist()
                 table = given.ints(follow * (1 + n_tags + self._type(kind)[1])).reshape(follow, -1)
+            tags = np.zeros((len(table), 2), np.int64)
+            tags[:, : min(n_tags, 2)] = table[:, 1 : 1 + min(n_tags, 2)]
+            place = np.arange(done, done + len(table))
+            tables[kind].append(
+                np.column_stack([place, table[:, 0], np.abs(tags[:, 0]), tags[:, 1], table[:, 1 + n_tags :]])
+            )
             done += len(table)
-            if kind != kind_before:
-                self._block(kind_before, ids, rows)
-                kind_before, ids, rows = kind, [], []
-            for row in table.tolist():
-                group, entity = abs(row[1]) if n_tags else 0, row[2] if n_tags > 1 else 0
-                points = tuple(row[1 + n_tags :])
-                element, groups = known.get((kind, entity, points), (-1, set()))
-                if element < 0 or group in groups:
-                    element, groups = self.count + len(ids), set()
-                    known[kind, entity, points] = element, groups
-                    ids.append(row[0])
-                    rows.append(points)
-                groups.add(group)
+        whole = {kind: np.concatenate(parts) for kind, parts in tables.items()}
+        same = np.arange(done)  # the place of the element that a line is of
+        of_kind = np.zeros(done, np.int64)
+        for kind, table in whole.items():
+            _, first, back = np.unique(table[:, 3:], axis=0, return_index=True, return_inverse=True)
+            lead = np.column_stack([table[first[back.reshape(-1)], 0], table[:, 2]])
+            once = np.unique(lead, axis=0, return_index=True)[1]  # twice in one group it is another element
+            same[table[once, 0]] = lead[once, 0]
+            of_kind[table[:, 0]] = kind
+        kept = same == np.arange(done)
+        element = (self.count + np.cumsum(kept) - 1)[same]
+        for kind, table in whole.items():
+            for group in np.unique(table[:, 2]).tolist():
                 if group:
-                    self.groups[_dim(kind), group].append(np.array([element]))
-        self._block(kind_before, ids, rows)
+                    self.groups[_dim(kind), group].append(element[table[table[:, 2] == group, 0]])
+        places = np.flatnonzero(kept)
+        for run in np.split(places, np.flatnonzero(np.diff(of_kind[places])) + 1):
+            if len(run):
+                table = whole[int(of_kind[run[0]])]
+                rows = table[np.searchsorted(table[:, 0], run)]
+                self._block(int(of_kind[run[0]]), rows[:, 1], rows[:, 4:])
+
+    def _run(self, given: _Text, most: int) -> tuple[int, int, np.ndarray]:
+        """Type and number of tags of the next lines that have the same, and these (k, number, tags and points)."""
+        kind, n_tags = given.ints(3)[1:].tolist()
+        given.at -= 3
+        width = 3 + n_tags + self._type(kind)[1]
+        most = min(most, LOOK, (len(given.values) - given.at) // width)
+        table = given.ints(max(most, 1) * width).reshape(-1, width)
+        other = np.flatnonzero((table[:, 1] != kind) | (table[:, 2] != n_tags))
+        k = int(other[0]) if len(other) else len(table)
+        given.at -= (len(table) - k) * width
+        return kind, n_tags, table[:k, [0, *range(3, width)]]
 
     # ---- both --------------------------------------------------------------------------------------------------
 

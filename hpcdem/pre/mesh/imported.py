@@ -35,12 +35,13 @@ Sets = dict[str, dict[str, np.ndarray]]
 @dataclass(frozen=True)
 class Imported:
     """A mesh, with its groups of elements; set -> group -> numbers of its nodes and of its faces; notes: what else the
-    file held, or was changed."""
+    file held, or was changed; files: that were read with it."""
 
     mesh: Mesh
     nodes: Sets = field(default_factory=dict)
     faces: Sets = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
 
 
 def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2) -> Mesh:
@@ -67,12 +68,12 @@ def read(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2)
     if len(bad):
         raise data.refuse(f"point {data.point(bad[0])} is not finite: {data.points[bad[0]].tolist()}")
     notes = list(data.notes)
-    _straightened(data, notes)
+    between = _straightened(data, notes)
     _refuse_kinds(data, dim)
     points = (data.points if dim == 3 else _plane(data)) * scale
     number = _merged(points, merge) if merge > 0.0 else np.arange(len(points))
     own, place = (_in_space if dim == 3 else _in_plane)(data, points, number, merge)
-    return _with_names(data, own, place, notes)
+    return _with_names(data, own, place, between, notes)
 
 
 @dataclass(frozen=True)
@@ -144,8 +145,9 @@ def _used(n: int, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 # ---- names of parts ------------------------------------------------------------------------------------------------
 
 
-def _with_names(data: FileMesh, own: _Own, place: np.ndarray, notes: list[str]) -> Imported:
-    """The mesh with groups and layers; place (points of the file,): their rows in the mesh, -1: none."""
+def _with_names(data: FileMesh, own: _Own, place: np.ndarray, between: np.ndarray, notes: list[str]) -> Imported:
+    """The mesh with groups and layers; place (points of the file,): their rows in the mesh, -1: none; between: points
+    that straight elements have lost."""
     mesh, dim = own.mesh, own.mesh.dim
     check(mesh, str(data.path), own.names)
     kinds = np.concatenate([np.full(len(b.rows), DIMENSIONS[b.kind]) for b in data.blocks])
@@ -160,10 +162,11 @@ def _with_names(data: FileMesh, own: _Own, place: np.ndarray, notes: list[str]) 
             sides.setdefault(name, []).append(block.rows[at])
         for block, at in _by_block(data, numbers[kinds[numbers] < dim - 1]):
             nodes.setdefault(name, []).append(block.rows[at].ravel())
-        if not len(numbers):
-            notes.append(f"the set '{name}', which has no element that is read")
+    empty = [f"'{name}'" for name, numbers in data.element_sets.items() if not len(numbers)]
+    if empty:
+        notes.append(f"sets without an element that is read: {listed(empty)}")
     for name, rows in data.node_sets.items():
-        nodes.setdefault(name, []).append(rows)
+        nodes.setdefault(name, []).append(rows[~np.isin(rows, between)])
     edges = mesh.edges()
     layers: dict[str, np.ndarray] = {}
     faces: dict[str, np.ndarray] = {}
@@ -195,6 +198,7 @@ def _with_names(data: FileMesh, own: _Own, place: np.ndarray, notes: list[str]) 
         _in_sets(at_nodes, len(mesh.points)),
         _in_sets(faces, 4 * len(mesh.cells)),
         notes,
+        data.files,
     )
 
 
@@ -283,17 +287,22 @@ def _by_meshio(path: Path) -> FileMesh:
     return made
 
 
-def _straightened(data: FileMesh, notes: list[str]) -> None:
-    """Elements of second order keep their corners."""
+def _straightened(data: FileMesh, notes: list[str]) -> np.ndarray:
+    """Elements of second order keep their corners. The points (rows) that only they had between them."""
+    count: dict[str, int] = {}
+    between, corners = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
     for k, block in enumerate(data.blocks):
-        n = CORNERS.get(block.kind)
-        if n is None or block.rows.shape[1] <= n:
-            continue
-        data.blocks[k] = Block(block.kind, block.rows[:, :n], block.ids, block.label)
-        if DIMENSIONS[block.kind] > 1:
-            notes.append(
-                f"points between the corners of {len(block.ids)} elements ({block.label}): their edges are straight"
-            )
+        n = CORNERS.get(block.kind, block.rows.shape[1])
+        corners.append(block.rows[:, :n].ravel())
+        if block.rows.shape[1] > n:
+            between.append(block.rows[:, n:].ravel())
+            data.blocks[k] = Block(block.kind, block.rows[:, :n], block.ids, block.label)
+            if DIMENSIONS[block.kind] > 1:
+                count[block.label] = count.get(block.label, 0) + len(block.ids)
+    notes += [
+        f"points between the corners of {n} elements ({kind}): their edges are straight" for kind, n in count.items()
+    ]
+    return np.setdiff1d(np.concatenate(between), np.concatenate(corners))
 
 
 def _refuse_kinds(data: FileMesh, dim: int) -> None:
