@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from hpcdem.physics.fdem import changes, convergence, diagnostics
+from hpcdem.physics.fdem import changes, convergence, creep, diagnostics
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA, softening
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks import models
@@ -150,15 +150,20 @@ def test_the_account_does_not_change_the_run():
     assert math.isfinite(float(np.nansum(ends[0])))
 
 
-@pytest.mark.parametrize("damping", ["viscous", "rayleigh"])
+@pytest.mark.parametrize("damping", ["viscous", "rayleigh", "creep"])
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 def test_small_strains_close_to_rounding(kind, damping):
     """Their forces are those of an energy, on the shape of the mesh: of a soft cantilever that swings far, all that
     damping does not take is there."""
     sim = Blocks()
     sim.take_mesh(shaken(rectangle(6, 3, 1.0, 0.5, kind=kind), 0.2))
-    soft = {"density": 2500.0, "young": 1e7, "poisson_ratio": 0.25, "damp_factor": 0.3 * (damping == "viscous")}
-    changes.element_model(sim, None, "mech_iso_elastic", soft)
+    soft = {"density": 2500.0, "damp_factor": 0.3 * (damping == "viscous")}
+    if damping == "creep":
+        units = {"maxwell_viscosity": 4e5, "kelvin_shear": 4e6, "kelvin_viscosity": 2e5}
+        changes.element_model(sim, None, "mech_burgers", {**soft, **units, "bulk": 6.7e6, "maxwell_shear": 4e6})
+        creep.switch(sim, True)
+    else:
+        changes.element_model(sim, None, "mech_iso_elastic", {**soft, "young": 1e7, "poisson_ratio": 0.25})
     sim.option(large_strain=False, collision=False)
     if damping == "rayleigh":
         sim.rayleigh(0.1, 30.0)
@@ -170,5 +175,5 @@ def test_small_strains_close_to_rounding(kind, damping):
     convergence.advance(sim, 600)
     found = diagnostics.energies(sim)
     assert np.abs(diagnostics.values(sim, "displacement_y")).max() > 0.02
-    assert found["viscous_lost"] > 0.1 * given
+    assert found["viscous_lost"] + found["creep_lost"] > 0.1 * given
     assert found["relative"] < 1e-12, found

@@ -158,6 +158,8 @@ def test_a_stop_in_mid_injection_changes_nothing(tmp_path, monkeypatch, reason) 
     for name in ("pressure", "saturation", "fluid"):
         one, other = (Flow.of(rock.blocks).values("flow-node", name) for rock in (straight, again))
         assert np.array_equal(one, other)
+    for folder in ("a", "b"):
+        assert len((tmp_path / folder / "data" / "cracks.csv").read_text().splitlines()) == 1 + counts[2]
     at = np.flatnonzero((again.blocks.mesh.points == 0.0).all(axis=1))
     assert again["pcdc"].history("p")[-1, 2] == Flow.of(again.blocks).values("flow-node", "pressure", at)[0] > 1e6
     one, other = (rock["pcdc"].history("p") for rock in (straight, again))

@@ -65,6 +65,18 @@ def test_a_joint_that_is_pumped_open() -> None:
     assert errors[0] < 0.02 and errors[1] < 0.004
 
 
+@pytest.mark.parametrize("kind", ["cross", "mixed"])
+def test_what_fluid_does_on_triangles(kind: str) -> None:
+    """What was pumped in, and is neither lost by the flow nor stored in the fluid, was done on the blocks."""
+    sim, flow = plate(10, kind=kind)
+    equilibrium.solve_elastic(sim)
+    flow.prescribe(at(sim, 0.0, 0.0), kernels.RATE, 1e-5)
+    over(sim, 5.0, 10)
+    found = flow.energies()
+    assert found["pushed"] == pytest.approx(found["pumped"] - found["viscous"] - found["fluid"], rel=0.03)
+    assert found["pushed"] == pytest.approx(found["strain"] + found["joints"] + found["fracture"], rel=0.03)
+
+
 def test_flow_through_a_line_loses_what_comes_in() -> None:
     """Blocks stand still, steady: rate times the difference of pressures. Work of the conditions at both ends."""
     sim, flow = line(10, 1.0)

@@ -418,9 +418,9 @@ def test_all_of_it_at_once_is_that_of_small_explicit_steps() -> None:
 LENGTH, HEIGHT = 4.0, 2.0
 
 
-def plate(cells: int = 20, pressed: float = 1e6) -> tuple[Blocks, Flow]:
+def plate(cells: int = 20, pressed: float = 1e6, kind: str = "quad") -> tuple[Blocks, Flow]:
     """Two halves of a block, pressed together, with an open crack between them all along; held above and below."""
-    mesh = rectangle(cells, cells // 2, LENGTH, HEIGHT, y0=-0.5 * HEIGHT, kind="quad")
+    mesh = rectangle(cells, cells // 2, LENGTH, HEIGHT, y0=-0.5 * HEIGHT, kind=kind)
     sim = model(mesh)
     joints = near(mesh, 1, 0.0, inner=True)
     joints = np.unique(np.minimum(joints, sim.partner[joints]))

@@ -178,6 +178,7 @@ def solve_hydraulic(
             f"iterations, {count.unknowns} unknowns, {count.solver}, {duration(clocks.monotonic() - began)}"
         )
     histories.flush(project)
+    cracks.flush(project)  # joints that broke became free faces at the end
     frames.settle(project)
 
 

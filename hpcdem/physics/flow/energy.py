@@ -39,7 +39,8 @@ def of_blocks(
     equilibrium.place_corners(sim, a)
     way = sim.x.copy()
     equilibrium.place_corners(sim, b)
-    way = sim.x - way  # with the time step 1 of the static mode a velocity
+    # With the time step 1 of the static mode a velocity; rows of triangles have fewer columns for these.
+    way = np.ascontiguousarray((sim.x - way)[:, : sim.v.shape[1]])
     shown = fluid.flow.state.copy()
 
     def done(state: np.ndarray | float, points: np.ndarray, weights: np.ndarray) -> dict[str, float]:
