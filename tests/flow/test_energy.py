@@ -68,13 +68,13 @@ def test_a_joint_that_is_pumped_open() -> None:
 @pytest.mark.parametrize("kind", ["cross", "mixed"])
 def test_what_fluid_does_on_triangles(kind: str) -> None:
     """What was pumped in, and is neither lost by the flow nor stored in the fluid, was done on the blocks."""
-    sim, flow = plate(10, kind=kind)
+    sim, flow = plate(12, kind=kind)
     equilibrium.solve_elastic(sim)
     flow.prescribe(at(sim, 0.0, 0.0), kernels.RATE, 1e-5)
     over(sim, 5.0, 10)
     found = flow.energies()
     assert found["pushed"] == pytest.approx(found["pumped"] - found["viscous"] - found["fluid"], rel=0.03)
-    assert found["pushed"] == pytest.approx(found["strain"] + found["joints"] + found["fracture"], rel=0.03)
+    assert found["pushed"] == pytest.approx(found["strain"] + found["joints"] + found["fracture"], rel=0.06)
 
 
 def test_flow_through_a_line_loses_what_comes_in() -> None:
