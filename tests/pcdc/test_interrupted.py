@@ -10,6 +10,9 @@ import pytest
 from hpcdem.commands.fdem import checkpoints
 from hpcdem.core.errors import StoppedWithCheckpoint
 from hpcdem.io import checkpoint
+from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem.kernels.joints import BROKEN
+from hpcdem.physics.flow.model import Flow
 from hpcdem.runtime.stop_requests import AUTO, NONE, STOP, StopRequests
 from tests.pcdc.test_time import Rock
 from tests.pcdc.test_whole import tables
@@ -60,6 +63,20 @@ pcdc well create 'w' range x 1 1 y 0.3 0.7
 pcdc well stage 'w' rate 1e-5 time 0.4 limit 8e5
 pcdc well stage 'w' shut-in
 pcdc model solve hydraulic time 0.8 dt 0.1
+""",
+    "tetrahedra": f"""
+pcdc model new dim 3
+pcdc mesh structured (0,0,0) (0.6,0.4,0.4) cells 3 2 2
+{ROCK}
+pcdc face-joint c-model c-i-c-i property friction 30 cohesion 1e8 tensile-strength 1e6 gf1 2 gf2 20 \\
+    penalty-normal 5e12 range z 0.2 0.2
+{WATER} range z 0.2 0.2
+pcdc node boundary mech-vel-b-c velocity-x 0 velocity-y 0 velocity-z 0 range z 0 0
+pcdc node boundary mech-vel-b-c velocity-x 0 velocity-y 0 velocity-z 0 range z 0.4 0.4
+pcdc model option dynamic off
+SEEN
+pcdc node boundary hydra-c-f-b flow-rate 1e-6 range x 0 0 y 0 0 z 0.2 0.2
+pcdc model solve hydraulic time 2 dt 0.2
 """,
     "flow alone": f"""
 pcdc mesh structured (0,0) (4,2) cells 8 4
@@ -212,3 +229,19 @@ def test_checkpoints_change_nothing(tmp_path: Path, name: str) -> None:
     assert_alike(straight, stopped)
     if "crack" in name or "breaks" in name:
         assert len((straight / "data" / "cracks.csv").read_text().splitlines()) >= 4
+
+
+def test_a_checkpoint_in_the_middle_is_a_model_of_its_own(tmp_path: Path) -> None:
+    """Restored by name, and not gone on with, it is what the command leaves that was stopped there: broken joints that
+    press on each other meanwhile are free faces."""
+    with pytest.raises(StoppedWithCheckpoint) as stop:
+        done(tmp_path, SCRIPTS["a crack in contact"], asking := Asking(STOP, 20))
+    (path,) = (tmp_path / "data").glob("*.sav")
+    assert asking.looks == 20 and path.name in str(stop.value)
+    rock = Rock(tmp_path / "again", "")(f"pcdc model restore '{path}'\n")
+    restored, flow = rock.blocks, Flow.of(rock.blocks)
+    assert not flow.implicit and flow.condensed is None
+    assert diagnostics.joint_counts(restored)[2] == len(restored.event_rows) > 2
+    assert not (restored.local.slot_state == BROKEN).any() and restored.slid and restored.open.any()
+    rock("pcdc model solve hydraulic time 0.2 dt 0.1\n")
+    assert not flow.implicit
