@@ -76,7 +76,7 @@ def refused(call: Callable[[], Any]) -> tuple[int, str]:
 
 
 def test_python_and_commands(viewing: Viewing):
-    assert talk(viewing, "1 + 1", language="pcdc") == ["2"]
+    assert talk(viewing, "1 + 1", language="pcdc")[-1] == "2"  # kernels may be compiled before
     assert talk(viewing, "a = 3\nb = 4") == [] and talk(viewing, "a * b") == ["12"]
     assert talk(viewing, "pcdc modle new")[0].startswith("console 4:1: pcdc modle new: read 'modle'")
     assert "ZeroDivisionError" in talk(viewing, "1 / 0")[-1]
