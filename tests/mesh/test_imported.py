@@ -147,6 +147,8 @@ def test_refused_with_file_and_element(read, name):
         msh(SQUARES, TWO)[:-60],
         msh(SQUARES, TWO).replace("2.2 0 8", "9.9 0 8"),
         msh(SQUARES, [(2, 1, 1, 2, 55)]),
+        msh(SQUARES, TWO).replace("$Elements\n4", "$Elements\n3"),
+        msh(SQUARES, TWO).replace("$Nodes\n7", "$Nodes\n99999999999"),
     ],
 )
 def test_broken_files(read, capfd, text):
@@ -187,6 +189,7 @@ DECKS = {
     "bars first": ("*ELEMENT, TYPE=T2D2, ELSET=BARS\n1, 10, 20\n2, 20, 30\n" + QUADS.format(", ELSET=A", ", ELSET=B"),
                    {"A": [0], "B": [1]}, {}),
     "generated, with gaps": (QUADS.format("", "") + "*ELSET, ELSET=G, GENERATE\n50, 250, 50\n", {"G": [0, 1]}, {}),
+    "generated, to any": (QUADS.format("", "") + "*ELSET, ELSET=G, GENERATE\n2, 4000000000\n", {"G": [0, 1]}, {}),
     "sets of sets, the later first": (
         QUADS.format(", ELSET=A", ", ELSET=B")
         + "*ELSET, ELSET=TOP\nMID,\n*ELSET, ELSET=MID\nA, 200\n*ELSET, ELSET=TOP\nTOP\n",
@@ -261,6 +264,7 @@ def test_several_sections_of_nodes_and_an_included_file(read, tmp_path):
     assert [file.name for file in found.files] == ["m.inp", "more.inc"]  # nothing is written over these
     assert any("*MATERIAL" in note and "*BOUNDARY (2 times)" in note for note in found.notes)
     assert any("between the corners of 1 elements (CPS8R)" in note for note in found.notes)
+    assert any("the plane stress of CPS8R" in note for note in found.notes)
 
 
 PARTS = """*PART, NAME=BLOCK
@@ -362,6 +366,15 @@ def test_what_a_deck_lacks_is_said_with_its_line(read, name):
     text, said = BAD_DECKS[name]
     with pytest.raises(HpcdemError, match=said):
         read(STRIP + text, "m.inp")
+
+
+def test_surfaces_through_hexahedra_are_none_of_their_sides(read):
+    """Shells on the top, and across the middle, of a cube."""
+    cube = PARTS[PARTS.index("*NODE") : PARTS.index("*NSET")]
+    found = read(cube + "*ELEMENT, TYPE=S4R, ELSET=SKIN\n2, 5, 6, 7, 8\n3, 1, 3, 7, 5\n", "m.inp", dim=3, whole=True)
+    (rows,) = (np.array(rows) for rows in names(found.faces).values())
+    assert len(rows) == 2 and np.allclose(found.mesh.points[found.mesh.face_points(rows)][..., 2], 1.0)
+    assert any("2 surfaces of the group 'SKIN' are not faces" in note for note in found.notes)
 
 
 def test_sets_become_groups_of_the_model(tmp_path):

@@ -89,7 +89,7 @@ class Entry:
     """What an entry of a set names: numbers, or another set; nodes_of: the points of that set of elements; instance:
     whose; side: of a surface."""
 
-    value: np.ndarray | str
+    value: np.ndarray | range | str
     line: Line
     instance: str = ""
     nodes_of: bool = False
@@ -270,7 +270,7 @@ class _Reader:
                 first, last, step = ([_whole(text, line) for text in row] + [1])[:3] if len(row) > 1 else (0, 0, 0)
                 if step < 1 or last < first:
                     raise HpcdemError(f"{line.where}: GENERATE needs a first and a last number, and a step above 0")
-                entries.append(Entry(np.arange(first, last + 1, step), line, instance))
+                entries.append(Entry(range(first, last + 1, step), line, instance))
             else:
                 entries += [Entry(_number_or_name(text), line, instance) for text in row]
         self.scope.add(word.name, word.get(word.name), word, entries)
@@ -377,11 +377,11 @@ class _Reader:
                     raise HpcdemError(f"{entry.line.where}: there is no *{of_kind} '{entry.value}'")
                 found = self._members(of, of_kind, value, lost, above)
             else:
-                found = self._numbered(of, of_kind, value, lost if len(value) == 1 else [])
+                found = self._numbered(of, of_kind, value, lost)
             out.append(self._points_of(found) if entry.nodes_of else found)
         return np.unique(np.concatenate(out))
 
-    def _target(self, scope: Scope, entry: Entry) -> tuple[Scope, np.ndarray | str]:
+    def _target(self, scope: Scope, entry: Entry) -> tuple[Scope, np.ndarray | range | str]:
         """Whose numbers, or whose set (in capitals), an entry names: `7`, `SET`, `INSTANCE.7`, `INSTANCE.SET`."""
         value = entry.value
         of = self._instance_named(entry.instance, entry) if entry.instance else scope
@@ -396,9 +396,12 @@ class _Reader:
             raise HpcdemError(f"{entry.line.where}: there is no instance {name}")
         return self.instances[name.upper()]
 
-    def _numbered(self, scope: Scope, kind: str, numbers: np.ndarray, lost: list[int]) -> np.ndarray:
+    def _numbered(self, scope: Scope, kind: str, numbers: np.ndarray | range, lost: list[int]) -> np.ndarray:
         table = self.rows[scope.name] if kind == NODES else self.numbers[scope.name]
-        named = numbers.tolist()
+        if isinstance(numbers, range):  # it may have gaps, and be as long as it likes
+            named = [n for n in table if n in numbers]
+        else:
+            named = numbers.tolist()
         lost += [n for n in named if n not in table and (kind == NODES or n not in scope.others)]
         return np.array([table[n] for n in named if n in table], np.int64)
 
@@ -449,6 +452,10 @@ class _Reader:
 
     def _say(self) -> None:
         notes = self.made.notes
+        for begins, what in (("CPS", "plane stress"), ("CAX", "rotational symmetry"), ("CGAX", "rotational symmetry")):
+            labels = dict.fromkeys(block.label for block in self.made.blocks if block.label.startswith(begins))
+            if labels and all(DIMENSIONS.get(block.kind) == 2 for block in self.made.blocks):
+                notes.append(f"the {what} of {', '.join(labels)}: blocks of the plane are in plane strain")
         for label, numbers in self.kinds.items():
             notes.append(f"{len(numbers)} elements of type {label} ({listed(numbers)})")
         notes += dict.fromkeys(self.notes)
@@ -505,6 +512,8 @@ def _with_files(word: Keyword, depth: int) -> Iterator[Keyword]:
         raise HpcdemError(f"{word.line.where}: files within files, deeper than {DEEPEST}")
     file = word.line.file.parent / named
     if word.name == "INCLUDE":
+        if not file.is_file():
+            raise HpcdemError(f"{word.line.where}: there is no file {file}")
         yield from _keywords(file, depth + 1)
         return
     try:

@@ -147,6 +147,8 @@ class _Reader:
                 else:
                     text = _Text(section)
                     take(text, int(text.ints(1)[0]) if self.version < 3.0 else 0)
+                    if text.at < len(text.values):
+                        raise HpcdemError(f"{self.path}: ${name} has more lines than its head says")
             except (EOFError, ValueError, IndexError, MemoryError):
                 raise HpcdemError(
                     f"{self.path}: ${name} ends too early, or holds something that is not a number of Gmsh's format"

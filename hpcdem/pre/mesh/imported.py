@@ -174,6 +174,8 @@ def _with_names(data: FileMesh, own: _Own, place: np.ndarray, between: np.ndarra
         given = _cut([place[rows] for rows in of if len(rows)], dim)
         rows = mesh.find_edges(edges, given)
         lost = (given < 0).any(axis=1) | (rows < 0)
+        if len(mesh.hexes):  # a surface through a hexahedron is none of its sides
+            lost |= mesh.inside_hexes(edges.faces[rows, 0])
         if lost.any():
             what = "lines" if dim == 2 else "surfaces"
             said = f"{what} of the group '{name}' are not {'edges' if dim == 2 else 'faces'} of the elements"
@@ -312,7 +314,7 @@ def _refuse_kinds(data: FileMesh, dim: int) -> None:
         kinds[block.label] = kinds.get(block.label, 0) + len(block.rows)
         if DIMENSIONS.get(block.kind, 4) > dim:
             can = ("triangles and quads can be used in two dimensions" if dim == 2 else
-                   "tetrahedra and hexahedra can be used in three")  # fmt: skip
+                   "tetrahedra and hexahedra can be used in three dimensions")  # fmt: skip
             three = "; model new dim 3 makes a model for it" if dim == 2 and DIMENSIONS.get(block.kind) == 3 else ""
             name = IN_WORDS.get(block.kind, f"elements of type '{block.label}'")
             raise data.refuse(
@@ -321,7 +323,9 @@ def _refuse_kinds(data: FileMesh, dim: int) -> None:
     if not any(DIMENSIONS[block.kind] == dim for block in data.blocks):
         lacks = "no triangles and no quads" if dim == 2 else "no tetrahedra and no hexahedra"
         held = ", ".join(f"{n} of {label}" for label, n in kinds.items()) or "none at all"
-        raise data.refuse(f"there are {lacks} (elements: {held})")
+        plane = dim == 3 and any(DIMENSIONS[block.kind] == 2 for block in data.blocks)
+        advice = "; model new dim 2 makes a model for these" * plane
+        raise data.refuse(f"there are {lacks} (elements: {held}){advice}")
 
 
 def _plane(data: FileMesh) -> np.ndarray:
