@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 LONGEST_WAIT = 64
 """Most steps between two checks of how far anyone has gone."""
+GLANCE = 10
+"""Steps between two glances: looks that change nothing unless somebody has sped up since the last check."""
 
 
 @dataclass
@@ -19,6 +21,14 @@ class CheckInterval:
         """One step more; whether a check is due."""
         self.countdown -= 1
         return self.countdown <= 0
+
+    def glances(self) -> bool:
+        """Whether somebody glances at this step, which is none of a check."""
+        return self.countdown % GLANCE == 0
+
+    def is_too_late(self, room: float, stride: float) -> bool:
+        """Whether so much room [m] is used up at this stride [m] per step before the next glance or check."""
+        return stride * min(GLANCE, self.countdown) > room
 
     def wait(self, *limits: float) -> None:
         """The next check comes after at most so many steps, at least one, and at most twice the last wait."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hpcdem.core import rebuild
 from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.kernels import detect
 from hpcdem.physics.fdem.simulation import Blocks
@@ -136,3 +137,17 @@ def test_rubble_without_friction_and_damping_keeps_its_energy():
         assert found["kinetic"] + found["strain"] < 1.02 * start
     assert most > 0.2 * start  # they did meet
     assert least > -0.01 * start
+
+
+@pytest.mark.parametrize("glances, late", [(True, 0), (False, 1)])
+def test_who_speeds_up_between_two_looks_is_seen(monkeypatch, glances, late):
+    """A body that is set in motion unseen, by half the skin of the lists in thirty steps: they are made again in time,
+    as somebody glances every few steps."""
+    if not glances:
+        monkeypatch.setattr(rebuild, "GLANCE", 10**9)
+    sim = model(rectangle(2, 2, 0.2, 0.2))
+    convergence.advance(sim, 3)
+    sim.rebuild_state.countdown = 60
+    sim.v[:, 0::2] = sim.rebuild_state.skin / (60.0 * sim.clock.dt)
+    convergence.advance(sim, 61)
+    assert sim.rebuild_state.late == late

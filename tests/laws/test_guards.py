@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.dem import cycles, particles, properties, settings, walls
+from hpcdem.core import rebuild
 from hpcdem.core.errors import PhysicsError
 from hpcdem.physics.dem import diagnostics, simulation
 from hpcdem.runtime.progress import Log
@@ -88,7 +89,7 @@ def test_who_runs_away_through_the_box_between_two_looks_stops_the_run(tmp_path,
     cycles.cycle(sim, 1)
     sim.particles["vx"][sim.particles["gid"] == 0], sim.rebuild_state.countdown = (
         speed,
-        simulation.GLANCE - 1,
+        rebuild.GLANCE - 1,
     )  # nobody has told it to look, or to glance
     for _ in range(5):
         sim.step()
@@ -113,7 +114,7 @@ def test_who_is_nowhere_is_not_thought_to_have_left(tmp_path):
 
 def meeting(folder, monkeypatch, glance: int, speed: float, walled: bool = False):
     """Two discs 0.9 skins apart, or one and a wall as far away; they are set in motion between two looks, unseen."""
-    monkeypatch.setattr(simulation, "GLANCE", glance)
+    monkeypatch.setattr(rebuild, "GLANCE", glance)
     sim, _ = crowd(folder, [], dt=1e-3)
     gap = 0.9 * simulation.NARROW
     particles.ball(sim, 0, 0.0, 0.0, 1.0)
@@ -132,7 +133,7 @@ def meeting(folder, monkeypatch, glance: int, speed: float, walled: bool = False
 def test_who_speeds_up_between_two_looks_is_seen(tmp_path, monkeypatch):
     """The lists are there before the contact is, as somebody glances every few steps; nothing is late."""
     for walled in (False, True):
-        sim = meeting(tmp_path, monkeypatch, simulation.GLANCE, 25.0, walled)
+        sim = meeting(tmp_path, monkeypatch, rebuild.GLANCE, 25.0, walled)
         for _ in range(64):
             sim.step()
         assert sim.rebuilds > 1 and diagnostics.survey(sim).deepest > 0.1

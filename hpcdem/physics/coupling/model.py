@@ -27,7 +27,7 @@ from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import EMPTIED
 from hpcdem.physics.dem.kernels import laws, motion
 from hpcdem.physics.dem.kernels.neighbours import NO_ROWS
-from hpcdem.physics.dem.simulation import GLANCE, Simulation
+from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.fdem import build
 from hpcdem.physics.fdem import diagnostics as of_blocks
 from hpcdem.physics.fdem.simulation import Blocks
@@ -112,7 +112,7 @@ class Coupled(SurfaceLoad):
         due = self._check_interval.passed()
         if not self._link_holds():
             self._connect()
-        elif (due or self._check_interval.countdown % GLANCE == 0) and self._check_rebuild(glance=not due):
+        elif (due or self._check_interval.glances()) and self._check_rebuild(glance=not due):
             self._connect()
         self._interact()
         if books:
@@ -212,7 +212,7 @@ class Coupled(SurfaceLoad):
             self._stop_on_breakthrough(int(found[4]))
         path_d, speed_d, path_b, speed_b = np.sqrt(found[:4]).tolist()
         room, stride = link.room - path_d - path_b, (speed_d + speed_b) * dt
-        if glance and room >= stride * (min(GLANCE, self._check_interval.countdown) + 2):
+        if glance and not self._check_interval.is_too_late(room - 2.0 * stride, stride):
             return False
         self.late += room < 0.0
         self._check_interval.wait(0.5 * max(room, 0.0) / stride if stride > 0.0 else math.inf)

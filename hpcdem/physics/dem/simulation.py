@@ -41,8 +41,6 @@ from hpcdem.runtime.run_folder import Retention
 
 NARROW, WIDE = 0.3, 0.6
 """Skin over the largest radius, at rest and in fast motion."""
-GLANCE = 10
-"""Steps between two looks at the motion at which nothing is changed unless somebody has sped up since the last one."""
 SHORT_LIVED, LONG_LIVED = 60, 200
 """Lists that lasted fewer steps call for the wide skin, more steps for the narrow one."""
 EVERYWHERE = (-math.inf, math.inf, -math.inf, math.inf)
@@ -205,7 +203,7 @@ class Simulation(Model):
                 self.walls.move(self.clock.dt)
         self.rebuild_state.age += 1
         stale, look = False, self.rebuild_state.passed()
-        if look or self.rebuild_state.countdown % GLANCE == 0:
+        if look or self.rebuild_state.glances():
             with timers("reduce"):
                 stale, request = self._check_rebuild(glance=not look)
         with timers("halo"):
@@ -273,9 +271,9 @@ class Simulation(Model):
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
         stride = max(math.sqrt(found[motion.SPEED2]), self._wall_speed()) * dt
         room = 0.5 * rebuild_state.skin - path
-        if glance:
-            ahead = min(GLANCE, rebuild_state.countdown)
-            if stride * ahead <= room and found[5 + fast.DUE] == 0.0 and found[5 + fast.HURRY] * ahead <= 2.0:
+        if glance and not rebuild_state.is_too_late(room, stride) and found[5 + fast.DUE] == 0.0:
+            hurry = found[5 + fast.HURRY]  # half the room over the stride, of the fast ones
+            if hurry == 0.0 or not rebuild_state.is_too_late(2.0 / hurry, 1.0):
                 return False, 0
         if (room < 0.0 and self.largest_radius > 0.0) or found[5 + fast.DUE] == fast.LATE:
             with self.timers("neighbour"):

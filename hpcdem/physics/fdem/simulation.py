@@ -273,7 +273,8 @@ class Blocks(State):
         rebuild_state.age += 1
         rebuild_state.stored += 1
         stale = outdated = False
-        if rebuild_state.passed():
+        look = rebuild_state.passed()
+        if look or (self.options.collision and rebuild_state.glances() and self._has_sped_up()):
             with timers("reduce"):
                 try:
                     stale, outdated, request = self._check_rebuild()
@@ -351,19 +352,33 @@ class Blocks(State):
         kernel = of.drift if self.threads == 1 else of.drift_threaded
         kernel(self.threads, self.n_left + first, self.n_left + last, self.x, self.v, self.clock.dt)
 
+    def _survey(self, places: np.ndarray, out: np.ndarray) -> None:
+        """How far the elements of this rank have gone from these places, and how fast they are, into out."""
+        if self.dim == 3:
+            space.survey(self.x, self.v, places, self.n_left, self.n_own, out)
+        else:
+            cells = self.the_mesh().cells
+            build.survey(self.x, self.v, places, self.n_left, self.n_own, cells, self.number, out)
+
+    def _has_sped_up(self) -> bool:
+        """A glance between two looks: whether the next one might come too late for the contact lists. Collective."""
+        found = np.zeros(4)
+        with self.timers("reduce"):
+            self._survey(self.listed, found)
+            self.comm.max_into(found)
+        room = 0.5 * self.rebuild_state.skin - math.sqrt(found[0])
+        return self.rebuild_state.is_too_late(room, math.sqrt(found[1]) * self.clock.dt)
+
     def _check_rebuild(self) -> tuple[bool, bool, int]:
         """How far has anyone gone since the lists were built? Sets the step of the next look.
 
         Returns whether contact lists, and whether the storage has to be made again now, and the outside's request. All
         ranks get the same answers.
         """
-        rebuild_state, cells = self.rebuild_state, self.the_mesh().cells
+        rebuild_state = self.rebuild_state
         found, more = np.zeros(8), np.zeros(4)
         for places, out in ((self.listed, found), (self.origin, more)):
-            if self.dim == 3:
-                space.survey(self.x, self.v, places, self.n_left, self.n_own, out)
-            else:
-                build.survey(self.x, self.v, places, self.n_left, self.n_own, cells, self.number, out)
+            self._survey(places, out)
         found[4] = float(self.local.tally[:, elements.NEW_BROKEN].sum())
         found[5] = float(self.local.tally[:, elements.NEW_YIELDED].sum())
         found[6] = self.stop.local_request() if self.stop is not None else 0
