@@ -108,6 +108,29 @@ def test_what_cannot_be_glued_is_said_with_its_place() -> None:
         glue.glued(joined(*bent))
 
 
+@pytest.mark.parametrize("kind", [6, "hex"])
+def test_seams_within_one_body(kind: int | str) -> None:
+    """A base with two blocks on it, side by side: once both hang on the base the seam between them is in one body, with
+    points of its own on either side, and finer on one."""
+
+    def part(x: tuple, z: tuple, n: int, name: str) -> Mesh:
+        grid = lines((*x, n), (0, 1, n), (*z, n))
+        return (
+            structured_space.hexes(grid, ("s", name))
+            if kind == "hex"
+            else structured_space.box(grid, kind, ("s", name))
+        )
+
+    mesh = joined(joined(part((0, 2), (0, 1), 2, "a"), part((0, 1), (1, 2), 1, "b")), part((1, 2), (1, 2), 2, "c"))
+    for pair in ("ac", "ab"):
+        sides = [np.isin(np.arange(len(mesh.cells)), mesh.groups["s"][name]) for name in pair]
+        mesh = glue.glued(mesh, between=(sides[0], sides[1])).mesh
+    assert fit.fit(mesh).bodies == 1 and len(fit.fit(mesh).parts)
+    mesh = glue.glued(mesh).mesh
+    check(mesh)
+    assert fit.fit(mesh).said() == "" and mesh.areas().sum() == pytest.approx(4.0)
+
+
 def test_a_whole_stays_as_it_is() -> None:
     mesh = block(0, 1, 2, 2)
     assert glue.glued(mesh).mesh is mesh

@@ -78,7 +78,7 @@ def test_only_those_between_two_groups(desk):
 @pytest.mark.parametrize(
     ("second", "line", "message"),
     [("(2.1,0) (4,1) cells 4 2", "", "no faces of different bodies lie on each other within 0.0004[0-9]* m"),
-     ("(2,0) (4,1) cells 4 2", "tolerance 0.6", "too large: points .* of one body"),
+     ("(2,0) (4,1) cells 4 2", "tolerance 0.6", "too large: points .* of one element"),
      ("(1,0) (2,1) cells 2 2", "", "lie on the same side of their common face at"),
      ("(2,1) (4,2) cells 4 2", "", "no faces of different bodies lie on each other"),
      ("(2,0) (4,1) cells 4 2", "between 'a' 'a' set 'bodies'", "no faces of different bodies lie on each other"),

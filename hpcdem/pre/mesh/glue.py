@@ -59,7 +59,7 @@ def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray,
 
     between: elements (ne,) bool of the two sides; faces between others stay as they are. CommandError, with the place,
     if nothing lies on each other, if a face in space is covered in part only, if bodies overlap there, or if the
-    tolerance would make points of one body one.
+    tolerance would make points of one element one.
     """
     free = _between(fit.free_faces(mesh), between)
     if not len(free.faces):
@@ -119,18 +119,18 @@ def _between(free: fit.Free, between: tuple[np.ndarray, np.ndarray] | None) -> f
 
 def _spots(free: fit.Free, tolerance: float) -> np.ndarray:
     """(np,) the lowest of the surface points nearer to each other than the tolerance; CommandError if two are of one
-    body."""
-    mesh, dim = free.mesh, free.mesh.dim
-    points, first = np.unique(free.points, return_index=True)
-    spot = fit.spots(mesh.points, points, tolerance)
-    body = np.repeat(free.body, dim)[first]
-    key = np.column_stack([spot[points], body])
-    order = np.lexsort((key[:, 1], key[:, 0]))
-    same = np.flatnonzero((key[order[1:]] == key[order[:-1]]).all(axis=1))
+    element."""
+    mesh = free.mesh
+    spot = fit.spots(mesh.points, np.unique(free.points), tolerance)
+    corners = np.where(mesh.cells >= 0, spot[mesh.cells], -1)
+    order = np.argsort(corners, axis=1, kind="stable")
+    ranked = np.take_along_axis(corners, order, axis=1)
+    same = np.argwhere(ranked[:, 1:] == ranked[:, :-1])
     if len(same):
-        p, q = points[order[same[0]]], points[order[same[0] + 1]]
+        e, k = same[0]
+        p, q = sorted(mesh.cells[e, order[e, k : k + 2]].tolist())
         raise CommandError(
-            f"the tolerance {tolerance:g} m is too large: points {p} and {q} of one body at "
+            f"the tolerance {tolerance:g} m is too large: points {p} and {q} of one element at "
             f"{fit.places(mesh.points[p : p + 1])} would become one"
         )
     return spot
