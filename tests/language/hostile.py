@@ -383,6 +383,7 @@ RUNS = [
         "PROP: tolerate 1e+300 and rext 1 would bond particles 1e+300 m apart",
     ),
     (BEGIN + TWO + "PROP n_bond 1 rext 1e300", "PROP: tolerate 1e-06 and rext 1e+300 would bond"),
+    (BEGIN + TWO + "PROP kn 1e308", "PROP: kn must be at most 1e+60, got 1e+308"),
     (BEGIN + TWO + "PROP n_bond 1 tolerate 10.1", "at most 10 radii of the largest particle, 10 m"),
     ("START\nSET frac 0.3\nCYC 1", "CYC: SET frac: no particle is free to move"),
     ("START\nSET frac 0.3\n" + BOX + BALL + "PROP density 1\nCYC 1", "CYC: SET frac: no stiffness is set"),
