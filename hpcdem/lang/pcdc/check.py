@@ -101,4 +101,51 @@ def _loose_names(script: Source) -> list[str]:
                     used.append((statement.line, "table", of))
                 case Drawn(of):
                     used.append((statement.line, "field", of))
-    return [f"line {line}: no line makes the {kind} '{name}'" for line, kind, name in used if name not in made[kind]]
+    found = [(line, f"{kind} '{name}'") for line, kind, name in used if name not in made[kind]]
+    return [f"line {line}: no line makes the {what}" for line, what in sorted(found + _loose_groups(script))]
+
+
+_GROUPED = {"element": "element", "node": "node", "element-face": "face", "face-joint": "joint"}
+"""Kinds of objects of which a script makes all groups, and how messages call them."""
+
+
+def _loose_groups(script: Source) -> list[tuple[int, str]]:
+    """Groups and sets that a range names and no line makes, with the line. Nothing is said of a kind of which groups
+    have names that are expressions, or come from the bodies or regions of a mesh."""
+    made: dict[str, set[tuple[str, str]]] = {kind: set() for kind in _GROUPED}
+    unknown: set[str] = set()
+    for statement in script.statements:
+        words, given = statement.command.name.split(), statement.arguments
+        if words[0] == "mesh" and words[1] in ("create", "structured", "equilateral"):
+            if "region" in given or "bodies" in given:
+                unknown.add("element")
+            kind, group = "element", given.get("group", {"value": "default"})
+        elif words[-1] == "group" and words[0] in made:
+            kind, group = words[0], {"value": given["group"], "set": given.get("set", "default")}
+        else:
+            continue
+        name, set_name = group["value"], group.get("set", "default")
+        if isinstance(name, str) and isinstance(set_name, str):
+            made[kind].add((name, set_name))
+        else:
+            unknown.add(kind)
+    found = []
+    for statement in script.statements:
+        ranged = statement.command.ranged
+        if ranged == "any":
+            shown = str(statement.arguments.get("object"))
+            ranged = {"joint": "face-joint"}.get(shown, shown)
+        for term, value in statement.range or ():
+            kind = ranged if term in ("group", "set") else "element" if term in ("face-of", "between") else ""
+            if kind not in made or kind in unknown:
+                continue
+            if term == "set":
+                if isinstance(value, str) and value not in {set_name for _, set_name in made[kind]}:
+                    found.append((statement.line, f"set '{value}' of {_GROUPED[kind]}s"))
+                continue
+            names = value["value"] if term == "between" else (value["value"],)
+            set_name = value.get("set", "default")
+            for name in names:
+                if isinstance(name, str) and isinstance(set_name, str) and (name, set_name) not in made[kind]:
+                    found.append((statement.line, f"group '{name}' of {_GROUPED[kind]}s in set '{set_name}'"))
+    return found

@@ -36,6 +36,7 @@ from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal, described
 from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.source import CALL, Source
 from hpcdem.lang.pcdc.statement import Statement, shown
+from hpcdem.lang.pcdc.trial import hyphened
 from hpcdem.lang.pcdc.vector import Vector
 from hpcdem.lang.pcdc.views import Model
 from hpcdem.runtime.progress import write
@@ -165,7 +166,7 @@ class Interpreter:
             way = _way([(f.filename, f.lineno or 0) for f in frames[:-1]])
             if isinstance(error, CommandError):
                 text = self.sources[last.filename].line(last.lineno or 0)
-                return ScriptError(last.filename, last.lineno or 0, f"{shown(text)}: {error}{way}")
+                return ScriptError(last.filename, last.lineno or 0, f"{shown(text)}: {hyphened(str(error))}{way}")
             if statement is not None:
                 return statement.error(f"{type(error).__name__}: {error}{way}")
             if isinstance(error, (RecursionError, MemoryError)):
@@ -224,7 +225,7 @@ class Interpreter:
     def _told_with_line(self, error: HpcdemError, statement: Statement) -> HpcdemError:
         """An error of a command, with the line."""
         if isinstance(error, (CommandError, ScriptError)):
-            return self._on_the_way(error if isinstance(error, ScriptError) else statement.error(str(error)))
+            return self._on_the_way(error if isinstance(error, ScriptError) else statement.error(hyphened(str(error))))
         if isinstance(error, EquilibriumError):
             return EquilibriumError(str(self._on_the_way(statement.error(str(error)))))
         if type(error) is HpcdemError:

@@ -167,6 +167,13 @@ class _Line:
         found = self.take(command.models)
         if found is None:
             token = self.next("the name of a model: " + _joined(m.keyword.name for m in command.models))
+            if isinstance(token, Word):
+                for other in self.table.commands:
+                    for model in matching(token.text, other.models):
+                        raise ValueError(
+                            f"{token} ({model.keyword}) belongs to pcdc {other.name}, not to '{self.context}', which "
+                            f"has {_joined(m.keyword.name for m in command.models)}"
+                        )
             self.unknown(token, command.models)
         self.context = f"{self.context} {found.keyword}"
         self.refuse_elsewhere(found.keyword, found.dims)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -13,6 +15,7 @@ from hpcdem.lang.pcdc.table import (
     BOLT_VELOCITY,
     BURGERS,
     COHESIVE,
+    COMMANDS,
     CONTACT,
     FLOW_CONDITION,
     FLUID_HEAT,
@@ -23,6 +26,7 @@ from hpcdem.lang.pcdc.table import (
     POROUS,
     PROPPANT,
     PROPPANT_CONDITION,
+    RECORDED,
     USER,
     Command,
 )
@@ -81,7 +85,7 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
         elif command.name in _TRIALS and known(list(arguments.values())):
             _TRIALS[command.name](arguments)
     except CommandError as error:
-        raise ValueError(str(error)) from None
+        raise ValueError(hyphened(str(error))) from None
 
 
 def known(value: Any) -> bool:
@@ -96,6 +100,21 @@ def known(value: Any) -> bool:
 def python(name: str) -> str:
     """`poisson-ratio` as a name of Python."""
     return name.replace("-", "_")
+
+
+@functools.cache
+def _hyphens() -> dict[str, str]:
+    """Words with hyphens by their names in Python."""
+    models = [model for command in COMMANDS for model in command.models]
+    rows: list[Any] = [*COMMANDS, *models]
+    options = [option for row in rows for option in row.options]
+    names = {row.name for row in options} | {model.keyword.name for model in models}
+    return {python(name): name for name in names.union(*RECORDED.values()) if "-" in name}
+
+
+def hyphened(text: str) -> str:
+    """A message with the words of the language as they are written in it, but for what is quoted."""
+    return re.sub(r"'[^']*'|\b[a-z]\w*_\w+\b", lambda found: _hyphens().get(found[0], found[0]), text)
 
 
 def _given(arguments: Mapping[str, Any]) -> dict[str, Any]:

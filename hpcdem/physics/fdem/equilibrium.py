@@ -137,6 +137,8 @@ def solve_elastic(
     that touch (before or in the answer), laws of users, joints behind their peak (before or in the answer), no
     convergence.
     """
+    for load in sim.surface_loads:
+        load.check_complete()
     if cycles < 1 or not ratio > 0.0 or solver not in SOLVERS:
         raise CommandError(f"cycles and ratio must be positive, solver one of {', '.join(SOLVERS)}")
     if steps < 1:

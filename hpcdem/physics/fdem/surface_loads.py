@@ -64,6 +64,9 @@ class SurfaceLoad(ABC):
         """(n_own, 4) dashpots [N s/m per m] that it brings to corners of owned elements, for the time step."""
         return None
 
+    def check_complete(self) -> None:  # noqa: B027 - most have nothing to do here
+        """CommandError if some elements lack what others have of this physics. Not collective."""
+
     def check_start(self) -> None:  # noqa: B027 - most have nothing to do here
         """CommandError if no step can be done with it. Not collective."""
 

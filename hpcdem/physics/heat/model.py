@@ -791,16 +791,21 @@ class Heat(SurfaceLoad):
                 "thermal",
             )
 
+    def check_complete(self) -> None:
+        blocks = self.blocks
+        bare = np.flatnonzero((self.row == 0) & blocks.alive & bool(self.rows and blocks.options.thermal))
+        if len(bare):
+            at = ", ".join(f"{c:g}" for c in blocks.the_mesh().centroids(bare[:1])[0])
+            raise CommandError(
+                f"element {bare[0]} at ({at}) has no thermal model ({len(bare)} in all), but others have: element "
+                "c-model thermal-iso-heat for all"
+            )
+
     def check_elements(self) -> None:
         """CommandError if an element lacks a thermal model, or has a law that knows no temperature, or a transfer
         coefficient that nothing takes. Not collective."""
         blocks = self.blocks
-        bare = np.flatnonzero((self.row == 0) & blocks.alive)
-        if len(bare):
-            raise CommandError(
-                f"element {bare[0]} has no thermal model ({len(bare)} in all), but others have: element c-model "
-                "thermal-iso-heat for all"
-            )
+        self.check_complete()
         passes = np.flatnonzero((self._transfers > 0.0) & blocks.alive)
         if len(passes) and not blocks.options.collision and all(one.environment is None for one in self.faces):
             raise CommandError(
