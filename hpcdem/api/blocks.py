@@ -1066,6 +1066,7 @@ class BlockCommands:
         dynamic: bool | None = None,
         collision: bool | None = None,
         overlap: str | None = None,
+        deep_overlap: str | None = None,
         potential: str | None = None,
         large_strain: bool | None = None,
         energy: bool | None = None,
@@ -1076,11 +1077,12 @@ class BlockCommands:
         proppant: bool | None = None,
     ) -> None:
         """Of blocks: motion in time or towards equilibrium; contact of surfaces; of bodies that overlap at first
-        "refuse", "relax" or "keep"; the potential of contact in space, "distance" or "munjiza"; rotations of elements;
-        keep the energy budget; motion at all; flow of fluid, and whether it does not push; flow of heat; proppant that
-        moves in the fluid."""
+        "refuse", "relax" or "keep"; of those that come to overlap too deep "warn" or "stop"; the potential of contact
+        in space, "distance" or "munjiza"; rotations of elements; keep the energy budget; motion at all; flow of fluid,
+        and whether it does not push; flow of heat; proppant that moves in the fluid."""
         given = {
-            "dynamic": dynamic, "collision": collision, "overlap": overlap, "potential": potential,
+            "dynamic": dynamic, "collision": collision, "overlap": overlap,
+            "deep_overlap": deep_overlap, "potential": potential,
             "large_strain": large_strain, "energy": energy, "mechanical": mechanical, "hydraulic": hydraulic,
             "one_way": one_way, "thermal": thermal, "proppant": proppant,
         }  # fmt: skip

@@ -326,6 +326,8 @@ PCDC_KEYWORDS = {
     "of bodies that overlap before the first step: refuse it, with the places; let a static stage move them apart; "
     "or start as they are":
     "第一步之前物体已重叠时:refuse 拒绝并报出位置;relax 由静力计算阶段使其分开;keep 照原样开始",
+    "of bodies that come to overlap by more than a tenth of an altitude of an element: say where, or end the run there":
+    "计算中物体重叠超过单元高度的十分之一时:warn 报出位置;stop 在该处终止计算",
     "what contact presses with: the distance to the nearest side of an element over the usual altitude in its body, "
     "or four times the smallest of its barycentric coordinates":
     "接触的势函数:到单元最近一边的距离与其物体中单元典型高之比,或最小面积坐标的 4 倍",

@@ -27,9 +27,9 @@ def forces(
     table = np.tile([penalty, shear, friction, 0.0], (n + 4, 1))
     table.view(np.int64)[:, contact.CODE] = int(half) + contact.ALL_EDGES
     history = np.zeros((n + 4, 6)) if history is None else history
-    dampers, largest = np.zeros((0, 3)), np.zeros((0, 12))
+    dampers, largest = np.zeros((0, contact.DAMPER)), np.zeros((0, 12))
     if damp is not None:
-        dampers, largest = np.tile([*damp[:2], dashpot], (n + 4, 1)), damp[2]
+        dampers, largest = np.tile([damp[0], *damp[:2], dashpot], (n + 4, 1)), damp[2]
     touching, out = np.zeros(n, np.uint8), np.zeros((n, 12))
     contact.forces(
         1, np.arange(n), np.arange(n, 2 * n), 8 * np.arange(2 * n), 6 * np.arange(2 * n), x, v, table, history, dampers,

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 
-from hpcdem.core.errors import CommandError
+from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, overlaps, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import joined, jointed, model, near, rectangle
+from tests.space import support as space
 
 
 def two(depth: float, kind: str = "cross", x0: float = 0.213) -> Blocks:
@@ -126,3 +128,81 @@ def test_a_script_is_told_the_line(resident, tmp_path, ranks):
         assert done.returncode == code, done.stdout + done.stderr
         assert ("over.sc:6: " in done.stderr and "by 0.0016 m at" in done.stderr) == (code == 2)
         assert ("went" in done.stdout) == (code == 0)
+
+
+def sinks(depth: float, **options: str) -> tuple[Blocks, list[str]]:
+    """A block of 1 m on a held one, pressed in by its weight as far as a penalty lets it [m]; what the log says."""
+    mesh = joined(rectangle(2, 2, 1.0, 1.0), rectangle(2, 2, 1.0, 1.0, y0=1.0 + 1e-6))
+    sim, said = Blocks(), []
+    sim.log = Log(said)
+    sim.take_mesh(mesh)
+    changes.element_model(
+        sim, None, "mech_iso_elastic", {"density": 2700.0, "young": 1e9, "poisson_ratio": 0.25, "damp_factor": 1.0}
+    )
+    # 3 P d (1/h + 1/h), h = 0.5 m
+    penalty = 2700.0 * 9.81 / (12.0 * depth)
+    sim.face_model(None, "contact_mohr_coulomb", {"friction": 30.0, "penalty_normal": penalty})
+    sim.velocity_condition(np.arange(9), vx=0.0, vy=0.0)
+    sim.gravity(0.0, -9.81)
+    if options:
+        sim.option(**options)
+    convergence.solve(sim, time=math.pi * math.sqrt(depth / 9.81))  # it swings to twice that depth
+    return sim, said
+
+
+class Log:
+    def __init__(self, said: list[str]) -> None:
+        self.said = said
+
+    def warn(self, text: str) -> None:
+        self.said.append(text)
+
+    def info(self, text: str) -> None:
+        pass
+
+    def warn_once(self, key: str, text: str) -> None:
+        self.said.append(text)
+
+
+def test_a_deep_overlap_is_said_with_its_place():
+    """Twice 0.035 m of an altitude of 0.5 m: where, how deep, how many; twice 0.02 m: nothing is said."""
+    assert not sinks(0.02)[1]
+    sim, said = sinks(0.035)
+    found = re.search(
+        r"step \d+: (\d+) pairs of elements overlap by more than 0.1 of an altitude: elements (\d+) and (\d+) by (\S+) "
+        r"m at \((\S+), (\S+)\), (\S+) of the altitude",
+        said[0],
+    )
+    assert found is not None, said
+    pairs, one, other, depth, x, y, part = map(float, found.groups())
+    assert pairs >= 2 and one < 8 <= other and 0.0 <= x <= 1.0 and 0.9 < y <= 1.0
+    assert 0.05 < depth < 0.07 and part == pytest.approx(depth / 0.5, rel=0.05)
+
+
+def test_a_deep_overlap_stops_a_run_on_request():
+    with pytest.raises(PhysicsError, match=r"pairs of elements overlap .* stopped, as model option deep-overlap stop"):
+        sinks(0.035, deep_overlap="stop")
+    sinks(0.02, deep_overlap="stop")
+    with pytest.raises(CommandError, match="deep-overlap is one of warn, stop, got maybe"):
+        Blocks().option(deep_overlap="maybe")
+
+
+def test_a_deep_overlap_in_space():
+    """A box that a soft contact lets into a plate, at most a quarter of an altitude."""
+    plate, box = space.box((3, 3, 1), (0.6, 0.6, 0.2)), space.box((1, 1, 1), (0.2, 0.2, 0.2))
+    mesh = type(plate).of(
+        np.concatenate([plate.points, box.points + np.array([0.2, 0.2, 0.200001])]),
+        np.concatenate([plate.cells, box.cells + len(plate.points)]),
+    )
+    for penalty, deep in ((1e7, False), (2e4, True)):
+        sim, said = Blocks(), []
+        sim.log = Log(said)
+        sim.take_mesh(mesh)
+        changes.element_model(sim, None, "mech_iso_elastic", {"density": 2700.0, "young": 1e8, "poisson_ratio": 0.25})
+        sim.face_model(None, "contact_mohr_coulomb", {"penalty_normal": penalty})
+        sim.velocity_condition(np.arange(len(plate.points)), vx=0.0, vy=0.0, vz=0.0)
+        changes.set_velocity(sim, np.arange(len(plate.points), len(mesh.points)), 0.0, 0.0, -1.0)
+        convergence.solve(sim, time=0.05)
+        assert bool(said) == deep
+        if deep:
+            assert re.search(r"elements \d+ and \d+ by \S+ m at \(\S+, \S+, \S+\), 0\.\d+ of the altitude", said[0])

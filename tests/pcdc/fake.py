@@ -65,6 +65,9 @@ class FakeBlocks:
     def told_time(self) -> float:
         return self.clock.time
 
+    def changing_tables(self) -> list[str]:
+        return []
+
     def clear(self) -> None:
         self.local = SimpleNamespace(passes=0)
         self.event_rows: list[Any] = []
@@ -135,6 +138,9 @@ class FakeBlocks:
         """What is looked at on the way to a ratio."""
         self.calls.append(("watch", how, {}))
         return Watch(0, 0, self.clock.step)
+
+    def deep_overlaps(self) -> int:
+        return 0
 
     def joint_counts(self) -> tuple[int, int, int]:
         return 7, 2, 1

@@ -337,7 +337,8 @@ def carry_out(sim: Simulation, text: str) -> Any:
 
 
 IN_SPACE: list[tuple[str, str]] = [
-    ("pcdc model option potential munjiza overlap keep", "sim.option(potential='munjiza', overlap='keep')"),
+    ("pcdc model option potential munjiza overlap keep deep-overlap stop",
+     "sim.option(potential='munjiza', overlap='keep', deep_overlap='stop')"),
     ("pcdc element-face c-model contact-m-c property p-n 1e9 friction 30 range boundary",
      "sim.faces.model('contact-m-c', penalty_normal=1e9, friction=30, where='boundary')"),
     ("pcdc model gravity (0,1,-9.81)", "sim.gravity((0, 1, -9.81))"),

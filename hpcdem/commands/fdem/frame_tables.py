@@ -120,7 +120,7 @@ def _node_conditions(blocks: Blocks) -> Columns | None:
     numbers, lead, row = numbers[there], lead[there], row[there]
     if blocks.sided:
         columns["element"] = np.where(lead >= 0, lead // 4, -1)
-    points, time, plane = blocks.the_mesh().points[numbers], blocks.told_time(), blocks.dim == 2
+    points, time, plane = blocks.the_mesh().points[numbers], blocks.time_now(), blocks.dim == 2
     placed = Placed(blocks.acting(), row, points)
     table = blocks.local.conditions_now(placed, time, time, 1.0)[placed.of]
     does, at, force, constraint = (
@@ -153,7 +153,7 @@ def _face_conditions(blocks: Blocks) -> Columns | None:
     numbers = numbers[blocks.alive[numbers // 4]]
     if not len(numbers):
         return None
-    mesh, time = blocks.the_mesh(), blocks.told_time()
+    mesh, time = blocks.the_mesh(), blocks.time_now()
     corners = mesh.face_corners(numbers)
     columns: Columns = {"number": numbers, **dict(zip(CORNERS[mesh.dim], corners.T.copy(), strict=True))}
     middle = mesh.points[mesh.cells[corners // 4, corners % 4]].mean(axis=1)

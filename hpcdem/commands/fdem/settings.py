@@ -40,6 +40,7 @@ def option(
     collision: bool | None = None,
     large_strain: bool | None = None,
     overlap: str | None = None,
+    deep_overlap: str | None = None,
     potential: str | None = None,
     energy: bool | None = None,
     mechanical: bool | None = None,
@@ -48,9 +49,9 @@ def option(
     thermal: bool | None = None,
     proppant: bool | None = None,
 ) -> None:
-    """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, potential: of contact
-    in space, see `Blocks.option`; energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal,
-    proppant: `Blocks.parts`."""
+    """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, deep_overlap: later,
+    potential: of contact in space, see `Blocks.option`; energy: keep the energy budget from here on; mechanical,
+    hydraulic, one_way, thermal, proppant: `Blocks.parts`."""
     if mechanical is False:
         coupling.refuse(project, "model option mechanical off")
     parts = {
@@ -62,7 +63,7 @@ def option(
         project.dynamic = dynamic
     of_blocks: dict[str, Any] = {
         "dynamic": dynamic, "collision": collision, "large_strain": large_strain, "overlap": overlap,
-        "potential": potential,
+        "deep_overlap": deep_overlap, "potential": potential,
     }  # fmt: skip
     given = {name: value for name, value in of_blocks.items() if value is not None}
     if given:

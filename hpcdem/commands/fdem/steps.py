@@ -14,7 +14,7 @@ from hpcdem.commands.fdem import checkpoints, coupling, cracks, frames, historie
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.io.behind import under_way
-from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium
+from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium, overlaps
 from hpcdem.physics.fdem.convergence import RATIO, Watch
 from hpcdem.physics.flow import costs
 from hpcdem.physics.flow.coupled import Coupled
@@ -98,6 +98,12 @@ def solve(
     except EquilibriumError as error:
         reason, found, text = "runaway", math.nan, f"no equilibrium: {error}; {_what_moves(project)}"
     project.solved = {"reason": reason, "ratio": found, "steps": project.step - first}
+    if reason == "ratio" and not project.dynamic and project.log is not None:
+        for name in project.blocks.changing_tables():
+            project.log.warn(
+                f"{_where(project)}balance was found while table '{name}' of a condition goes on to change with each "
+                "static step: model solve cycles, or model step, goes on to its end"
+            )
     if text and on_failure != CONTINUE:
         raise EquilibriumError(text)
     if text and project.log is not None:
@@ -620,6 +626,8 @@ class _Report:
         clock = blocks.clock
         intact, yielded, broken = diagnostics.joint_counts(blocks)
         joints = f" | joints: {yielded} yielded, {broken} broken" if intact + yielded + broken else ""
+        if deep := diagnostics.deep_overlaps(blocks):
+            joints += f" | {deep} overlaps beyond {overlaps.DEEP:g} of an altitude"
         time = f" | t {clock.time:.6g} s, dt {clock.dt:.4g} s" if self.project.dynamic else ""
         if blocks.creep.on:
             time += f" | creep time {blocks.creep.time:.6g} s"

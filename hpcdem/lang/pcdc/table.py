@@ -626,6 +626,8 @@ _MODEL = (
                 Option("over{lap}", (choice("refuse", "relax", "keep"),), "of bodies that overlap before the first "
                        "step: refuse it, with the places; let a static stage move them apart; or start as they are",
                        default="refuse"),
+                Option("deep-o{verlap}", (choice("warn", "stop"),), "of bodies that come to overlap by more than a "
+                       "tenth of an altitude of an element: say where, or end the run there", default="warn"),
                 Option("pot{ential}", (choice("distance", "munjiza"),), "what contact presses with: the distance to "
                        "the nearest side of an element over the usual altitude in its body, or four times the smallest "
                        "of its barycentric coordinates", default="distance", dims=SPACE),

@@ -369,7 +369,7 @@ class Bolts(Structure):
 
     def _find_forces(self) -> None:
         """Forces on nodes and rock, of the present positions and moment."""
-        nodes, time = self.nodes, self.blocks.clock.time
+        nodes, time = self.nodes, self.blocks.time_now()
         kernels.node_forces(
             self.first, self._along, self._tangent, self.elements["force"], nodes["bond"], nodes["plate"], self.hosted,
             self._carrier, self._share, self._conditions_at(time, time), self._total, self._on_rock,
@@ -416,7 +416,7 @@ class Bolts(Structure):
         with blocks.timers("force"):
             static = not blocks.options.dynamic
             point, normal = np.ascontiguousarray(seen[:, :-1]), np.ascontiguousarray(seen[:, -1])
-            time = clock.time if static else clock.time - clock.dt
+            time = self._time_before()
             conditions = self._conditions_at(time, time if static else clock.time - 0.5 * clock.dt)
             work = self.work if self._account is not None and not static else np.zeros(kernels.WORK)
             before = self._on_rock.copy()

@@ -45,6 +45,8 @@ SAFETY = 0.8
 """Part of the stability limit that is used as time step."""
 OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
 """What becomes of bodies that overlap before the first step."""
+DEEP_OVERLAP = WARN, STOP = "warn", "stop"
+"""What becomes of a run in which they come to overlap too deep."""
 POTENTIAL = DISTANCE, MUNJIZA = "distance", "munjiza"
 """What contact in space presses with: the distance to the nearest side of an element, over a length of its body, or
 four times the smallest of its barycentric coordinates (Munjiza 2004)."""
@@ -85,13 +87,13 @@ TRACTIONS = {
 
 @dataclass(frozen=True)
 class Options:
-    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most
-    one of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`; potential: of `POTENTIAL`, in space.
-    mechanical, hydraulic: blocks move, fluid flows; one_way: fluid does not push; proppant: grains move in it;
-    flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps (0: as many as are needed)
-    of flow_dt [s] (0: the time of those steps, or a stable one); thermal: heat flows, in cycles as often as those
-    of flow, of heat_steps sub-steps of heat_dt [s] likewise. mass_damping [1/s], stiffness_damping [s]: Rayleigh
-    damping, of dynamic runs."""
+    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
+    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`, deep_overlap: of `DEEP_OVERLAP`; potential: of
+    `POTENTIAL`, in space. mechanical, hydraulic: blocks move, fluid flows; one_way: fluid does not push; proppant:
+    grains move in it; flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps (0: as many
+    as are needed) of flow_dt [s] (0: the time of those steps, or a stable one); thermal: heat flows, in cycles as often
+    as those of flow, of heat_steps sub-steps of heat_dt [s] likewise. mass_damping [1/s], stiffness_damping [s]:
+    Rayleigh damping, of dynamic runs. static_since: step at which static mode was switched on."""
 
     gx: float = 0.0
     gy: float = 0.0
@@ -104,6 +106,8 @@ class Options:
     safety: float = SAFETY
     mass_scaling: float = 0.0
     overlap: str = REFUSE
+    deep_overlap: str = WARN
+    static_since: int = 0
     potential: str = DISTANCE
     mechanical: bool = True
     hydraulic: bool = True
@@ -687,16 +691,21 @@ class ModelDefinition:
         """Delete a table; CommandError while a condition uses it."""
         if name not in self.tables:
             raise CommandError(f"there is no table '{name}'")
-        used_conditions = {self.conditions[r] for r in np.unique(self.corner_row)}
-        used_loads = {self.loads[r] for r in np.unique(self.load_row)}
-        for one in (*used_conditions, *used_loads):
-            if name in asdict(one).values():
-                raise CommandError(f"table '{name}' is used by a boundary condition")
+        if name in self.followed_tables():
+            raise CommandError(f"table '{name}' is used by a boundary condition")
         # Rows that nothing follows any more are evaluated with the others.
         self.conditions = [NodeCondition() if name in asdict(one).values() else one for one in self.conditions]
         self.loads = [Traction() if name in asdict(one).values() else one for one in self.loads]
         self._acting = None
         del self.tables[name]
+
+    def followed_tables(self) -> list[str]:
+        """Tables over time that conditions of nodes and faces follow."""
+        rows = [self.conditions[r] for r in np.unique(self.corner_row)] + [
+            self.loads[r] for r in np.unique(self.load_row)
+        ]
+        said = {value for one in rows for value in asdict(one).values() if isinstance(value, str)}
+        return [name for name in self.tables if name in said]
 
     def random_field(self, name: str, field: RandomField) -> None:
         """Make or replace a random field; properties that were drawn from one of this name stay."""
@@ -718,7 +727,7 @@ class ModelDefinition:
         return float(finite(what, [value])[0])
 
     def time_now(self) -> float:
-        """Model time [s]."""
+        """What tables and functions of conditions are read at, see `State.time_now`."""
         return 0.0
 
     def velocity_condition(
@@ -1031,17 +1040,22 @@ class ModelDefinition:
         large_strain: bool | None = None,
         overlap: str | None = None,
         potential: str | None = None,
+        deep_overlap: str | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. collision (on): contact.
         large_strain (on): rotations of any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap
         before the first step: refuse it; "relax": a static stage moves them apart; "keep": they start as they are.
-        potential ("distance"): of contact in space, see `POTENTIAL`."""
+        deep_overlap ("warn"): of bodies that come to overlap by more than a tenth of an altitude: say where; "stop":
+        end the run. potential ("distance"): of contact in space, see `POTENTIAL`."""
         given = {"dynamic": dynamic, "collision": collision, "large_strain": large_strain}
-        if overlap is not None and overlap not in OVERLAP:
-            raise CommandError(f"overlap is one of {', '.join(OVERLAP)}, got {overlap}")
         changes: dict[str, Any] = {name: bool(value) for name, value in given.items() if value is not None}
-        if overlap is not None:
-            changes["overlap"] = overlap
+        for name, value, known in (
+            ("overlap", overlap, OVERLAP), ("deep_overlap", deep_overlap, DEEP_OVERLAP)
+        ):  # fmt: skip
+            if value is not None and value not in known:
+                raise CommandError(f"{name.replace('_', '-')} is one of {', '.join(known)}, got {value}")
+            if value is not None:
+                changes[name] = value
         if potential is not None:
             if self.mesh is not None:
                 self._only_in_space("choice of the potential of contact", potential)

@@ -11,7 +11,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import PER_METRE
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import by_temperature, connectivity, sides, user_laws
+from hpcdem.physics.fdem import by_temperature, connectivity, floors, overlaps, sides, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
 from hpcdem.physics.fdem.kernels import plasticity, tets
@@ -628,14 +628,15 @@ def joint_counts(sim: Blocks) -> tuple[int, int, int]:
 
 
 def unbalanced_ratio(sim: Blocks) -> float:
-    """Sum of |unbalanced| over sum of |contributing| forces at the nodes, of the present positions. Collective."""
+    """Sum of |unbalanced| over sum of |contributing| forces at the nodes, of the present positions; 0 if there are none
+    but by rounding, see floors.py. Collective."""
     seen, local, own = sim.evaluate(), sim.local, sim.owned
     felt, outside = seen.felt[local.my_nodes], seen.outside[local.my_nodes]
     alone = seen.force[own].reshape(sim.n_own, 4, sim.stride)[local.alone()].reshape(-1)
     of_loads = sim.surface_loads.balance()[0]
     unbalanced = np.concatenate([np.abs(felt[:, : sim.dim] + outside).reshape(-1), np.abs(alone), *of_loads])
     total = exact_sum(contributing(sim, seen), sim.comm)
-    return exact_sum(unbalanced, sim.comm) / total if total != 0.0 else 0.0
+    return floors.ratio(sim, exact_sum(unbalanced, sim.comm), total)
 
 
 def contributing(sim: Blocks, seen: Evaluation) -> np.ndarray:
@@ -658,6 +659,11 @@ def contributing(sim: Blocks, seen: Evaluation) -> np.ndarray:
         stress -= pull
         parts.append(pull)
     return np.concatenate([np.abs(part).reshape(-1) for part in (*parts, *sim.surface_loads.balance()[1])])
+
+
+def deep_overlaps(sim: Blocks) -> int:
+    """Pairs of elements that overlap too deep now, if any ever did, see overlaps.py. Collective."""
+    return overlaps.count(sim, sim.local) if sim.rebuild_state.deep else 0
 
 
 def critical_time_step(sim: Blocks) -> float:

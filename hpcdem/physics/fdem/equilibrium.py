@@ -21,7 +21,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import changes, connectivity, diagnostics, tangent_space, user_functions, user_laws
+from hpcdem.physics.fdem import changes, connectivity, diagnostics, floors, tangent_space, user_functions, user_laws
 from hpcdem.physics.fdem.by_temperature import TEMPERATURE
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import nodes as moving
@@ -112,6 +112,8 @@ class Nodes:
     least: float = 0.0
     """Sum of forces [N/m] to which what is unbalanced is compared at least: joints that break may leave none, nor does
     heat in a body that is free to expand."""
+    nothing: float = 0.0
+    """Sum of forces below which the model is unloaded, see floors.py."""
 
 
 def solve_elastic(
@@ -167,6 +169,7 @@ def solve_elastic(
         sim.before_change()  # what flows and breaks is the doing of a command
         sim.close_model()
     relaxations, remembered = sim.relaxations, Memory.of(sim)
+    sim.ahead = cycles  # loads are those at the end
     try:
         with at_rest(sim, nodes):
             x, balanced = _follow(
@@ -183,6 +186,8 @@ def solve_elastic(
         remembered.put_back(sim)
         settle(sim, nodes, nodes.x, nodes.v)
         raise
+    finally:
+        sim.ahead = 0
     for load in sim.surface_loads:
         load.balanced()
     sim.clock.step += cycles
@@ -249,7 +254,8 @@ def all_nodes(sim: Blocks) -> Nodes:
     owner = np.zeros(len(lead), np.int64)
     for rank, (numbers, values) in enumerate(sim.comm.allgather((mine, np.column_stack(columns)))):
         found[numbers], owner[numbers] = values, rank
-    return Nodes(lead, cells.reshape(-1)[lead], owner, found[:, : sim.dim].copy(), found[:, sim.dim :].copy())
+    x, v = found[:, : sim.dim].copy(), found[:, sim.dim :].copy()
+    return Nodes(lead, cells.reshape(-1)[lead], owner, x, v, nothing=floors.nothing(sim))
 
 
 def forces_of_heat(sim: Blocks) -> float:
@@ -271,8 +277,7 @@ def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
     there = nodes.lead >= 0
     of_nodes = np.zeros(len(nodes.lead), np.int64)
     of_nodes[there] = sim.rows_of_nodes(nodes.lead[there], sim.node)[0]
-    table = sim.conditions_at(sim.clock.time, sim.clock.time, 1.0)
-    dim = sim.dim
+    table, dim = _mean_conditions(sim, cycles), sim.dim
     free, way, step = (np.empty((len(table), *shape)) for shape in ((dim,), (dim, dim), (dim,)))
     for row, one in enumerate(table):
         points = nodes.point[there & (of_nodes == row)]
@@ -284,6 +289,27 @@ def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
     number = np.full(free.shape, -1, np.int64)
     number[free > 0.0] = np.arange(int((free > 0.0).sum()))
     return Unknowns(number, way, step * cycles, ~(way == np.eye(dim)).all(axis=(1, 2)))
+
+
+def _mean_conditions(sim: Blocks, cycles: int) -> np.ndarray:
+    """The table of conditions, movement per unit of time as it is in the mean of these static steps."""
+    now, at = sim.time_now(), slice(moving.AT_X, moving.AT_Y + 1, moving.AT_Y - moving.AT_X)
+    if sim.dim == 3:
+        at = slice(space.AT, space.AT + 3)
+    table = sim.conditions_at(now, now, 1.0)
+    if cycles > 1 and not sim.options.dynamic and not sim.creep.on and sim.conditions_vary():
+        each = [sim.conditions_at(now + k, now + k, 1.0)[:, at] for k in range(cycles)]
+        table[:, at] = np.mean(each, axis=0)
+    return table
+
+
+def refuse_changing_tables(sim: Blocks, what: str) -> None:
+    """CommandError if conditions of the blocks go on to change while implicit steps count no static ones."""
+    for name in sim.changing_tables():
+        raise CommandError(
+            f"table '{name}' of a condition of blocks goes on to change, with each static step by one unit of time: "
+            f"{what} do not count static steps. Bring it to its end before (model step, model solve), or say a number"
+        )
 
 
 def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -755,6 +781,8 @@ def unbalanced(
     if sim.comm.any(not np.isfinite(sizes).all()) or not np.isfinite(force).all():
         return force, math.inf, math.inf
     total = max(exact_sum(sizes, sim.comm), nodes.least)
+    if total < nodes.nothing:
+        total = max(total, floors.rounding(sim) / ENOUGH)
     unbalanced = float(np.abs(unknowns.reduced(force)).sum())
     return force, unbalanced / total if total != 0.0 else 0.0, total
 

@@ -724,10 +724,16 @@ class Local:
             *self.springs(), o.mass_damping, o.stiffness_damping, o.safety, target, mass,
         )  # fmt: skip
 
-    def _make_static_masses(self) -> None:
+    def row_sums(self) -> np.ndarray:
+        """Sums of |K_ij| over a row of the stiffness at each corner (n, 4) [N/m per m], in space [N/m]. Collective."""
+        masses = np.zeros_like(self.true_mass)
+        self._make_static_masses(masses)
+        return masses / (0.25 * 1.25 * (1.0 + ALPHA))
+
+    def _make_static_masses(self, mass: np.ndarray) -> None:
         limits.static_masses(
             self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, self.sim.owned.start,
-            self.springs()[0], ALPHA, self.mass,
+            self.springs()[0], ALPHA, mass,
         )  # fmt: skip
 
     def added_mass(self) -> float:
@@ -756,7 +762,7 @@ class Local:
         sim, o = self.sim, self.sim.options
         self._mass = self.true_mass if self.true_masses() else self.true_mass.copy()
         if not o.dynamic or not o.mechanical:
-            self._make_static_masses()
+            self._make_static_masses(self.mass)
             sim.clock.dt = 1.0
         else:
             wanted = sim.rebuild_state.dt == 0.0
@@ -774,7 +780,7 @@ class Local:
         self._place_nodes(self.mass)
         dt = sim.clock.dt
         self.node_kick = dt / self.node_mass
-        self._conditions = None if sim.conditions_vary() else sim.conditions_at(sim.clock.time, sim.clock.time, dt)
+        self._conditions = None if sim.conditions_vary() else sim.conditions_at(0.0, 0.0, dt)
         self._set_kicks(dt)
 
     def _set_kicks(self, dt: float) -> None:
@@ -1070,7 +1076,7 @@ class Local:
         sim, clock = self.sim, self.sim.clock
         if self.some_applied:
             self.applied[:] = 0.0
-            loads = self.loads_now(self.load_functions, clock.time)
+            loads = self.loads_now(self.load_functions, sim.time_now())
             moving.tractions(self.load_edge, self.load_a, self.load_b, self.load_of, loads, sim.x, self.applied)
             if len(self.quiet_edge):
                 moving.dashpots(
@@ -1085,8 +1091,8 @@ class Local:
                 sim.halo.fill(self.applied)
         table = self._conditions
         if table is None:
-            half = 0.5 * clock.dt if sim.options.dynamic else 0.0
-            table = self.conditions_now(self.node_functions, clock.time, clock.time + half, clock.dt)
+            now, half = sim.time_now(), 0.5 * clock.dt if sim.options.dynamic else 0.0
+            table = self.conditions_now(self.node_functions, now, now + half, clock.dt)
         self._move(
             sim.threads, self.node_begin, self.node_corner, self.node_place, self.node_again, self.node_kick,
             self.node_condition, self.node_share, table, self.some_applied, self.force, self.applied, sim.v,

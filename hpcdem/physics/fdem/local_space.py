@@ -266,12 +266,12 @@ class LocalSpace(LawsSpace):
         alone[self.hexes.rows - self.sim.n_left] = False
         return rows[alone], self.stiff[: self.count][alone]
 
-    def _make_static_masses(self) -> None:
+    def _make_static_masses(self, mass: np.ndarray) -> None:
         springs = self.springs()[0]
         rows, c = self._tetrahedra()
-        space.static_masses(c, rows, self.sim.n_left, springs, ALPHA, self.mass)
+        space.static_masses(c, rows, self.sim.n_left, springs, ALPHA, mass)
         if self.hexes is not None:
-            self.hexes.static_masses(self.stiff_hexes, springs, ALPHA, self.mass)
+            self.hexes.static_masses(self.stiff_hexes, springs, ALPHA, mass)
 
     def _set_kicks(self, dt: float) -> None:
         mass = self.mass[self.sim.owned]
@@ -352,7 +352,7 @@ class LocalSpace(LawsSpace):
             return
         if self.some_applied:
             self.applied[:] = 0.0
-            loads = self.loads_now(self.load_functions, clock.time)
+            loads = self.loads_now(self.load_functions, sim.time_now())
             space.tractions(self.load_corner, self.load_of, self.load_share, loads, sim.x, self.applied)
             if len(self.quiet_corner):
                 space.dashpots(
@@ -366,8 +366,8 @@ class LocalSpace(LawsSpace):
                 sim.halo.fill(self.applied)
         table = self._conditions
         if table is None:
-            half = 0.5 * clock.dt if sim.options.dynamic else 0.0
-            table = self.conditions_now(self.node_functions, clock.time, clock.time + half, clock.dt)
+            now, half = sim.time_now(), 0.5 * clock.dt if sim.options.dynamic else 0.0
+            table = self.conditions_now(self.node_functions, now, now + half, clock.dt)
         pulled = (self.node_begin, self.node_corner) if self.pulled is None else self.pulled
         self._move(
             sim.threads, self.node_begin, self.node_corner, *pulled, self.node_kick, self.node_condition,

@@ -1,4 +1,5 @@
-"""Bodies that overlap before anything has moved: where, and how deep.
+"""Bodies that overlap: before anything has moved, and later so deep that contact no longer tells inside from outside;
+where, and how deep.
 
 Contact would throw them apart: an overlap d stores 3/2 P d^2 (1/h_1 + 1/h_2) per area, and the pressure is 60 E d/h at
 P = 10 E. So the first step of a new model is refused, unless overlaps are asked for.
@@ -6,12 +7,12 @@ P = 10 E. So the first step of a new model is refused, unless overlaps are asked
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.definition import REFUSE, RELAX
+from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.physics.fdem.definition import REFUSE, RELAX, STOP
 from hpcdem.physics.fdem.kernels import contact, detect
 from hpcdem.physics.fdem.pairs import Bodies
 from hpcdem.physics.fdem.pairs_space import AllPairs
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
 
 ROUNDING = 1e-5
 """Overlap over the size of the smaller element that is put down to the rounding of coordinates."""
+DEEP = 0.1
+"""Overlap over an altitude that is too much: at a third contact lets go of what comes further in."""
+AGAIN = 1.5
+"""It is said again when it has grown by this."""
 NAMED = 5
 """Places that a message names."""
 
@@ -54,11 +59,65 @@ def check(sim: State, local: Local) -> None:
         sim.log.info(said)
 
 
+def part(sim: State, local: Local) -> float:
+    """The deepest overlap of this rank's pairs, over an altitude; the model is closed. Not collective."""
+    return float(local.pairs.parts(sim.x).max(initial=0.0)) if len(local.pairs) else 0.0
+
+
+def count(sim: State, local: Local) -> int:
+    """Pairs of elements that overlap too deep. Collective."""
+    return len(_deep(sim, local))
+
+
+def tell(sim: State, local: Local) -> None:
+    """Say where bodies overlap too deep; PhysicsError if the run shall stop there. The model is closed. Collective."""
+    found, o = _deep(sim, local), sim.options
+    if not len(found):
+        return
+    places = "; ".join(
+        f"elements {int(a)} and {int(b)} by {depth:.3g} m at ({', '.join(f'{c:.6g}' for c in place)}), {share:.2g} of "
+        "the altitude"
+        for depth, *place, share, a, b in found[:NAMED]
+    )
+    said = (
+        f"step {sim.clock.step}: {len(found)} pairs of elements overlap by more than {DEEP:g} of an altitude: {places}."
+        " "
+        "Contact is too soft for what presses there: take a larger penalty-normal (10 to 100 E)"
+    )
+    if o.deep_overlap == STOP:
+        raise PhysicsError(f"{said}; stopped, as model option deep-overlap stop asks for")
+    if sim.log is not None:
+        sim.log.warn(f"{said}; model option deep-overlap stop ends the run there")
+
+
+def _deep(sim: State, local: Local) -> np.ndarray:
+    """Pairs of elements that overlap too deep, on all ranks: depth [m], place [m], depth over the altitude, both
+    numbers; the deepest first. Collective."""
+    pairs: Any = local.pairs
+    own = sim.owned
+    share = pairs.parts(sim.x)
+    at = np.flatnonzero(share > DEEP)
+    first, second, depth = pairs.first[at], pairs.second[at], np.zeros((len(at), sim.dim + 1))
+    if sim.dim == 3:
+        one, other, row = pairs.face[first] // 4, pairs.element[second], pairs.face_row[first]
+    else:
+        one, other, row = pairs.element[first], pairs.element[second], pairs.row[first]
+    if len(at):
+        pairs.depths_of(at, sim.x, depth)
+    real = (row >= own.start) & (row < own.stop)  # a pair is told by the owner of its first element, or of its face
+    return _gathered(sim, np.column_stack([depth, share[at], np.minimum(one, other), np.maximum(one, other)])[real])
+
+
 def deepest(sim: State, local: Local) -> np.ndarray:
     """Pairs of elements that overlap by more than rounding, on all ranks: (n, 5), in space (n, 6), depth [m], place
     [m], both numbers; the deepest first. However deep they are: all elements count, not those at the surface alone. The
     model is closed. Collective."""
-    rows = _in_space(sim) if sim.dim == 3 else _in_the_plane(sim, local)
+    return _gathered(sim, _in_space(sim) if sim.dim == 3 else _in_the_plane(sim, local))
+
+
+def _gathered(sim: State, rows: np.ndarray) -> np.ndarray:
+    """Rows (n, k) of all ranks, depth first, numbers of both elements last: of each pair the deepest one, the deepest
+    pair first. Collective."""
     every = np.concatenate(sim.comm.allgather(rows))
     every = every[np.lexsort((every[:, -1], every[:, -2], -every[:, 0]))]
     _, once = np.unique(every[:, -2:], axis=0, return_index=True)  # of halves of quads, and of faces, the deepest one

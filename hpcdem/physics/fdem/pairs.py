@@ -157,13 +157,16 @@ class Surfaces:
         self, i: np.ndarray, other: Surfaces, j: np.ndarray, shared: np.ndarray, overlay: np.ndarray
     ) -> np.ndarray:
         """Properties (m, 3 + contact.DAMPER) of pairs (face i of these, face j of the others): normal and shear penalty
-        [Pa], tan(phi), and the columns of the table of dampers.
+        [Pa], tan(phi), and the columns of the table of dampers, face i on the first side.
 
         The smaller of both (damping: what damps more). Where neither says anything: the normal stress of two jointed
         elements goes on when the joint between them breaks closed, P = P_overlay / (3 h (1 / h_i + 1 / h_j)), h_i, h_j:
         altitudes on the joint of length h; otherwise 10 E. shared (m,) [m2]: length squared of the face that both
         elements have in common in the mesh, 0: there is none (the mean edges then take its place); overlay (m,) [Pa]:
         of the joint that was there, else NaN.
+
+        T is shared out between the two contactors as their stress is, 3 P d over the altitude of the other one, so that
+        both reach their part at the same overlap and bear T together.
 
         Dashpot: xi sqrt(k m) for each of the two contactors, k = 3 P (1 / h_i + 1 / h_j) per area, m = m_i m_j / (m_i +
         m_j), m_i = rho h_i / 3 the mass of the surface nodes per area: the damping ratio of two lone elements is xi.
@@ -182,14 +185,21 @@ class Surfaces:
         out = np.empty((len(i), 3 + contact.DAMPER))
         out[:, 0], out[:, 1] = normal, np.where(np.isnan(shear), normal, shear)
         out[:, 2] = np.minimum(self.tan_phi[i], other.tan_phi[j])
-        out[:, 3] = np.minimum(self.most[i], other.most[j])
-        out[:, 4] = np.maximum(self.exponent[i], other.exponent[j])
-        out[:, 5] = 0.0
+        per_i, per_j = self.edge[i] / self.double_area[i], other.edge[j] / other.double_area[j]
+        alone_i, alone_j = (
+            np.where(shared > 0.0, 1.0 / area, per)
+            for area, per in ((self.double_area[i], per_i), (other.double_area[j], per_j))
+        )
+        most = np.minimum(self.most[i], other.most[j])
+        for side, alone in enumerate((alone_j, alone_i)):
+            out[:, 3 + contact.LARGEST_STRESS + side] = most * (alone / (alone_i + alone_j))
+        out[:, 3 + contact.EXPONENT] = np.maximum(self.exponent[i], other.exponent[j])
+        out[:, 3 + contact.DASHPOT] = 0.0
         if not self.ratio.any() and not other.ratio.any():
             return out
-        per_i, per_j = self.edge[i] / self.double_area[i], other.edge[j] / other.double_area[j]
         mass = 1.0 / (self.nodes * (per_i / self.density[i] + per_j / other.density[j]))
-        out[:, 5] = np.maximum(self.ratio[i], other.ratio[j]) * np.sqrt(self.slope * normal * (per_i + per_j) * mass)
+        damped = np.maximum(self.ratio[i], other.ratio[j])
+        out[:, 3 + contact.DASHPOT] = damped * np.sqrt(self.slope * normal * (per_i + per_j) * mass)
         return out
 
 
@@ -304,7 +314,8 @@ class ContactPairs(Bodies):
         if not sim.options.dynamic:
             laws[:, 3 + contact.DASHPOT] = self.choices[:, contact.PROPERTIES + 3 + contact.DASHPOT] = 0.0
         every = np.concatenate([laws[:, 3:], self.choices[:, contact.PROPERTIES + 3 :]])
-        if (np.isfinite(every[:, 0]) | (every[:, 1] != 1.0) | (every[:, 2] > 0.0)).any():
+        most, exponent, dashpot = every[:, [contact.LARGEST_STRESS, contact.EXPONENT, contact.DASHPOT]].T
+        if (np.isfinite(most) | (exponent != 1.0) | (dashpot > 0.0)).any():
             self.dampers = np.zeros((m + 4, contact.DAMPER))
             self.dampers[:m] = laws[:, 3:]
             self.largest = np.zeros((m + 4, 2 * contact.EDGES))
@@ -337,6 +348,9 @@ class ContactPairs(Bodies):
         known = known[each, k]
         of_targets = Surfaces(sim, shapes, known[:, 0].astype(np.int64), self.row[other[each]])
         found = of_edges.of_pairs(each, of_targets, np.arange(len(each)), shared[pair[each]], overlay[pair[each]])
+        turned = np.flatnonzero(edge[each] >= 3)  # their own body is the second of the pair
+        sides = slice(3 + contact.LARGEST_STRESS, 5 + contact.LARGEST_STRESS)
+        found[turned, sides] = found[turned, sides][:, ::-1]
         begin = np.searchsorted(each, np.arange(len(pair)))
         differs = np.zeros(len(pair), bool)
         np.logical_or.at(differs, each, (found != found[begin[each]]).any(axis=1))
@@ -470,6 +484,17 @@ class ContactPairs(Bodies):
         collect(
             self.threads, self.begin, self.entry, self.entry_start, self.corners, self.touching, self.out, self.pushed
         )
+
+    def parts(self, x: np.ndarray) -> np.ndarray:
+        """How deep pairs are in each other now, over an altitude (m,)."""
+        part = np.zeros(len(self))
+        find = contact.parts if self.threads == 1 else contact.parts_threaded
+        find(self.threads, self.first, self.second, self.x_place, x, self.table, self.touching, part)
+        return part
+
+    def depths_of(self, at: np.ndarray, x: np.ndarray, depth: np.ndarray) -> None:
+        """How deep the pairs `at` are [m], and where, into depth (n, 3)."""
+        contact.depths(self.first[at], self.second[at], self.free, self.x_place, x, depth)
 
     def histories(self, sim: State) -> tuple[np.ndarray, np.ndarray]:
         """Owned element (0 ..) and row (histories.py) of each pair that remembers something, for both its elements."""

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 
+OF_CONTACTOR = [0, 1, 2, 3, 5, 6]
+"""Columns of `Surfaces.of_pairs` that a pair has: of T the part of the face, which is the contactor."""
+
+
 class Surface(NamedTuple):
     """The surface of a whole model, known to all ranks. mesh, closed, closed_faces: of which it is; clusters (ne, 4):
     numbers of the corners, those that hang together have one; faces (k,): free faces, ascending; first (ne,): of each
@@ -182,7 +186,7 @@ class ContactSpace:
         faces = Surfaces(sim, shapes, self.face, np.searchsorted(self.row, self.face_row))
         targets = Surfaces(sim, shapes, surface.first[self.element], np.arange(len(self.row)))
         shared, overlay = shared_faces(sim, self.face[first] // 4, self.element[second])
-        self.law = faces.of_pairs(first, targets, second, shared, overlay)
+        self.law = faces.of_pairs(first, targets, second, shared, overlay)[:, OF_CONTACTOR]
         varied = np.flatnonzero(surface.several(Kinds.of(sim))[self.element[second]])
         if len(varied):
             self._vary(sim, surface, shapes, faces, varied, shared, overlay)
@@ -210,7 +214,7 @@ class ContactSpace:
         pair = np.repeat(varied, counts)
         touched = Surfaces(sim, shapes, face[at], known[which[at]])
         found = faces.of_pairs(self.first[pair], touched, np.arange(len(at)), shared[pair], overlay[pair])
-        self.choices = np.hstack([parts[at], found])
+        self.choices = np.hstack([parts[at], found[:, OF_CONTACTOR]])
         self.choice_begin = np.append(0, ends)
         self.chosen = np.full(len(self.first), -1)
         self.chosen[varied] = np.arange(len(varied))
@@ -249,6 +253,17 @@ class ContactSpace:
             self.chosen, self.choice_begin, self.choices, self.history, self.touching, self.out, dt, self.begin,
             self.entry, self.pushed,
         )  # fmt: skip
+
+    def parts(self, x: np.ndarray) -> np.ndarray:
+        """How deep pairs are in each other now, over an altitude (m,)."""
+        part = np.zeros(len(self))
+        find = contact.parts if self.threads == 1 else contact.parts_threaded
+        find(self.threads, self.first, self.second, self.corner, self.place, x, self.touching, part)
+        return part
+
+    def depths_of(self, at: np.ndarray, x: np.ndarray, depth: np.ndarray) -> None:
+        """How deep the pairs `at` are [m], and where, into depth (n, 4)."""
+        contact.depths(self.first[at], self.second[at], self.corner, self.place, x, depth)
 
     def add_to(self, force: np.ndarray) -> None:
         """Add them to the forces (n, 16) [N] of the elements."""
@@ -302,7 +317,7 @@ class AllPairs(ContactSpace):
     def depths(self, sim: State) -> np.ndarray:
         """(m, 4) how deep each contactor is in its target [m], and where."""
         depth = np.zeros((len(self), 4))
-        contact.depths(self.first, self.second, self.corner, self.place, sim.x, depth)
+        self.depths_of(np.arange(len(self)), sim.x, depth)
         return depth
 
 

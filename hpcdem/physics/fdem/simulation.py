@@ -65,6 +65,8 @@ OUTSIDE, MUCH = 1e-6, 1e-3
 that relaxation begins with."""
 LOCKS = 0.45
 """Poisson's ratio above which tetrahedra are said to lock."""
+OWN_CLOCK = ("fluid", "proppant", "heat")
+"""Physics whose conditions follow tables over a time of their own."""
 AUTO = 100
 """Steps after which an automatic time step is estimated again."""
 
@@ -220,18 +222,61 @@ class Blocks(State):
         large_strain: bool | None = None,
         overlap: str | None = None,
         potential: str | None = None,
+        deep_overlap: str | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. Velocities become zero when it is
         changed, as those of the static mode are ways per step. collision (on): contact. large_strain (on): rotations of
         any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap before the first step: refuse
-        it; "relax": a static stage moves them apart; "keep": they start as they are. potential ("distance"): of contact
-        in space, see `definition.POTENTIAL`."""
+        it; "relax": a static stage moves them apart; "keep": they start as they are. deep_overlap ("warn"): of bodies
+        that come to overlap by more than a tenth of an altitude: say where; "stop": end the run. potential
+        ("distance"): of contact in space, see `definition.POTENTIAL`."""
         before = self.options.dynamic
         if dynamic is not None and dynamic != before:
             self.drop_creep_step()
-        super().option(dynamic, collision, large_strain, overlap, potential)
+            if dynamic:
+                self._tell_of_tables()
+        super().option(dynamic, collision, large_strain, overlap, potential, deep_overlap)
         if self.options.dynamic != before:
             self.v[:] = 0.0
+            if before:
+                self._set(static_since=self.clock.step)
+
+    def tables_over_time(self) -> list[str]:
+        """Tables that conditions of blocks, bolts and liners follow; fluid and heat have clocks of their own."""
+        others = [load for load in self.surface_loads if load.name not in OWN_CLOCK]
+        said = self.followed_tables()
+        return [name for name in self.tables if name in said or any(load.uses_table(name) for load in others)]
+
+    def changing_tables(self) -> list[str]:
+        """Those of which later values are others than that of now."""
+        now = self.time_now()
+        return [name for name in self.tables_over_time() if self.tables[name].changes_after(now)]
+
+    def _tell_of_tables(self) -> None:
+        """Static mode ends: a line in the log about tables that have another value at the model time."""
+        then, now = self.time_now(), self.clock.time
+        for name in self.tables_over_time() if self.log is not None else ():
+            table = self.tables[name]
+            if table(then) != table(now):
+                self.log.warn(
+                    f"table '{name}' of a condition goes from {table(then):g} to {table(now):g}: static mode, where a "
+                    f"step is one unit of time, had come to {then:g}, and the model time is {now:g} s. Say the "
+                    "condition again, by a number or another table, if that is not what is wanted"
+                )
+
+    def _warn_of_quick_tables(self) -> None:
+        """A line in the log about tables that are over within a static step."""
+        if self.options.dynamic or self.creep.on or self.log is None:
+            return
+        now = self.time_now()
+        for name in self.changing_tables():
+            if self.tables[name].times[-1] - now < 1.0:
+                self.log.warn_once(
+                    f"table {name} in a static step",
+                    f"table '{name}' of a condition goes from {self.tables[name](now):g} to "
+                    f"{self.tables[name].values[-1]:g} within one static step, which is one unit of time: say the "
+                    "condition after the static stage if it belongs to motion in time, or give the table in steps",
+                )
 
     def _remember(self, name: str, columns: int) -> None:
         """Owned elements remember so much for each of their triangles. (In files from before quads could yield or
@@ -278,7 +323,7 @@ class Blocks(State):
             with timers("reduce"):
                 try:
                     stale, outdated, request = self._check_rebuild()
-                except EquilibriumError:
+                except (EquilibriumError, PhysicsError):
                     halo.finish()  # the script may go on
                     raise
         with timers("halo"):
@@ -327,7 +372,7 @@ class Blocks(State):
                 raise CommandError(
                     "without mechanics time passes by flow and heat: model option dynamic on comes first"
                 )
-            others = [load.name for load in self.surface_loads if load.name not in ("fluid", "proppant", "heat")]
+            others = [load.name for load in self.surface_loads if load.name not in OWN_CLOCK]
             if others:
                 raise CommandError(f"{others[0].replace('_', '-')} move with the blocks: model option mechanical on")
             if self.creep.on:
@@ -376,19 +421,25 @@ class Blocks(State):
         ranks get the same answers.
         """
         rebuild_state = self.rebuild_state
-        found, more = np.zeros(8), np.zeros(4)
+        found, more = np.zeros(9), np.zeros(4)
         for places, out in ((self.listed, found), (self.origin, more)):
             self._survey(places, out)
         found[4] = float(self.local.tally[:, elements.NEW_BROKEN].sum())
         found[5] = float(self.local.tally[:, elements.NEW_YIELDED].sum())
         found[6] = self.stop.local_request() if self.stop is not None else 0
         found[7] = more[0]
+        if due := self.options.collision and self.clock.step - rebuild_state.watched >= LONGEST_WAIT:
+            rebuild_state.watched = self.clock.step
+            found[8] = overlaps.part(self, self.local)
         self.comm.max_into(found)
-        path2, speed2, broken, inverted, breaks, yields, request, way2 = found.tolist()
+        path2, speed2, broken, inverted, breaks, yields, request, way2, deep = found.tolist()
         dt = self.clock.dt
         stride = math.sqrt(speed2) * dt
         if broken or inverted or stride > 0.5 * self.mean_edge:
             self._stop_on_runaway(bool(broken), bool(inverted))
+        if due and deep > max(overlaps.DEEP, overlaps.AGAIN * rebuild_state.deep):
+            rebuild_state.deep = deep
+            overlaps.tell(self, self.local)
         self.local.tally[:, elements.NEW_YIELDED] = 0
         stale, outdated = breaks > 0.0, rebuild_state.stored >= OLDEST
         wait = float(LONGEST_WAIT // 4 if yields > 0.0 else LONGEST_WAIT)  # a joint may be about to break
@@ -599,6 +650,7 @@ class Blocks(State):
         for load in self.surface_loads:
             if load.kernel_kind:
                 self.prepare_kernels(load.kernel_kind + ("-space" if self.dim == 3 and not load.of_both else ""))
+        self._warn_of_quick_tables()
         user_laws.begin(self)
         user_laws.compile_for_quads(self)
         stale = self._topology_stale

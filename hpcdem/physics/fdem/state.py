@@ -29,7 +29,8 @@ NARROW, WIDE = 0.1, 0.3
 class ListState(RebuildState):
     """Skin over the mean edge; stored: age of the storage in steps (`age`: of the contact lists); dt: time step of the
     dynamic mode [s], 0 if it must be estimated, and the step at which it was. step, time: when the contact lists were
-    made; dt is the same since then.
+    made; dt is the same since then. watched: step of the last look at how deep bodies overlap; deep: the deepest
+    overlap that was said, over an altitude.
     """
 
     skin_factor: float = NARROW
@@ -38,6 +39,8 @@ class ListState(RebuildState):
     estimated: int = 0
     step: int = 0
     time: float = 0.0
+    watched: int = 0
+    deep: float = 0.0
 
 
 class Crack(NamedTuple):
@@ -175,8 +178,18 @@ class State(ModelDefinition, Model):
         """The mesh; CommandError if there is none."""
         return self._mesh()
 
+    ahead: int = 0
+    """Static steps that are about to be done at once."""
+
     def time_now(self) -> float:
-        return self.clock.time
+        """What tables and functions of conditions of blocks, bolts and liners are read at: model time [s]; in static
+        mode, where it stands still, the static steps since the mode was switched on besides, each a unit of time, or
+        with creep the creep time at the end of the creep step."""
+        if self.options.dynamic:
+            return self.clock.time
+        if self.creep.on:
+            return self.creep.time + self.creep.passed
+        return self.clock.time + (self.clock.step - self.options.static_since + self.ahead)
 
     @property
     def owned(self) -> slice:

@@ -225,6 +225,13 @@ class Structure(SurfaceLoad):
         rows = np.array([[now(self.conditions[k], name) for name in names] for k in used.tolist()], np.float64)
         return rows.reshape(-1, len(names))[row.reshape(-1)]
 
+    def _time_before(self) -> float:
+        """What tables were read at before the step that the blocks have done."""
+        blocks = self.blocks
+        if blocks.options.dynamic:
+            return blocks.clock.time - blocks.clock.dt
+        return blocks.time_now() - (0.0 if blocks.creep.on else 1.0)
+
     # ---- what is asked -----------------------------------------------------------------------------------------------
 
     def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:

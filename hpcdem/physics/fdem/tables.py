@@ -40,6 +40,10 @@ class Table:
         """Value at a time [s]."""
         return float(np.interp(time, self.times, self.values))
 
+    def changes_after(self, time: float) -> bool:
+        """Whether a later value is another one than that of this time [s]."""
+        return bool((self.values[self.times > time] != self(time)).any())
+
     def at(self, coordinates: np.ndarray) -> np.ndarray:
         """Values (n,) at coordinates (n,) [m]."""
         return np.interp(coordinates, self.times, self.values)

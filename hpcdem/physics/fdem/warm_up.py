@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from hpcdem.halo.comm import SerialComm
-from hpcdem.physics.fdem import changes, connectivity, convergence, creep, diagnostics, equilibrium
+from hpcdem.physics.fdem import changes, connectivity, convergence, creep, diagnostics, equilibrium, overlaps
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over, Value
@@ -25,6 +25,7 @@ def warm_up(threads: int = 1) -> None:
         sim.close_model()
         connectivity.bodies(sim.partner)
         convergence.advance(sim, 3)
+        overlaps.count(sim, sim.local)
         diagnostics.energies(sim)
         changes.set_velocity(sim, None, 0.0, 0.0)
         changes.set_velocity(sim, [0, 1], 10.0, 10.0)
@@ -250,6 +251,7 @@ def in_space(threads: int = 1) -> None:
     sim.velocity_condition([0], vx=0.0, vz=0.0)
     sim.stress_condition([0], normal=-1.0, quiet=True)
     convergence.advance(sim, 20)
+    overlaps.count(sim, sim.local)
     sim.rebuild()
     for name in ("stress_xx", "strain_energy", "position_x", "reaction_x"):
         diagnostics.values(sim, name)

@@ -126,6 +126,8 @@ class Coupled:
         inside = flow.implicit  # says the checkpoint
         flow.check_wells()
         sim.close_model()
+        if self.moves:
+            equilibrium.refuse_changing_tables(sim, "implicit steps of flow")
         if self.moves and not inside and sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
             sim._renew_lists()
         if flow.slurry is not None:

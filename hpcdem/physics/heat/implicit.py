@@ -56,6 +56,8 @@ class Implicit:
                     f"implicit steps of heat know no {load.name}: model step and model solve step blocks with them"
                 )
         sim.close_model()
+        if self.moves:
+            equilibrium.refuse_changing_tables(sim, "implicit steps of heat")
         heat.check_elements()
         self.steps = self.factors = self.unknowns = 0
         self.solver: Direct | Petsc | None = None

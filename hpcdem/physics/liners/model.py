@@ -417,7 +417,7 @@ class Liners(Structure):
         )
 
     def _find_forces(self) -> None:
-        beams, time, o = self.elements, self.blocks.clock.time, self.blocks.options
+        beams, time, o = self.elements, self.blocks.time_now(), self.blocks.options
         self._node_table[:, kernels.WEIGHT_X] = self._true_mass * o.gx
         self._node_table[:, kernels.WEIGHT_Y] = self._true_mass * o.gy
         kernels.node_forces(
@@ -468,7 +468,7 @@ class Liners(Structure):
                 blocks.comm.sum_into(seen.view(np.int64))  # one rank has each row, the others zero: exact
         with blocks.timers("force"):
             static = not blocks.options.dynamic
-            time = clock.time if static else clock.time - clock.dt
+            time = self._time_before()
             conditions = self._conditions_at(time, time if static else clock.time - 0.5 * clock.dt)
             work = self.work if self._account is not None and not static else np.zeros(kernels.WORK)
             before, point = self._on_rock.copy(), beams["point"].reshape(-1, 2)

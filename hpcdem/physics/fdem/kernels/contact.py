@@ -50,11 +50,12 @@ PAIR = 4
 ALL_EDGES = 4 * 63
 # What a pair remembers (m, 6): F_s [N/m] of the edges of the first, then of the second triangle.
 EDGES = 6
-# Normal damping, where a model asks for it: table (m, 3) of T [Pa], exponent b, dashpot [Pa s/m], history (m, 12):
+# Normal damping, where a model asks for it: table (m, 4) of the parts of T [Pa] of the edges of the first and of the
+# second triangle, as both press where surfaces lie on each other, exponent b, dashpot [Pa s/m]; history (m, 12):
 # largest overlap [m] of the six edges, then the normal stress there [Pa].
-LARGEST_STRESS, EXPONENT, DASHPOT = 0, 1, 2
-DAMPER = 3
-# Faces that a target can be touched at (q, 10): a corner of the target at which the face begins (END 1) or ends (-1),
+LARGEST_STRESS, EXPONENT, DASHPOT = 0, 2, 3
+DAMPER = 4
+# Faces that a target can be touched at (q, 11): a corner of the target at which the face begins (END 1) or ends (-1),
 # the face as a combination of the target's first two edges from its first corner, and the properties it then has.
 CORNER, END, ALONG_2, ALONG_3, PROPERTIES = 0, 1, 2, 3, 4
 CHOICE = PROPERTIES + 3 + DAMPER
@@ -304,11 +305,11 @@ def _damp(n, side, m, slots, dampers, largest, lanes):
     """What is left by damping of the normal force of edge m of triangle A (side 0) or B, into the lane LESS; the
     history moves on.
 
-    While surfaces approach sigma = min(sigma_try, T), sigma_try the mean normal stress on the part inside; below the
-    largest overlap o_max it is min(sigma_try, sigma(o_max) (o / o_max)^b). o: largest of 3-lambda depth times the mean
-    altitude of the target. A dashpot adds c v, v the speed of approach at the centre of the force, without pulling
-    (Cundall & Strack 1979), on edges that look against the nearest side of the target: others, at acute corners, would
-    hold back what parts.
+    While surfaces approach sigma = min(sigma_try, T_side), T_side the part of T of edges of this triangle, sigma_try
+    the mean normal stress on the part inside; below the largest overlap o_max it is min(sigma_try, sigma(o_max) (o /
+    o_max)^b). o: largest of 3-lambda depth times the mean altitude of the target. A dashpot adds c v, v the speed of
+    approach at the centre of the force, without pulling (Cundall & Strack 1979), on edges that look against the nearest
+    side of the target: others, at acute corners, would hold back what parts.
     """
     size = U(CAPACITY)
     on = U((ON + 3 * side + m) * CAPACITY)
@@ -318,7 +319,7 @@ def _damp(n, side, m, slots, dampers, largest, lanes):
     target, within = U((8 - 8 * side) * CAPACITY), WITHIN_B if side == 0 else WITHIN_A
     for e in range(U(n)):
         k = slots[e]
-        most, exponent = dampers[DAMPER * k + LARGEST_STRESS], dampers[DAMPER * k + EXPONENT]
+        most, exponent = dampers[DAMPER * k + LARGEST_STRESS + side], dampers[DAMPER * k + EXPONENT]
         dashpot = dampers[DAMPER * k + DASHPOT]
         lanes[LESS + e] = 1.0
         if (most == math.inf and exponent == 1.0 and dashpot == 0.0) or lanes[on + e] == 0.0:
@@ -561,9 +562,9 @@ def forces(threads, *args):
     """Forces of all pairs; histories move on by dt.
 
     first, second (m,) i8: bodies of each pair; x_place, v_place (bodies,) i8: where their corners begin in x and v
-    (flat); pairs (m, 4), history (m, 6), dampers (m, 3), largest (m, 12): see above, the last two without rows if
+    (flat); pairs (m, 4), history (m, 6), dampers (m, 4), largest (m, 12): see above, the last two without rows if
     nothing is damped; chosen (m,) i8: rows whose properties are chosen, number in choice_begin, else -1; choice_begin
-    (n + 1,) i8: rows of choices (q, 10); without rows if there are none; touching (m,) u1: pairs that overlap; out
+    (n + 1,) i8: rows of choices (q, 11); without rows if there are none; touching (m,) u1: pairs that overlap; out
     (m, 12) [N/m]: forces on the corners of the first and of the second body, valid where they touch.
     """
     for t in range(threads):
@@ -581,6 +582,51 @@ def forces_threaded(
             t, threads, first, second, x_place, v_place, x, v, pairs, history, dampers, largest, chosen, choice_begin,
             choices, touching, out, dt,
         )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _coordinates_in(px, py, x, t):
+    """Barycentric coordinates of a point in the triangle with corners from x[t]."""
+    x3, y3 = x[t + 4], x[t + 5]
+    ux, uy, wx, wy = x[t] - x3, x[t + 1] - y3, x[t + 2] - x3, x[t + 3] - y3
+    inverse = 1.0 / (ux * wy - uy * wx)
+    one, two = ((px - x3) * wy - (py - y3) * wx) * inverse, (ux * (py - y3) - uy * (px - x3)) * inverse
+    return one, two, (1.0 - one) - two
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _parts(t, threads, first, second, x_place, x, pairs, touching, part):
+    x, pairs = x.reshape(x.size), pairs.reshape(pairs.size)
+    for k in range(len(first) * t // threads, len(first) * (t + 1) // threads):
+        part[k] = 0.0
+        if touching[k] == 0:
+            continue
+        code = as_bits(pairs[PAIR * k + CODE])
+        for side in range(2):
+            own, other = (first[k], second[k]) if side == 0 else (second[k], first[k])
+            o, target, aside = x_place[own], x_place[other], 1e30 if code >> (1 - side) & 1 else 0.0
+            for m in range(3):
+                if code >> (2 + 3 * side + m) & 1 == 0:
+                    continue
+                a, b = o + 2 * m, o + 2 * ((m + 1) % 3)
+                a1, a2, a3 = _coordinates_in(x[a], x[a + 1], x, target)
+                b1, b2, b3 = _coordinates_in(x[b], x[b + 1], x, target)
+                part[k] = max(part[k], edge_integral(a1, a2, a3, b1, b2, b3, aside)[3])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def parts(threads, *args):
+    """How deep the contactors of each row are in the other body, over its altitude there: part (m,), at most 1/3, 0
+    where they do not touch. Arguments as those of `forces`."""
+    for t in range(threads):
+        _parts(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def parts_threaded(threads, first, second, x_place, x, pairs, touching, part):
+    """The same on several threads."""
+    for t in prange(threads):
+        _parts(t, threads, first, second, x_place, x, pairs, touching, part)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

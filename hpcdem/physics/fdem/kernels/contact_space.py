@@ -29,7 +29,7 @@ from hpcdem.physics.fdem.kernels.tets import ROW, STRIDE
 from hpcdem.physics.fdem.tetrahedra import FACES
 
 # Columns of the table of pairs (m, 6): normal and shear penalty [Pa], tangent of the friction angle, and normal damping
-# as in contact.py: T [Pa], exponent b, dashpot [Pa s/m].
+# as in contact.py: the part of T [Pa] of this face, exponent b, dashpot [Pa s/m].
 PENALTY, SHEAR, TAN_PHI, LARGEST_STRESS, EXPONENT, DASHPOT = range(6)
 LAW = 6
 # What a pair remembers (m, 5): F_s [N], largest phi and the normal stress there [Pa].
@@ -439,6 +439,33 @@ def add(rows, pushed, force):
     for i in range(len(rows)):
         for c in range(ROW):
             force[rows[i], c] += pushed[i, c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _parts(t, threads, first, second, corner, place, x, touching, part):
+    x, w = x.reshape(x.size), np.zeros(SCRATCH)
+    for p in range(len(first) * t // threads, len(first) * (t + 1) // threads):
+        part[p] = 0.0
+        if touching[p] == 0:
+            continue
+        a, b, c = corner[first[p], 0], corner[first[p], 1], corner[first[p], 2]
+        if _may_overlap(a, b, c, place[second[p]], 0.0, x, w)[0]:
+            part[p] = 0.25 * _integrals(w)[4]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def parts(threads, *args):
+    """How deep the face of each pair is in its target, over its altitude there: part (m,), at most 1/4, 0 where they do
+    not touch. Arguments as those of `forces`."""
+    for t in range(threads):
+        _parts(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def parts_threaded(threads, first, second, corner, place, x, touching, part):
+    """The same on several threads."""
+    for t in prange(threads):
+        _parts(t, threads, first, second, corner, place, x, touching, part)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

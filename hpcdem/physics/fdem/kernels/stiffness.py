@@ -39,6 +39,8 @@ from hpcdem.physics.fdem.kernels.joints import INTACT
 
 LEAST = 1e-3
 """Part of the slope at the origin that a joint point keeps in the tangent near and beyond its peak."""
+FLAT = 1e-12
+"""Opening and slip over the length of a joint that are rounding."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -132,10 +134,14 @@ def quads(rows, x, c, s0, small, out):
 
 @njit(cache=True, error_model="numpy")
 def slopes(o, s, kop, tensile, overlay, tan_phi, cohesion, half_shear):
-    """Derivatives of laws.intact_point: sigma by o, tau by o, tau by s, and how much is left to the peak."""
+    """Derivatives of laws.intact_point: sigma by o, tau by o, tau by s, and how much is left to the peak. What has no
+    strength and lies flat is closed and sticks: which way it moves rounding would say."""
     sigma, _, left = laws.intact_point(o, s, kop, tensile, overlay, tan_phi, cohesion, half_shear)
     r = o * kop
-    normal = overlay if o < 0.0 else 2.0 * tensile * kop * max(1.0 - r, LEAST)
+    flat = abs(o) <= FLAT and abs(s) <= FLAT
+    normal = overlay if o < 0.0 or (flat and tensile == 0.0) else 2.0 * tensile * kop * max(1.0 - r, LEAST)
+    if flat and cohesion == 0.0:
+        return normal, 0.0, 2.0 * half_shear if tan_phi > 0.0 else 0.0, 1.0
     limit = max(cohesion - sigma * tan_phi, 0.0)
     peak = max(limit if sigma < 0.0 else cohesion, laws.TINY)
     q = abs(s) * half_shear / peak
