@@ -249,7 +249,7 @@ def glue(
 ) -> None:
     """Bodies that were meshed separately hang together where their faces lie on each other: these become joints, as
     inside of a body; where the faces differ, elements are cut. tolerance [m]: points nearer than this are one; between:
-    only faces between the elements of two groups."""
+    only faces between the elements of two groups. Collective."""
     mesh = project.whole_mesh()
     project.refuse_in_use("bodies are glued")
     sides = None
@@ -257,8 +257,8 @@ def glue(
         one, other = (project.groups[ELEMENT].members(name, set_name) for name in between)
         numbers = np.arange(len(mesh.cells))
         sides = np.isin(numbers, one), np.isin(numbers, other)
-    made = glue_of.glued(mesh, tolerance, sides)
-    if made.mesh is mesh:
+    made: glue_of.Glued = made_once(project.comm, lambda: glue_of.glued(mesh, tolerance, sides))
+    if not made.faces:
         _say(project, "glue: the mesh is one body already")
         return
     project.refit(made)
