@@ -8,7 +8,7 @@ ranks.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +17,8 @@ from hpcdem.core.fields import GID, RADIUS, X, Y
 from hpcdem.physics.dem.guards import NAMED
 from hpcdem.physics.dem.kernels.walls import closest
 
-if TYPE_CHECKING:
-    from hpcdem.physics.dem.simulation import Simulation
 
-
-def stop_on_missed(sim: Simulation) -> None:
+def stop_on_missed(sim: Any) -> None:
     """PhysicsError, on all ranks, if particles touch each other or a wall and are not in the lists. Collective."""
     p, lists = sim.particles, sim.lists
     hot, gid = p.hot[p.owned], p["gid"]
@@ -61,7 +58,7 @@ def stop_on_missed(sim: Simulation) -> None:
 class _Listed:
     """The pairs in the lists of this rank, by ids."""
 
-    def __init__(self, sim: Simulation) -> None:
+    def __init__(self, sim: Any) -> None:
         lists, gids = sim.lists, sim.particles.ihot[:, GID]
         self._pieces = [(gids[row], gids[partner]) for row, partner, _, _ in lists.pieces()]
 
