@@ -311,7 +311,7 @@ def test_what_makes_no_sense_is_refused() -> None:
     with pytest.raises(CommandError, match="conductivity must be > 0"):
         heat.assign(None, {"conductivity": 0.0, "capacity": 1.0})
     heat.assign(np.arange(3), GRANITE)
-    with pytest.raises(CommandError, match="element 3 at .* has no thermal model"):
+    with pytest.raises(CommandError, match=r"element 3 at .* has no thermal model"):
         sim.step()
     with pytest.raises(CommandError, match="element 3 has no thermal model whose properties"):
         heat.adjust(np.array([2, 3]), {"capacity": 1.0})

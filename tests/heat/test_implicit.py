@@ -165,7 +165,7 @@ def test_what_implicit_steps_cannot_do_is_refused() -> None:
     with pytest.raises(CommandError, match="dynamic off comes first, or mechanical"):
         Implicit(sim)
     sim.option(dynamic=False)
-    with pytest.raises(CommandError, match="element 3 at .* has no thermal model"):
+    with pytest.raises(CommandError, match=r"element 3 at .* has no thermal model"):
         Implicit(sim)
     heat.assign(None, GRANITE)
     with pytest.raises(CommandError, match="solver is one of auto, direct, petsc"):
