@@ -267,6 +267,52 @@ def test_several_sections_of_nodes_and_an_included_file(read, tmp_path):
     assert any("the plane stress of CPS8R" in note for note in found.notes)
 
 
+def test_a_file_may_be_included_between_lines_of_data(read, tmp_path):
+    (tmp_path / "points.txt").write_text("** without a keyword\n1, 0., 0.\n2, 1., 0.\n3, 1., 1.\n")
+    (tmp_path / "corner.txt").write_text("1, 1, 2, 3\n")
+    text = (
+        "*NODE\n*INCLUDE, INPUT=points.txt\n4, 0., 1.\n*ELEMENT, TYPE=CPE3, ELSET=A\n*INCLUDE, INPUT=corner.txt\n"
+        "2, 1, 3, 4\n"
+    )
+    found = read(text, "m.inp", whole=True)
+    assert found.mesh.groups["physical"]["A"].tolist() == [0, 1]
+    assert [file.name for file in found.files] == ["corner.txt", "m.inp", "points.txt"]
+
+
+SQUARE = "*NODE\n1, 0., 0.\n2, 1., 0.\n3, 1., 1.\n4, 0., 1.\n*ELEMENT, TYPE=CPE3\n1, 1, 2, 3\n2, 1, 3, 4\n"
+
+
+@pytest.mark.parametrize(("encoding", "first", "second"), [("gbk", "灰岩", "泥岩"), ("latin-1", "É", "Ü")])
+def test_names_that_are_not_in_utf_8_stay_apart(tmp_path, encoding, first, second):
+    sets = f"** {second}\x85, ".encode(encoding, "ignore") + f"\n*ELSET, ELSET={first}\n1\n".encode(encoding)
+    sets += f"*ELSET, ELSET={second}\n2\n".encode(encoding)
+    (tmp_path / "m.inp").write_bytes(SQUARE.encode() + sets)
+    assert names(imported.read(tmp_path / "m.inp").mesh.groups) == {first: [0], second: [1]}
+    gmsh = (
+        f'$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 1 "{first}"\n2 2 "{second}"\n$EndPhysicalNames\n'
+        "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n"
+        "$Elements\n2\n1 2 2 1 1 1 2 3\n2 2 2 2 1 1 3 4\n$EndElements\n"
+    )
+    (tmp_path / "m.msh").write_bytes(gmsh.encode(encoding))
+    assert names(imported.read(tmp_path / "m.msh").mesh.groups) == {first: [0], second: [1]}
+    (tmp_path / "m.msh").write_text(gmsh.replace("\n1 0 0 0", f"\n{2**60} 0 0 0"))
+    with pytest.raises(HpcdemError, match=r"\$Nodes .* holds something that is not a number of Gmsh"):
+        imported.read(tmp_path / "m.msh")
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("*PART, NAME=P\n*END PART\n*PART, NAME=p\n", ":11: part p is there already"),
+        ("*INCLUDE\n", r":9: \*INCLUDE needs INPUT="),
+        (f"*NODE\n{10**25}, 0., 0.\n", ":10: 10000000000000000000000000 is too large for the number of a node"),
+    ],
+)
+def test_what_would_be_lost_in_an_abaqus_file_is_refused(read, more, said):
+    with pytest.raises(HpcdemError, match=said):
+        read(SQUARE + more, "m.inp")
+
+
 PARTS = """*PART, NAME=BLOCK
 *NODE
 1, 0., 0., 0.

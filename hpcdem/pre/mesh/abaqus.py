@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.pre.mesh.file_mesh import DIMENSIONS, Block, FileMesh, listed
+from hpcdem.pre.mesh.file_mesh import DIMENSIONS, Block, FileMesh, lines, listed
 
 REFUSED = {
     "NGEN": "makes points between others", "NFILL": "makes points between others", "NCOPY": "copies points",
@@ -42,6 +42,8 @@ SIDES = {
     "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
 }
 """Corners of S1, S2, ... of each kind."""
+LARGEST = 2**63
+"""Numbers of nodes and elements are smaller."""
 DEEPEST = 20
 """Files that include files."""
 NODES, ELEMENTS, FACES = "NSET", "ELSET", "SURFACE"
@@ -157,8 +159,7 @@ class _Reader:
         self.numbers: dict[str, dict[int, int]] = {}
 
     def read(self) -> FileMesh:
-        for word in _keywords(self.path):
-            self.files |= {word.line.file, *(line.file for line in word.data[:1])}
+        for word in _keywords(self.path, self.files):
             self._take(word)
         if not any(scope.nodes for scope in (self.root, *self.parts.values(), *self.instances.values())):
             raise HpcdemError(f"{self.path}: this is no Abaqus input file with points: nothing stands below *NODE")
@@ -173,7 +174,10 @@ class _Reader:
                 f"{word.line.where}: *{name} {REFUSED[name]}, which is not read; write points and elements out"
             )
         if name == "PART":
-            self.scope = self.parts[word.get("NAME").upper()] = Scope(word.get("NAME"))
+            part = word.get("NAME")
+            if part.upper() in self.parts:
+                raise HpcdemError(f"{word.line.where}: part {part} is there already")
+            self.scope = self.parts[part.upper()] = Scope(part)
         elif name == "ASSEMBLY":
             self.scope, self.assembled = self.root, True
         elif name == "INSTANCE":
@@ -463,34 +467,49 @@ class _Reader:
             notes.append(", ".join(name + (f" ({n} times)" if n > 1 else "") for name, n in self.dropped.items()))
 
 
-def _keywords(path: Path, depth: int = 0) -> Iterator[Keyword]:
-    """The keywords of a file, those of files that it includes in their place."""
+def _keywords(path: Path, files: set[Path]) -> Iterator[Keyword]:
+    """The keywords with their data, those of files that are included in their place; files: gets what is read."""
     word: Keyword | None = None
+    for piece in _pieces(path, files, 0):
+        if isinstance(piece, Keyword):
+            if word is not None:
+                yield word
+            word = piece
+        elif word is None:
+            raise HpcdemError(f"{piece.where}: a line of data without a keyword: {piece.text.strip()[:40]!r}")
+        else:
+            word.data.append(piece)
+    if word is not None:
+        yield word
+
+
+def _pieces(path: Path, files: set[Path], depth: int) -> Iterator[Keyword | Line]:
+    """Keywords and lines of data, one after the other: a file may be included between two lines of data too."""
+    files.add(path)
     head: tuple[Line, str] | None = None
-    try:
-        text = path.read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        raise HpcdemError(f"{path}: this file cannot be read ({error.strerror})") from None
-    for number, raw in enumerate(text.splitlines(), 1):
-        given, line = raw.strip(), Line(path, number, raw)
+    for line in _lines(path, str(path)):
+        given = line.text.strip()
         if not given or given.startswith("**"):
             continue
         if head is not None:
             head = head[0], head[1] + given
         elif given.startswith("*"):
-            if word is not None:
-                yield from _with_files(word, depth)
-            word, head = None, (line, given)
-        elif word is None:
-            raise HpcdemError(f"{line.where}: a line of data without a keyword: {given[:40]!r}")
+            head = line, given
         else:
-            word.data.append(line)
+            yield line
         if head is not None and not head[1].endswith(","):
-            word, head = _keyword(*head), None
+            yield from _with_files(_keyword(*head), files, depth)
+            head = None
     if head is not None:
-        word = _keyword(*head)
-    if word is not None:
-        yield from _with_files(word, depth)
+        yield from _with_files(_keyword(*head), files, depth)
+
+
+def _lines(path: Path, where: str) -> list[Line]:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise HpcdemError(f"{where}: {path} cannot be read ({error.strerror})") from None
+    return [Line(path, number, raw) for number, raw in enumerate(lines(content), 1)]
 
 
 def _keyword(line: Line, text: str) -> Keyword:
@@ -502,27 +521,24 @@ def _keyword(line: Line, text: str) -> Keyword:
     return Keyword("".join(name.upper().split()), parameters, line)
 
 
-def _with_files(word: Keyword, depth: int) -> Iterator[Keyword]:
+def _with_files(word: Keyword, files: set[Path], depth: int) -> Iterator[Keyword | Line]:
     """The keyword, with the lines of a file that it takes its data from; *INCLUDE: what is in the file."""
-    named = word.parameters.get("INPUT")
-    if not named or word.name not in ("INCLUDE", "NODE", "ELEMENT", NODES, ELEMENTS):
-        yield word
-        return
+    where = word.line.where
     if depth == DEEPEST:
-        raise HpcdemError(f"{word.line.where}: files within files, deeper than {DEEPEST}")
-    file = word.line.file.parent / named
+        raise HpcdemError(f"{where}: files within files, deeper than {DEEPEST}")
     if word.name == "INCLUDE":
+        file = word.line.file.parent / word.get("INPUT")
         if not file.is_file():
-            raise HpcdemError(f"{word.line.where}: there is no file {file}")
-        yield from _keywords(file, depth + 1)
+            raise HpcdemError(f"{where}: there is no file {file}")
+        yield from _pieces(file, files, depth + 1)
         return
-    try:
-        lines = file.read_text(encoding="utf-8-sig", errors="replace").splitlines()
-    except OSError as error:
-        raise HpcdemError(f"{word.line.where}: {file} cannot be read ({error.strerror})") from None
-    own = [Line(file, n, raw) for n, raw in enumerate(lines, 1) if raw.strip() and not raw.lstrip().startswith("*")]
-    word.data[:0] = own
     yield word
+    if word.name in ("NODE", "ELEMENT", NODES, ELEMENTS) and word.parameters.get("INPUT"):
+        file = word.line.file.parent / word.parameters["INPUT"]
+        files.add(file)
+        for line in _lines(file, where):
+            if line.text.strip() and not line.text.lstrip().startswith("*"):
+                yield line
 
 
 def _kind(label: str) -> tuple[str, int]:
@@ -546,9 +562,9 @@ def _number(text: str, line: Line) -> float:
 
 
 def _whole(text: str, line: Line) -> int:
-    if text.isdecimal():
-        return int(text)
-    value = _number(text, line)
+    value = int(text) if text.isdecimal() else _number(text, line)
+    if not abs(value) < LARGEST:
+        raise HpcdemError(f"{line.where}: {text[:40]} is too large for the number of a node or an element")
     if value != int(value):
         raise HpcdemError(f"{line.where}: a whole number was expected, not {text[:40]}")
     return int(value)

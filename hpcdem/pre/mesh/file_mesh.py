@@ -6,6 +6,7 @@ of it.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -77,6 +78,14 @@ class FileMesh:
     def refuse(self, what: str) -> HpcdemError:
         """The error, with the name of the file."""
         return HpcdemError(f"{self.path}: {what}")
+
+
+def lines(content: bytes) -> list[str]:
+    """Of a text in UTF-8, or in what programs on Chinese and on western systems write: names that differ stay so."""
+    for encoding in ("utf-8-sig", "gb18030", "latin-1"):
+        with contextlib.suppress(UnicodeDecodeError):
+            return content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    raise AssertionError
 
 
 def listed(numbers: Iterable[object], most: int = 5) -> str:

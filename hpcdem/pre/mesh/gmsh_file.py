@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.pre.mesh.file_mesh import DIMENSIONS, Block, FileMesh
+from hpcdem.pre.mesh.file_mesh import DIMENSIONS, Block, FileMesh, lines
 
 _TYPES: dict[str, dict[int, int]] = {
     "line": {1: 2, 8: 3, 26: 4, 27: 5, 28: 6},
@@ -52,14 +52,21 @@ class _Text:
 
     def ints(self, n: int) -> np.ndarray:
         """The next n."""
-        return self.floats(n).astype(np.int64)
+        return _whole(self.floats(n))
 
     sizes = ints
 
     def records(self, n: int, ints: int, floats: int, kind: str = "i4") -> tuple[np.ndarray, np.ndarray]:
         """(n, ints), (n, floats) of n records."""
         both = self.floats(n * (ints + floats)).reshape(n, ints + floats)
-        return both[:, :ints].astype(np.int64), both[:, ints:]
+        return _whole(both[:, :ints]), both[:, ints:]
+
+
+def _whole(values: np.ndarray) -> np.ndarray:
+    """As integers; ValueError for what is none, or too large for a double to tell it from the next."""
+    if not (np.abs(values) < 2.0**53).all() or (values != np.rint(values)).any():
+        raise ValueError
+    return values.astype(np.int64)
 
 
 class _Binary:
@@ -174,7 +181,7 @@ class _Reader:
             at = end.end()
 
     def _names(self, section: bytes) -> None:
-        for line in section.decode("utf-8", "replace").splitlines()[1:]:
+        for line in lines(section)[1:]:
             found = re.match(r'\s*(\d+)\s+(-?\d+)\s+"(.*)"', line)
             if found:
                 self.names[int(found[1]), abs(int(found[2]))] = found[3]
