@@ -183,7 +183,8 @@ def test_excavation_takes_its_fluid_away() -> None:
 
 
 def test_pressure_breaks_joints_and_lists_follow() -> None:
-    """A jointed block that bursts: the fluid's account closes, and the energy's, in which it is work from outside."""
+    """A jointed block that bursts: the fluid's account closes, and the energy's, in which it is work from outside. Its
+    pieces turn as they fly apart: channels get short, and flow needs ever more sub-steps within 100 cycles."""
     sim = model(rectangle(6, 4, 0.6, 0.4))
     joints = inner(sim.mesh)
     sim.joint_model(joints, "classic_intrinsic_cohesive_interface", {**JOINT, "gf1": 5.0, "gf2": 5.0})
@@ -191,7 +192,7 @@ def test_pressure_breaks_joints_and_lists_follow() -> None:
     flow.assign(joints, {**CRACK, "aperature_maximum": 1e-3})
     diagnostics.account_energy(sim)
     hold(flow, at(sim, 0.3, 0.2), 30e6)
-    run(sim, 600)
+    run(sim, 1500)
     energies = diagnostics.energies(sim)
     assert diagnostics.joint_counts(sim)[2] > 3 and energies["work_outside"] > 0.0
     assert energies["relative"] < 0.02

@@ -69,7 +69,7 @@ def test_apertures_follow_fields_and_tables(tmp_path: Path) -> None:
     field = "pcdc field create 'f' lognormal 2e-5 5e-6 seed 3\npcdc face-joint property aperature-initial field 'f'"
     found = apertures(tmp_path, field)
     assert len(set(found.tolist())) == 4 and (found > 1e-6).all() and np.array_equal(found, apertures(tmp_path, field))
-    with pytest.raises(HpcdemError, match=r"face-joint [0-9]+: aperature_minumum must be > 0"):
+    with pytest.raises(HpcdemError, match=r"face-joint [0-9]+: aperature-minumum must be > 0"):
         bench(tmp_path, "pcdc table create 'a' values (0,-1) (4,1)\npcdc face-joint property a-min table 'a' over x")
 
 
@@ -77,9 +77,9 @@ def test_leak_off_can_be_switched_on_later(tmp_path: Path) -> None:
     on = "pcdc face-joint property leak-off on matrix-permeability 1e-15 matrix-porosity 0.2 m-p-c 1e-9"
     flow = Flow.of(bench(tmp_path, on).project.blocks)
     assert (flow.laws()[flow.row[flow.network.channels] - 1][:, kernels.LEAK] > 0.0).all()
-    for more, said in (("leak-off on", "leak_off needs matrix_permeability"),
-                       ("leak-off on matrix-permeability 1e-15", "leak_off needs matrix_porosity"),
-                       ("matrix-porosity 0.2", "matrix_porosity goes with leak_off, which is off")):  # fmt: skip
+    for more, said in (("leak-off on", "leak-off needs matrix-permeability"),
+                       ("leak-off on matrix-permeability 1e-15", "leak-off needs matrix-porosity"),
+                       ("matrix-porosity 0.2", "matrix-porosity goes with leak-off, which is off")):  # fmt: skip
         with pytest.raises(HpcdemError, match=said):
             bench(tmp_path, f"pcdc face-joint property {more}")
 

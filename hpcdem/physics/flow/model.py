@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 LOOK = 100
 """Cycles of flow after which an estimated sub-step is estimated again."""
+GLANCE = 8
+"""Sub-steps after which it is seen whether one has come to half the stability limit before that: pieces that turn as
+they fly apart shorten their channels faster than a look comes."""
 SAFETY = 0.8
 """Part of half the stability limit that an estimated sub-step may be when blocks move."""
 FAR = 2.0
@@ -969,7 +972,8 @@ class Flow(SurfaceLoad):
         elif period == 0.0:
             self.sub_steps, self.dt = max(1, o.flow_steps), limit
         else:
-            self.sub_steps = o.flow_steps or max(1, math.ceil(period / (SAFETY * limit)))
+            need = period / (SAFETY * limit) if limit > 0.0 else math.inf
+            self.sub_steps = o.flow_steps or max(1, math.ceil(min(need, 1e15)))
             self.dt = period / self.sub_steps
         if not o.flow_steps and self.sub_steps > MANY:
             raise CommandError(
@@ -977,6 +981,13 @@ class Flow(SurfaceLoad):
                 "model time-step hydraulic gives it a clock of its own, model solve hydraulic takes implicit steps"
             )
         self._tell_step(limit)
+
+    def _outrun(self) -> bool:
+        """An estimated sub-step is more than half the stability limit, before it is looked at again. Collective."""
+        o = self.blocks.options
+        if o.flow_dt > 0.0 or o.flow_steps > 0 or self.cycles % max(1, GLANCE // self.sub_steps):
+            return False
+        return self.dt > self.limit()
 
     def _tell_step(self, limit: float) -> None:
         log = self.blocks.log
@@ -1055,7 +1066,7 @@ class Flow(SurfaceLoad):
                 if any(self._gravity()):
                     self._take_heights()
                     self._refresh()
-            if o.mechanical and (self.cycles % LOOK == 0 or self._found_for != self._given()):
+            if o.mechanical and (self.cycles % LOOK == 0 or self._found_for != self._given() or self._outrun()):
                 self._find_step()
             if self.carried is not None:
                 self.carried = np.zeros(len(self._ends))
