@@ -27,6 +27,8 @@ UNUSED_DAYS = 60
 """Kernels that nobody has used for so long are removed."""
 _DIGEST = 32
 """Bytes of SHA-256, before what a file holds."""
+_ROOM = 1 << 16
+"""Bytes that a folder must take to be one for kernels."""
 _PACKAGE = Path(__file__).resolve().parent.parent
 _DAY = 86400.0
 
@@ -79,8 +81,10 @@ class Files:
         if not self._enabled or path is None or found.lifted or found.library.has_dynamic_globals:
             return
         data = dumps(found._reduce())
-        with contextlib.suppress(OSError):
+        try:
             write(path, hashlib.sha256(data).digest() + data)
+        except OSError as error:
+            unkept.append(error.strerror or str(error))
 
     def enable(self) -> None:
         """Read and write files."""
@@ -113,6 +117,8 @@ def write(path: Path, data: bytes) -> None:
 
 late: list[str] = []
 """Kernels that this process has compiled outside of a warm-up, which should have called them."""
+unkept: list[str] = []
+"""Why kernels that this process has compiled could not be kept, of each of them."""
 _usual: Callable[[Any], None] | None = None
 _warming = 0
 
@@ -292,8 +298,8 @@ def can_write(base: Path) -> bool:
     """Whether files can be made in the folder, which is made first."""
     try:
         base.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=base):
-            return True
+        with tempfile.TemporaryFile(dir=base, buffering=0) as file:
+            return file.write(bytes(_ROOM)) == _ROOM  # a full disk, and a quota that is used up, take a name only
     except OSError:
         return False
 

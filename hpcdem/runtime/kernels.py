@@ -57,6 +57,7 @@ def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[
     turn = turn_of([rank[:2] for rank in ranks], comm.rank)
     cores = frozenset().union(*(rank[3] for rank in ranks if rank[0] == host))
     problem = ""
+    kept.unkept.clear()
     for now in range(3):
         if now == turn:
             problem = _compile(place, missing, cores, log if comm.rank == 0 else None)
@@ -67,6 +68,11 @@ def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[
         )
     if problem := next(filter(None, comm.allgather(problem)), ""):
         log.warn(f"processes that compiled kernels failed, so one went on alone ({problem})")
+    if reason := next((reasons[0] for reasons in comm.allgather(kept.unkept[:1]) if reasons), ""):
+        log.warn(
+            f"compiled kernels cannot be kept in {place} ({reason}), so later runs compile them again. Make room there; "
+            "NUMBA_CACHE_DIR moves it"
+        )
     if comm.rank == 0:
         kept.tidy(place.parent)
     return place
@@ -106,8 +112,9 @@ def _compile(place: Path, warm_ups: Mapping[str, Callable[[], None]], cores: fro
         with progress.told(), kept.warming():
             for kind, warm in missing.items():
                 warm()  # what the processes could not know of, and all of it if there were none
-                with contextlib.suppress(OSError):
-                    kept.write(place / _name(kind, _threaded()), b"")
+                if not kept.unkept:
+                    with contextlib.suppress(OSError):
+                        kept.write(place / _name(kind, _threaded()), b"")
     return problem
 
 

@@ -8,6 +8,7 @@ import importlib.util
 import io
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -365,16 +366,29 @@ def test_who_waits_says_for_whom(base, kernels):
 
 
 def test_a_full_disk_costs_the_next_run_time_and_nothing_else(base, kernels, monkeypatch):
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, "no space left on device")
+    usual = os.replace
+
+    def full(source: object, target: Path) -> None:
+        if target.suffix == ".nbc":  # names of empty files find room
+            raise OSError(errno.ENOSPC, "no space left on device")
+        usual(source, target)
 
     with monkeypatch.context() as disk:
         disk.setattr(kept.os, "replace", full)
         folder, said = prepare(kernels)
-    assert kernels.calls == [42] and files(folder) == [] and "warning" not in said
+    assert kernels.calls == [42] and files(folder) == [] and not kernels_.ready("")
+    assert said.count("warning") == 1 and f"cannot be kept in {folder} (no space left on device)" in said
     assert not [path for path in folder.rglob(".*") if path.is_file()]
-    prepare(kernels)
-    assert len(files(folder)) == 1
+    assert "warning" not in prepare(kernels)[1]
+    assert len(files(folder)) == 1 and kernels_.ready("")
+
+
+def test_a_folder_that_takes_names_only_is_none_for_kernels(tmp_path):
+    limit = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, {resource.RLIM_INFINITY})); "
+    ask = "import pathlib, sys; from hpcdem.runtime import kept; print(kept.can_write(pathlib.Path(sys.argv[1])))"
+    for first, answer in (("", "True"), (limit, "False")):
+        done = subprocess.run([sys.executable, "-c", first + ask, tmp_path], capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == answer
 
 
 @pytest.mark.parametrize("damage", [b"", b"nonsense", None])
