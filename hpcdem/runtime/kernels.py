@@ -70,8 +70,8 @@ def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[
         log.warn(f"processes that compiled kernels failed, so one went on alone ({problem})")
     if reason := next((reasons[0] for reasons in comm.allgather(kept.unkept[:1]) if reasons), ""):
         log.warn(
-            f"compiled kernels cannot be kept in {place} ({reason}), so later runs compile them again. Make room there; "
-            "NUMBA_CACHE_DIR moves it"
+            f"compiled kernels cannot be kept in {place} ({reason}), and later runs compile them again. Make room, "
+            "or set NUMBA_CACHE_DIR"
         )
     if comm.rank == 0:
         kept.tidy(place.parent)
