@@ -37,6 +37,8 @@ LAUNCHERS = {
 SLURM_NTASKS is not asked: sbatch sets it too, for a batch script that is one process. PMIx has no variable for
 the size, so its processes start MPI and ask.
 """
+MOST_THREADS = 1024
+"""Of a rank: as many processors as Linux counts in a mask."""
 
 
 def version() -> str:
@@ -61,6 +63,8 @@ def prepare_environment(threads: int) -> tuple[int, list[str]]:
     Returns the number of threads per rank that can be had, and warnings. The number of threads is taken from -j
     alone: it overrides what a job script left in OMP_NUM_THREADS.
     """
+    if threads > MOST_THREADS:  # libgomp ends the process where it cannot start them
+        raise UsageError(f"{threads} threads per rank were asked for: {MOST_THREADS} are the most; see -j")
     os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
     os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
     set_thread_variables(threads)

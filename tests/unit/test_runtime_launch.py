@@ -118,6 +118,12 @@ def clean(monkeypatch):
         monkeypatch.delenv(name)
 
 
+def test_threads_that_no_machine_has_are_refused(clean):
+    with pytest.raises(UsageError, match="1025 threads per rank were asked for: 1024 are the most"):
+        launching.prepare_environment(1025)
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+
+
 def test_one_knob_sets_all_threads(clean, monkeypatch):
     monkeypatch.setattr(launching, "openmp_runtime_found", lambda: True)
     assert launching.prepare_environment(3) == (3, [])
