@@ -164,7 +164,7 @@ def explained(kind: type[Case], error: ValidationError) -> str:
     name = str(first["loc"][0])
     known = kind.model_fields
     if name not in known:
-        return f"{kind.__name__} has no parameter '{name}'{hint(name, known)} There are {', '.join(known)}"
+        return f"{kind.__name__} has no parameter '{name}'{hint(name, known) or '.'} There are {', '.join(known)}"
     unit = unit_of(known[name])
     what = known[name].description if unit in ("", "1") else f"{known[name].description}, {unit}"
     expected = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ").split(", unable")[0]

@@ -52,7 +52,7 @@ TEXTS = {
     "draw frames as the window shows them": "按窗口中的样子画出各帧",
     "make a film of a run": "制作动画",
     "say what a frame or a checkpoint holds": "说明一帧或重启文件的内容",
-    "measure a finished run: wedge, cracks, fluid, stress, ...": "测量已完成的运行:楔体、裂缝、流体、应力等",
+    "measure a finished run: wedge, cracks, fluid, faults, ...": "测量已完成的运行:楔体、裂缝、流体、断层等",
     "stress and strain of the frames of a finished run": "计算已完成运行各帧的应力和应变",
     "write the script of a ready-made model": "写出现成模型的脚本",
     "list the examples, or copy one to this folder": "列出示例,或复制一个到当前目录",

@@ -81,7 +81,7 @@ def copied(name: str, into: Path) -> list[Path]:
     known = scripts()
     path = known.get(Path(name).stem)
     if path is None:
-        raise UsageError(f"{name}: no such example{hint(name, known)} There are {', '.join(known)}")
+        raise UsageError(f"{name}: no such example{hint(name, known) or '.'} There are {', '.join(known)}")
     text = path.read_text(encoding="utf-8")
     others = [other for other in folder().iterdir() if other.is_file() and other.suffix not in SUFFIXES]
     files = [path, *(other for other in sorted(others) if other.name in text)]

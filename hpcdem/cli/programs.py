@@ -25,14 +25,14 @@ GROUPS: dict[str, tuple[Program, ...]] = {
         Program("sweep", "SCRIPT", "run one script for many values and report on them", "sweep"),
     ),
     "Look": (
-        Program("view", "[DIR]", "open a run or a script in the browser", "view"),
+        Program("view", "DIR", "open a run or a script in the browser", "view"),
         Program("draw", "DIR", "draw frames as the window shows them", "draw", looks=True),
         Program("movie", "DIR", "make a film of a run", "movie", looks=True),
         Program("info", "FILE", "say what a frame or a checkpoint holds", "info", looks=True),
     ),
     "Measure": (
         Program(
-            "measure", "WHAT DIR", "measure a finished run: wedge, cracks, fluid, stress, ...", "measure", looks=True
+            "measure", "DIR [WHAT]", "measure a finished run: wedge, cracks, fluid, faults, ...", "measure", looks=True
         ),
         Program("-s", "DIR", "stress and strain of the frames of a finished run"),
     ),

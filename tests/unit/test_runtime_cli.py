@@ -105,6 +105,19 @@ def test_help_also_as_the_manual_spells_it(word):
         assert option in done.stdout
 
 
+def test_help_gives_the_arguments_that_a_command_takes():
+    seen = set()
+    for name, command in commands().items():
+        one = BY_NAME.get(name.rpartition(".")[2])
+        if one is not None:
+            pieces = [piece.strip("[].") for piece in command.collect_usage_pieces(click.Context(command))]
+            words = [word.strip("[]") for word in one.use.split()]
+            taken = [piece.split("|")[-1 if one.name == "draw" else 0] for piece in pieces if piece != "OPTIONS"]
+            assert taken == words, name
+            seen.add(one.name)
+    assert {"measure", "view", "draw", "info", "movie", "resume", "sweep", "examples"} <= seen
+
+
 def test_help_lists_every_command_by_group_and_in_chinese():
     page = cli.hpcdem.get_help(click.Context(cli.hpcdem, info_name="hpcdem", max_content_width=110))
     for group, programs in GROUPS.items():
@@ -141,6 +154,8 @@ def test_examples_are_listed_and_copied(tmp_path):
     assert done.returncode == 0 and {path.name for path in tmp_path.iterdir()} == {"specimens.py", "grading.txt"}
     again = program("main", "examples", "specimens", "--into", str(tmp_path))
     assert again.returncode == 2 and "exists already" in again.stderr
+    far = program("main", "examples", "../x")
+    assert far.returncode == 2 and "../x: no such example. There are angle_of_repose, " in far.stderr
     wrong = program("main", "examples", "puhs")
     assert wrong.returncode == 2 and "did you mean 'push'?" in wrong.stderr
 
