@@ -9,12 +9,13 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, floors
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
 from tests.blocks.support import JOINT, near, rectangle
-from tests.flow.support import WATER, inner
+from tests.flow.support import WATER, at, hold, inner, line
 from tests.space import support as space
 
 ROCK = {"density": 2400.0, "young": 2e10, "poisson_ratio": 0.25}
@@ -148,6 +149,24 @@ def test_flow_in_rock_without_loads():
         with Coupled(sim, 5.0) as run:
             while flow.time < end:
                 run.advance(end)
+
+
+def test_steady_flow_between_equal_pressures():
+    """Nothing flows between them; a rate without a pressure anywhere has no steady flow."""
+    for ends in ((2e4, 2e4), (2e4, 2e4 - 1e-6), (0.0, 0.0)):
+        sim, flow = line(4, 2.0)
+        flow.fill(None, saturation=1.0)
+        for x, pressure in zip((0.0, 2.0), ends, strict=True):
+            hold(flow, at(sim, x, 0.0), pressure)
+        with Coupled(sim, 1.0) as run:
+            run.steady()
+        assert flow.values("flow-node", "pressure") == pytest.approx(ends[0], rel=1e-9)
+        assert flow.account()["stored"] == pytest.approx(2e-5, rel=1e-4)
+    sim, flow = line(4, 2.0)
+    flow.fill(None, saturation=1.0)
+    flow.prescribe(at(sim, 0.0, 0.0), kernels.RATE, 1e-6)
+    with Coupled(sim, 1.0) as run, pytest.raises(CommandError, match="steady flow"):
+        run.steady()
 
 
 def test_what_is_no_balance_is_still_said():

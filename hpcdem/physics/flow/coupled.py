@@ -40,13 +40,19 @@ MOST_STEADY = 100
 """Time steps towards steady flow."""
 STEADY = 1e-9
 """Storage over what flows, below which a flow is steady."""
+ROUNDING = 1e-14
+"""Change of pressures and saturations in a step, over the largest, that is none."""
+KEPT = 1e-6
+"""Change of the fluid in such a step, over all of it, that rounding of what flows may be."""
+QUIET = 8
+"""Steps without a change, each longer than the one before, after which nothing flows at all: that is steady too."""
 
 
 @dataclass
 class _Found:
     """What Newton's method came to: positions (nn, dim), variables (nf,), the balance of the fluid, what is lacking,
     iterations, joints that pass their peak; error: why this is no balance, "" if it is; storing: fluid that is stored
-    over what flows."""
+    over what flows; still: nothing has changed."""
 
     x: np.ndarray
     u: np.ndarray
@@ -56,6 +62,7 @@ class _Found:
     past: int
     error: str
     storing: float = 0.0
+    still: bool = False
 
 
 @dataclass
@@ -323,7 +330,7 @@ class Coupled:
             raise CommandError("steady flow is that in blocks that stand still: model option mechanical off first")
         if bool(np.isfinite(flow.since).any()):
             raise CommandError("leak-off goes on for ever: there is no steady flow with it")
-        time, dt, growth = flow.time, self.longest, 10.0
+        time, dt, growth, quiet = flow.time, self.longest, 10.0, 0
         for _ in range(MOST_STEADY):
             found = self._tried(dt, passes=False)
             flow.time = time
@@ -334,7 +341,8 @@ class Coupled:
                     raise CommandError(f"steady flow: {found.error}")
                 continue
             self.count.steps += 1
-            if found.storing <= STEADY:
+            quiet = quiet + 1 if found.still else 0
+            if found.storing <= STEADY or quiet == QUIET:
                 return
             dt, growth = growth * dt, min(1.5 * growth, 10.0)
         raise CommandError(
@@ -370,7 +378,10 @@ class Coupled:
             self.fluid.show(self.fluid.state_of(self.fluid.u, self.x))
             return found
         total = float(found.fluid.sizes.sum())
-        found.storing = float(np.abs(found.fluid.fluid - step.fluid).sum()) / total if total > 0.0 else 0.0
+        change, held = (float(np.abs(one).sum()) for one in (found.fluid.fluid - step.fluid, step.fluid))
+        found.storing = change / total if total > 0.0 else 0.0
+        still = np.abs(found.u - self.fluid.u).max(initial=0.0) <= ROUNDING * np.abs(found.u).max(initial=0.0)
+        found.still = bool(still) and change <= KEPT * held
         volume = self.fluid.volume
         self.x = found.x
         given = self.fluid.take(step, found.fluid, found.u)

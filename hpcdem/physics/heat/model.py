@@ -779,7 +779,7 @@ class Heat(SurfaceLoad):
 
     def _tell_step(self) -> None:
         log = self.blocks.log
-        if log is None or abs(self.dt - self._told) <= 0.1 * self._told:
+        if log is None or not math.isfinite(self.dt) or abs(self.dt - self._told) <= 0.1 * self._told:
             return
         self._told = self.dt
         log.info(f"heat: {self.sub_steps} sub-steps of {self.dt:.4g} s per cycle; stability limit {self._limit:.4g} s")
