@@ -313,6 +313,20 @@ def test_what_would_be_lost_in_an_abaqus_file_is_refused(read, more, said):
         read(SQUARE + more, "m.inp")
 
 
+def test_the_face_of_a_shell_is_no_side_in_the_plane(read):
+    found = read(SQUARE + "*SURFACE, NAME=S\n1, SPOS\n2, S1\n", "m.inp", whole=True)
+    assert found.mesh.layers["S"].tolist() == [[0, 2]] and "the sides SPOS of CPE3 in the surface S" in found.notes
+
+
+def test_names_in_quotes_before_a_dot(read):
+    text = (
+        f'*PART, NAME="a part"\n{SQUARE}*ELSET, ELSET="a set"\n2\n*END PART\n*ASSEMBLY, NAME=A\n'
+        '*INSTANCE, NAME="part one", PART="a part"\n*END INSTANCE\n'
+        '*ELSET, ELSET=PICKED\n"part one"."a set", "part one".1\n*END ASSEMBLY\n'
+    )
+    assert names(read(text, "m.inp").groups) == {"a set": [1], "PICKED": [0, 1]}
+
+
 PARTS = """*PART, NAME=BLOCK
 *NODE
 1, 0., 0., 0.

@@ -433,7 +433,7 @@ class _Reader:
         for block, at in self._by_block(elements):
             sides = SIDES.get(block.kind, ())
             number = entry.side[1:]
-            if entry.side in ("SPOS", "SNEG") and DIMENSIONS.get(block.kind) == 2:
+            if entry.side in ("SPOS", "SNEG") and DIMENSIONS.get(block.kind) == 2 < self._dim():
                 out.append(block.rows[at, : len(sides)])
             elif entry.side[:1] in ("S", "E") and number.isdigit() and 1 <= int(number) <= len(sides):
                 out.append(block.rows[at][:, sides[int(number) - 1]])
@@ -443,10 +443,13 @@ class _Reader:
                 self.notes.append(f"the sides {entry.side or 'on the outside'} of {block.label} in the surface {title}")
         return out
 
+    def _dim(self) -> int:
+        return max(DIMENSIONS.get(block.kind, 3) for block in self.made.blocks)
+
     def _outside(self, faces: np.ndarray) -> np.ndarray:
         """Those of these sides of elements that no other element has."""
         if not hasattr(self, "sides"):
-            dim = max(DIMENSIONS.get(block.kind, 0) for block in self.made.blocks)
+            dim = self._dim()
             self.sides = Counter(
                 tuple(sorted(row))
                 for block in self.made.blocks if DIMENSIONS.get(block.kind) == dim
@@ -571,7 +574,7 @@ def _whole(text: str, line: Line) -> int:
 
 
 def _number_or_name(text: str) -> np.ndarray | str:
-    return np.array([int(text)]) if re.fullmatch(r"\d+", text) else text.strip("\"'")
+    return np.array([int(text)]) if re.fullmatch(r"\d+", text) else re.sub("[\"']", "", text)
 
 
 def _rotation(axis: np.ndarray, degrees: float) -> np.ndarray:
