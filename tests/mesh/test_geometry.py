@@ -253,6 +253,18 @@ def test_units_of_a_drawing(ezdxf, tmp_path, code, scale, factor, said):
     assert re.search(said, line) and f"to ({2000 * factor:g}, {1000 * factor:g}) m" in line
 
 
+def test_what_leaves_the_plane_is_refused(ezdxf, tmp_path):
+    document = ezdxf.new("R2010")
+    document.modelspace().add_line((0, 0, 2), (1, 0, 2), dxfattribs={"layer": "level"})
+    document.modelspace().add_line((0, 0, 0), (1, 0, 5), dxfattribs={"layer": "slanted"})
+    document.modelspace().add_spline([(0, 0, 0), (1, 1, 0), (2, 0, 1)], dxfattribs={"layer": "bent"})
+    document.saveas(tmp_path / "high.dxf")
+    assert list(read_dxf(tmp_path / "high.dxf", only={"level"})) == ["level"]
+    for layer, said in (("slanted", "LINE .* runs from z = 0 to 5"), ("bent", "SPLINE .* runs from z = .* to 1")):
+        with pytest.raises(HpcdemError, match=said):
+            read_dxf(tmp_path / "high.dxf", only={layer})
+
+
 def test_no_drawing(ezdxf, tmp_path):
     with pytest.raises(CommandError, match="no such file"):
         read_dxf(tmp_path / "none.dxf")

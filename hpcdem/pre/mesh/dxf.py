@@ -120,8 +120,18 @@ def _xy(at: Any) -> tuple[float, float]:
     return float(at[0]), float(at[1])
 
 
+def _level(points: Any, where: str) -> list[tuple[float, float]]:
+    """The points without z; HpcdemError if they do not all have the same."""
+    heights = [float(at[2]) for at in points]
+    flat = [_xy(at) for at in points]
+    low, high = min(heights), max(heights)
+    if high - low > 1e-6 * max(math.dist(flat[0], at) for at in flat):
+        raise HpcdemError(f"{where}: it runs from z = {low:g} to {high:g}, only what lies in the x-y plane counts")
+    return flat
+
+
 def _line(entity: Any, where: str) -> Curve:
-    return geometry.polyline([_xy(entity.dxf.start), _xy(entity.dxf.end)])
+    return geometry.polyline(_level([entity.dxf.start, entity.dxf.end], where))
 
 
 def _circle(entity: Any, where: str) -> Curve:
@@ -164,7 +174,7 @@ def _with_bulges(rows: np.ndarray, closed: bool) -> Curve:
 
 def _flattened(entity: Any, where: str) -> Curve:
     # A rough polyline first: its size says how much the fine one may deviate.
-    rough = np.array([_xy(p) for p in entity.flattening(1e300, 8)], np.float64)
+    rough = np.array(_level(list(entity.flattening(1e300, 8)), where), np.float64)
     size = float(np.ptp(rough, axis=0).max())
     fine = [_xy(p) for p in entity.flattening(FLATTENING * size)] if size > 0.0 else []
     if len(fine) > 2 and math.dist(fine[0], fine[-1]) < 1e-9 * size:
