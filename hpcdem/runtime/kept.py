@@ -190,7 +190,7 @@ def install() -> None:
 
 def has(kernel: Any, types: tuple[Any, ...]) -> bool:
     """Whether a kernel with these types of arguments is in the store."""
-    path = kernel._cache.path((types, None)) if isinstance(kernel._cache, Files) else None
+    path = kernel._cache.path(types) if isinstance(kernel._cache, Files) else None
     return path is not None and path.is_file()
 
 

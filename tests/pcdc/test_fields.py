@@ -104,7 +104,7 @@ def test_ranks_and_a_restart_do_not_change_a_bit(resident, alone, tmp_path, rank
      ("element property young table 'E' over z", "expected one of x, y"),
      ("element property young table 'none' over y", "young: there is no table 'none'"),
      ("face-joint property gf1 field 'none'", "gf1: there is no field 'none'"),
-     ("element property poisson-ratio field 'strength'", r"element 0: poisson_ratio must be > -1"),
+     ("element property poisson-ratio field 'strength'", r"element 0: poisson-ratio must be > -1"),
      ("node boundary mech-vel-b-c velocity-x field 'strength'", "expected a number, table"),
      ("field delete 'none'", "there is no field 'none'")],
 )  # fmt: skip

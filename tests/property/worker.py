@@ -200,7 +200,9 @@ def carry_out_words(comm: Any, channel: Any, job: dict[str, Any], say: Any) -> d
     enter(None)
     sys.argv, sys.path = words, path
     for name in set(sys.modules) - modules:
-        if str(getattr(sys.modules[name], "__file__", "")).startswith(job["folder"]):
+        file = str(getattr(sys.modules[name], "__file__", ""))
+        own = file.startswith(sys.prefix) or name.partition(".")[0] in ("hpcdem", "tests")
+        if file.startswith(job["folder"]) and not own:
             del sys.modules[name]  # a helper that stands beside the script
     return {"code": failure.code if failure else 0, "out": out.getvalue(), "err": err.getvalue()}
 

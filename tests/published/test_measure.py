@@ -38,7 +38,7 @@ def test_wedge_on_a_bed(slope: float) -> None:
 
 
 def test_a_surface_rising_all_the_way_is_no_wedge() -> None:
-    with pytest.raises(ValueError, match="in front of the crest"):
+    with pytest.raises(ValueError, match="is its far end"):
         measure.wedge(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.0]))
 
 

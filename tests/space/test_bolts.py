@@ -279,7 +279,7 @@ def test_what_is_for_space_is_refused_in_the_plane(tmp_path: Path) -> None:
     flat += f"pcdc bolt create polyline (0.5,1) (0.6,0.3)\npcdc bolt c-model mech-e-p property {WORDS}\n"
     for line, message in (
         ("bolt-node boundary b-n-c velocity-z 1", "velocity-z.* is for three dimensions"),
-        ("history create 'h' bolt-node value position-z id 0", "no quantity position_z of a bolt-node"),
+        ("history create 'h' bolt-node value position-z id 0", "no quantity position-z of a bolt-node"),
     ):
         with pytest.raises((HpcdemError, ScriptError), match=message):
             Bench(tmp_path, blocks=Blocks())(flat + f"pcdc {line}\n")

@@ -221,7 +221,7 @@ def take_up(project: Project) -> None:
     if both is not None and project.continues is not None:
         from hpcdem.physics.coupling import saved_state
 
-        run = saved_state.restore(both, project.continues)["run"]
+        run = saved_state.restore(both, project.continues).get("run", {})
         # Between two commands they may have been edited; files of versions before do not tell.
         both.particles.edited, both.particles.resumed = bool(run.get("edited")), True
         project.continues = None

@@ -317,9 +317,6 @@ def _refuse(kind: str, done: Done, plan: Plan) -> None:
     if kind == "faults" and not some:
         names = "the sections in ss/data are of other frames; with --increment the frames themselves are compared"
         raise _NothingThere(f"faults: {names if plan.sections else f'{where} has only one frame, and no sections'}")
-    if kind == "wedge" and len(flat := kinds.without_wedge(done)) == len(done):
-        last, reason = flat[-1]
-        raise _NothingThere(f"wedge: no frame in {where} has a wedge yet; at step {last.step}: {reason}")
     if kind == "cracks" and not any(len(part.change.made) for part in some):
         raise _NothingThere(f"cracks: no frame in {where} has bonds")
 
