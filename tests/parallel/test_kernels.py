@@ -191,7 +191,8 @@ def test_what_was_forgotten_is_told_and_kept_for_later_runs(launch: Launcher, tm
         "from hpcdem.numerics import rng\nfrom hpcdem.runtime import kernels, kept\n"
         "rng.uniform._cache._name += 'of-this-test'\nrng.uniform._cache.flush()\n"
         "import sys\nrng.uniform(True, 1, 2)\nprint(*kernels.late)\n"
-        "print(sum(rng.uniform.stats.cache_hits.values()), any(kept.has(rng.uniform, one) for one in rng.uniform.signatures))\n"
+        "known = any(kept.has(rng.uniform, one) for one in rng.uniform.signatures)\n"
+        "print(sum(rng.uniform.stats.cache_hits.values()), known)\n"
         "rng.uniform._cache.flush()\n"
     )
     done = launch.python(1, "model.py", cwd=tmp_path)

@@ -303,7 +303,8 @@ def _write(kind: str, done: Done, plan: Plan, final: Grains) -> list[Path]:
     _refuse(kind, done, plan)
     more = (final,) if kind == "cracks" else ()
     files = [write_sheet(request.target, sheet) for sheet in recipe.sheets(done, plan, *more)]
-    if request.formats:
+    to_draw = kind != "wedge" or len(kinds.without_wedge(done)) < len(done)
+    if request.formats and to_draw:
         log = (cracks.read_log(request.log),) if kind == "cracks" and request.log is not None else ()
         figure = recipe.figure(done, plan, final, *log)
         files += [figures.save(figure, request.target / f"{kind}.{suffix}") for suffix in request.formats]
