@@ -198,52 +198,63 @@ def has(kernel: Any, types: tuple[Any, ...]) -> bool:
 def _digest(source: Path) -> str:
     """Of a module and of all modules that its first column imports: kernels take functions and constants from them, and
     numba does not see when these change."""
-    digest, seen, wanted = hashlib.sha256(), {source}, [source]
-    for path in wanted:
-        data = path.read_bytes()
-        digest.update(data)
-        new = sorted({file for file in _imported(data.decode()) if file.is_file()} - seen)
-        seen.update(new)
-        wanted += new
+    text = source.read_text(encoding="utf-8")
+    digest, wanted = hashlib.sha256(text.encode()), sorted(_imported(text) & _files(), key=_parts)
+    for name in wanted:
+        text = (_PACKAGE / name).read_text(encoding="utf-8")
+        digest.update(text.encode())
+        wanted += sorted((_imported(text) & _files()).difference(wanted), key=_parts)
     return digest.hexdigest()[:12]
 
 
-def _imported(text: str) -> set[Path]:
-    """Files that the statements ``from hpcdem.a import b`` in the first column may mean."""
-    files = set()
+def _parts(name: str) -> list[str]:
+    return name.split("/")
+
+
+@cache
+def _files() -> frozenset[str]:
+    """The modules of hpcdem, as `physics/model.py`."""
+    found = []
+    for folder, _, names in os.walk(_PACKAGE):
+        inner = os.path.relpath(folder, _PACKAGE).replace(os.sep, "/")
+        found += [name if inner == "." else f"{inner}/{name}" for name in names if name.endswith(".py")]
+    return frozenset(found)
+
+
+def _imported(text: str) -> set[str]:
+    """Modules that the statements ``from hpcdem.a import b`` in the first column may mean."""
+    found = set()
     for module, names in re.findall(r"^from (hpcdem[\w.]*) import (\([^)]*\)|.*)$", text, re.MULTILINE):
-        folder = _PACKAGE.joinpath(*module.split(".")[1:])
-        inner = [folder / name for name in re.findall(r"\w+", names)]
-        files |= {one for path in (folder, *inner) for one in (path.with_suffix(".py"), path / "__init__.py")}
-    return files
+        folder = "/".join(module.split(".")[1:])
+        for one in (folder, *(f"{folder}/{name}".lstrip("/") for name in re.findall(r"\w+", names))):
+            found |= {f"{one}.py", f"{one}/__init__.py".lstrip("/")}
+    return found
 
 
 @cache
 def sources() -> str:
     """A digest of all modules of hpcdem that decide which kernels there are."""
     digest = hashlib.sha256()
-    for path, text in deciding().items():
-        digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + text.encode())
+    for name, text in deciding().items():
+        digest.update(name.encode() + b"\0" + text.encode())
     return digest.hexdigest()[:12]
 
 
-def deciding() -> dict[Path, str]:
+def deciding() -> dict[str, str]:
     """The modules of hpcdem with kernels, all that these import, and those that call them with types of their choice;
     with their texts."""
-    texts = {path: path.read_text(encoding="utf-8") for path in _PACKAGE.rglob("*.py")}
-    imports = {path: _all_imported(text) & texts.keys() for path, text in texts.items()}
-    kernels = {path for path, text in texts.items() if _COMPILES.search(text)}
+    texts = {name: (_PACKAGE / name).read_text(encoding="utf-8") for name in _files()}
+    indented = re.compile(r"^[ \t]+from ", re.MULTILINE)
+    imports = {name: _imported(indented.sub("from ", text)) & texts.keys() for name, text in texts.items()}
+    kernels = {name for name, text in texts.items() if _COMPILES.search(text)}
     found, wanted = set(kernels), list(kernels)
     while wanted:
         more = imports[wanted.pop()] - found
         found |= more
         wanted += more
-    callers = {path for path, used in imports.items() if used & kernels}
-    return {path: texts[path] for path in sorted(found | callers | set(_PACKAGE.rglob("warm_up.py")))}
-
-
-def _all_imported(text: str) -> set[Path]:
-    return _imported(re.sub(r"^[ \t]+from ", "from ", text, flags=re.MULTILINE))
+    callers = {name for name, used in imports.items() if used & kernels}
+    warm_ups = {name for name in texts if name.endswith("warm_up.py")}
+    return {name: texts[name] for name in sorted(found | callers | warm_ups, key=_parts)}
 
 
 _COMPILES = re.compile(r"^\s*from numba import .*njit", re.MULTILINE)
