@@ -93,13 +93,15 @@ class Shore:
     """Corners of wet free faces at which no channel ends: what is said of them gives the pressure there.
 
     at (k,): where they begin in x, flat; row (k,): of the conditions; node (k,): points of the mesh, the lowest flow
-    node of their well, -1: they belong to none; ref (k,): its row in the state.
+    node of their well, -1: they belong to none; ref (k,): its row in the state; apart (k, dim): from that node to the
+    corner, in the mesh [m], as the node may be in motion on another rank.
     """
 
     at: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     row: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     node: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     ref: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    apart: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
 
     def __len__(self) -> int:
         return len(self.at)
@@ -883,7 +885,8 @@ class Flow(SurfaceLoad):
             mine = (node < 0) & (row == 0) & np.isin(points, well.wall)
             if len(at) and mine.any():
                 node[mine] = at[np.argmax(mesh.points[at] @ down)]
-        return Shore(self._begins(corner), row, node, np.full(len(points), -1, np.int64)), beyond
+        apart = np.where((node >= 0)[:, None], mesh.points[points] - mesh.points[node], 0.0)
+        return Shore(self._begins(corner), row, node, np.full(len(points), -1, np.int64), apart), beyond
 
     def find_shore(self, conditions: np.ndarray | None = None) -> None:
         """Pressures at the shore where it is now, by a table of conditions (None: that of now). Not collective."""
@@ -895,9 +898,9 @@ class Flow(SurfaceLoad):
         does, value = (self.conditions_at(self.time) if conditions is None else conditions)[shore.row].T
         p = np.where(does == kernels.SURFACE, np.maximum(value - energy, 0.0), value)
         of_well = np.flatnonzero(shore.ref >= 0)
-        lowest = self.state[shore.ref[of_well]]
-        head = lowest[:, kernels.P] + lowest[:, kernels.E]
-        p[of_well] = np.where(lowest[:, kernels.P] > 0.0, np.maximum(head - energy[of_well], 0.0), 0.0)
+        lowest = self.state[shore.ref[of_well], kernels.P]
+        drop = rho * sum(g * shore.apart[of_well, k] for k, g in enumerate(self._gravity()))
+        p[of_well] = np.where(lowest > 0.0, np.maximum(lowest + drop, 0.0), 0.0)
         self.state[len(self.held) :, kernels.P] = p
 
     def show(self, rows: np.ndarray | float, conditions: np.ndarray | None = None) -> None:
@@ -1204,6 +1207,8 @@ class Flow(SurfaceLoad):
     # ---- forces --------------------------------------------------------------------------------------------------
 
     def add_to(self, applied: np.ndarray) -> None:
+        if not self.implicit:  # by the places of now in each step: a run that goes on has no others
+            self.find_shore()
         self.push(self.state, kernels.P, applied)
 
     def push(self, state: np.ndarray, column: int, applied: np.ndarray, free: bool = True) -> None:
