@@ -835,7 +835,7 @@ REFUSED = {
                            "sim.every(5, lambda s: s.step(1)); sim.step(10)", 2,
                            "study.py:6: step: model step 1 cannot be used"),
     "file on a full disk": ("sim.charts.create('c'); sim.charts.add('c', values=[(0, 0)]); "
-                            "sim.charts.export('c', 'none/c.png')", 1, "study.py:5: charts.export: .*none"),
+                            "sim.charts.export('c', '/proc/none/c.png')", 1, "study.py:5: charts.export: .*none"),
     "kind of run": ("", 2, "--resume is for ZDEM and PCDC scripts"),
     "fingerprints": ("", 2, "study.py:3: mesh.structured: --check-reproducible is for models of particles"),
 }  # fmt: skip
