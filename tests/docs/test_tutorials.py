@@ -100,7 +100,8 @@ QUICK = ("thrust_belt", "water")
 def test_tutorial(page: str, tmp_path: Path) -> None:
     """Quickly; those that are not changed print what they say."""
     done(page, tmp_path, SHORTER[page])
-    assert figures(tmp_path) >= WANTED[page]
+    later = {"wedge.png"} if SHORTER[page] else set()  # so soon there is none yet
+    assert figures(tmp_path) >= WANTED[page] - later
 
 
 @pytest.mark.slow
