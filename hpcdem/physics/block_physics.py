@@ -57,4 +57,4 @@ PHYSICS: Mapping[str, Callable[[], type[Structure] | type[FreeField] | type[Flow
     "bolts": _bolts, "liners": _liners, "free_field": _free_field, "fluid": _fluid, "proppant": _proppant,
     "heat": _heat,
 }  # fmt: skip
-"""How to get each class: its import brings kernels, which must wait for their cache folder."""
+"""How to get each class: its import brings numba and kernels, which takes a second."""

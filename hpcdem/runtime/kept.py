@@ -13,6 +13,7 @@ import itertools
 import os
 import pickle
 import re
+import shutil
 import sys
 import tempfile
 import time
@@ -37,7 +38,7 @@ class Files:
     """What a dispatcher of numba takes for its cache: a folder, and how the names of the kernel's files begin."""
 
     def __init__(self, place: Path, name: str) -> None:
-        self.cache_path, self._place, self._name, self._enabled = str(place), place, name, True
+        self.cache_path, self._place, self._name = str(place), place, name
 
     def path(self, signature: Any) -> Path | None:
         """Where a kernel with these types of arguments is; None if the text of the types does not tell them apart."""
@@ -51,7 +52,7 @@ class Files:
         from numba.core.compiler import CompileResult
 
         target.refresh()
-        data = self._read(signature) if self._enabled else None
+        data = self._read(signature)
         return None if data is None else CompileResult._rebuild(target, *pickle.loads(data))
 
     def _read(self, signature: Any) -> bytes | None:
@@ -78,21 +79,13 @@ class Files:
         from numba.core.serialize import dumps
 
         path = self.path(signature)
-        if not self._enabled or path is None or found.lifted or found.library.has_dynamic_globals:
+        if path is None or found.lifted or found.library.has_dynamic_globals:
             return
         data = dumps(found._reduce())
         try:
             write(path, hashlib.sha256(data).digest() + data)
         except OSError as error:
             unkept.append(error.strerror or str(error))
-
-    def enable(self) -> None:
-        """Read and write files."""
-        self._enabled = True
-
-    def disable(self) -> None:
-        """Read and write nothing any more."""
-        self._enabled = False
 
     def flush(self) -> None:
         """Forget what is kept: numba's `recompile`."""
@@ -364,8 +357,6 @@ def tidy(base: Path) -> None:
                 with contextlib.suppress(OSError):
                     inner.rmdir()
         elif unused(folder) > (1 if ".building-" in folder.name else UNUSED_DAYS):
-            import shutil
-
             shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -1,8 +1,4 @@
-"""Calls every kernel once that particles, blocks and files share: they have a cache folder of their own.
-
-numba keeps a kernel in the folder that was set when its module was imported. With these modules in the folder of
-particles, that of blocks would lack them in a process that has both, and the other way round.
-"""
+"""Calls every kernel once that particles, blocks and files share."""
 
 from __future__ import annotations
 

@@ -224,7 +224,7 @@ assert plan.expected_steps(script.statements) == 3
     ids=["pcdc", "zdem", "python"],
 )
 def test_what_comes_before_the_kernels_does_not_bring_them(program):
-    """A script is read, a program imports: numba settles the folder of a kernel when its module is imported."""
+    """A script is read and a program imports without the second that numba and the kernels take."""
     command = [sys.executable, "-c", f"{program}\nimport sys\nassert 'numba' not in sys.modules"]
     done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

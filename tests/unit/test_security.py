@@ -73,7 +73,7 @@ KNOWN = {
     ("runtime/compilers.py", "subprocess.Popen"),
     ("runtime/compilers.py", "import pickle"),
     ("runtime/kernels.py", "import pickle"),
-    # Compiled laws of the user in his own cache folder, beside the kernels that numba keeps there in the same way; the
+    # Compiled laws of the user in his own cache folder, beside the kernels of hpcdem; the
     # name of a folder follows from the law that the script has just named.
     ("runtime/kept.py", "import pickle"),
     # Programs with a list of words, never through a shell; the first is this one, for another set of kernels.

@@ -104,7 +104,7 @@ def test_strain_adds_up_from_the_first_frame(frames: list[Frame], tmp_path: Path
 
 @pytest.mark.parametrize("threads", ["1", "3"])
 def test_kernels_of_as_many_threads_as_a_run_has(monkeypatch: pytest.MonkeyPatch, threads: str) -> None:
-    """Both share a folder of kernels, which must be complete for either."""
+    """Both need the same kernels."""
     asked = []
     monkeypatch.setattr("hpcdem.session.prepare", lambda comm, log, kinds, *count: asked.append((kinds, count)))
     monkeypatch.setenv("NUMBA_NUM_THREADS", threads)

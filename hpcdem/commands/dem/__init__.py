@@ -1,7 +1,6 @@
 """The commands of ZDEM, one function each.
 
-Modules are imported when they are first used, as most bring kernels, which must come after their cache is settled
-(runtime/kernels.py).
+Modules are imported when they are first used, as most bring numba and kernels, which takes a second.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 The first argument is the `Project`: the simulation and what a script has prepared for it. All are collective and
 raise CommandError for what makes no sense, equal on all ranks. Modules are imported when they are first used, as most
-bring kernels, which must come after their cache is settled (runtime/kernels.py).
+bring numba and kernels, which takes a second.
 """
 
 from __future__ import annotations

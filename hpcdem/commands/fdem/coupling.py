@@ -1,7 +1,6 @@
 """Particles beside the blocks of a script: hpcdem.couple, and what `model step` and `model solve` then do.
 
-Whatever is about particles is imported where they are there: a script of blocks alone does without their kernels, and
-numba keeps a kernel in the folder of those with which it was imported (see runtime/kernels.py).
+Modules about particles are imported where there are particles: a script of blocks alone does without their kernels.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What commands make of their values alone, without a model: also when a line is read (lang/pcdc/trial.py).
 
-Nothing here brings kernels: scripts are read before the cache of these is settled (runtime/kernels.py).
+Nothing here imports kernels: a script is read and checked without the second that they take.
 """
 
 from __future__ import annotations
