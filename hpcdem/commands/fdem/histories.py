@@ -16,7 +16,7 @@ from hpcdem.io.agreed import make_folder
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
 from hpcdem.physics import supports
-from hpcdem.physics.fdem import connectivity, diagnostics, tetrahedra, user_laws
+from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.connectivity import nearest_point
 from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids, Range
 from hpcdem.physics.fdem.sides import SIDE
@@ -106,11 +106,10 @@ def _nearest(project: Project, kind: str, at: tuple[float, ...]) -> int:
         numbers, middles = everything(project, kind, None), places(project, kind)
         return int(numbers[nearest_point(middles, at)])
     mesh, xy = project.whole_mesh(), project.positions()
-    of = tetrahedra if mesh.dim == 3 else connectivity
     if kind == NODE:
         return _nearest_side(project, at)
     if kind == ELEMENT:
-        return of.nearest_element(xy, mesh.cells, at, np.flatnonzero(project.alive))
+        return mesh.nearest_element(xy, mesh.cells, at, np.flatnonzero(project.alive))
     edges = project.edges()
     inner = np.flatnonzero(edges.inner)
     inner = inner[~mesh.inside_hexes(edges.faces[inner, 0])]
@@ -135,8 +134,7 @@ def _nearest_side(project: Project, at: tuple[float, ...]) -> int:
         return point
     own = 4 * (beside // 4)[:, None] + np.arange(4)
     own = np.where(cells[own] >= 0, own, -1)
-    of = tetrahedra if mesh.dim == 3 else connectivity
-    return SIDE + int(beside[of.nearest_element(corners, own, at, np.arange(len(own)))])
+    return SIDE + int(beside[mesh.nearest_element(corners, own, at, np.arange(len(own)))])
 
 
 def delete(project: Project, name: str) -> None:

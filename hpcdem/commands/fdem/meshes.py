@@ -269,25 +269,12 @@ def glue(
         f"(within {made.tolerance:g} m)",
     )
     if made.cut:
-        before, after = (altitudes.min() for altitudes in (_altitudes(mesh), _altitudes(made.mesh)))
+        before, after = (quality.altitudes(one).min() for one in (mesh, made.mesh))
         _say(
             project,
             f"glue: {made.cut} elements were cut, which makes {len(made.mesh.cells) - len(mesh.cells)} more, where "
             f"points of others lie on their sides; the least altitude was {before:.3g} m and is {after:.3g} m",
         )
-
-
-def _altitudes(mesh: Mesh) -> np.ndarray:
-    """(ne,) sizes over those of the largest faces, times the dimensions [m]: the least height of triangles and
-    tetrahedra, half the height of quads."""
-    faces = np.arange(4 * len(mesh.cells)).reshape(-1, 4)
-    real = np.ones(faces.shape, bool)
-    if mesh.dim == 2:
-        real[:, 3] = mesh.cells[:, 3] >= 0
-    sizes = np.zeros(faces.shape)
-    sizes[real] = mesh.face_sizes(faces[real])
-    height = mesh.dim * mesh.areas() / sizes.max(axis=1)
-    return np.where(mesh.cells[:, 3] >= 0, 0.5 * height, height) if mesh.dim == 2 else height
 
 
 def tell_quality(project: Project) -> None:

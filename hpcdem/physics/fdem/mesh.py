@@ -214,6 +214,12 @@ class Mesh:
             out[of >= 0] = self.points[self.hexes[of[of >= 0], :8]].mean(axis=1)
         return out
 
+    def nearest_element(self, points: np.ndarray, cells: np.ndarray, at: tuple[float, ...], among: np.ndarray) -> int:
+        """Which of the cells (n, 4) of points (m, dim) holds the point `at`, or is nearest to it; among: of these."""
+        if self.dim == 3:
+            return tetrahedra.nearest_element(points, cells, at, among)
+        return connectivity.nearest_element(points, cells, (at[0], at[1]), among)
+
     def mean_edge(self) -> float:
         """Mean length of an edge [m]."""
         if self.dim == 2:

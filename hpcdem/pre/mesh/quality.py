@@ -78,7 +78,10 @@ def aspects(mesh: Mesh) -> np.ndarray:
 
 
 def altitudes(mesh: Mesh) -> np.ndarray:
-    """(ne,) least height [m]: 2 area / longest edge of a triangle; of a quad the least of its four corner triangles."""
+    """(ne,) least height [m]: 2 area / longest edge of a triangle; of a quad the least of its four corner triangles;
+    3 volumes / largest face of a tetrahedron."""
+    if mesh.dim == 3:
+        return 3.0 * mesh.areas() / mesh.face_sizes(np.arange(mesh.cells.size)).reshape(-1, 4).max(axis=1)
     out = np.empty(len(mesh.cells))
     for rows, xy in _by_kind(mesh):
         a, b, c = np.roll(xy, 1, axis=1), xy, np.roll(xy, -1, axis=1)
