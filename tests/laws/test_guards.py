@@ -143,7 +143,7 @@ def test_who_speeds_up_between_two_looks_is_seen(tmp_path, monkeypatch):
 def test_a_contact_that_began_unseen_stops_the_run(tmp_path, monkeypatch, walled):
     """Without glances: the message names who met; a motion that meets nobody goes on."""
     whom = "particle 0 and wall 3" if walled else "particles 0 and 1"
-    with pytest.raises(PhysicsError, match=f"contacts began unseen, .*: {whom}. The time step 0.001 s is too large"):
+    with pytest.raises(PhysicsError, match=f"contacts were missed, .*: {whom}. The time step 0.001 s is too large"):
         sim = meeting(tmp_path, monkeypatch, 10**9, 25.0, walled)
         for _ in range(64):
             sim.step()

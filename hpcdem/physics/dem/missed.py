@@ -1,4 +1,5 @@
-"""Whether a contact began unseen: asked where somebody has gone farther than the lists allow, before they are rebuilt.
+"""Whether the contact search missed a contact: asked where a particle went farther than the lists allow, before they
+are rebuilt.
 
 Lists hold all pairs that can meet while nobody goes farther than half the skin (a fast particle: its reach). Where one
 has gone farther, most often nothing has happened: a pair is missed only if both went towards each other. If one was,
@@ -22,23 +23,17 @@ def stop_on_missed(sim: Any) -> None:
     """PhysicsError, on all ranks, if particles touch each other or a wall and are not in the lists. Collective."""
     p, lists = sim.particles, sim.lists
     hot, gid = p.hot[p.owned], p["gid"]
-    way = np.hypot(hot[:, X] - sim.origin[:, 0], hot[:, Y] - sim.origin[:, 1])
+    travelled = np.hypot(hot[:, X] - sim.origin[:, 0], hot[:, Y] - sim.origin[:, 1])
     reach = np.full(len(p), 0.5 * sim.rebuild_state.skin)
     rows, at = sim.fast.among(gid)
     reach[rows] = sim.fast.reach[at]
-    far = np.flatnonzero(way + sim.walls.longest_travel() > reach)
+    far = np.flatnonzero(travelled + sim.walls.longest_travel() > reach)
     parts = sim.comm.allgather((gid[far].copy(), p.clump[far].copy(), hot[far][:, [X, Y, RADIUS]]))
     theirs, clumps, places = (np.concatenate([part[k] for part in parts]) for k in range(3))
-    known = _Listed(sim)
-    found: list[tuple[int, str]] = []
-    for other, clump, (x, y, r) in zip(theirs.tolist(), clumps.tolist(), places.tolist()):
-        near = np.hypot(hot[:, X] - x, hot[:, Y] - y) < hot[:, RADIUS] + r
-        near &= (gid != other) & ((clump < 0) | (p.clump != clump))
-        found += [
-            (min(g, other), f"particles {min(g, other)} and {max(g, other)}")
-            for g in gid[near].tolist()
-            if not known.pair(g, other)
-        ]
+    one, other = _touching(hot[:, [X, Y, RADIUS]], places)
+    real = (gid[one] != theirs[other]) & ((clumps[other] < 0) | (p.clump[one] != clumps[other]))
+    pairs = _pairs(gid[one[real]], theirs[other[real]])
+    found = [(a, f"particles {a} and {b}") for a, b in sorted(set(map(tuple, pairs.tolist())) - _listed(sim, theirs))]
     slots = set(zip(lists.slot_row.tolist(), lists.slot_wall.tolist()))
     for w, wall in enumerate(sim.walls.table()):
         for c in far.tolist():
@@ -49,19 +44,33 @@ def stop_on_missed(sim: Any) -> None:
     if every:
         names = "; ".join(name for _, name in every)
         raise PhysicsError(
-            f"step {sim.clock.step + 1}: contacts began unseen, as somebody went farther than half the skin of the "
-            f"contact search, {0.5 * sim.rebuild_state.skin:g} m, within {sim.rebuild_state.age} steps: {names}. The "
-            f"time step {sim.clock.dt:g} s is too large for such motion"
+            f"step {sim.clock.step + 1}: contacts were missed, as a particle or wall travelled farther than half the "
+            f"skin of the contact search, {0.5 * sim.rebuild_state.skin:g} m, within {sim.rebuild_state.age} steps: "
+            f"{names}. The time step {sim.clock.dt:g} s is too large for such motion"
         )
 
 
-class _Listed:
-    """The pairs in the lists of this rank, by ids."""
+def _touching(discs: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of discs (n, 3) and of others (m, 3), x, y and radius [m], that overlap."""
+    if not len(discs) or not len(others):
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    from scipy.spatial import cKDTree  # seldom needed, and slow to import
 
-    def __init__(self, sim: Any) -> None:
-        lists, gids = sim.lists, sim.particles.ihot[:, GID]
-        self._pieces = [(gids[row], gids[partner]) for row, partner, _, _ in lists.pieces()]
+    near = cKDTree(discs[:, :2]).query_ball_point(others[:, :2], others[:, 2] + discs[:, 2].max())
+    other = np.repeat(np.arange(len(others)), [len(rows) for rows in near])
+    one = np.concatenate([np.array(rows, np.int64) for rows in near])
+    apart = np.hypot(discs[one, 0] - others[other, 0], discs[one, 1] - others[other, 1])
+    touch = apart < discs[one, 2] + others[other, 2]
+    return one[touch], other[touch]
 
-    def pair(self, one: int, other: int) -> bool:
-        """Whether it is there."""
-        return any(bool((((a == one) & (b == other)) | ((a == other) & (b == one))).any()) for a, b in self._pieces)
+
+def _pairs(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(n, 2) ids, the lower one first."""
+    return np.sort(np.column_stack([one, other]), axis=1)
+
+
+def _listed(sim: Any, gids: np.ndarray) -> set[tuple[int, ...]]:
+    """Pairs in the lists of this rank of which one has one of these ids."""
+    of = sim.particles.ihot[:, GID]
+    found = [_pairs(of[row], of[partner]) for row, partner, _, _ in sim.lists.pieces()]
+    return {pair for part in found for pair in map(tuple, part[np.isin(part, gids).any(axis=1)].tolist())}
