@@ -373,8 +373,9 @@ def test_a_checkpoint_that_nobody_asked_for(launch, script, undisturbed):
     done = launch(1, script, "--autosave", "0.2", "--no-figure", cwd=script.parent)
     assert done.returncode == 0, done.stderr
     data = script.parent / "data"
-    assert done.stdout.count("as the last one was long ago") >= 2
-    assert len(checkpoints(data)) == 2 and all(name.startswith("auto_") for name in checkpoints(data))
+    written = done.stdout.count("as the last one was long ago")  # one alone where writing it took a tenth of a second
+    assert written >= 1
+    assert len(checkpoints(data)) == min(written, 2) and all(name.startswith("auto_") for name in checkpoints(data))
     assert (data / LAST_FRAME).read_bytes() == undisturbed
 
 
