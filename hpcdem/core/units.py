@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from hpcdem.core.errors import CommandError
@@ -130,3 +130,91 @@ def doubt(where: System, name: str, unit: str, value: float) -> str:
     *_, called, size = min(fits)
     factor = size / own
     return f"{said}: looks like {called}; x {factor:g} makes it {value * factor:g}; it is used as it is"
+
+
+# -- prefixes: a value in the unit that people would use for its size ----------------------------------------------
+
+_WHOLE = tuple(("kMGTPE"[n], 1e3 ** (n + 1)) for n in range(6))
+_PARTS = (("n", 1e-9), ("µ", 1e-6), ("m", 1e-3))
+
+
+def _prefixed(unit: str, parts: int = 0, whole: int = 6) -> tuple[tuple[float, str], ...]:
+    """Sizes and names of a unit with its last `parts` small and its first `whole` large prefixes, smallest first."""
+    small = _PARTS[len(_PARTS) - parts :]
+    return tuple((size, prefix + unit) for prefix, size in (*small, ("", 1.0), *_WHOLE[:whole]))
+
+
+_LADDERS: dict[str, tuple[tuple[float, str], ...]] = {
+    "Pa": _prefixed("Pa", 0, 3),
+    "N": _prefixed("N", 1),
+    "J": _prefixed("J", 2),
+    "W": _prefixed("W", 1),
+    "Hz": _prefixed("Hz", 1, 3),
+    "m": ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m"), (1e3, "km")),
+    "m2": ((1e-6, "mm2"), (1.0, "m2"), (1e6, "km2")),
+    "m3": ((1e-9, "mm3"), (1.0, "m3"), (1e9, "km3")),
+    "s": ((1e-9, "ns"), (1e-6, "µs"), (1e-3, "ms"), (1.0, "s"), (3600.0, "h"), (86400.0, "days"),
+          (365.25 * 86400.0, "years")),
+    "kg": ((1e-6, "mg"), (1e-3, "g"), (1.0, "kg"), (1e3, "t"), (1e6, "kt"), (1e9, "Mt")),
+    "m3/s": ((1e-6, "mL/s"), (1e-3, "L/s"), (1.0, "m3/s")),
+    "m2/s": ((1e-6, "mm2/s"), (1.0, "m2/s")),
+}  # fmt: skip
+"""Units that are written with prefixes. Of a compound ("N/m", "Pa s") the first factor has the prefix."""
+_PLAIN = ("kg/m3", "kg/m2", "m/s2", "s/m")
+"""Compounds that nobody writes with prefixes."""
+
+
+def ladder(unit: str) -> Sequence[tuple[float, str]]:
+    """Sizes in SI, and names, of the multiples in which a unit of SI is written, smallest first; the unit alone if
+    there are none."""
+    if unit in _LADDERS:
+        return _LADDERS[unit]
+    head = re.match(r"[A-Za-z]+(?=[ /])", unit)
+    if head is None or head[0] not in _LADDERS or unit in _PLAIN:
+        return ((1.0, unit),)
+    return tuple((size, name + unit[head.end() :]) for size, name in _LADDERS[head[0]])
+
+
+def scale(largest: float, unit: str, digits: int = 4) -> tuple[float, str]:
+    """In what people write a value of this magnitude.
+
+    Parameters
+    ----------
+    largest : float
+        The value, or the largest of those that are written in one unit, in `unit`.
+    unit : str
+        Of SI: "Pa", "m", "N/m", "m3/s" ...
+    digits : int
+        To which the value will be rounded: 999.99 Pa is 1 kPa.
+
+    Returns
+    -------
+    size : float
+        By which values are divided.
+    name : str
+        Of the unit: 2.5e6 of "Pa" gives 1e6 and "MPa".
+    """
+    steps = ladder(unit)
+    magnitude = abs(float(f"{largest:.{digits}g}"))
+    if magnitude == 0.0 or not math.isfinite(magnitude):
+        return 1.0, unit
+    fits = [step for step in steps if magnitude >= step[0]]
+    return fits[-1] if fits else steps[0]
+
+
+def with_prefix(value: float, unit: str, digits: int = 4, system: str = "") -> str:
+    """A value as people write it: ``2.5 MPa``, ``12 mm``, ``3.17 years``.
+
+    Parameters
+    ----------
+    value : float
+        In `unit`, or in the unit of the same name of `system`.
+    unit : str
+        Of SI, "" for a bare number.
+    digits : int
+        Significant digits.
+    system : str
+        Units that the model declared (`SYSTEMS`), "" none. In units other than SI values are written as they are.
+    """
+    size, name = scale(value, unit, digits) if system in ("", SI.name) else (1.0, label(system, unit))
+    return f"{value / size + 0.0:.{digits}g} {name}".rstrip()

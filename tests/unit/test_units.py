@@ -213,3 +213,34 @@ def test_python_program(tmp_path):
 @pytest.fixture
 def bench(tmp_path):
     return Bench(tmp_path)
+
+
+# -- prefixes ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (2.5e6, "Pa", "2.5 MPa"), (-3.2e4, "Pa", "-32 kPa"), (3e10, "Pa", "30 GPa"), (0.02, "Pa", "0.02 Pa"),
+        (999.996, "Pa", "1 kPa"), (0.0, "Pa", "0 Pa"), (-0.0, "m", "0 m"), (float("inf"), "s", "inf s"),
+        (0.012, "m", "12 mm"), (4.2e-6, "m", "4.2 µm"), (12e3, "m", "12 km"), (2.5e-3, "m/s", "2.5 mm/s"),
+        (1.5e6, "N/m", "1.5 MN/m"), (2e3, "N m", "2 kN m"), (1e-3, "Pa s", "0.001 Pa s"), (5e-4, "m3/s", "500 mL/s"),
+        (1e8, "s", "3.169 years"), (7200.0, "s", "2 h"), (59.0, "s", "59 s"), (3.2e-6, "s", "3.2 µs"),
+        (2650.0, "kg/m3", "2650 kg/m3"), (9.81, "m/s2", "9.81 m/s2"), (1e-5, "1/K", "1e-05 1/K"), (12.0, "", "12"),
+        (3e-4, "m2", "300 mm2"), (300.0, "K", "300 K"), (1e22, "J", "1e+04 EJ"),
+    ],
+)  # fmt: skip
+def test_values_are_written_as_people_write_them(value, unit, text):
+    assert units.with_prefix(value, unit) == text
+
+
+def test_values_of_a_declared_system_keep_its_units():
+    assert units.with_prefix(2.5, "Pa", system="mm-mpa-s") == "2.5 MPa"
+    assert units.with_prefix(12.0, "m", system="si") == "12 m" and units.with_prefix(0.5, "N", system="si") == "500 mN"
+
+
+def test_several_values_share_the_unit_of_the_largest():
+    assert units.scale(3.2e7, "Pa") == (1e6, "MPa") and units.scale(0.0, "Pa") == (1.0, "Pa")
+    for unit in ("Pa", "N/m", "m", "m/s", "m2", "m3", "s", "kg", "m3/s", "J/m2", "W/(m K)"):
+        steps = units.ladder(unit)
+        assert (1.0, unit) in steps and [size for size, _ in steps] == sorted(size for size, _ in steps)
