@@ -58,11 +58,11 @@ def test_ambiguity_and_exact_words():
 
 def choices() -> Iterator[tuple[str, Sequence[HasKeyword]]]:
     """Every set of words among which the parser chooses."""
-    depths = max(len(c.words) for c in PCDC.commands)
+    depths = max(len(way.words) for way in PCDC.ways)
     for depth in range(depths):
-        for start in dict.fromkeys(c.words[:depth] for c in PCDC.commands if len(c.words) > depth):
-            words = distinct([c for c in PCDC.commands if c.words[:depth] == start], depth)
-            ended = [c for c in PCDC.commands if c.words == start]
+        for start in dict.fromkeys(way.words[:depth] for way in PCDC.ways if len(way.words) > depth):
+            words = distinct([way for way in PCDC.ways if way.words[:depth] == start], depth)
+            ended = [way.command for way in PCDC.ways if way.words == start]
             models = ended[0].models if ended else ()
             yield " ".join(w.name for w in start) or "pcdc", [*words, *models]
     for command in PCDC.commands:

@@ -12,7 +12,7 @@ from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
 from hpcdem.lang.pcdc.kinds import Pending
 from hpcdem.lang.pcdc.lexer import Escape, Token, Word
 from hpcdem.lang.pcdc.statement import Statement, resolved, shown
-from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, distinct
+from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, Way, distinct
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 
@@ -39,6 +39,16 @@ def expected(words: str, table: Table) -> Sequence[Any]:
     return line.wanted if line is not None and line.at >= len(line.tokens) else ()
 
 
+class Refused(ValueError):
+    """A word that is known and refused, with what to do instead."""
+
+
+def trace(words: str, table: Table, dim: int | None) -> tuple[Command, Way, list[str]]:
+    """The command of a line, the words that named it, and all words of the line in full. ValueError; Refused."""
+    line = _Line(words, table, dim)
+    return line.statement("", 0, "", 0).command, line.way, line.trail
+
+
 class _Line:
     """Reads one line, word by word, against the table. Errors are ValueErrors. wanted: the rows of keywords
     that may stand where the line ends."""
@@ -51,6 +61,9 @@ class _Line:
         self.expressions = kinds.Expressions()
         self.context = "pcdc"
         self.wanted: Sequence[Any] = ()
+        self.way = Way(table.commands[0], ())
+        self.trail: list[str] = []
+        """Keywords that were read, in full."""
         self.rows: Sequence[Option] = ()
         """Keywords of the command."""
 
@@ -80,6 +93,9 @@ class _Line:
         if not found:
             return None
         self.at += 1
+        self.trail.append(found[0].keyword.name)
+        if refused := getattr(found[0], "refused", ""):
+            raise Refused(f"{token} is refused after '{self.context}': {refused}")
         return found[0]
 
     def unknown(self, token: Token, rows: Sequence[Row]) -> NoReturn:
@@ -128,25 +144,34 @@ class _Line:
 
     def command(self) -> Command:
         """The words of a command, one after the other."""
-        rows: Sequence[Command] = self.table.commands
+        ways: Sequence[Way] = self.table.ways
         depth = 0
         while True:
-            level = distinct(rows, depth)
-            ended = next((c for c in rows if len(c.words) == depth), None)
+            level = distinct(ways, depth)
+            ended = next((way for way in ways if len(way.words) == depth), None)
             found = self.take(level)
             if found is None:
-                if ended is not None:
+                if ended is not None and (ended.own or not self._is_unknown(ended.command)):
                     return self._allowed(ended)
                 token = self.next("a command: " + _joined(row.keyword.name for row in level))
                 self.unknown(token, level)
-            rows = [c for c in rows if len(c.words) > depth and c.words[depth] == found.keyword]
+            ways = [way for way in ways if len(way.words) > depth and way.words[depth] == found.keyword]
             depth += 1
             self.context = f"{self.context} {found.keyword}" if depth > 1 else found.keyword.name
-            if len(rows) == 1 and len(rows[0].words) == depth:
-                return self._allowed(rows[0])
+            if len(ways) == 1 and len(ways[0].words) == depth:
+                return self._allowed(ways[0])
 
-    def _allowed(self, command: Command) -> Command:
+    def _is_unknown(self, command: Command) -> bool:
+        """Is the next word none that this command may go on with, where its last word is left out?"""
+        token = self.peek()
+        rows = (*command.options, *command.models)
+        return token is None or (isinstance(token, Word) and not matching(token.text, rows))
+
+    def _allowed(self, way: Way) -> Command:
+        command, self.way = way.command, way
         self.refuse_elsewhere(command.name, command.dims)
+        if command.refused:
+            raise Refused(f"'{self.context}' is refused: {command.refused}")
         return command
 
     def refuse_elsewhere(self, word: object, dims: Sequence[int]) -> None:
@@ -243,6 +268,7 @@ class _Line:
             if inner.name in given:
                 if any(row.keyword == inner.keyword for row in self.rows):
                     self.at -= 1
+                    self.trail.pop()
                     break
                 raise ValueError(f"'{inner.keyword}' is given twice after '{option.keyword}'")
             given[inner.name] = self.values(inner)
@@ -281,6 +307,8 @@ class _Line:
             if isinstance(name, Pending):
                 raise ValueError("the file of a function is plain text: it is read and checked before the script runs")
             return kinds.FunctionName(name)
+        if isinstance(token, Word) and token.text.lower() in kind.words:
+            self.trail.append(token.text.lower())
         return kinds.read_value(kind, token, what, self.expressions)
 
     def _varied(self, token: Word, kind: kinds.Kind) -> Any:

@@ -121,7 +121,8 @@ class Command:
     """notation: its words; leading: values (and words in the place of values) that come first; models: one of them is
     named after the words; ranged: the objects that RANGE chooses among, "" if it takes none; needs_option: at least one
     option must be given; properties: the word ``property`` may stand before the options; manual: printed there; dims:
-    as of models."""
+    as of models; also: other words for all of the notation, of the online help; idle: why it has no effect here;
+    refused: why it is, and what to write instead."""
 
     notation: str
     doc: str
@@ -134,10 +135,18 @@ class Command:
     properties: bool = False
     manual: bool = False
     dims: tuple[int, ...] = PLANE
+    also: tuple[str, ...] = ()
+    idle: str = ""
+    refused: str = ""
 
     @cached_property
     def words(self) -> tuple[Keyword, ...]:
-        return tuple(Keyword(word) for word in self.notation.split())
+        return _keywords(self.notation)
+
+    @cached_property
+    def ways(self) -> tuple[Way, ...]:
+        """Its words, and others that name it."""
+        return (Way(self, self.words), *(Way(self, _keywords(words), own=False) for words in self.also))
 
     @cached_property
     def name(self) -> str:
@@ -152,9 +161,28 @@ class Level:
     keyword: Keyword
 
 
-def distinct(commands: Iterable[Command], depth: int) -> list[Level]:
+@dataclass(frozen=True)
+class Way:
+    """Words that name a command; own: those that it is called by here."""
+
+    command: Command
+    words: tuple[Keyword, ...]
+    own: bool = True
+
+
+_SPELLINGS = {
+    "c-m{odel}": ("c{onstitutive}-m{odel}",), "init{ial}": ("init{ialize}",), "r{emove}": ("r{move}",),
+}  # fmt: skip
+"""Words of commands that may be written otherwise, too."""
+
+
+def _keywords(notation: str) -> tuple[Keyword, ...]:
+    return tuple(Keyword(word, _SPELLINGS.get(word, ())) for word in notation.split())
+
+
+def distinct(ways: Iterable[Way], depth: int) -> list[Level]:
     """The words at this place of the commands, each once."""
-    return [Level(word) for word in dict.fromkeys(c.words[depth] for c in commands if len(c.words) > depth)]
+    return [Level(word) for word in dict.fromkeys(way.words[depth] for way in ways if len(way.words) > depth)]
 
 
 @dataclass(frozen=True)
@@ -164,6 +192,11 @@ class Table:
     commands: tuple[Command, ...]
     range_terms: tuple[Option, ...] = field(default=())
 
+    @cached_property
+    def ways(self) -> tuple[Way, ...]:
+        """All words that name commands."""
+        return tuple(way for command in self.commands for way in command.ways)
+
     def command(self, name: str) -> Command:
         """The row of a command by its words in full."""
         return next(c for c in self.commands if c.name == name)
@@ -171,7 +204,7 @@ class Table:
 
 PROPERTY = Option("prop{erty}", ())
 RANGE = Option("ran{ge}", ())
-SET = Option("set", (STRING,), "the set of the group", default="'default'")
+SET = Option("s{et}", (STRING,), "the set of the group", default="'default'")
 
 # ---- models of solids (tables 1 to 3, 12) --------------------------------------------------------------------------
 
@@ -577,8 +610,8 @@ def _leading(name: str, kind: Kind, doc: str, unit: str = "", required: bool = T
 
 def _group_command(kind: str, notation: str) -> Command:
     return Command(
-        f"{notation} group", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the one it "
-        "was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
+        f"{notation} g{{roup}}", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the "
+        "one it was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
         (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
         dims=BOTH if kind in ("element", "element-face", "face-joint", "node", "bolt-element", "bolt-node") else PLANE,
     )  # fmt: skip
@@ -607,12 +640,12 @@ _MODEL = (
             ("pcdc model new", "pcdc model new dim 3"),
             options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three not everything is there, see "
                             "the end of the reference", "", "2"),), manual=True, dims=BOTH),
-    Command("mod{el} save", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables and "
-            "functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
+    Command("mod{el} sav{e}", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables "
+            "and functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
             (_leading("file", FILE, "name of the file, beside the script"),), manual=True, dims=BOTH),
-    Command("mod{el} restore", "The state of a file, and its m_ variables and functions.",
+    Command("mod{el} rest{ore}", "The state of a file, and its m_ variables and functions.",
             ("pcdc model restore 'test.sav'",), (_leading("file", FILE, "name of the file"),), manual=True, dims=BOTH),
-    Command("mod{el} grav{ity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),
+    Command("mod{el} g{ravity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),
             (_leading("gravity", VECTOR, "acceleration", "m/s2"),), dims=BOTH),
     Command("mod{el} units", "The units of all values that follow: those that are unlikely in them are warned of, once "
             "per property and with the factor that looks missing; histories and charts are labelled with them. No "
@@ -644,9 +677,9 @@ _MODEL = (
                 Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
                        "where they are", default="on")),
             needs_option=True, manual=True, dims=BOTH),
-    Command("mod{el} time-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. Without "
-            "this command it is estimated at the first step and after each change of the model. Of value, mass-scaling "
-            "and auto on the one said last holds and ends the others.",
+    Command("mod{el} t{ime}-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. "
+            "Without this command it is estimated at the first step and after each change of the model. Of value, "
+            "mass-scaling and auto on the one said last holds and ends the others.",
             ("pcdc model time-step auto off", "pcdc model time-step value 1e-7", "pcdc model time-step value 0"),
             options=(
                 Option("value", (NOT_NEGATIVE,), "the time step itself; 0: estimated again", "s"),
@@ -675,9 +708,9 @@ _MODEL = (
              "pcdc model solve hydraulic steady", "pcdc model solve hydraulic auto time 3600",
              "pcdc model solve thermal time 3e7 dt 1e5", "pcdc model solve thermal steady",
              "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
-            options=(Option("rat{io}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
+            options=(Option("r{atio}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
                             "as far below as rounding allows", "1"),
-                     Option("cyc{les}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
+                     Option("c{ycles}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
                             "velocities act"),
                      Option("time", (POSITIVE,), "time that passes; in static runs creep time, each creep step to its "
                             "ratio (1e-5), or with elastic at once", "s"),
@@ -750,28 +783,28 @@ _LENGTHS = (
 )
 
 _GEOMETRY = (
-    Command("geom{etry} cr{eate} p{olyline}", "Straight lines from point to point.",
+    Command("geom{etry} c{reate} p{olyline}", "Straight lines from point to point.",
             ("pcdc geometry create polyline ([i],0) (0,[i]) as-layer ['line'+ str(i)]",),
             (_leading("points", VECTORS, "the points; or a list of vectors", "m"),), (_LAYER,), manual=True),
-    Command("geom{etry} cr{eate} polyg{on}", "A closed line; in three dimensions the flat surface within.",
+    Command("geom{etry} c{reate} polyg{on}", "A closed line; in three dimensions the flat surface within.",
             ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'block'",),
             (_leading("points", PLACES, "the corners", "m"),), (_LAYER,), dims=BOTH),
-    Command("geom{etry} cr{eate} rec{tangle}", "A rectangle along the axes.",
+    Command("geom{etry} c{reate} rec{tangle}", "A rectangle along the axes.",
             ("pcdc geometry create rectangle (0,0) (10,5) as-layer 'box'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
             (_LAYER,)),
-    Command("geom{etry} cr{eate} cir{cle}", "A circle.", ("pcdc geometry create circle (0,0) 1 as-layer 'hole'",),
+    Command("geom{etry} c{reate} cir{cle}", "A circle.", ("pcdc geometry create circle (0,0) 1 as-layer 'hole'",),
             (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m")),
             (_LAYER,)),
-    Command("geom{etry} cr{eate} arc", "A part of a circle, counter-clockwise.",
+    Command("geom{etry} c{reate} arc", "A part of a circle, counter-clockwise.",
             ("pcdc geometry create arc (0,0) 1 0 90 as-layer 'arch'",),
             (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m"),
              _leading("begin", FLOAT, "first angle", "degrees"), _leading("end", FLOAT, "last angle", "degrees")),
             (_LAYER,)),
-    Command("geom{etry} cr{eate} poi{nt}", "Single points, which become points of the mesh.",
+    Command("geom{etry} c{reate} poi{nt}", "Single points, which become points of the mesh.",
             ("pcdc geometry create point (1,1) as-layer 'gauge'",),
             (_leading("points", VECTORS, "the points", "m"),), (_LAYER,)),
-    Command("geom{etry} cr{eate} frac{tures}", "A set of fractures with given statistics, as straight lines, in three "
+    Command("geom{etry} c{reate} frac{tures}", "A set of fractures with given statistics, as straight lines, in three "
             "dimensions discs; for mesh create crack, or mesh intersect.",
             ("pcdc geometry create fractures orientation fisher 30 spread 20 length exponential 2 p21 1.5 inside 'out' "
              "seed 7 as-layer 'set1'",),
@@ -802,35 +835,35 @@ _GEOMETRY = (
                 Option("hole", (STRING,), "none inside of this layer", repeated=True, dims=PLANE),
                 Option("shortest", (NOT_NEGATIVE,), "shorter pieces at the rim are left out", "m", "0", dims=PLANE),
                 Option("seed", (ZERO_OR_MORE,), "another seed, another network", required=True), _LAYER), dims=BOTH),
-    Command("geom{etry} cr{eate} box", "A box along the axes.",
+    Command("geom{etry} c{reate} box", "A box along the axes.",
             ("pcdc geometry create box (0,0,0) (10,5,4) as-layer 'rock'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
             (_LAYER,), dims=SPACE),
-    Command("geom{etry} cr{eate} sph{ere}", "A sphere.", ("pcdc geometry create sphere (0,0,0) 1 as-layer 'cavity'",),
+    Command("geom{etry} c{reate} sph{ere}", "A sphere.", ("pcdc geometry create sphere (0,0,0) 1 as-layer 'cavity'",),
             (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m")),
             (_LAYER,), dims=SPACE),
-    Command("geom{etry} cr{eate} cyl{inder}", "A round cylinder.",
+    Command("geom{etry} c{reate} cyl{inder}", "A round cylinder.",
             ("pcdc geometry create cylinder (0,0,0) (0,0,0.1) 0.025 as-layer 'core'",),
             (_leading("first", VECTOR, "middle of one end", "m"), _leading("second", VECTOR, "of the other", "m"),
              _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE),
-    Command("geom{etry} cr{eate} con{e}", "A round cone, or a part of one.",
+    Command("geom{etry} c{reate} con{e}", "A round cone, or a part of one.",
             ("pcdc geometry create cone (0,0,0) (0,0,1) 0.5 0.2 as-layer 'tip'",),
             (_leading("first", VECTOR, "middle of one end", "m"), _leading("second", VECTOR, "of the other", "m"),
              _leading("radius", NOT_NEGATIVE, "radius at the first end", "m"),
              _leading("other", NOT_NEGATIVE, "radius at the other", "m")), (_LAYER,), dims=SPACE),
-    Command("geom{etry} cr{eate} disc", "The surface of a round disc: meshes are cut along it.",
+    Command("geom{etry} c{reate} disc", "The surface of a round disc: meshes are cut along it.",
             ("pcdc geometry create disc (0,0,0) (0,0,1) 2 as-layer 'crack'",),
             (_leading("centre", VECTOR, "centre", "m"), _leading("normal", VECTOR, "normal of any length"),
              _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE),
-    Command("geom{etry} cr{eate} plane", "A plane without end.",
+    Command("geom{etry} c{reate} plane", "A plane without end.",
             ("pcdc geometry create plane (0,0,1) (0,0.2,1) as-layer 'fault'",),
             (_leading("point", VECTOR, "a point of it", "m"), _leading("normal", VECTOR, "normal of any length")),
             (_LAYER,), dims=SPACE),
-    Command("geom{etry} cr{eate} ext{rude}", "The bodies that the polygons of a layer become, drawn along a way.",
+    Command("geom{etry} c{reate} ext{rude}", "The bodies that the polygons of a layer become, drawn along a way.",
             ("pcdc geometry create extrude layer 'profile' along (0,10,0) as-layer 'slope'",),
             options=(Option("layer", (STRING,), "of polygons", required=True),
                      Option("along", (VECTOR,), "the way", "m", required=True), _LAYER), dims=SPACE),
-    Command("geom{etry} cr{eate} rev{olve}", "The bodies that the polygons of a layer become, turned about an axis in "
+    Command("geom{etry} c{reate} rev{olve}", "The bodies that the polygons of a layer become, turned about an axis in "
             "their plane.", ("pcdc geometry create revolve layer 'profile' axis (0,0,1) as-layer 'ring'",),
             options=(Option("layer", (STRING,), "of polygons", required=True),
                      Option("axis", (VECTOR,), "direction of the axis", required=True),
@@ -850,7 +883,7 @@ _GEOMETRY = (
              Option("rot{ate}", (FLOAT,), "then, counter-clockwise", "degrees"),
              Option("about", (VECTOR,), "centre of both", "m", "(0,0)"), Option("move", (VECTOR,), "last", "m")),
             needs_option=True),
-    Command("geom{etry} del{ete}", "Forgets a layer.", ("pcdc geometry delete 'hole'",),
+    Command("geom{etry} d{elete}", "Forgets a layer.", ("pcdc geometry delete 'hole'",),
             (_leading("layer", STRING, "name of the layer"),), dims=BOTH),
 )  # fmt: skip
 
@@ -919,8 +952,8 @@ _MESH = (
 )  # fmt: skip
 
 _OBJECTS = (
-    _group_command("element", "el{ement}"),
-    Command("el{ement} c-m{odel}", "The constitutive model of elements, with its properties.",
+    _group_command("element", "e{lement}"),
+    Command("e{lement} c-m{odel}", "The constitutive model of elements, with its properties.",
             ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25",
              "pcdc element c-model null range group 'excav_1' set 'domain'",
              "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
@@ -932,15 +965,15 @@ _OBJECTS = (
              "'limit' 2e5"),
             models=(ISO_ELASTIC, NULL, MOHR_COULOMB, USER, BURGERS, ISO_HEAT), ranged="element", manual=True,
             dims=BOTH),
-    Command("el{ement} law", "Reads, checks and compiles a law of a Python file without giving it to elements: for a "
+    Command("e{lement} law", "Reads, checks and compiles a law of a Python file without giving it to elements: for a "
             "script that begins with model restore. A checkpoint does not name files that are executed.",
             ("pcdc element law 'clay.py:clay'",), (_LAW,), dims=BOTH),
-    Command("el{ement} prop{erty}", "Changes properties; the others stay.",
+    Command("e{lement} prop{erty}", "Changes properties; the others stay.",
             ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
              "pcdc element property conductivity 3.5 range group 'salt'",
              "pcdc element property young table 'E_of_depth' over y density field 'density'"),
             options=_OF_SOLIDS, ranged="element", needs_option=True, dims=BOTH),
-    Command("el{ement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
+    Command("e{lement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
             "not given are zero; in the plane stress-zz is then that of plane strain, Poisson's ratio times xx + yy. "
             "It is that of a strain, by the moduli of this moment: where these are lowered later, it goes down with "
             "them. A stress beyond the strength of the element is said in the log.",
@@ -953,43 +986,44 @@ _OBJECTS = (
                 Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa", dims=SPACE,
                        more=(Option("grad{ient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
                 for c in ("xz", "yz")), ranged="element", needs_option=True, dims=BOTH),
-    Command("el{ement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
+    Command("e{lement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
             "log says that nothing was changed. Stresses stay; plastic strain is counted from here on.",
             ("pcdc element reset state",), ranged="element", manual=True, dims=BOTH),
-    Command("el{ement} res{et} k{elvin}-s{train}", "The Kelvin units of elements that creep are without strain from "
+    Command("e{lement} res{et} k{elvin}-s{train}", "The Kelvin units of elements that creep are without strain from "
             "here on. Stresses and displacements stay.", ("pcdc element reset kelvin-strain",), ranged="element",
             dims=BOTH),
-    _group_command("element-face", "element-f{ace}"),
-    Command("element-f{ace} c-m{odel}", "The contact model of surfaces.",
+    _group_command("element-face", "e{lement}-f{ace}"),
+    Command("e{lement}-f{ace} c-m{odel}", "The contact model of surfaces.",
             ("pcdc element-face c-model contact-m-c property pen-shear 5e11 pen-normal 5e11 friction 30",),
             models=(CONTACT,), ranged="element-face", manual=True, dims=BOTH),
-    Command("element-f{ace} prop{erty}", "Changes properties of contact models; the others stay.",
+    Command("e{lement}-f{ace} prop{erty}", "Changes properties of contact models; the others stay.",
             ("pcdc element-face property friction 20 range geometry 'fault'",), options=_properties(CONTACT),
             ranged="element-face", needs_option=True, dims=BOTH),
-    Command("element-f{ace} bou{ndary}", "A boundary condition of surfaces.",
+    Command("e{lement}-f{ace} b{oundary}", "A boundary condition of surfaces.",
             ("pcdc element-face boundary m-s-b-c stress-normal table 'blast' range geometry 'hole'",
              "pcdc element-face boundary m-s-b-c quiet on incoming-x table 'wave' range boundary y 0 0",
              "pcdc element-face boundary free-field range boundary x 0 0",
              "pcdc element-face boundary therm-c-h transfer-coeficient 25 environment-temperature 10 range boundary"),
-            models=(STRESS, FREE_FIELD, CONST_HEAT), ranged="element-face", dims=BOTH),
-    Command("element-f{ace} bou{ndary} rem{ove}", "Takes boundary conditions of surfaces back.",
+            models=(STRESS, FREE_FIELD, CONST_HEAT), ranged="element-face", dims=BOTH,
+            also=("e{lement}-f{ace} b{oundary} a{pply}", "e{lement}-f{ace} a{pply}")),
+    Command("e{lement}-f{ace} b{oundary} r{emove}", "Takes boundary conditions of surfaces back.",
             ("pcdc element-face boundary remove range geometry 'hole'",), ranged="element-face", dims=BOTH),
-    _group_command("face-joint", "face-j{oint}"),
-    Command("face-j{oint} c-m{odel}", "The model of the joints between elements. Joints without one hold for ever.",
+    _group_command("face-joint", "f{ace}-j{oint}"),
+    Command("f{ace}-j{oint} c-m{odel}", "The model of the joints between elements. Joints without one hold for ever.",
             ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",
              "pcdc face-joint c-model hydr-p-m property fluid-density 1000 fluid-bulk 2.2e9 viscosity 1e-6 "
              "aperature-initial 1e-5 aperature-minumum 1e-6 aperature-maximum 1e-3"),
             models=(COHESIVE, POROUS, PROPPANT, FLUID_HEAT), ranged="face-joint", dims=BOTH),
-    Command("face-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
+    Command("f{ace}-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
             ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",
              "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'",
              "pcdc face-joint property aperature-initial field 'aperture' shear-dilation 5 range geometry 'fault'"),
             options=(*_properties(COHESIVE), *_properties(POROUS), *_properties(FLUID_HEAT), *_properties(GRAINS)),
             ranged="face-joint", needs_option=True, dims=BOTH),
-    Command("face-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
+    Command("f{ace}-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
             ("pcdc face-joint reset state",), ranged="face-joint", dims=BOTH),
-    _group_command("node", "node"),
-    Command("node bou{ndary}", "A boundary condition of nodes.",
+    _group_command("node", "n{ode}"),
+    Command("n{ode} bou{ndary}", "A boundary condition of nodes.",
             ("pcdc node boundary mech-vel-b-c velocity-y -0.05 range group 'platen' set 'bc'",
              "pcdc node boundary mech-vel-b-c velocity-x function 'pump.py:wave' range x 0 0",
              "pcdc node boundary mech-m-b-c type 1 (0,0) range id 1",
@@ -997,21 +1031,21 @@ _OBJECTS = (
              "pcdc node boundary therm-s-b-c temperature table 'heating' range geometry 'hole'",
              "pcdc node boundary therm-f-b-c temperature 20 range group 'well'"),
             models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE),
-            ranged="node", dims=BOTH),
-    Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
+            ranged="node", dims=BOTH, also=("n{ode} bou{ndary} a{pply}", "n{ode} a{pply}")),
+    Command("n{ode} func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
             ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
-    Command("node bou{ndary} rem{ove}", "Takes boundary conditions of nodes back.",
+    Command("n{ode} bou{ndary} r{emove}", "Takes boundary conditions of nodes back.",
             ("pcdc node boundary remove range group 'platen' set 'bc'",), ranged="node", dims=BOTH),
-    Command("node init{ial}", "The velocity or temperature of nodes now.",
+    Command("n{ode} init{ial}", "The velocity or temperature of nodes now.",
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
                      Option("temp{erature}", (FLOAT,), "temperature, of the fluid at them too; before, it is 0. "
                             "Elements around the nodes are free of thermal stress then", "K")), ranged="node",
             needs_option=True, dims=BOTH),
-    Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True,
+    Command("n{ode} re{set} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True,
     dims=BOTH),
-    Command("node res{et} disp{lacement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
+    Command("n{ode} re{set} dis{placement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
             manual=True, dims=BOTH),
     Command("flow-n{ode} init{ial}", "Fluid that the flow nodes (nodes at which a channel ends) among these nodes hold "
             "now; before, channels are dry.", ("pcdc flow-node initial saturation 1",
@@ -1054,14 +1088,15 @@ _OBJECTS = (
             ("pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 tensile-yield-force 250e3 "
              "shear-stiffness-rock-bolt 1e9 grout-thickness 0.0125 cohesion-rock-grout 1.5e6 cohesion-grout-bolt 2e6 "
              "spacing 1.5 pretension-force 50e3 range group 'roof'",),
-            models=(BOLT,), ranged="bolt-element", dims=BOTH),
-    _group_command("bolt-element", "bolt-e{lement}"),
-    _group_command("bolt-node", "bolt-n{ode}"),
-    Command("bolt-n{ode} bou{ndary}", "What is prescribed at nodes of bolts.",
+            models=(BOLT,), ranged="bolt-element", dims=BOTH, also=("b{olt}-e{lement} c-m{odel}",)),
+    _group_command("bolt-element", "b{olt}-e{lement}"),
+    _group_command("bolt-node", "b{olt}-n{ode}"),
+    Command("b{olt}-n{ode} bou{ndary}", "What is prescribed at nodes of bolts.",
             ("pcdc bolt-node boundary b-n-c velocity-y -1e-3 range id 0",
              "pcdc bolt-node boundary b-n-f-b-c force-y -50e3 range group 'heads'"),
-            models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH),
-    Command("bolt-n{ode} bou{ndary} rem{ove}", "Takes it back.",
+            models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH,
+            also=("b{olt}-n{ode} bou{ndary} a{pply}", "b{olt}-n{ode} a{pply}")),
+    Command("b{olt}-n{ode} bou{ndary} r{emove}", "Takes it back.",
             ("pcdc bolt-node boundary remove range group 'heads'",), ranged="bolt-node", dims=BOTH),
     Command("bolt del{ete}", "Takes elements of bolts out at once, with their part of the grout. Their numbers go with "
             "them, those of the others stay; without RANGE all of them.",
