@@ -18,7 +18,7 @@ import pytest
 from hpcdem.runtime import kept
 from hpcdem.runtime.launch import openmp_runtime_found
 
-pytest_plugins = ["tests.browser"]
+pytest_plugins = ["tests.browser", "tests.suite"]
 ROOT = Path(__file__).resolve().parent.parent
 BIN = Path(sys.executable).parent
 PATIENCE = 300.0
