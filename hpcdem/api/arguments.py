@@ -94,7 +94,7 @@ def _read(options: tuple[Option, ...], given: Mapping[str, Any], of: str, dim: i
         if value is None:
             continue
         option = _option(options, name, of)
-        if not option.values:
+        if not option.values and not option.more:
             if not isinstance(value, (bool, np.bool_)):
                 raise ValueError(f"{name}: expected True or False, got {_shown(value)}")
             if not value:

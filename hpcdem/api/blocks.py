@@ -292,6 +292,98 @@ class Mesh(Words):
         }  # fmt: skip
         self._do("mesh structured", given)
 
+    def brick(
+        self,
+        p0: Point,
+        p1: Point,
+        p2: Point,
+        p3: Point | None = None,
+        *,
+        n: tuple[int, ...],
+        ratio: tuple[float, ...] | None = None,
+        triangle: bool | None = None,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """A regular mesh of the parallelogram, in three dimensions the parallelepiped, by a corner p0 and the ends of
+        its edges there [m], with n elements along each; ratio: each is so many times as large as the one before;
+        triangle=False: quads, or hexahedra."""
+        given = {"p0": p0, "p1": p1, "p2": p2, "p3": p3, "n": n, "ratio": ratio, "triangle": triangle}
+        self._do("element create brick", {**given, "group": _group(group, set)})
+
+    def geometry(
+        self,
+        *,
+        layer: Iterable[tuple[Any, ...]] = (),
+        circle: Iterable[tuple[Any, ...]] = (),
+        arc: Iterable[tuple[Any, ...]] = (),
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """Triangles in the inside of closed lines, with a mesh size for each piece. layer: (names, size); circle:
+        (centre, radius, size); arc: (centre, start, end, size), counter-clockwise; True as a last item: it bounds the
+        mesh, as the first piece does where none is said to. Others become edges of the mesh."""
+        size = ("mesh_size", "is_boundary")
+        given = {
+            "layer": [_named(one, "value", *size) for one in layer] or None,
+            "circle": [{"value": True, **_named(one, "center", "radius", *size)} for one in circle] or None,
+            "arc": [{"value": True, **_named(one, "center", "start_point", "end_point", *size)} for one in arc] or None,
+        }
+        self._do("element create geometry", {**given, "group": _group(group, set)})
+
+    def patch(
+        self,
+        boundary: Iterable[Mapping[str, Any]],
+        *,
+        polyline: Iterable[Mapping[str, Any]] = (),
+        point: Iterable[Mapping[str, Any]] = (),
+        global_mesh_size: float | None = None,
+        tolerance: float | None = None,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """Triangles in the inside of closed lines that follow other lines and points. Each piece is a dict of array
+        (points [m]) or layer (names of layers), and mesh_size [m]; tolerance [m]: points nearer than this are one."""
+        pieces = {"boundary_close_polyline": boundary, "constrain_polyline": polyline, "constrain_point": point}
+        given = {name: [{"value": True, **one} for one in of] or None for name, of in pieces.items()}
+        more = {"global_mesh_size": global_mesh_size, "tolerance": tolerance, "group": _group(group, set)}
+        self._do("element create geometry-patch", {**given, **more})
+
+    def boundary(
+        self,
+        boundary: Sequence[Point],
+        mesh_size: float | None = None,
+        *,
+        inner: Iterable[tuple[Any, ...]] = (),
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """Triangles in the inside of a closed line [m]. inner: (points, size) of closed lines in it, which are holes;
+        True as a third item: filled."""
+        given = {
+            "boundary": {"value": boundary, "mesh_size": mesh_size},
+            "inner_boundary": [_named(one, "value", "mesh_size", "filled") for one in inner] or None,
+        }
+        self._do("element create geometry-boundary", {**given, "group": _group(group, set)})
+
+    def hollow_circle(
+        self,
+        center: Point,
+        radius: float,
+        inner_radius: float,
+        mesh_size: float | None = None,
+        inner_mesh_size: float | None = None,
+        *,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """Triangles in a ring, with mesh sizes on its outer and inner circle [m]."""
+        given = {
+            "center": center, "radius": {"value": radius, "mesh_size": mesh_size},
+            "inner_radius": {"value": inner_radius, "mesh_size": inner_mesh_size}, "group": _group(group, set),
+        }  # fmt: skip
+        self._do("element create hollow-circle", given)
+
     def equilateral(
         self, first: Point, second: Point, size: float, *, group: str | None = None, set: str | None = None
     ) -> None:

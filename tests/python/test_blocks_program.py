@@ -107,6 +107,22 @@ SAME: list[tuple[str, str]] = [
     ("pcdc mesh intersect layer 'l' follow", "sim.mesh.intersect('l', follow=True)"),
     ("pcdc mesh glue tolerance 1e-3 between 'a' 'b' set 'd'", "sim.mesh.glue(1e-3, ('a', 'b'), set='d')"),
     ("pcdc mesh quality", "sim.mesh.quality()"),
+    ("pcdc element create brick p0 (0,0) p1 (2,0) p2 (1,1) n 4 2 ratio 1 2 triangle off group 'a' set 'd'",
+     "sim.mesh.brick((0, 0), (2, 0), (1, 1), n=(4, 2), ratio=(1, 2), triangle=False, group='a', set='d')"),
+    ("pcdc element create geometry layer 'a' 'b' m-s 1 is-b circle c (0,0) r 1 m-s 0.5 arc c (0,0) s-p (1,0) e-p (0,1) "
+     "group 'a'",
+     "sim.mesh.geometry(layer=[(['a', 'b'], 1, True)], circle=[((0, 0), 1, 0.5)], arc=[((0, 0), (1, 0), (0, 1))], "
+     "group='a')"),
+    ("pcdc element create geometry-patch b-c-p layer 'a' m-s 1 c-polyline array (0,0) (1,1) c-point array (2,2) m-s "
+     "0.2 g-m-s 2 tolerance 1e-3 group 'a'",
+     "sim.mesh.patch([{'layer': ['a'], 'mesh_size': 1}], polyline=[{'array': [(0, 0), (1, 1)]}], "
+     "point=[{'array': [(2, 2)], 'mesh_size': 0.2}], global_mesh_size=2, tolerance=1e-3, group='a')"),
+    ("pcdc element create geometry-boundary boundary (0,0) (2,0) (0,2) m-s 1 inner-boundary (0.1,0.1) (0.5,0.1) "
+     "(0.1,0.5) m-s 0.1 filled on group 'a'",
+     "sim.mesh.boundary([(0, 0), (2, 0), (0, 2)], 1, inner=[([(0.1, 0.1), (0.5, 0.1), (0.1, 0.5)], 0.1, True)], "
+     "group='a')"),
+    ("pcdc element create hollow-circle c (0,0) r 4 m-s 0.8 i-r 1 m-s 0.2 group 'a'",
+     "sim.mesh.hollow_circle((0, 0), 4, 1, 0.8, 0.2, group='a')"),
     ("pcdc element group 'a' set 's' range x 0 1 present", "sim.elements.group('a', 's', where='x 0 1 present')"),
     ("pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 cohesion 1e6 "
      "tensile 1e5 dilation 5",
@@ -337,6 +353,8 @@ def carry_out(sim: Simulation, text: str) -> Any:
 
 
 IN_SPACE: list[tuple[str, str]] = [
+    ("pcdc element create brick p0 (0,0,0) p1 (2,0,0) p2 (1,1,0) p3 (0,0,2) n 4 2 2",
+     "sim.mesh.brick((0, 0, 0), (2, 0, 0), (1, 1, 0), (0, 0, 2), n=(4, 2, 2))"),
     ("pcdc model option potential munjiza overlap keep deep-overlap stop",
      "sim.option(potential='munjiza', overlap='keep', deep_overlap='stop')"),
     ("pcdc element-face c-model contact-m-c property p-n 1e9 friction 30 range boundary",

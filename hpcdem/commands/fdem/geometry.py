@@ -21,14 +21,16 @@ Vector = tuple[float, ...]
 SHAPES: dict[str, Callable[..., shapes.Curve]] = {
     "polyline": shapes.polyline, "polygon": shapes.polygon, "rectangle": shapes.rectangle, "circle": shapes.circle,
     "arc": shapes.arc,
+    "arc-between": shapes.arc_between, "segmented-circle": shapes.segmented_circle,
 }  # fmt: skip
 
 
 def shape(kind: str, *values: Any) -> list[Any]:
-    """The curves [m] of a polyline or polygon (points), rectangle (two corners), circle (centre, radius), arc (the same
-    and two angles [degrees], counter-clockwise), or of single points (point); in space the solid [m] of a box (two
-    corners), sphere (centre, radius), cylinder or cone (middles of its ends, its radius or radii), or the surface of a
-    polygon (corners), disc (centre, normal, radius) or plane (point, normal)."""
+    """The curves [m] of a polyline or polygon (points), rectangle (two corners), circle (centre, radius; or, as
+    segmented-circle, with the length of its sides), arc (centre, radius and two angles [degrees], counter-clockwise;
+    or, as arc-between, centre and ends), or of single points (point); in space the solid [m] of a box (two corners),
+    sphere (centre, radius), cylinder or cone (middles of its ends, its radius or radii), or the surface of a polygon
+    (corners), disc (centre, normal, radius) or plane (point, normal)."""
     if kind in solids.KINDS and (kind not in SHAPES or len(values[0][0]) == 3):
         return [solids.made(kind, *values)]
     return [shapes.point(at) for at in values[0]] if kind == "point" else [SHAPES[kind](*values)]

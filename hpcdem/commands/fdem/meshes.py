@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.commands.fdem import values
+from hpcdem.commands.fdem.geometry import shape
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, hexahedra
@@ -27,7 +28,9 @@ from hpcdem.pre.mesh import (
     structured_space,
 )
 from hpcdem.pre.mesh import glue as glue_of
+from hpcdem.pre.mesh import patch as patches
 from hpcdem.pre.mesh.once import made_once
+from hpcdem.pre.mesh.pieces import Piece
 from hpcdem.pre.mesh.regions import polygon_of
 from hpcdem.pre.mesh.sizes import Refinement
 from hpcdem.pre.mesh.triangulate import Meshed, Region, Wishes, triangulate
@@ -138,6 +141,52 @@ def box(
     back, bottom, top."""
     lines, name = values.grid_lines(first, second, cells, ratio), (set_name, group)
     _add(project, structured_space.hexes(lines, name) if hexes else structured_space.box(lines, split, name))
+
+
+def brick(
+    project: Project,
+    corner: tuple[float, ...],
+    ends: Sequence[tuple[float, ...]],
+    cells: tuple[int, ...],
+    ratio: tuple[float, ...] | None = None,
+    split: bool = True,
+    group: str = DEFAULT,
+    set_name: str = DEFAULT,
+) -> None:
+    """A regular mesh of the parallelogram, in space the parallelepiped, whose edges lead from a corner to two or three
+    ends [m]; cells along each, and ratio: each is so many times as large as the one before. split: into triangles or
+    tetrahedra, else quads or hexahedra. Its sides are the layers of `rectangle` and `box`."""
+    grid = values.brick(corner, ends, cells, ratio)
+    name = (set_name, group)
+    if grid.shape[-1] == 2:
+        _add(project, structured.of_grid(grid, "tri" if split else "quad", group=name))
+    else:
+        _add(project, structured_space.of_grid(grid, group=name) if split else
+             structured_space.hexes_of_grid(grid, name))  # fmt: skip
+
+
+def patch(
+    project: Project,
+    pieces: Sequence[Piece],
+    size: float | None = None,
+    tolerance: float = 0.0,
+    group: str = DEFAULT,
+    set_name: str = DEFAULT,
+) -> None:
+    """Triangles in the inside of closed lines, by Gmsh, with sizes per piece. Collective.
+
+    pieces: the lines and points; size [m]: where no piece says one, the largest of the pieces' otherwise; tolerance
+    [m]: ends of lines and points nearer than this to an earlier one lie on it."""
+    if project.dim == 3:
+        raise CommandError("lines bound a mesh in two dimensions only")
+    shaped = [(piece, shape(*piece.shape) if piece.shape else []) for piece in pieces]
+    layers, wishes = patches.wishes(project.layers, shaped, size, tolerance, (set_name, group))
+    made: Meshed = made_once(project.comm, lambda: triangulate(layers, wishes))
+    for note in made.notes:
+        _say(project, note)
+    mesh = made.mesh
+    named = {name: rows for name, rows in mesh.layers.items() if name in project.layers}
+    _add(project, Mesh.of(mesh.points, mesh.cells, mesh.groups, named, mesh.cracks, mesh.crack_sets))
 
 
 def rectangle(

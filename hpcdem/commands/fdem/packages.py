@@ -10,6 +10,10 @@ EXTRA = optional.EXTRA
 """What brings all of them."""
 NEEDED: Mapping[str, Callable[[str], tuple[optional.Load, ...]]] = {
     "mesh create": lambda file: (optional.gmsh, optional.shapely),
+    **{
+        f"element create {name}": lambda file: (optional.gmsh, optional.shapely)
+        for name in ("geometry", "geometry-patch", "geometry-boundary", "hollow-circle")
+    },
     "mesh import": optional.of_mesh,
     "geometry import": optional.of_drawing,
 }

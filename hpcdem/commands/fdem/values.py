@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh.disc_sets import DiscSet, Poles
 from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
-from hpcdem.pre.mesh.sizes import spaced
+from hpcdem.pre.mesh.sizes import skew_grid, spaced
 
 FIGURES = (".png", ".pdf", ".svg")
 
@@ -27,6 +28,19 @@ def grid_lines(
     if not len(first) == len(second) == len(cells) == len(ratio):
         raise CommandError("corners, cells and ratio need a number for each dimension of space")
     return tuple(spaced(min(a, b), max(a, b), n, r) for a, b, n, r in zip(first, second, cells, ratio))
+
+
+def brick(
+    corner: tuple[float, ...],
+    ends: Sequence[tuple[float, ...]],
+    cells: tuple[int, ...],
+    ratio: tuple[float, ...] | None = None,
+) -> np.ndarray:
+    """Points of a regular mesh whose edges lead from a corner to two or three ends [m], see `sizes.skew_grid`."""
+    ratio = ratio or (1.0,) * len(corner)
+    if not len(corner) == len(ends) == len(cells) == len(ratio) or any(len(end) != len(corner) for end in ends):
+        raise CommandError("ends, n and ratio need a number for each dimension of space")
+    return skew_grid(corner, ends, cells, ratio)
 
 
 def fracture_set(

@@ -168,6 +168,19 @@ def _mesh_structured(call: Call) -> None:
     )  # fmt: skip
 
 
+def _brick(call: Call) -> None:
+    fdem.meshes.brick(
+        call.project, call["p0"], [call[name] for name in ("p1", "p2", "p3") if name in call.arguments], call["n"],
+        split=call.get("triangle", True), **call.given_only("ratio"), **call.group(),
+    )  # fmt: skip
+
+
+def _patch(call: Call) -> None:
+    pieces = trial.pieces(call.arguments)
+    size = call.given_only("tolerance")
+    fdem.meshes.patch(call.project, pieces, call.get("global-mesh-size"), **size, **call.group())
+
+
 def _mesh_glue(call: Call) -> None:
     groups = call.get("between", {})
     fdem.meshes.glue(
@@ -427,6 +440,11 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "mesh intersect": lambda c: fdem.meshes.intersect(c.project, c["layer"], c.get("follow", False)),
     "mesh glue": _mesh_glue,
     "mesh quality": lambda c: fdem.meshes.tell_quality(c.project),
+    "element create brick": _brick,
+    "element create geometry": _patch,
+    "element create geometry-patch": _patch,
+    "element create geometry-boundary": _patch,
+    "element create hollow-circle": _patch,
     "element group": _group(g.ELEMENT),
     "element c-model": _element_model,
     "element law": lambda c: fdem.assignments.load_law(c.project, c["law"]),

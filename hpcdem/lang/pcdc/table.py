@@ -951,6 +951,71 @@ _MESH = (
     Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",)),
 )  # fmt: skip
 
+# ---- meshes in the words of the online commands -------------------------------------------------------------------
+
+_SIZE = Option("m{esh}-s{ize}", (POSITIVE,), "length of edges there", "m", "the largest of the others")
+_BOUNDARY = Option("is-b{oundary}", (), "it bounds the mesh: what is outside is cut off", "", "the first piece does")
+_ARRAY = Option("ar{ray}", (VECTORS,), "points; or a list of vectors", "m")
+_LAYERS = Option("la{yer}", (STRINGS,), "layers of geometry")
+_ELEMENT_CREATE = (
+    Command("el{ement} create br{ick}", "A regular mesh of a parallelogram, in three dimensions of a parallelepiped, "
+            "by a corner and the ends of its edges there.",
+            ("pcdc element create brick p0 (0,0) p1 (30,0) p2 (4,12) n 30 12 ratio 1 1.1 triangle off",
+             "pcdc element create brick p0 (0,0,0) p1 (6,0,0) p2 (0,4,0) p3 (0,0,5) n 6 4 5 triangle off"),
+            options=(Option("p0", (VECTOR,), "the corner", "m", required=True),
+                     Option("p1", (VECTOR,), "end of its first edge", "m", required=True),
+                     Option("p2", (VECTOR,), "of the second", "m", required=True),
+                     Option("p3", (VECTOR,), "of the third", "m", required=True, dims=SPACE),
+                     Option("n", (COUNT, COUNT, THIRD_COUNT), "elements along each edge", required=True),
+                     Option("r{atio}", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along each edge an element is so many "
+                            "times as large as the one before", "1", "1 1"),
+                     Option("tri{angle}", (BOOL,), "triangles, or tetrahedra; off: quads, or hexahedra", default="on",
+                            also=("tet{ra}",)), _GROUP), dims=BOTH),
+    Command("el{ement} create geo{metry}", "Triangles in the inside of closed lines, by Gmsh, with a mesh size for "
+            "each piece. Other pieces become edges and points of the mesh, as far as they lie inside.",
+            ("pcdc element create geometry layer 'out' m-s 1.5 is-boundary layer 'fault' m-s 0.5 circle center (4,3) "
+             "radius 1 m-s 0.25",),
+            options=(
+                Option("la{yer}", (STRINGS,), "layers of geometry", repeated=True, more=(_SIZE, _BOUNDARY)),
+                Option("cir{cle}", (), "a circle", repeated=True,
+                       more=(Option("c{enter}", (VECTOR,), "its centre", "m", required=True),
+                             Option("r{adius}", (POSITIVE,), "its radius", "m", required=True), _SIZE, _BOUNDARY)),
+                Option("arc", (), "an arc, counter-clockwise", repeated=True,
+                       more=(Option("c{enter}", (VECTOR,), "its centre", "m", required=True),
+                             Option("s{tart}-p{oint}", (VECTOR,), "where it begins", "m", required=True),
+                             Option("e{nd}-p{oint}", (VECTOR,), "where it ends", "m", required=True), _SIZE,
+                             _BOUNDARY)), _GROUP), needs_option=True),
+    Command("el{ement} create geo{metry}-p{atch}", "Triangles in the inside of closed lines, by Gmsh, that follow "
+            "other lines and points as far as these lie inside.",
+            ("pcdc element create geometry-patch b-c-p array (0,0) (9,0) (9,6) (0,6) m-s 1 c-polyline layer 'fault' "
+             "m-s 0.4 c-point array (2,2) m-s 0.2 g-m-s 1.5",),
+            options=(
+                Option("b{oundary}-c{lose}-p{olyline}", (), "bounds the mesh", required=True, repeated=True,
+                       more=(_ARRAY, _LAYERS, _SIZE)),
+                Option("c{onstrain}-poly{line}", (), "lines that become edges", repeated=True,
+                       more=(_ARRAY, _LAYERS, _SIZE)),
+                Option("c{onstrain}-p{oint}", (), "points of the mesh", repeated=True, more=(_ARRAY, _LAYERS, _SIZE)),
+                Option("g{lobal}-m{esh}-s{ize}", (POSITIVE,), "of pieces without one, and away from them", "m",
+                       "the largest of the pieces"),
+                Option("t{olerance}", (NOT_NEGATIVE,), "points nearer than this are one", "m", "1e-4"), _GROUP)),
+    Command("el{ement} create geo{metry}-b{oundary}", "Triangles in the inside of a closed line, by Gmsh, with others "
+            "in it that are holes, or filled.",
+            ("pcdc element create geometry-boundary boundary (0,0) (9,0) (9,6) (0,6) m-s 1 inner-boundary (3,2) (5,2) "
+             "(4,4) m-s 0.4 inner-boundary (6,2) (8,2) (7,3) m-s 0.5 filled on",),
+            options=(
+                Option("b{oundary}", (VECTORS,), "corners of the outline; or a list of vectors", "m", required=True,
+                       more=(_SIZE,)),
+                Option("i{nner}-b{oundary}", (VECTORS,), "corners of a line in it", "m", repeated=True,
+                       more=(_SIZE, Option("filled", (BOOL,), "elements inside; off: a hole", default="off"))),
+                _GROUP)),
+    Command("el{ement} create h{ollow}-cir{cle}", "Triangles in a ring, by Gmsh.",
+            ("pcdc element create hollow-circle center (0,0) radius 4 m-s 0.8 inner-radius 1 m-s 0.2",),
+            options=(Option("c{enter}", (VECTOR,), "centre of both circles", "m", required=True),
+                     Option("r{adius}", (POSITIVE,), "outer radius", "m", required=True, more=(_SIZE,)),
+                     Option("i{nner}-r{adius}", (POSITIVE,), "radius of the hole", "m", required=True, more=(_SIZE,)),
+                     _GROUP)),
+)  # fmt: skip
+
 _OBJECTS = (
     _group_command("element", "e{lement}"),
     Command("e{lement} c-m{odel}", "The constitutive model of elements, with its properties.",
@@ -1242,5 +1307,5 @@ _RECORDS = (
              Option("title", (STRING,), "over the picture; {step} and {time} are filled in")), ranged="any", dims=BOTH),
 )  # fmt: skip
 
-COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_OBJECTS, *_RECORDS)
+COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_ELEMENT_CREATE, *_OBJECTS, *_RECORDS)
 PCDC = Table(COMMANDS, RANGE_TERMS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from hpcdem.commands.fdem import geometry, values
@@ -37,6 +38,7 @@ from hpcdem.physics.flow.properties import POROUS as FLUID
 from hpcdem.physics.heat.properties import FLUID_HEAT as HEAT_OF_FLUID
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT
 from hpcdem.physics.proppant.properties import PROPPANT as GRAINS
+from hpcdem.pre.mesh.pieces import HOLE, LINE, OUTLINE, Piece
 
 MODELS = {
     model.keyword.name: model.of
@@ -196,6 +198,63 @@ def _equilateral(arguments: Mapping[str, Any]) -> None:
     values.grid_lines(arguments["first"], arguments["second"], (1, 1), (1.0, 1.0))
 
 
+def _brick(arguments: Mapping[str, Any]) -> None:
+    ends = [arguments[name] for name in ("p1", "p2", "p3") if name in arguments]
+    values.brick(arguments["p0"], ends, (1,) * len(ends), (1.0,) * len(ends))
+
+
+_ROLES = {
+    "boundary-close-polyline": OUTLINE, "constrain-polyline": LINE, "constrain-point": LINE, "boundary": OUTLINE,
+    "inner-boundary": LINE, "layer": LINE, "circle": LINE, "arc": LINE, "radius": OUTLINE, "inner-radius": HOLE,
+}  # fmt: skip
+
+
+def pieces(arguments: Mapping[str, Any]) -> list[Piece]:
+    """The pieces of a mesh that the words of `element create` name, in their order."""
+    found = []
+    for word, given in arguments.items():
+        if word not in _ROLES:
+            continue
+        role = _ROLES[word]
+        for one in given if isinstance(given, list) else [given]:
+            layers, role_here = one.get("layer", []), role
+            shape: tuple[Any, ...] = ()
+            if one.get("is-boundary"):
+                role_here = OUTLINE
+            if word == "inner-boundary" and not one.get("filled", False):
+                role_here = HOLE
+            if word == "layer":
+                layers = one["value"]
+            elif word == "circle":
+                shape = ("circle", one["center"], one["radius"])
+            elif word == "arc":
+                shape = ("arc-between", one["center"], one["start-point"], one["end-point"])
+            elif word in ("radius", "inner-radius"):
+                shape = ("circle", arguments["center"], one["value"])
+            elif word in ("boundary", "inner-boundary"):
+                shape = ("polygon", one["value"])
+            elif "array" in one:
+                kind = {"constrain-point": "point", "constrain-polyline": "polyline"}.get(word, "polygon")
+                shape = (kind, one["array"])
+            elif not layers:
+                raise CommandError(f"{word} needs array, points, or layer, names of layers")
+            found.append(Piece(role_here, word, layers, shape, one.get("mesh-size")))
+    if "radius" in arguments and not arguments["inner-radius"]["value"] < arguments["radius"]["value"]:
+        raise CommandError("inner-radius is below radius: between them is the ring")
+    if not any(piece.role == OUTLINE for piece in found):
+        first = next((k for k, piece in enumerate(found) if piece.what != "arc"), 0)
+        found[first] = replace(found[first], role=OUTLINE)
+    if all(piece.size is None for piece in found) and "global-mesh-size" not in arguments:
+        raise CommandError("mesh-size is missing: of one of the pieces at least")
+    return found
+
+
+def _pieces(arguments: Mapping[str, Any]) -> None:
+    for piece in pieces(arguments):
+        if piece.shape:
+            geometry.shape(*piece.shape)
+
+
 def _table(arguments: Mapping[str, Any]) -> None:
     Table.of(arguments["values"], arguments["name"])
 
@@ -271,6 +330,9 @@ _TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
     "geometry create fractures": _fractures,
     "bolt create polyline": _bolt,
     "mesh structured": _rectangle,
+    "element create brick": _brick,
+    **{f"element create {name}": _pieces for name in
+       ("geometry", "geometry-patch", "geometry-boundary", "hollow-circle")},
     "mesh equilateral": _equilateral,
     "table create": _table,
     "history create": _history,

@@ -18,6 +18,8 @@ from hpcdem.core.errors import CommandError
 
 Vector = Sequence[float]
 
+MOST_SIDES = 100_000
+"""Of a circle of straight sides."""
 STEPS_PER_CIRCLE = 8
 """A circle has at least so many edges, however coarse the mesh."""
 
@@ -84,6 +86,20 @@ def circle(centre: Vector, radius: float) -> Curve:
     return Curve(np.array([[x - radius, y], [x + radius, y]]), np.array([1.0, 1.0]), True)
 
 
+def segmented_circle(centre: Vector, radius: float, length: float) -> Curve:
+    """Polygon of equal sides of nearly this length with its corners on a circle [m], the first in the direction of x;
+    at least three."""
+    x, y = _pair(centre, "circle")
+    _positive(radius, "circle: radius")
+    _positive(length, "circle: segment length")
+    sides = max(3, round(2.0 * math.pi * radius / length))
+    if sides > MOST_SIDES:
+        raise CommandError(f"circle: sides of {length:g} are {sides} of them, more than {MOST_SIDES}")
+    turn = 360.0 / sides
+    at = [_cos_sin(k * turn) for k in range(sides)]
+    return _curve([(x + radius * c, y + radius * s) for c, s in at], closed=True, least=3, what="circle")
+
+
 def arc(centre: Vector, radius: float, start: float, end: float) -> Curve:
     """Arc [m], counter-clockwise from angle `start` to angle `end` [degrees from the x axis]; less than a circle."""
     x, y = _pair(centre, "arc")
@@ -98,6 +114,21 @@ def arc(centre: Vector, radius: float, start: float, end: float) -> Curve:
     xy = np.column_stack([x + radius * np.cos(a), y + radius * np.sin(a)])
     bulge = math.tan(math.radians(sweep) / 8.0)
     return Curve(xy, np.array([bulge, bulge, 0.0]), False)
+
+
+def arc_between(centre: Vector, start: Vector, end: Vector) -> Curve:
+    """Arc about a centre, counter-clockwise from a point to another [m]; CommandError if they are not as far from it as
+    each other."""
+    one, other = (np.array(_pair(at, "arc")) - np.array(_pair(centre, "arc")) for at in (start, end))
+    radius, far = float(np.hypot(*one)), float(np.hypot(*other))
+    if abs(radius - far) > 1e-6 * max(radius, far):
+        raise CommandError(
+            f"arc: its ends are {radius:g} and {far:g} m away from its centre; both lie on the same circle about it"
+        )
+    found = arc(centre, radius, *(math.degrees(math.atan2(at[1], at[0])) for at in (one, other)))
+    points = found.points.copy()
+    points[0], points[-1] = start, end
+    return Curve(points, found.bulges, False)
 
 
 def transformed(

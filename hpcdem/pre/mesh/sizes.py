@@ -18,6 +18,8 @@ GROWTH = 0.2
 """Edges grow by this much of the distance from a refined layer, where nothing else is said: neighbours by a fifth."""
 MOST_ELEMENTS = 20_000_000
 """More are refused before they are made."""
+FLAT = 1e-9
+"""Edges that span less than this part of the square, or cube, of the longest are flat."""
 MOST_SAMPLES = 500_000
 """Points along a refined layer at most."""
 
@@ -122,6 +124,11 @@ def spaced(start: float, end: float, n: int, ratio: float = 1.0) -> np.ndarray:
     """(n + 1,) coordinates from start to end [m]; each of the n intervals is `ratio` times the one before."""
     if not (math.isfinite(start) and math.isfinite(end) and end > start):
         raise CommandError(f"a structured mesh needs an upper bound above the lower one, not {start:g} to {end:g}")
+    return between((start,), (end,), n, ratio)[:, 0]
+
+
+def between(first: Sequence[float], last: Sequence[float], n: int, ratio: float = 1.0) -> np.ndarray:
+    """(n + 1, dim) points from the first to the last [m]; each of the n intervals is `ratio` times the one before."""
     if n < 1:
         raise CommandError(f"a structured mesh needs at least one element in each direction, not {n}")
     if not (math.isfinite(ratio) and ratio > 0.0):
@@ -134,6 +141,36 @@ def spaced(start: float, end: float, n: int, ratio: float = 1.0) -> np.ndarray:
         raise CommandError(f"with the ratio {ratio:g}, {n} elements differ too much in size")
     else:
         part = np.expm1(k * math.log(ratio)) / math.expm1(n * math.log(ratio))
-    out = start + (end - start) * part
+    start, end = np.array(first, np.float64), np.array(last, np.float64)
+    out = start + (end - start) * part[:, None]
     out[-1] = end
     return out
+
+
+def skew_grid(
+    corner: Sequence[float], ends: Sequence[Sequence[float]], cells: Sequence[int], ratio: Sequence[float]
+) -> np.ndarray:
+    """Points of a grid [m], (ny + 1, nx + 1, 2) or (nz + 1, ny + 1, nx + 1, 3), in the parallelogram or parallelepiped
+    whose edges lead from a corner to two or three ends; cells and ratio along each, see `between`. Along the axes
+    the coordinates are those of `spaced`; where the edges are left-handed the first runs backwards in the grid."""
+    dim, at = len(corner), np.array(corner, np.float64)
+    edges = np.array(ends, np.float64) - at
+    longest = float(np.sqrt((edges * edges).sum(axis=1)).max())
+    turn = float(np.linalg.det(edges)) if np.isfinite(edges).all() else math.nan
+    if not abs(turn) > FLAT * longest**dim:
+        raise CommandError(
+            f"the edges from {_place(corner)} to {', '.join(map(_place, ends))} span no "
+            + ("area" if dim == 2 else "volume")
+        )
+    not_too_many(float(np.prod(np.array(cells, np.float64))), f"cells {' '.join(map(str, cells))}")
+    out = at.reshape((1,) * dim + (dim,))
+    for axis, (end, n, r) in enumerate(zip(ends, cells, ratio, strict=True)):
+        shape = [1] * dim
+        shape[dim - 1 - axis] = n + 1
+        line = between(corner, end, n, r).reshape(*shape, dim)
+        out = np.where(out == at, line, np.where(line == at, out, out + (line - at)))
+    return np.asarray(out if turn > 0.0 else out[..., ::-1, :])
+
+
+def _place(at: Sequence[float]) -> str:
+    return f"({', '.join(f'{c:g}' for c in at)})"

@@ -38,13 +38,22 @@ def rectangle(
     for v, name in ((xs, "x"), (ys, "y")):
         if v.ndim != 1 or len(v) < 2 or not np.isfinite(v).all() or not (np.diff(v) > 0.0).all():
             raise CommandError(f"grid lines in {name} must be finite and ascend")
+    not_too_many(float(len(xs)) * len(ys), f"cells {len(xs) - 1} {len(ys) - 1}")
+    return of_grid(np.stack(np.meshgrid(xs, ys), axis=-1), kind, diagonal, group)
+
+
+def of_grid(
+    grid: np.ndarray, kind: str = "quad", diagonal: str = "alternate", group: tuple[str, str] | None = None
+) -> Mesh:
+    """The same between the points of a grid (ny + 1, nx + 1, 2), counter-clockwise; `left` is its first column,
+    `bottom` its first row."""
     if kind not in ("quad", "tri"):
         raise CommandError(f"a structured mesh consists of 'quad' or 'tri', not '{kind}'")
     if kind == "tri" and diagonal not in DIAGONALS:
         raise CommandError(f"diagonal '{diagonal}' is not known, choose from {', '.join(DIAGONALS)}")
-    nx, ny = len(xs) - 1, len(ys) - 1
+    ny, nx = grid.shape[0] - 1, grid.shape[1] - 1
     not_too_many(nx * ny * (1 if kind == "quad" else 4 if diagonal == "both" else 2), f"cells {nx} {ny}")
-    points = np.array(np.meshgrid(xs, ys)).reshape(2, -1).T
+    points = grid.reshape(-1, 2)
     j, i = (v.ravel() for v in np.mgrid[:ny, :nx])
     a = j * (nx + 1) + i
     quads = np.column_stack([a, a + 1, a + nx + 2, a + nx + 1])

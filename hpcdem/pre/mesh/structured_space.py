@@ -20,14 +20,26 @@ SIDES = (("left", 0, 0), ("right", 0, -1), ("front", 1, 0), ("back", 1, -1), ("b
 
 def box(lines: Sequence[np.ndarray], split: int = 6, group: tuple[str, str] | None = None) -> Mesh:
     """Tetrahedra between the grid lines in x, y and z (ascending); group: (set, group) for all of them."""
+    return of_grid(_grid(lines), split, group)
+
+
+def _grid(lines: Sequence[np.ndarray]) -> np.ndarray:
+    """(nz + 1, ny + 1, nx + 1, 3) points where grid lines cross."""
+    if not all(len(line) > 1 and np.isfinite(line).all() and (np.diff(line) > 0.0).all() for line in lines):
+        raise CommandError("grid lines must be finite and ascend")
+    n = [len(line) - 1 for line in lines]
+    not_too_many(float(np.prod(np.array(n, np.float64))), f"cells {' '.join(map(str, n))}")
+    z, y, x = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
+    return np.stack([x, y, z], axis=-1)
+
+
+def of_grid(grid: np.ndarray, split: int = 6, group: tuple[str, str] | None = None) -> Mesh:
+    """The same between the points of a grid (nz + 1, ny + 1, nx + 1, 3) with edges that are right-handed."""
     if split not in SPLITS:
         raise CommandError(f"a box is split into {', '.join(map(str, SPLITS))} tetrahedra, not into {split}")
-    n = np.array([len(line) - 1 for line in lines])
-    if (n < 1).any() or not all(np.isfinite(line).all() and (np.diff(line) > 0.0).all() for line in lines):
-        raise CommandError("grid lines must be finite and ascend")
+    n = np.array(grid.shape[2::-1]) - 1
     not_too_many(float(np.prod(n)) * split, f"cells {' '.join(map(str, n))}")
-    z, y, x = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
-    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    points = grid.reshape(-1, 3)
     number = np.arange(len(points)).reshape(*(n + 1)[::-1])
     corner: dict[tuple[int, ...], np.ndarray] = {
         (i, j, k): number[k : n[2] + k, j : n[1] + j, i : n[0] + i].ravel() for i, j, k in np.ndindex(2, 2, 2)
@@ -62,8 +74,13 @@ def box(lines: Sequence[np.ndarray], split: int = 6, group: tuple[str, str] | No
 
 def hexes(lines: Sequence[np.ndarray], group: tuple[str, str] | None = None) -> Mesh:
     """Hexahedra between the grid lines in x, y and z, with the layers of `box`."""
-    made = box(lines, 6)
-    n = np.array([len(line) - 1 for line in lines])
+    return hexes_of_grid(_grid(lines), group)
+
+
+def hexes_of_grid(grid: np.ndarray, group: tuple[str, str] | None = None) -> Mesh:
+    """The same between the points of a grid, see `of_grid`."""
+    made = of_grid(grid, 6)
+    n = np.array(grid.shape[2::-1]) - 1
     number = np.arange(len(made.points)).reshape(*(n + 1)[::-1])
     corner = {(i, j, k): number[k : n[2] + k, j : n[1] + j, i : n[0] + i].ravel() for i, j, k in np.ndindex(2, 2, 2)}
     ring = ((0, 0), (1, 0), (1, 1), (0, 1))
