@@ -3,12 +3,14 @@
 ``online.txt`` is the tree of their keywords: a row is a word in the notation of `keywords`, its depth in blanks, then
 between tabs the kinds of its values, the dimensions (2, 3) in which it is there, its state in each of them, and what a
 line with it needs besides: words that follow; after ``+`` pairs of a word and a value that lines with words below it
-need, too; after ``=`` the whole line. ``python -m hpcdem.lang.pcdc.online states`` writes the file with the states as
-they are, ``... page`` docs/pcdc_online.md.
+need, too (or, between ``|``, words with their values, ``{3}`` before those of three dimensions only); after ``=`` the
+whole line. ``python -m hpcdem.lang.pcdc.online states`` writes the file with the states as they are, ``... page``
+docs/pcdc_online.md.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
 from dataclasses import dataclass
@@ -29,10 +31,12 @@ STATES = {
 _SAMPLES = {
     "int": "3", "float": "0.25", "bool": "on", "string": "'a'", "vector": "(1,2)", "float,float": "0 1",
     "vector,vector": "(0,0) (1,1)", "vector,vector,vector": "(0,0) (2,0) (1,2)", "int,int": "4 2",
-    "int,int,int": "4 2 3", "string,string,string": "'a' 'b'", "float,float,float": "0 1, 2 3",
+    "int,int,int": "4 2 3", "string,string,string": "'a' 'b'",
+    "string,string,string,float,bool": "'a' 'b'", "float,float,float": "0 1, 2 3",
 }  # fmt: skip
 _IN_SPACE = {"(1,2)": "(1,2,3)", "(0,0) (1,1)": "(0,0,0) (1,1,1)", "(0,0) (2,0) (1,2)": "(0,0,0) (2,0,0) (1,2,0)"}
 _TABLE = "|table"
+_VECTOR = re.compile(r"\(([^,()]+,[^,()]+)\)")
 
 _HEAD = "| path | values | in | state | read as |"
 _TOP = """\
@@ -82,12 +86,21 @@ class Row:
             last = k == len(words) - 1
             parts += [word, "table 'a'" if table and last else _IN_SPACE.get(sample, sample) if dim == 3 else sample]
         if self.needs and not self.needs.startswith("+"):
-            parts.append(self.needs)
+            parts += _segments(self.needs, dim) if "|" in self.needs else [self.needs]
         else:
-            needs = (self.needs[1:] or self.inherited).split()
-            pairs = zip(needs[::2], needs[1::2])
-            parts += [f"{word} {value}" for word, value in pairs if word not in self.words[1:]]
+            needs = _segments(self.needs[1:] or self.inherited, dim)
+            parts += [one for one in needs if one.split()[0] not in self.words[1:]]
         return " ".join(filter(None, parts))
+
+
+def _segments(needs: str, dim: int) -> list[str]:
+    """Words with their values."""
+    if "|" not in needs:
+        words = needs.split()
+        return [" ".join(pair) for pair in zip(words[::2], words[1::2])]
+    found = [one.removeprefix(f"{{{dim}}}") for one in needs.split("|")]
+    found = [one for one in found if one and not one.startswith("{")]
+    return [_VECTOR.sub(r"(\1,0)", one) for one in found] if dim == 3 else found
 
 
 @cache

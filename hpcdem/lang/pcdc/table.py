@@ -955,10 +955,10 @@ _MESH = (
 
 _SIZE = Option("m{esh}-s{ize}", (POSITIVE,), "length of edges there", "m", "the largest of the others")
 _BOUNDARY = Option("is-b{oundary}", (), "it bounds the mesh: what is outside is cut off", "", "the first piece does")
-_ARRAY = Option("ar{ray}", (VECTORS,), "points; or a list of vectors", "m")
-_LAYERS = Option("la{yer}", (STRINGS,), "layers of geometry")
+_ARRAY = Option("a{rray}", (VECTORS,), "points; or a list of vectors", "m")
+_LAYERS = Option("l{ayer}", (STRINGS,), "layers of geometry")
 _ELEMENT_CREATE = (
-    Command("el{ement} create br{ick}", "A regular mesh of a parallelogram, in three dimensions of a parallelepiped, "
+    Command("e{lement} create b{rick}", "A regular mesh of a parallelogram, in three dimensions of a parallelepiped, "
             "by a corner and the ends of its edges there.",
             ("pcdc element create brick p0 (0,0) p1 (30,0) p2 (4,12) n 30 12 ratio 1 1.1 triangle off",
              "pcdc element create brick p0 (0,0,0) p1 (6,0,0) p2 (0,4,0) p3 (0,0,5) n 6 4 5 triangle off"),
@@ -971,12 +971,12 @@ _ELEMENT_CREATE = (
                             "times as large as the one before", "1", "1 1"),
                      Option("tri{angle}", (BOOL,), "triangles, or tetrahedra; off: quads, or hexahedra", default="on",
                             also=("tet{ra}",)), _GROUP), dims=BOTH),
-    Command("el{ement} create geo{metry}", "Triangles in the inside of closed lines, by Gmsh, with a mesh size for "
+    Command("e{lement} create geo{metry}", "Triangles in the inside of closed lines, by Gmsh, with a mesh size for "
             "each piece. Other pieces become edges and points of the mesh, as far as they lie inside.",
             ("pcdc element create geometry layer 'out' m-s 1.5 is-boundary layer 'fault' m-s 0.5 circle center (4,3) "
              "radius 1 m-s 0.25",),
             options=(
-                Option("la{yer}", (STRINGS,), "layers of geometry", repeated=True, more=(_SIZE, _BOUNDARY)),
+                Option("layer", (STRINGS,), "layers of geometry", repeated=True, more=(_SIZE, _BOUNDARY)),
                 Option("cir{cle}", (), "a circle", repeated=True,
                        more=(Option("c{enter}", (VECTOR,), "its centre", "m", required=True),
                              Option("r{adius}", (POSITIVE,), "its radius", "m", required=True), _SIZE, _BOUNDARY)),
@@ -985,7 +985,7 @@ _ELEMENT_CREATE = (
                              Option("s{tart}-p{oint}", (VECTOR,), "where it begins", "m", required=True),
                              Option("e{nd}-p{oint}", (VECTOR,), "where it ends", "m", required=True), _SIZE,
                              _BOUNDARY)), _GROUP), needs_option=True),
-    Command("el{ement} create geo{metry}-p{atch}", "Triangles in the inside of closed lines, by Gmsh, that follow "
+    Command("e{lement} create geo{metry}-p{atch}", "Triangles in the inside of closed lines, by Gmsh, that follow "
             "other lines and points as far as these lie inside.",
             ("pcdc element create geometry-patch b-c-p array (0,0) (9,0) (9,6) (0,6) m-s 1 c-polyline layer 'fault' "
              "m-s 0.4 c-point array (2,2) m-s 0.2 g-m-s 1.5",),
@@ -998,7 +998,7 @@ _ELEMENT_CREATE = (
                 Option("g{lobal}-m{esh}-s{ize}", (POSITIVE,), "of pieces without one, and away from them", "m",
                        "the largest of the pieces"),
                 Option("t{olerance}", (NOT_NEGATIVE,), "points nearer than this are one", "m", "1e-4"), _GROUP)),
-    Command("el{ement} create geo{metry}-b{oundary}", "Triangles in the inside of a closed line, by Gmsh, with others "
+    Command("e{lement} create geo{metry}-b{oundary}", "Triangles in the inside of a closed line, by Gmsh, with others "
             "in it that are holes, or filled.",
             ("pcdc element create geometry-boundary boundary (0,0) (9,0) (9,6) (0,6) m-s 1 inner-boundary (3,2) (5,2) "
              "(4,4) m-s 0.4 inner-boundary (6,2) (8,2) (7,3) m-s 0.5 filled on",),
@@ -1008,7 +1008,7 @@ _ELEMENT_CREATE = (
                 Option("i{nner}-b{oundary}", (VECTORS,), "corners of a line in it", "m", repeated=True,
                        more=(_SIZE, Option("filled", (BOOL,), "elements inside; off: a hole", default="off"))),
                 _GROUP)),
-    Command("el{ement} create h{ollow}-cir{cle}", "Triangles in a ring, by Gmsh.",
+    Command("e{lement} create h{ollow}-cir{cle}", "Triangles in a ring, by Gmsh.",
             ("pcdc element create hollow-circle center (0,0) radius 4 m-s 0.8 inner-radius 1 m-s 0.2",),
             options=(Option("c{enter}", (VECTOR,), "centre of both circles", "m", required=True),
                      Option("r{adius}", (POSITIVE,), "outer radius", "m", required=True, more=(_SIZE,)),

@@ -38,8 +38,12 @@ def rectangle(
     for v, name in ((xs, "x"), (ys, "y")):
         if v.ndim != 1 or len(v) < 2 or not np.isfinite(v).all() or not (np.diff(v) > 0.0).all():
             raise CommandError(f"grid lines in {name} must be finite and ascend")
-    not_too_many(float(len(xs)) * len(ys), f"cells {len(xs) - 1} {len(ys) - 1}")
+    _not_too_many(len(xs) - 1, len(ys) - 1, kind, diagonal)
     return of_grid(np.stack(np.meshgrid(xs, ys), axis=-1), kind, diagonal, group)
+
+
+def _not_too_many(nx: int, ny: int, kind: str, diagonal: str) -> None:
+    not_too_many(nx * ny * (1 if kind == "quad" else 4 if diagonal == "both" else 2), f"cells {nx} {ny}")
 
 
 def of_grid(
@@ -52,7 +56,7 @@ def of_grid(
     if kind == "tri" and diagonal not in DIAGONALS:
         raise CommandError(f"diagonal '{diagonal}' is not known, choose from {', '.join(DIAGONALS)}")
     ny, nx = grid.shape[0] - 1, grid.shape[1] - 1
-    not_too_many(nx * ny * (1 if kind == "quad" else 4 if diagonal == "both" else 2), f"cells {nx} {ny}")
+    _not_too_many(nx, ny, kind, diagonal)
     points = grid.reshape(-1, 2)
     j, i = (v.ravel() for v in np.mgrid[:ny, :nx])
     a = j * (nx + 1) + i

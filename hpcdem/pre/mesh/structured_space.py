@@ -20,15 +20,15 @@ SIDES = (("left", 0, 0), ("right", 0, -1), ("front", 1, 0), ("back", 1, -1), ("b
 
 def box(lines: Sequence[np.ndarray], split: int = 6, group: tuple[str, str] | None = None) -> Mesh:
     """Tetrahedra between the grid lines in x, y and z (ascending); group: (set, group) for all of them."""
-    return of_grid(_grid(lines), split, group)
+    return of_grid(_grid(lines, split), split, group)
 
 
-def _grid(lines: Sequence[np.ndarray]) -> np.ndarray:
+def _grid(lines: Sequence[np.ndarray], split: int = 6) -> np.ndarray:
     """(nz + 1, ny + 1, nx + 1, 3) points where grid lines cross."""
     if not all(len(line) > 1 and np.isfinite(line).all() and (np.diff(line) > 0.0).all() for line in lines):
         raise CommandError("grid lines must be finite and ascend")
     n = [len(line) - 1 for line in lines]
-    not_too_many(float(np.prod(np.array(n, np.float64))), f"cells {' '.join(map(str, n))}")
+    not_too_many(float(np.prod(np.array(n, np.float64))) * split, f"cells {' '.join(map(str, n))}")
     z, y, x = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
     return np.stack([x, y, z], axis=-1)
 
