@@ -1075,6 +1075,7 @@ class Output(Words):
         field: str | None = None,
         object: str | None = None,
         limits: tuple[float, float] | None = None,
+        full: bool = False,
         log: bool = False,
         colours: str | None = None,
         opacity: float | None = None,
@@ -1093,13 +1094,14 @@ class Output(Words):
         """Draw the model as it is now, ``<file>_<step>.png``, with objects coloured by a field that frames have.
 
         view: a file *.mv, else everything is shown; object: "elements", "joints", ..., of which the field and the other
-        looks are; limits: values of the first and the last colour; camera: lower left and upper right corner [m]; eye:
-        in space from where it is seen ("-y", "iso", "1,-2,0.5"); section: a plane that cuts it ("x=1.5"); where: the
-        objects that are shown. See docs/view.md."""
+        looks are; limits: values of the first and the last colour, full: the least and the greatest, else those that
+        1 % is below or above; camera: lower left and upper right corner [m]; eye: in space from where it is seen ("-y",
+        "iso", "1,-2,0.5"); section: a plane that cuts it ("x=1.5"); where: the objects that are shown. See
+        docs/view.md."""
         given = {
-            "file": file, "view": view, "field": field, "object": object, "limits": limits, "log": log,
-            "colours": colours, "opacity": opacity, "edges": edges, "size": size, "vectors": vectors, "arrows": arrows,
-            "filter": filter, "deformed": deformed, "camera": camera, "eye": eye, "section": section,
+            "file": file, "view": view, "field": field, "object": object, "limits": limits, "full": full,
+            "log": log, "colours": colours, "opacity": opacity, "edges": edges, "size": size, "vectors": vectors,
+            "arrows": arrows, "filter": filter, "deformed": deformed, "camera": camera, "eye": eye, "section": section,
             "title": title,
         }  # fmt: skip
         self._do("output image", given, where, g.SHOWN.get(object or "", g.ELEMENT))

@@ -38,8 +38,8 @@ LOOKS = {
 @click.option("--field", metavar="NAME", help="Colour objects by this field; --list tells which there are.")
 @click.option("--object", "on", metavar="WORD", help="Of which objects --field and the options below are: elements, "
               "particles, joints, ... [the first that have the field].")  # fmt: skip
-@click.option("--range", "limits", type=Numbers(2), metavar="A,B", help="Values of the first and the last colour "
-              "[those of what is shown in all frames].")  # fmt: skip
+@click.option("--range", "limits", type=Numbers(2, "full"), metavar="A,B|full", help="Values of the first and the last "
+              "colour; full: the least and the greatest [those that 1 % is below or above].")  # fmt: skip
 @click.option("--log", is_flag=True, default=None, help="Colours by the logarithm.")
 @click.option(
     "--colours", metavar="NAME", help="viridis, cividis, yellow-brown, blue-red, ... (docs/view.md) [viridis]."

@@ -48,22 +48,23 @@ class Formats(click.ParamType):
 
 
 class Numbers(click.ParamType):
-    """So many numbers with commas between them."""
+    """So many numbers with commas between them, or one of `words`."""
 
     name = "numbers"
 
-    def __init__(self, count: int) -> None:
-        self.count = count
+    def __init__(self, count: int, *words: str) -> None:
+        self.count, self.words = count, words
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if isinstance(value, tuple):
+        if isinstance(value, tuple) or value in self.words:
             return value
         try:
             found = tuple(FINITE.convert(word, param, ctx) for word in str(value).split(","))
         except click.BadParameter:
             found = ()
         if len(found) != self.count:
-            self.fail(f"{value!r}: expected {self.count} numbers with commas between them", param, ctx)
+            also = "".join(f", or {word}" for word in self.words)
+            self.fail(f"{value!r}: expected {self.count} numbers with commas between them{also}", param, ctx)
         return found
 
 

@@ -32,8 +32,8 @@ FORMATS = ("jpg", "png", "tiff", "pdf", "svg")
 )  # fmt: skip
 @click.option("--field", metavar="NAME", help="Particles in the colours of a field: vx, rotation, stress, ... (see "
               "`hpcdem draw --list`) [their own].")  # fmt: skip
-@click.option("--range", "limits", type=Numbers(2), metavar="A,B", help="--field: values of the first and the last "
-              "colour [those of all frames].")  # fmt: skip
+@click.option("--range", "limits", type=Numbers(2, "full"), metavar="A,B|full", help="--field: values of the first and "
+              "the last colour; full: the least and the greatest [those that 1 % is below or above].")  # fmt: skip
 @click.option("--colours", metavar="NAME", help="--field: viridis, cividis, blue-red, ... [viridis].")
 @number("max_workers", None, "Processes that draw at a time [one per core].", POSITIVE)
 @click.version_option(launch.version(), "-v", "--version", prog_name="zdem2jpg", message="%(prog)s %(version)s")

@@ -202,6 +202,37 @@ def scale(largest: float, unit: str, digits: int = 4) -> tuple[float, str]:
     return fits[-1] if fits else steps[0]
 
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+COLDEST = 173.0
+"""No rock is as cold [K]: temperatures below are those of a script that counts in °C."""
+
+
+def on_bar(low: float, high: float, unit: str) -> tuple[float, str]:
+    """Size and printed name of the unit in which a bar of colours, or an axis, from `low` to `high` [SI] is read:
+    numbers at its ticks are neither very long nor very small. What has no unit with prefixes takes a power of ten."""
+    largest = max(abs(low), abs(high))
+    size, name = scale(largest, unit)
+    part = largest / size
+    if math.isfinite(part) and part > 0.0 and not 1e-3 <= part < 1e5:
+        power = 3 * math.floor(math.log10(part) / 3.0)
+        size, name = size * 10.0**power, f"10{str(power).translate(_RAISED)} {name}".rstrip()
+    return size, "°C" if name == "K" and low < COLDEST else printed(name)
+
+
+def printed(unit: str) -> str:
+    """A unit as it is printed: m², kg/m³."""
+    return re.sub(r"(?<=[A-Za-z])\d+", lambda found: found[0].translate(_RAISED), unit)
+
+
+def power_of_ten(value: float) -> str:
+    """A number at a tick of logarithms: 0.01, 200, 10⁻⁶, 2·10⁸."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:g}"
+    head, _, power = f"{value:e}".partition("e")
+    factor = f"{float(head):g}"
+    return ("" if factor == "1" else f"{factor}·") + f"10{str(int(power)).translate(_RAISED)}"
+
+
 def with_prefix(value: float, unit: str, digits: int = 4, system: str = "") -> str:
     """A value as people write it: ``2.5 MPa``, ``12 mm``, ``3.17 years``.
 

@@ -8,14 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpcdem.core.units import power_of_ten
 from hpcdem.io.frame import Frame
 
-UNITS = ((1000.0, 1000.0, "km"), (1.0, 1.0, "m"), (0.05, 0.01, "cm"), (0.0, 0.001, "mm"))
+UNITS = ((1e3, 1e3, "km"), (1.0, 1.0, "m"), (0.05, 0.01, "cm"), (1e-3, 1e-3, "mm"), (0.0, 1e-6, "µm"))
 """Smallest longer side [m], length of the unit [m], its name."""
 CM = 1.0 / 2.54
 """A centimetre in inches."""
 MOST = 12.0
 """Steps along an axis at most."""
+LEAST = 5
+"""Numbers along a bar of colours at least."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +146,22 @@ def _multiples(low: float, high: float, step: float) -> list[float]:
     """Multiples of `step` from low to high, ends included."""
     first, last = math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
     return [k * step for k in range(first, last + 1)]
+
+
+def bar_ticks(low: float, high: float, log: bool = False) -> list[tuple[float, str]]:
+    """Places from `low` to `high`, and what is written there: LEAST at least, in round steps."""
+    if log:
+        for parts in ((1.0,), (1.0, 2.0, 5.0), tuple(map(float, range(1, 10)))):
+            decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+            if len(parts) == 1:
+                decades = decades[:: max(1, len(decades) // 8)]
+            found = [part * 10.0**k for k in decades for part in parts]
+            found = [v for v in found if low * (1.0 - 1e-9) <= v <= high * (1.0 + 1e-9)]
+            if len(found) >= LEAST:
+                return [(v, power_of_ten(v)) for v in found]
+    step = max(step for step in _round_steps(high - low) if len(_multiples(low, high, step)) >= LEAST)
+    digits = max(0, -math.floor(math.log10(step) + 1e-9))
+    return [(v, f"{v:.{digits}f}" if abs(v) > 0.5 * step else "0") for v in _multiples(low, high, step)]
 
 
 def number(value: float) -> str:

@@ -19,6 +19,7 @@ import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.looks import COLOURS, EYES, OBJECTS
+from hpcdem.io.axes import UNITS as AXES
 from hpcdem.page import exports
 from hpcdem.page.desk import Desk
 from hpcdem.page.lifetime import live, static
@@ -138,7 +139,7 @@ class Viewer:
         return {
             "step": moment.step, "time": moment.time, "view": view.model_dump(), "whole": [left, right, bottom, top],
             "objects": {name: objects.count for name, objects in moment.objects.items()},
-            "order": list(OBJECTS), "displaced": moment.displacement is not None,
+            "lengths": AXES, "order": list(OBJECTS), "displaced": moment.displacement is not None,
             "colours": {name: _stops(name) for name in COLOURS}, "box": _box(moment), "eyes": EYES,
         }  # fmt: skip
 
@@ -332,6 +333,8 @@ def _legend(shown: Scene) -> list[dict[str, Any]]:
             told.append({
                 "label": layer.layer.label, "title": layer.scale.title, "low": layer.scale.low,
                 "high": layer.scale.high, "log": layer.scale.log, "colours": layer.scale.colours,
+                "unit": layer.scale.unit, "ticks": layer.scale.ticks(), "below": layer.scale.below,
+                "above": layer.scale.above,
             })  # fmt: skip
         elif layer.legend:
             told.append({"label": layer.layer.label, "classes": layer.legend})

@@ -311,6 +311,7 @@ SAME: list[tuple[str, str]] = [
      "sim.output.image('f', view='a.mv', field='stress-yy', limits=(-1, 2), log=True, colours='cividis', opacity=0.5, "
      "edges=True, size=2, vectors='velocity', arrows=3, filter='x > 1', deformed=10, camera=((0, 0), (1, 2)), "
      "title='a')"),
+    ("pcdc output image 'f' field 'stress-yy' full", "sim.output.image('f', field='stress-yy', full=True)"),
     ("pcdc output image 'f' object elements range id 0 3", "sim.output.image('f', object='elements', where='id 0 3')"),
 ]  # fmt: skip
 """A line of a script, and the line of a program that does the same."""

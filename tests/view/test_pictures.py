@@ -215,7 +215,7 @@ def test_logarithms_and_limits(rock: Moment):
     assert layer.scale is not None and (layer.scale.low, layer.scale.high) == (1e-4, 1e-2)
     usual = scene(rock, bare(Layer(object="channels", field="aperture"))).layers[0]
     assert usual.kind.tolist() == [0, STEPS - 1] and usual.scale is not None
-    assert (usual.scale.low, usual.scale.high, usual.scale.title) == (1e-3, 2e-3, "aperture (m)")
+    assert (usual.scale.low, usual.scale.high, usual.scale.title) == (1e-3, 2e-3, "aperture (mm)")
     with pytest.raises(HpcdemError, match="log: no value of stress_yy is above 0"):
         scene(rock, bare(Layer(object="elements", field="stress_yy", log=True)))
 

@@ -385,7 +385,7 @@ def _output(call: Call) -> None:
 
 
 def _image(call: Call) -> None:
-    given = call.given("file", "object", "camera", "log", "edges")
+    given = call.given("file", "object", "camera", "log", "edges", "full")
     if "field" in given:
         given["field"] = python(given["field"])
     if "object" in call.arguments:
@@ -393,6 +393,7 @@ def _image(call: Call) -> None:
     if "camera" in call.arguments:
         given["corners"] = call["camera"]
     given |= {word: True for word in ("log", "edges") if word in call.arguments}
+    given |= {"limits": "full"} if "full" in call.arguments else {}
     fdem.pictures.image(call.project, call["file"], where=call.where, **given)
 
 

@@ -150,13 +150,15 @@ def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | Non
         raise ValueError("every and off exclude each other")
 
 
-LOOKS = ("limits", "log", "colours", "opacity", "edges", "size", "vectors", "arrows", "filter")
+LOOKS = ("limits", "full", "log", "colours", "opacity", "edges", "size", "vectors", "arrows", "filter")
 
 
 def _image(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     shown = arguments.get("object")
     if terms is not None and shown not in SHOWN and not isinstance(shown, Pending):
         raise ValueError(f"range goes with object, one of {', '.join(SHOWN)}: it says which of them are shown")
+    if "full" in arguments and "limits" in arguments:
+        raise ValueError("limits and full are two ways to say which value has which colour; take one of them")
     if "field" not in arguments and "object" not in arguments:
         for word in LOOKS:
             if word in arguments:

@@ -148,7 +148,7 @@ class Window {
     this.root.querySelector(".caption").textContent = header.title;
     this.canvas.setAttribute("aria-label", `${say("model")}: ${header.title}`);
     legend(this.root.querySelector(".legend"), this.view.legend ? header.legend : []);
-    if (this === current) { counts(); moment(); }
+    if (this === current) { counts(); ranged(); moment(); }
   }
 
   marks() {
@@ -328,7 +328,7 @@ function round(length) {
   return decade * (part < 1.5 ? 1 : part < 3.5 ? 2 : part < 7.5 ? 5 : 10);
 }
 
-/** Numbers along the lower and the left edge [m]; in space, where they would say nothing, the axes and a length. */
+/** Numbers along the lower and the left edge; in space, where they would say nothing, the axes and a length. */
 function axes(one, pen, w, h) {
   const k = w / Math.max(1, one.root.clientWidth), [left, right, bottom, top] = one.box, scale = w / (right - left);
   const ink = getComputedStyle(document.documentElement).getPropertyValue("--ink");
@@ -338,7 +338,9 @@ function axes(one, pen, w, h) {
   pen.lineWidth = k;
   pen.beginPath();
   const { turn } = one;
-  const step = round((right - left) * 110 * k / w), digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const longer = Math.max(right - left, top - bottom);
+  const [, size, unit] = about.lengths.find(([least]) => longer >= least) ?? about.lengths.at(-1);  // as in figures
+  const step = round((right - left) * 110 * k / w), digits = Math.max(0, -Math.floor(Math.log10(step / size) + 1e-9));
   const write = (text, x, y) => {  // readable over the model
     pen.save();
     pen.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--stage");
@@ -348,14 +350,14 @@ function axes(one, pen, w, h) {
     pen.restore();
     pen.fillText(text, x, y);
   };
-  const word = (v) => (step < 1e-4 || step >= 1e6 ? short(v, 4) : (Math.abs(v) < step / 2 ? 0 : v).toFixed(digits));
+  const word = (v) => (Math.abs(v) < step / 2 ? 0 : v / size).toFixed(digits);
   if (turn) {
     const length = step * scale, [x0, y0] = [w - 14 * k - length, h - 12 * k];
     pen.moveTo(x0, y0 - 5 * k); pen.lineTo(x0, y0); pen.lineTo(x0 + length, y0); pen.lineTo(x0 + length, y0 - 5 * k);
     const [cx, cy, reach] = [44 * k, h - 44 * k, 26 * k];
     pen.textAlign = "center";
     pen.textBaseline = "middle";
-    write(`${word(step)} m`, x0 + length / 2, y0 - 11 * k);
+    write(`${word(step)} ${unit}`, x0 + length / 2, y0 - 11 * k);
     [0, 1, 2].forEach((n) => {
       const [x, y] = [turn[0][n], turn[1][n]];
       pen.moveTo(cx, cy); pen.lineTo(cx + reach * x, cy - reach * y);
@@ -370,18 +372,20 @@ function axes(one, pen, w, h) {
   for (let n = Math.ceil(left / step); n * step <= right; n++) {
     const x = (n * step - left) * scale;
     pen.moveTo(x, h); pen.lineTo(x, h - 6 * k);
-    if (x > 50 * k && x < w - 30 * k) write(word(n * step), x, h - 7 * k);
+    if (x > 50 * k && x < w - 60 * k) write(word(n * step), x, h - 7 * k);
   }
   pen.textAlign = "left";
   pen.textBaseline = "middle";
   for (let n = Math.ceil(bottom / step); n * step <= top; n++) {
     const y = (top - n * step) * scale;
     pen.moveTo(0, y); pen.lineTo(6 * k, y);
-    if (y > 30 * k && y < h - 24 * k) write(word(n * step), 9 * k, y);
+    if (y > 44 * k && y < h - 24 * k) write(word(n * step), 9 * k, y);
   }
   pen.textAlign = "right";
   pen.textBaseline = "bottom";
-  write("m", w - 6 * k, h - 7 * k);
+  write(`x (${unit})`, w - 6 * k, h - 7 * k);
+  pen.textAlign = "left";
+  write(`y (${unit})`, 9 * k, 42 * k);
   pen.stroke();
   pen.restore();
 }
@@ -402,29 +406,40 @@ function legend(root, parts) {
       }
       return box;
     }
-    const bar = document.createElement("canvas");
-    bar.width = 150; bar.height = 10;
-    gradient(bar, part.colours);
-    const ends = document.createElement("span");
-    ends.className = "ends";
-    for (const value of [part.low, part.high]) {
-      const end = document.createElement("span");
-      end.textContent = short(value, 4);
-      ends.append(end);
-    }
-    box.append(part.log ? `${part.title}, log` : part.title, bar, ends);
+    box.append(part.title, bar(part));
     return box;
   }));
 }
 
-function gradient(canvas, name) {
-  const pen = canvas.getContext("2d");
-  const fill = pen.createLinearGradient(0, 0, canvas.width, 0);
-  const stops = about.colours[name];
+/** A bar of colours with numbers; its ends are pointed where values lie beyond them. */
+function bar(part) {
+  const root = document.createElement("span"), canvas = document.createElement("canvas");
+  const [w, h, point] = [BAR.width, BAR.height, 8], [top, bottom] = [point, h - point];
+  root.className = "bar";
+  root.style.height = `${h}px`;
+  canvas.width = w; canvas.height = h;
+  const pen = canvas.getContext("2d"), stops = about.colours[part.colours];
+  const fill = pen.createLinearGradient(0, bottom, 0, top);
   stops.forEach((colour, k) => fill.addColorStop(k / (stops.length - 1), colour));
   pen.fillStyle = fill;
-  pen.fillRect(0, 0, canvas.width, canvas.height);
+  pen.fillRect(0, top, w, bottom - top);
+  const end = (colour, from, to) => {
+    pen.fillStyle = colour;
+    pen.beginPath(); pen.moveTo(0, from); pen.lineTo(w / 2, to); pen.lineTo(w, from); pen.fill();
+  };
+  if (part.above) end(stops.at(-1), top, 0);
+  if (part.below) end(stops[0], bottom, h);
+  root.append(canvas);
+  for (const [place, text] of part.ticks) {
+    const mark = document.createElement("span");
+    mark.textContent = text;
+    mark.style.top = `${bottom - place * (bottom - top)}px`;
+    root.append(mark);
+  }
+  return root;
 }
+
+const BAR = { width: 12, height: 160 };
 
 // ---- objects and their properties ------------------------------------------------------------------------------------
 
@@ -501,8 +516,8 @@ async function properties() {
   for (const name of ["log", "edges"]) $(name).checked = one[name];
   $("own").checked = one.colour !== "";
   $("colour").value = one.colour || "#2f7fb5";
-  $("low").value = one.limits?.[0] ?? "";
-  $("high").value = one.limits?.[1] ?? "";
+  $("full").checked = one.limits === "full";
+  ranged(true);
   options($("colours"), Object.keys(about.colours).map((name) => [name, name]), one.colours);
   const mine = ++asked;
   let found = { fields: [], vectors: [] };
@@ -524,11 +539,24 @@ function change(values, name = chosen) {
   if ("visible" in values) tree();
 }
 
+const scaleOf = () => current.shown?.header.legend.find((part) => part.label === chosen && "low" in part);
+
+/** The values of the first and the last colour, in the unit of the bar; an end that nobody has said stays empty. */
+function ranged(all = false) {
+  const one = layer(), scale = scaleOf(), span = Array.isArray(one?.limits) ? one.limits : [];
+  $("range-unit").textContent = scale?.unit[1] ?? "";
+  ["low", "high"].forEach((id, k) => {
+    $(id).placeholder = scale ? short(scale[id] / scale.unit[0], 4) : "";
+    if (document.activeElement === $(id) || (!all && !$(id).value)) return;
+    $(id).value = span.length ? short(span[k] / (scale?.unit[0] ?? 1)) : "";
+  });
+}
+
 function limits() {
   const [low, high] = ["low", "high"].map((id) => $(id).value.trim());
   if (!low && !high) { change({ limits: null }); return; }
-  const scale = current.shown?.header.legend.find((part) => part.label === chosen && "low" in part);
-  const found = [low === "" ? scale?.low : Number(low), high === "" ? scale?.high : Number(high)];
+  const scale = scaleOf(), size = scale?.unit[0] ?? 1;
+  const found = [low === "" ? scale?.low : Number(low) * size, high === "" ? scale?.high : Number(high) * size];
   change({ limits: found.every((value) => typeof value === "number") ? found.map((v) => (Number.isFinite(v) ? v : String(v))) : null });
 }
 
@@ -990,6 +1018,7 @@ function connect() {
   const on = (id, event, action) => $(id).addEventListener(event, action);
   on("field", "change", () => { change({ field: $("field").value, limits: null }); $("low").value = $("high").value = ""; });
   for (const id of ["low", "high"]) on(id, "change", limits);
+  on("full", "change", () => { change({ limits: $("full").checked ? "full" : null }); properties(); });
   for (const id of ["log", "edges"]) on(id, "change", () => change({ [id]: $(id).checked }));
   for (const id of ["colours", "vectors"]) on(id, "change", () => change({ [id]: $(id).value }));
   for (const id of ["opacity", "size", "arrows"]) on(id, "input", () => { if ($(id).value) change({ [id]: Number($(id).value) }); });

@@ -31,7 +31,8 @@ class Layer(_Table):
     """One kind of object in a view.
 
     name: in the tree and the legend, else that of the object; field: what colours it, "" the object's own colours;
-    limits: values of the first and the last colour, else those of what is shown; colour: one for all; size: factor on
+    limits: values of the first and the last colour, "full": the least and the greatest of what is shown, else those
+    that one in a hundred is below or above; colour: one for all; size: factor on
     radii of particles and widths of lines; vectors: a field drawn as arrows, the longest `arrows` times a twentieth of
     the picture; filter: an expression that chooses objects, see hpcdem.post.view.filter."""
 
@@ -39,7 +40,7 @@ class Layer(_Table):
     name: Annotated[str, Field(max_length=60)] = ""
     visible: bool = True
     field: Annotated[str, Field(max_length=60)] = ""
-    limits: _Span | None = None
+    limits: _Span | Literal["full"] | None = None
     log: bool = False
     colours: Literal[tuple(COLOURS)] = "viridis"  # type: ignore[valid-type]
     colour: _Colour = ""
@@ -55,12 +56,17 @@ class Layer(_Table):
         """What the tree calls it."""
         return self.name or self.object
 
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """The limits where they are values."""
+        return None if isinstance(self.limits, str) else self.limits
+
     @model_validator(mode="after")
     def _ordered(self) -> Layer:
-        if self.limits is not None and not self.limits[0] < self.limits[1]:
-            raise ValueError(f"limits: {self.limits[0]:g} is not below {self.limits[1]:g}")
-        if self.log and self.limits is not None and self.limits[0] <= 0.0:
-            raise ValueError(f"limits: with log both are above 0, not {self.limits[0]:g}")
+        if self.span is not None and not self.span[0] < self.span[1]:
+            raise ValueError(f"limits: {self.span[0]:g} is not below {self.span[1]:g}")
+        if self.log and self.span is not None and self.span[0] <= 0.0:
+            raise ValueError(f"limits: with log both are above 0, not {self.span[0]:g}")
         return self
 
 

@@ -227,17 +227,16 @@ def _handles(layer: Painted) -> list[Any]:
 
 
 def colour_bar(figure: Any, axes: Any, scale: Scale, font: float) -> None:
-    """The bar of colours of a field, in axes of its own."""
+    """The bar of colours of a field, in axes of its own; its ends are pointed where values lie beyond them."""
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.colors import Normalize
 
-    high = scale.high if scale.high > scale.low else scale.low + max(1e-12, 1e-9 * abs(scale.low))
-    norm = (LogNorm if scale.log else Normalize)(scale.low, high)
-    bar = figure.colorbar(ScalarMappable(norm, COLOURS[scale.colours]), cax=axes)
+    beyond = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    colours = ScalarMappable(Normalize(0.0, 1.0), COLOURS[scale.colours])
+    bar = figure.colorbar(colours, cax=axes, extend=beyond[scale.below, scale.above], extendfrac=0.04)
+    ticks = scale.ticks()
+    bar.set_ticks([place for place, _ in ticks], labels=[text for _, text in ticks], minor=False)
+    bar.minorticks_off()
     bar.ax.tick_params(labelsize=0.85 * font, width=0.5, length=2.5)
-    if not scale.log:
-        bar.formatter.set_powerlimits((-3, 4))
-        bar.ax.yaxis.get_offset_text().set_fontsize(0.85 * font)
-        bar.ax.yaxis.get_offset_text().set_horizontalalignment("left")
     bar.outline.set_linewidth(0.5)
     bar.set_label(scale.title, fontsize=0.9 * font)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from hpcdem.core import units
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.looks import COLOURS, HIDDEN, OBJECTS, eye_of, section_of
 from hpcdem.io import colours
-from hpcdem.io.axes import View
+from hpcdem.io.axes import View, bar_ticks
 from hpcdem.post import blocks
 from hpcdem.post.view.filter import chosen, refusal
 from hpcdem.post.view.model import Layer, ModelView
@@ -58,13 +60,38 @@ CLASSES = 12
 
 @dataclass(frozen=True)
 class Scale:
-    """The bar of colours of a field: values of its ends, and whether they are logarithms."""
+    """The bar of colours of a field: its name, the unit of SI of its values, values of its ends, and whether they are
+    logarithms. below, above: some values of what is shown lie beyond the ends."""
 
-    title: str
+    name: str
+    si: str
     low: float
     high: float
     log: bool
     colours: str
+    below: bool = False
+    above: bool = False
+
+    @property
+    def unit(self) -> tuple[float, str]:
+        """Size in SI, and name, of the unit in which people read it."""
+        return units.on_bar(self.low, self.high, self.si)
+
+    @property
+    def title(self) -> str:
+        """Name and unit."""
+        unit = self.unit[1]
+        return f"{self.name} ({unit})" if unit else self.name
+
+    def ticks(self) -> list[tuple[float, str]]:
+        """Where numbers stand along the bar, from 0 to 1, and which."""
+        size = self.unit[0]
+        low, high = self.low / size, self.high / size
+        place = math.log10 if self.log else float
+        return [
+            (min(max((place(v) - place(low)) / (place(high) - place(low)), 0.0), 1.0), text)
+            for v, text in bar_ticks(low, high, self.log)
+        ]
 
 
 @dataclass
@@ -341,14 +368,15 @@ def _of(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def spans(moment: Moment, view: ModelView) -> dict[str, tuple[float, float]]:
-    """Least and greatest value of the field of each layer that has one and no limits: many frames share these."""
+    """Values of the first and the last colour of the field of each layer that has one and no limits: many frames share
+    these."""
     found = {}
     for layer in view.layers:
-        if layer.visible and layer.field and layer.limits is None and layer.object in moment.objects:
+        if layer.visible and layer.field and layer.span is None and layer.object in moment.objects:
             objects = moment.of(layer.object)
             if not objects.names.get(layer.field):
                 values = objects.values(layer.field, layer.object)[chosen_rows(moment, layer)]
-                found[layer.label] = _span(values.astype(float), layer)
+                found[layer.label] = _span(values, layer)
     return found
 
 
@@ -362,26 +390,52 @@ def common_spans(moments: Iterable[Moment], view: ModelView) -> dict[str, tuple[
     return {label: span for label, span in found.items() if span[0] < span[1]}
 
 
+FEW = 0.01
+"""Part of the values that may lie beyond each end of a bar: a single element shall not take all colours."""
+
+
 def _span(values: np.ndarray, layer: Layer) -> tuple[float, float]:
-    """Least and greatest value, of those above 0 where colours go by logarithms; (inf, -inf) without any."""
+    """Values that one in a hundred is below or above, of those above 0 where colours go by logarithms; with
+    `limits` "full", and of whole numbers, the least and the greatest; (inf, -inf) without any.
+
+    Where most objects have nothing (0 plastic strain), it is a hundredth of those that have something."""
     fit = values[np.isfinite(values) & ((values > 0.0) | (not layer.log))]
-    return (float(fit.min()), float(fit.max())) if len(fit) else (np.inf, -np.inf)
+    if not len(fit):
+        return np.inf, -np.inf
+    least, greatest = float(fit.min()), float(fit.max())
+    some = fit[fit != 0.0]
+    sparse = len(some) < 0.5 * len(fit)
+    some = some if sparse else fit
+    beyond = int(FEW * (len(some) - 1))
+    if layer.limits == "full" or values.dtype.kind != "f" or beyond < 1:
+        return least, greatest
+    some = np.partition(some, (beyond, len(some) - 1 - beyond))
+    low, high = float(some[beyond]), float(some[len(some) - 1 - beyond])
+    if sparse:
+        low, high = min(low, 0.0), max(high, 0.0)
+    return (low, high) if low < high else (least, greatest)
 
 
 def _by_field(result: Painted, objects: Objects, dim: int) -> None:
     layer = result.layer
     values = _of(np.asarray(objects.values(layer.field, layer.object)), result.rows)
     names = objects.names.get(layer.field)
-    if names and layer.limits is None:
+    if names and layer.span is None:
         _by_name(result, values, names)
         return
+    low, high = layer.span or _span(values, layer)
     values = values.astype(float, copy=False)
-    low, high = layer.limits or _span(values, layer)
     if layer.log and not low < np.inf and len(values):
         raise HpcdemError(f"log: no value of {layer.field} is above 0")
-    if not low <= high:
+    if not low <= high or low == high == 0.0:
         low, high = 0.0, 1.0
-    result.scale = Scale(_title(layer, dim), low, high, layer.log, layer.colours)
+    elif low == high:  # one value: in the middle of the colours
+        low, high = (low / 2.0, 2.0 * low) if layer.log else (low - 0.05 * abs(low), low + 0.05 * abs(low))
+    slack = 1e-9 * (high - low)
+    result.scale = Scale(
+        layer.field.replace("_", " "), unit_of(layer.field, dim), low, high, layer.log, layer.colours,
+        bool((values < low - slack).any()), bool((values > high + slack).any()),
+    )  # fmt: skip
     result.values = values
     with np.errstate(invalid="ignore", divide="ignore"):
         place, ends = (np.log10(values), np.log10((low, high))) if layer.log else (values, np.array((low, high)))
@@ -394,12 +448,6 @@ def _by_field(result: Painted, objects: Objects, dim: int) -> None:
     if layer.log:
         result.kind[~(values > 0.0)] = STEPS
     result.shades = np.concatenate([shades_of(layer.colours), rgb([NOTHING])])
-
-
-def _title(layer: Layer, dim: int) -> str:
-    unit = unit_of(layer.field, dim)
-    words = layer.field.replace("_", " ")
-    return f"{words} ({unit})" if unit else words
 
 
 def _by_name(result: Painted, values: np.ndarray, names: Sequence[str]) -> None:
