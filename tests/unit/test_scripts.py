@@ -11,7 +11,13 @@ import pytest
 
 from tests.conftest import ROOT
 
-PROGRAMS = [ROOT / "scripts" / "run", ROOT / "scripts" / "test", ROOT / "scripts" / "faults", ROOT / ".ci" / "run"]
+PROGRAMS = [
+    ROOT / "scripts" / "run",
+    ROOT / "scripts" / "test",
+    ROOT / "scripts" / "faults",
+    ROOT / "scripts" / "mutants",
+    ROOT / ".ci" / "run",
+]
 
 
 @pytest.mark.parametrize("script", [*PROGRAMS, ROOT / "scripts" / "lib" / "setup.sh"], ids=lambda path: path.name)

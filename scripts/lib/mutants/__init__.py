@@ -1,0 +1,1 @@
+"""Mutants: small seeded changes of the sources, and the tests that notice them."""

@@ -1,0 +1,3 @@
+from mutants.cli import main
+
+main()
