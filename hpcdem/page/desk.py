@@ -75,7 +75,7 @@ class Console:
             if name or not self._alive() or language != self.language:
                 self.start(language)
             assert self.process is not None and self.process.stdin is not None
-            for line in [f"run {name}"] if name else text.split("\n"):
+            for line in [f"run {name}"] if name else text.rstrip("\n").split("\n"):
                 self._note(line, "asked")
             try:
                 self.process.stdin.write(json.dumps({"text": text, "name": name}) + "\n")
@@ -165,10 +165,12 @@ class Desk:
             "say": self._say,
             "interrupt": self._interrupt,
             "restart": self._restart,
+            "whole": lambda wanted: as_json({"whole": whole(wanted.get("text"), wanted.get("language"))}),
             "complete": lambda wanted: as_json(complete(wanted.get("line"), wanted.get("language"))),
             "check": lambda wanted: as_json(check(wanted.get("text"), str(wanted.get("name") or "script"))),
             "scripts": lambda wanted: as_json({"names": self.names(), "first": self.first}),
             "read": lambda wanted: as_json(self.read(wanted.get("name"))),
+            "rename": lambda wanted: as_json(self.rename(wanted.get("name"), wanted.get("to"), wanted.get("stamp"))),
             "write": lambda wanted: as_json(self.write(wanted.get("name"), wanted.get("text"), wanted.get("stamp"))),
         }
 
@@ -240,6 +242,27 @@ class Desk:
             raise HpcdemError(f"cannot write {name}: {problem.strerror}") from None
         return {"name": name, "stamp": _stamp(path)}
 
+    def rename(self, name: Any, to: Any, stamp: Any) -> dict[str, Any]:
+        """Give a script another name. HpcdemError if there is one of that name, or others have changed it meanwhile."""
+        path, new = self._path(name), self._path(to)
+        try:
+            if _stamp(path) != stamp:
+                raise HpcdemError(f"{name} was changed by others meanwhile; open it again")
+            try:
+                os.link(path, new)  # unlike os.replace it refuses a name that is taken
+                path.unlink()
+            except FileExistsError:
+                raise
+            except OSError:  # a file system without links
+                if new.exists():
+                    raise FileExistsError from None
+                path.rename(new)
+        except FileExistsError:
+            raise HpcdemError(f"there is a script {to} already") from None
+        except OSError as problem:
+            raise HpcdemError(f"cannot rename {name}: {problem.strerror}") from None
+        return {"name": to, "stamp": _stamp(new)}
+
 
 def _stamp(path: Path) -> str:
     status = path.stat()
@@ -250,6 +273,18 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def whole(text: Any, language: Any) -> bool:
+    """Whether what was typed can be carried out, or goes on in another line: a block of Python ends with an empty
+    one."""
+    if not isinstance(text, str) or len(text) > LARGEST_SCRIPT:
+        raise HpcdemError("text: expected commands")
+    if language == "zdem":
+        return True
+    from hpcdem.lang.pcdc.console import is_whole
+
+    return is_whole(text.rstrip(" \t"))
 
 
 def complete(line: Any, language: Any) -> dict[str, Any]:

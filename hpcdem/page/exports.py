@@ -35,6 +35,11 @@ _drawing = threading.Lock()
 """Settings of matplotlib are those of the process."""
 
 
+def kinds() -> list[str]:
+    """What can be saved here: MP4 only where there is ffmpeg."""
+    return [kind for kind in (*FORMATS, "mv") if kind != "mp4" or movie.ffmpeg() is not None]
+
+
 def file(moment: Moment, view: ModelView, kind: str, wanted: dict[str, Any]) -> bytes:
     """A file of this kind of one frame. wanted: "label" of the layer of a table. Raises HpcdemError."""
     if kind == "csv":

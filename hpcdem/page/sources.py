@@ -13,20 +13,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.frames import FrameFile, list_frames, mesh_frames_by_name
 from hpcdem.io.run_record import PROGRESS
+from hpcdem.page.curves import Curves
 from hpcdem.post.view.moment import Moment, read_moment
-from hpcdem.runtime import run_folder
+from hpcdem.runtime import kernels, run_folder
 
 MOMENTS = 3
 """Frames that are kept in memory: one on show, and its neighbours."""
 OBJECTS = 500_000
 """One is read besides others if these have no more objects together."""
-POINTS = 2000
-"""Points of a history that the page gets at most."""
 SIGNALS = {"stop": signal.SIGUSR1, "save": signal.SIGUSR2}
 
 
@@ -50,12 +47,17 @@ class Sources:
         self.found: list[Source] = []
         self.moments: OrderedDict[tuple[str, int, int], Moment] = OrderedDict()
         self.lock = threading.Lock()
+        self._curves: Curves | None = None
+        self.empty = empty = empty or bool(kernels.builder())  # a run that has just been started makes its folder then
         self.look()
         for path in self.paths:
             if empty or not path.is_dir() or run_folder.running(path) is not None:
                 continue
             if not any(s.folder == path for s in self.found):
-                raise HpcdemError(f"no frame all_*.vtkhdf, all_*.dat or <name>_*.vtkhdf in {path}")
+                raise HpcdemError(
+                    f"no frame all_*.vtkhdf, all_*.dat or <name>_*.vtkhdf in {path}. Start the run that writes there, "
+                    "or open a console beside the page: hpcdem view --run"
+                )
         self._see_one()
 
     def _see_one(self) -> None:
@@ -147,31 +149,27 @@ class Sources:
                 for source in self.found
             ],
             "run": None,
-            "histories": [],
+            "histories": self.curves().state(),
         }
         for folder in self.folders()[:1]:
-            told["histories"] = sorted(path.name for path in folder.glob("history_*.csv"))
             told["run"] = _run(folder)
         return told
 
-    def history(self, name: Any) -> dict[str, Any]:
-        """Columns of a history: names, and at most POINTS values each. HpcdemError if it cannot be read."""
-        folder = next(iter(self.folders()), None)
-        if folder is None or name not in {path.name for path in folder.glob("history_*.csv")}:
-            raise HpcdemError("there is no such history")
-        try:
-            with open(folder / name, encoding="utf-8") as file:
-                titles = file.readline().strip().split(",")
-                rows = np.loadtxt(file, delimiter=",", ndmin=2)
-        except (OSError, ValueError) as problem:
-            raise HpcdemError(f"cannot read {name}: {problem}") from None
-        if len(rows) > POINTS:
-            rows = rows[np.unique(np.linspace(0, len(rows) - 1, POINTS).round().astype(int))]
-        columns = rows.T if len(rows) else np.zeros((len(titles), 0))
-        return {
-            "titles": titles,
-            "columns": [[float(v) if np.isfinite(v) else None for v in column] for column in columns],
-        }
+    def waiting(self) -> dict[str, Any]:
+        """Why there is no frame yet: kernels are compiled, a run goes on, or nothing does."""
+        folder = self.folders()[0] if self.folders() else self.paths[0]
+        holder = run_folder.running(folder) if folder.is_dir() else None
+        if holder is not None:
+            return {"kind": "first", "folder": str(folder)}
+        who = kernels.builder()
+        return {"kind": "compiling" if who else "empty", "who": who, "folder": str(folder)}
+
+    def curves(self) -> Curves:
+        """What the run of the first folder has recorded."""
+        folder = next(iter(self.folders()), self.paths[0])
+        if self._curves is None or self._curves.folder != folder:
+            self._curves = Curves(folder)
+        return self._curves
 
     def tell(self, what: Any) -> str:
         """Ask the run that writes into the first folder to stop after a checkpoint, or to save one: the same signals as

@@ -20,7 +20,9 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.looks import COLOURS, EYES, OBJECTS
 from hpcdem.io.axes import UNITS as AXES
+from hpcdem.lang import chinese
 from hpcdem.page import exports
+from hpcdem.page.curves import as_csv
 from hpcdem.page.desk import Desk
 from hpcdem.page.lifetime import live, static
 from hpcdem.page.maker import packed
@@ -51,6 +53,7 @@ KINDS = {
     "icon.svg": "image/svg+xml",
     "viewer.js": "text/javascript; charset=utf-8",
     "viewer_words.js": "text/javascript; charset=utf-8",
+    "charts.js": "text/javascript; charset=utf-8",
     "desk.js": "text/javascript; charset=utf-8",
     "words.js": "text/javascript; charset=utf-8",
     "server.js": "text/javascript; charset=utf-8",
@@ -73,7 +76,7 @@ def serve(
 ) -> None:  # fmt: skip
     """Serve the page until Ctrl-C or SIGTERM. view: a file *.mv to begin with; desk: what runs scripts, if it may.
     HpcdemError if there is nothing to show, or the port cannot be had."""
-    viewer = Viewer(Sources(paths, empty=desk is not None), read_view(view) if view is not None else None)
+    viewer = Viewer(Sources(paths, empty=desk is not None), read_view(view) if view is not None else None, desk)
     page = static(KINDS)
     calls = viewer.calls() | ({} if desk is None else desk.calls())
     server = PageServer(page | {"": page["viewer.html"], "desk": as_json({"run": desk is not None})}, calls, port)
@@ -86,10 +89,11 @@ def serve(
 
 
 class Viewer:
-    """first: the view that the page begins with, else all that the frame has."""
+    """first: the view that the page begins with, else all that the frame has; desk: what runs scripts, if it may."""
 
-    def __init__(self, sources: Sources, first: ModelView | None = None) -> None:
-        self.sources, self.first = sources, first
+    def __init__(self, sources: Sources, first: ModelView | None = None, desk: Desk | None = None) -> None:
+        self.sources, self.first, self.desk = sources, first, desk
+        self.warm = False
         self.layers: OrderedDict[tuple, Painted] = OrderedDict()
         self.turn = threading.Lock()
         self.last: tuple[str, Any, Scene] | None = None
@@ -98,12 +102,13 @@ class Viewer:
     def calls(self) -> dict[str, Call]:
         """What POST answers."""
         return {
-            "state": lambda wanted: as_json(self.sources.state()),
+            "state": lambda wanted: as_json(self.state()),
             "about": self._in_turn(self.about),
             "fields": self._in_turn(self.fields),
             "picture": self.picture,
             "pick": self._in_turn(self.pick),
-            "history": lambda wanted: as_json(self.sources.history(wanted.get("name"))),
+            "curves": self.curves,
+            "presets": lambda wanted: as_json({"presets": self.sources.curves().presets()}),
             "tell": lambda wanted: as_json({"said": self.sources.tell(wanted.get("what"))}),
             "view": lambda wanted: as_json(self._view(wanted).model_dump()),
             "file": self.file,
@@ -124,6 +129,7 @@ class Viewer:
 
         with self.turn:
             warm_up.in_plane()
+            self.warm = True
             warm_up.in_space()
 
     # ---- what there is ---------------------------------------------------------------------------------------------
@@ -141,7 +147,27 @@ class Viewer:
             "objects": {name: objects.count for name, objects in moment.objects.items()},
             "lengths": AXES, "order": list(OBJECTS), "displaced": moment.displacement is not None,
             "colours": {name: _stops(name) for name in COLOURS}, "box": _box(moment), "eyes": EYES,
+            "files": exports.kinds(), "chinese": _in_chinese(moment),
         }  # fmt: skip
+
+    def state(self) -> dict[str, Any]:
+        """Frames, the run, histories; where there is no picture yet, why."""
+        told = self.sources.state()
+        waiting = {"drawing": not self.warm}
+        if not told["sources"]:
+            waiting |= self.sources.waiting()
+            if waiting["kind"] == "empty" and self.desk is not None:
+                waiting["kind"] = "first" if self.desk.console.busy else "desk"
+        return told | {"waiting": waiting}
+
+    def curves(self, wanted: dict[str, Any]) -> Answer:
+        """Histories over each other, or a chart of the script; as CSV all of their points."""
+        curves, whole = self.sources.curves(), wanted.get("format") == "csv"
+        if "chart" in wanted:
+            told = curves.chart(wanted["chart"], whole)
+        else:
+            told = curves.drawn(wanted.get("x"), wanted.get("y"), whole)
+        return Answer(as_csv(told).encode(), "text/csv") if whole else as_json(told)
 
     def fields(self, wanted: dict[str, Any]) -> dict[str, Any]:
         """Fields and vectors of a kind of object, with their units."""
@@ -317,6 +343,15 @@ def _box(moment: Moment) -> list[list[float]] | None:
     return [points.min(axis=0).tolist(), points.max(axis=0).tolist()] if len(points) else [[0.0] * 3, [1.0] * 3]
 
 
+def _in_chinese(moment: Moment) -> dict[str, dict[str, str]]:
+    """What fields, colours and classes are called in Chinese."""
+    names = {name for objects in moment.objects.values() for name in (*objects.fields, *objects.vectors)}
+    return {
+        "fields": {name: chinese.field_name(name) for name in sorted(names)}, "colours": chinese.COLOURS,
+        "legend": chinese.LEGEND,
+    }  # fmt: skip
+
+
 def _older(layers: OrderedDict[tuple, Painted], key: tuple) -> bool:
     """Whether the oldest layer is of another frame than this one, and layers of this one are many bytes."""
     return _size(layers) > BYTES and next(iter(layers))[0] != key
@@ -331,7 +366,7 @@ def _legend(shown: Scene) -> list[dict[str, Any]]:
     for layer in shown.layers:
         if layer.scale is not None:
             told.append({
-                "label": layer.layer.label, "title": layer.scale.title, "low": layer.scale.low,
+                "label": layer.layer.label, "field": layer.layer.field, "title": layer.scale.title, "low": layer.scale.low,
                 "high": layer.scale.high, "log": layer.scale.log, "colours": layer.scale.colours,
                 "unit": layer.scale.unit, "ticks": layer.scale.ticks(), "below": layer.scale.below,
                 "above": layer.scale.above,

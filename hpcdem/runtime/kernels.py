@@ -143,6 +143,16 @@ def _alone(place: Path, log: Log | None) -> Iterator[None]:
         lock.release()
 
 
+def builder() -> str:
+    """Which process of this host compiles kernels at the moment, in words; "" none."""
+    words = _text(kept.store()[0] / f"building-{socket.gethostname()}")
+    try:
+        os.kill(int(words.split()[1]), 0)
+    except (IndexError, ValueError, OSError):  # nobody, or one that was killed
+        return ""
+    return words
+
+
 def _text(path: Path) -> str:
     with contextlib.suppress(OSError):
         return path.read_text()

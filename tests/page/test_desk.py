@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.page.desk import Desk, check, complete
+from hpcdem.page.desk import Desk, check, complete, whole
 from tests.conftest import BIN, run, until
 from tests.page.viewing import Tab, Viewing
 
@@ -245,6 +245,39 @@ def test_checks(text: str, name: str, language: str | None, line: int | None, wo
     assert words in (told["problem"] if line else told["summary"])
 
 
+def test_a_script_is_renamed(desk: Desk, tmp_path: Path):
+    """The old file is gone; a name that is taken, and a file that others have changed, are refused."""
+    found = desk.read("a.sc")
+    (tmp_path / "b.sc").write_text("other")
+    for name, stamp, said in (
+        ("b.sc", found["stamp"], r"there is a script b\.sc already"),
+        ("c.sc", "0 0", "changed by others"),
+        ("../c.sc", found["stamp"], "a script has a name like"),
+    ):
+        with pytest.raises(HpcdemError, match=said):
+            desk.rename("a.sc", name, stamp)
+    told = desk.rename("a.sc", "c.sc", found["stamp"])
+    assert desk.names() == ["b.sc", "c.sc"] and (tmp_path / "b.sc").read_text() == "other"
+    desk.write("c.sc", "pcdc model new\n# more\n", told["stamp"])
+    with pytest.raises(HpcdemError, match=r"cannot rename a\.sc"):
+        desk.rename("a.sc", "d.sc", None)
+
+
+@pytest.mark.parametrize(
+    ("text", "language", "ends"),
+    [
+        ("1 + 1", "pcdc", True), ("for i in range(3):", "pcdc", False),
+        ("for i in range(3):\n    print(i)", "pcdc", False),
+        ("for i in range(3):\n    print(i)\n    ", "pcdc", True), ("f(1,", "pcdc", False), ("f(1,\n2)", "pcdc", True),
+        ("pcdc model new", "pcdc", True), ("pcdc model step \\", "pcdc", False),
+        ("if a:\n    pcdc model new", "pcdc", False), ("for i in", "pcdc", True),
+        ("a = 1\nb = 2", "pcdc", True), ("BALL id 1", "zdem", True),
+    ],
+)  # fmt: skip
+def test_what_goes_on_in_another_line(text: str, language: str, ends: bool):
+    assert whole(text, language) == ends
+
+
 @pytest.mark.parametrize(
     ("line", "language", "words", "last"),
     [
@@ -360,6 +393,123 @@ def test_comments_and_selected_lines(bench: Bench):
     assert page.input_value("#text") == "# a = 20\n# b = 3\na + b\n"
     page.press("#text", "Control+/")
     assert page.input_value("#text") == "a = 20\nb = 3\na + b\n"
+    page.evaluate("document.getElementById('text').setSelectionRange(0, 12)")
+    for _ in range(2):  # unlike the key, a button does one of both
+        page.click("#comment-on")
+    assert page.input_value("#text") == "# # a = 20\n# # b = 3\na + b\n"
+    page.press("#text", "Control+z")
+    assert page.input_value("#text") == "# a = 20\n# b = 3\na + b\n", "undone as what is typed"
+    page.evaluate("document.getElementById('text').setSelectionRange(0, 16)")
+    page.click("#comment-out")
+    assert page.input_value("#text") == "a = 20\nb = 3\na + b\n"
+
+
+def test_blocks_of_python_are_typed_as_at_its_prompt(bench: Bench):
+    """Enter goes on with a block, indented, until an empty line; lines that were pasted are carried out together;
+    arrows stay within several lines."""
+    page = bench.page
+    page.click("#tab-console")
+    bench.wait()
+    page.focus("#input")
+    for line in ("for i in range(3):", "if i != 1:"):
+        page.keyboard.type(line)
+        page.keyboard.press("Enter")
+        bench.until(lambda: page.input_value("#input").endswith(f"{line}\n{'    ' if line[0] == 'f' else '        '}"))  # noqa: B023
+    page.keyboard.type("print('item', 10 * i)")
+    page.keyboard.press("ArrowUp")
+    assert page.input_value("#input").startswith("for i in"), "a line farther up, not what was typed before"
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("End")
+    for _ in range(2):
+        page.keyboard.press("Enter")
+        page.wait_for_timeout(300)
+    bench.says("item 20")
+    assert "item 10" not in page.inner_text("#output") and page.input_value("#input") == ""
+    bench.wait()
+    page.keyboard.press("ArrowUp")
+    assert page.input_value("#input").count("\n") == 3
+    page.fill("#input", "a = 5")
+    page.keyboard.press("Shift+Enter")
+    page.keyboard.type("print('sum', a + 1)")
+    page.keyboard.press("Enter")
+    bench.says("sum 6")
+
+
+def test_a_late_completion_touches_nothing(bench: Bench):
+    """The answer to a line that has changed meanwhile is dropped, in the console and in a script."""
+    page = bench.page
+    bench.wait()
+
+    def slow(route: Any) -> None:
+        waiting.append(route)
+
+    for tab, field in (("#tab-console", "#input"), ("#tab-editor", "#text")):
+        waiting: list[Any] = []
+        page.click(tab)
+        if field == "#text":
+            page.click("#script-new")
+        page.route("**/complete", slow)
+        page.fill(field, "pcdc mod")
+        page.press(field, "Tab" if field == "#input" else "Control+Space")
+        bench.until(lambda: bool(waiting))  # noqa: B023
+        page.keyboard.type("x")
+        waiting[0].continue_()
+        page.wait_for_timeout(400)
+        assert page.input_value(field) == "pcdc modx" and page.is_hidden("#words")
+        page.unroute("**/complete")
+        page.fill(field, "pcdc mod")
+        page.press(field, "Tab" if field == "#input" else "Control+Space")
+        bench.until(lambda: page.input_value(field) == "pcdc model ")  # noqa: B023
+
+
+def test_several_scripts_are_open_saved_renamed_and_closed(bench: Bench, folder: Path):
+    """Each keeps its text, its marks and its undo; two can be seen at a time."""
+    page = bench.page
+    (folder / "one.sc").write_text("a = 1\n")
+    (folder / "two.sc").write_text("b = 2\n")
+    page.click("#tab-editor")
+    for name in ("one.sc", "two.sc"):
+        page.click("#script-new")  # the list is that of now
+        bench.until(lambda: name in page.locator("#script option").all_text_contents())  # noqa: B023
+        page.select_option("#script", name)
+        bench.until(lambda: page.input_value("#text") == (folder / name).read_text())  # noqa: B023
+        page.focus("#text")
+        page.keyboard.press("Control+End")
+        page.keyboard.type("# more")
+    tabs = page.locator("#papers-open button")
+    assert [text for text in tabs.all_text_contents() if "●" in text] == ["● one.sc", "● two.sc"]
+    tabs.filter(has_text="one.sc").click()
+    assert page.input_value("#text") == "a = 1\n# more"
+    page.keyboard.press("Control+z")
+    assert page.input_value("#text") != "a = 1\n# more"
+    page.keyboard.press("Control+y")
+    for kind, along in (("2", "x"), ("2v", "y")):
+        page.select_option("#panes", kind)
+        boxes = [one.bounding_box() for one in page.locator(".paper:visible").all()]
+        assert len(boxes) == 2 and abs(boxes[0][along] - boxes[1][along]) > 20
+    page.select_option("#panes", "1")
+    page.click("#script-save-all")
+    bench.until(
+        lambda: (
+            (folder / "two.sc").read_text() == "b = 2\n# more" and (folder / "one.sc").read_text() == "a = 1\n# more"
+        )
+    )
+    assert "●" not in "".join(tabs.all_text_contents()) and page.is_disabled("#script-save-all")
+    page.once("dialog", lambda dialog: dialog.accept("uno.sc"))
+    page.click("#script-rename")
+    bench.until(lambda: (folder / "uno.sc").exists() and not (folder / "one.sc").exists())
+    bench.until(lambda: page.input_value("#script") == "uno.sc")
+    page.focus("#text")
+    page.keyboard.type("# last\n")
+    page.click("#script-close")
+    page.click("#question [data-answer=cancel]")
+    assert tabs.filter(has_text="uno.sc").count() == 1
+    page.click("#script-close")
+    page.click("#question [data-answer=save_and_close]")
+    bench.until(lambda: tabs.filter(has_text="uno.sc").count() == 0)
+    assert "# last" in (folder / "uno.sc").read_text()
+    for name in ("uno.sc", "two.sc"):
+        (folder / name).unlink()
 
 
 def test_without_run_there_is_no_console(browser: Any, without: Viewing):

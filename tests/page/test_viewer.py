@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import socket
 import time
 import urllib.error
 from collections.abc import Iterator
@@ -13,9 +15,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hpcdem.core.looks import COLOURS
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
+from hpcdem.lang import chinese
 from hpcdem.page import exports
+from hpcdem.page.sources import Sources
+from hpcdem.post import movie
 from hpcdem.post.view.model import read_view
+from hpcdem.post.view.moment import read_moment
+from hpcdem.runtime import kept, kernels, run_folder
 from tests.conftest import PATIENCE, Launcher, until
 from tests.page.viewing import Tab, Viewing
 from tests.view import frames
@@ -209,7 +217,7 @@ def test_time_goes_on(page: Tab):
     assert not same(first, last) and page.text("#moment") == "step 0, 0 s"
     page.after(lambda: page.tab.click("#next"))
     assert page.text("#moment") == "step 10, 0.01 s"
-    page.tab.select_option("#history", "history_load.csv")
+    page.tab.select_option("#history", "history load")
     page.tab.wait_for_selector("#chart:not([hidden])")
     page.tab.wait_for_timeout(300)
     box, side = (page.tab.locator(name).bounding_box() for name in ("#chart", "#side"))
@@ -312,6 +320,132 @@ def test_language_and_theme(page: Tab):
     assert page.text("#fit") == "Fit"
 
 
+def test_the_window_that_is_chosen_is_seen(page: Tab):
+    page.after(lambda: page.tab.select_option("#split", "2"))
+    for chosen in (0, 1):
+        page.tab.locator(".window canvas:first-child").nth(chosen).click()
+        colours = [
+            page.tab.evaluate(f"getComputedStyle(document.querySelectorAll('.window')[{n}], '::after').content")
+            for n in (0, 1)
+        ]
+        assert [colour != "none" for colour in colours] == [chosen == 0, chosen == 1]
+
+
+def test_films_are_offered_where_they_can_be_made(page: Tab, viewing: Viewing, monkeypatch: pytest.MonkeyPatch):
+    offered = page.tab.locator("#save option").evaluate_all("all => all.map((one) => one.value)")
+    assert ("mp4" in offered) == (movie.ffmpeg() is not None) and "gif" in offered and "mv" in offered
+    for there in (None, "/usr/bin/ffmpeg"):
+        monkeypatch.setattr(movie, "ffmpeg", lambda: there)  # noqa: B023
+        assert ("mp4" in exports.kinds()) == (there is not None)
+
+
+@pytest.mark.parametrize("width", [1920, 1280, 900, 390])
+@pytest.mark.parametrize("locale", ["en-GB", "zh-CN"])
+def test_nothing_sticks_out_at_any_width(browser: Any, viewing: Viewing, width: int, locale: str):
+    """One line of tools, nothing wider than the page, a picture that is worth its place; the panel folds away."""
+    tab = Tab(browser, viewing.url, locale=locale, viewport={"width": width, "height": 800})
+    page = tab.tab
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    header = page.locator("header").bounding_box()
+    assert header["height"] < 56
+    for box in (one.bounding_box() for one in page.locator("header :is(button, select, label):visible").all()):
+        assert box["x"] >= 0 and box["x"] + box["width"] <= width
+        assert header["y"] <= box["y"] and box["y"] + box["height"] <= header["y"] + header["height"]
+    assert page.is_visible("#side") == (width > 700)
+    wide = page.locator("#windows").bounding_box()
+    assert wide["height"] > 400 and wide["width"] > (0.6 if width > 700 else 0.95) * width
+    page.click("#fold")
+    assert page.is_visible("#side") != (width > 700)
+    if width > 700:
+        tab.until(lambda: page.locator("#windows").bounding_box()["width"] > 0.98 * width)
+    else:
+        page.click("#fold")
+    if width < 1181:
+        assert page.is_hidden("#split")
+        page.click("#menu")
+        assert page.is_visible("#split") and page.locator("#toolbar").bounding_box()["x"] >= 0
+    tab.context.close()
+    assert tab.errors == []
+
+
+def test_a_long_message_is_read_whole(page: Tab):
+    page.tab.click("li[data-layer=elements]")
+    page.tab.fill("#filter", f"abs({'x + ' * 12}x, y, {'x + ' * 10}nothing_of_this_name) > 1")
+    page.tab.click("#apply")
+    page.tab.wait_for_selector("#message.bad")
+    told = page.tab.locator("#message").evaluate(
+        "e => [e.scrollWidth - e.clientWidth, e.scrollHeight - e.clientHeight]"
+    )
+    assert told[0] <= 0 and told[1] <= 0
+
+
+def test_the_picture_has_a_light_ground_in_both_themes(browser: Any, viewing: Viewing):
+    """Black beds and blue walls are seen: the ground is far from both."""
+    for scheme in ("light", "dark"):
+        tab = Tab(browser, viewing.url, color_scheme=scheme, locale="en-GB")
+        corner = tab.pixels()[-3, 3].astype(float)
+        assert corner.mean() > 200, scheme
+        tab.context.close()
+
+
+def test_chinese_names_of_fields_and_colours(page: Tab):
+    page.tab.click("#language")
+    page.tab.click("li[data-layer=elements]")
+    page.until(lambda: "应力 yy stress_yy (Pa)" in page.tab.locator("#field option").all_text_contents())
+    assert "彩虹" in page.tab.locator("#colours option").all_text_contents()
+    page.until(lambda: page.text(".legend") == "拉裂")
+    page.tab.click("#language")
+    page.until(lambda: "stress_yy (Pa)" in page.tab.locator("#field option").all_text_contents())
+
+
+def test_fields_of_all_frames_are_known_in_chinese(tmp_path: Path):
+    made = (frames.write_blocks(tmp_path), frames.write_discs(tmp_path), frames.write_body(tmp_path))
+    for moment in map(read_moment, made):
+        for kind, objects in moment.objects.items():
+            for name in (*objects.fields, *objects.vectors):
+                assert re.search("[一-鿿]", chinese.field_name(name)), (kind, name)
+    assert set(chinese.COLOURS) == set(COLOURS)
+
+
+# ---- before there is a picture ---------------------------------------------------------------------------------------
+
+
+def test_an_empty_stage_says_why(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Compiling, waiting for the first frame, nothing that runs; then the picture comes by itself."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "store"))
+    place = kept.store()[0]
+    place.mkdir(parents=True)
+    building = place / f"building-{socket.gethostname()}"
+    building.write_text(f"process {os.getpid()} of here")
+    data = tmp_path / "data"
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    sources = Sources([data], empty=True)
+    monkeypatch.setattr(kept, "store", lambda: (place, True))
+    assert sources.waiting() == {"kind": "compiling", "who": f"process {os.getpid()} of here", "folder": str(data)}
+    building.write_text("process 999999999 of here")  # was killed
+    assert sources.waiting()["kind"] == "empty" and kernels.builder() == ""
+    data.mkdir()
+    monkeypatch.setattr(run_folder, "running", lambda folder: {"pid": 1})
+    assert sources.waiting()["kind"] == "first"
+    frames.write_blocks(data)
+    sources.look()
+    assert sources.found
+
+    empty = Viewing("--run", "--", tmp_path / "none")
+    try:
+        context = browser.new_context(locale="en-GB")
+        page = context.new_page()
+        page.goto(empty.url)
+        page.wait_for_selector("#waiting[data-kind=wait_desk]")
+        assert "press Run all" in page.inner_text("#waiting")
+        frames.write_blocks(tmp_path / "none")
+        page.wait_for_selector("#waiting", state="hidden")
+        page.wait_for_selector("body[data-fine=true]")
+        context.close()
+    finally:
+        empty.close()
+
+
 # ---- a run that goes on ----------------------------------------------------------------------------------------------
 
 MODEL = (
@@ -397,14 +531,17 @@ def test_what_may_be_asked(viewing: Viewing):
     ):  # fmt: skip
         status, said = refused(viewing, "picture", good | wanted)
         assert status == 422 and message in said, wanted
-    assert refused(viewing, "history", {"name": "../../etc/passwd"})[1] == "there is no such history"
+    assert refused(viewing, "curves", {"chart": "../../etc/passwd"})[1] == "there is no such chart"
+    assert refused(viewing, "curves", {"x": "time", "y": ["'../passwd'"]})[1].startswith(
+        "there is no history '../passwd'"
+    )
     assert refused(viewing, "file", good | {"format": "exe"})[1].startswith("format: expected one of png")
     assert refused(viewing, "tell", {"what": "stop"})[1] == "no run writes into this folder now"
     assert refused(viewing, "tell", {"what": "rm"})[1] == "a run can be told to stop or to save"
     picked = viewing.ask("pick", good | {"column": 0, "row": 0})
     assert picked == {"object": None}
-    history = viewing.ask("history", {"name": "history_load.csv"})
-    assert history["columns"][2] == [0.0, 20.0, 40.0, 60.0]
+    curve = viewing.ask("curves", {"x": "time", "y": ["'load'"]})["curves"][0]
+    assert curve["y"] == [0.0, 20.0, 40.0, 60.0] and (curve["unit"], curve["step"]) == ("N/m", [0, 10, 20, 30])
 
 
 def test_every_pixel_picks_what_is_there(viewing: Viewing, folder: Path):

@@ -47,7 +47,7 @@ class Tab:
     """The page in a browser."""
 
     def __init__(self, browser: Any, url: str, **options: Any) -> None:
-        self.context = browser.new_context(viewport={"width": 1280, "height": 720}, **options)
+        self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 720}} | options)
         self.tab = self.context.new_page()
         self.errors: list[str] = []
         self.tab.on("pageerror", lambda error: self.errors.append(str(error)))

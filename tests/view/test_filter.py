@@ -72,3 +72,16 @@ def test_what_is_said():
         chosen("x.real > 1", 5, FIELDS, groups)
     with pytest.raises(HpcdemError, match="expected a comparison"):
         chosen("x + 1", 5, FIELDS, groups)
+
+
+def test_lines_before_the_comparison_give_names():
+    """A script in place of an expression: names of numbers and of comparisons, in their order."""
+    fields = {"x": np.array([0.0, 3.0, 6.0]), "y": np.array([0.0, 4.0, 8.0])}
+    text = "r = hypot(x, y)\nfar = r > 1\n\nfar and\n r < 7"
+    assert chosen(text, 3, fields, lambda *_: np.zeros(3, bool)).tolist() == [False, True, False]
+    for wrong, said in (
+        ("r = hypot(x, y)", "names come first"), ("r > 1\nr = 2", "names come first"), ("q = w\nq > 1", "no field w"),
+        ("__import__ = x\n__import__('os') > 1", "no function"), ("r = x\nr", "expected a comparison"),
+    ):  # fmt: skip
+        with pytest.raises(HpcdemError, match=said):
+            chosen(wrong, 3, fields, lambda *_: np.zeros(3, bool))

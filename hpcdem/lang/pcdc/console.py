@@ -53,35 +53,9 @@ class Console:
     def _block(self) -> str:
         """Lines that belong together: a statement of Python is whole when Python says so."""
         lines = [self.ask(PROMPT)]
-        while not self._is_whole("\n".join(lines)):
+        while not is_whole("\n".join(lines)):
             lines.append(self.ask(MORE))
         return "\n".join(lines)
-
-    def _is_whole(self, text: str) -> bool:
-        last = text.split("\n")[-1].rstrip()
-        if last.lstrip().startswith("pcdc") and last.endswith("\\"):
-            return False
-        try:
-            python = source.read(text, "console", dim=None).python[:-1]  # as typed: an empty line ends a block
-        except ScriptError:
-            return self._broken_is_whole(text)
-        try:
-            # A block that could go on ends with an empty line, as in Python's own console.
-            return codeop.compile_command(python, "console", "single") is not None
-        except (SyntaxError, ValueError, OverflowError):
-            return True
-
-    @staticmethod
-    def _broken_is_whole(text: str) -> bool:
-        """A text that cannot be read may only lack its end: `for i in range(3):`."""
-        stand_in = "\n".join(
-            line[: len(line) - len(line.lstrip())] + "pass" if line.lstrip().startswith("pcdc ") else line
-            for line in text.split("\n")
-        )
-        try:
-            return codeop.compile_command(stand_in, "console", "single") is not None
-        except (SyntaxError, ValueError, OverflowError):
-            return True
 
     def carry_out(self, text: str, name: str = "") -> bool:
         """Carry out a statement, whose value is shown, or several; name: of a script. Whether there was a command in
@@ -112,6 +86,34 @@ class Console:
             self.say(str(error))
         except KeyboardInterrupt:
             self.say("interrupted")
+        return True
+
+
+def is_whole(text: str) -> bool:
+    """Whether a text can be carried out, or lacks its end: a block goes on until an empty line."""
+    last = text.split("\n")[-1].rstrip()
+    if last.lstrip().startswith("pcdc") and last.endswith("\\"):
+        return False
+    try:
+        python = source.read(text, "console", dim=None).python[:-1]  # as typed: an empty line ends a block
+    except ScriptError:
+        return _broken_is_whole(text)
+    try:
+        # A block that could go on ends with an empty line, as in Python's own console.
+        return codeop.compile_command(python, "console", "single") is not None
+    except (SyntaxError, ValueError, OverflowError):
+        return True
+
+
+def _broken_is_whole(text: str) -> bool:
+    """A text that cannot be read may only lack its end: `for i in range(3):`."""
+    stand_in = "\n".join(
+        line[: len(line) - len(line.lstrip())] + "pass" if line.lstrip().startswith("pcdc ") else line
+        for line in text.split("\n")
+    )
+    try:
+        return codeop.compile_command(stand_in, "console", "single") is not None
+    except (SyntaxError, ValueError, OverflowError):
         return True
 
 

@@ -6,6 +6,7 @@ import { say } from "./words.js";
 const $ = (id) => document.getElementById(id);
 const QUICK = 250, SLOW = 1000;  // ms between two looks at the console, at work and not
 const MOST = 5000;  // lines shown
+const STRETCH = 700;  // ms; what is typed within them is undone at once
 
 let complain = () => {};
 let changed = () => {};
@@ -13,13 +14,19 @@ let last = 0;
 let state = { busy: false, alive: false, language: "pcdc" };
 let asked = [];  // lines typed before
 let place = 0;
-let opened = { name: "", stamp: null, text: "" };
-let wrong = null;  // line
+let papers = [];  // scripts that are open
+let seen = [];  // of these, the one or two on show
+let opened = null;  // the one that keys and buttons are for
 
 async function json(name, content) { return (await ask(name, content)).json(); }
 const guarded = (action) => async (...given) => { try { await action(...given); } catch (error) { complain(error); } };
 
 // ---- the console -----------------------------------------------------------------------------------------------------
+
+let lastSaid = "";
+
+/** What the console said last, while it is at work. */
+export const lastLine = () => (state.busy ? lastSaid : "");
 
 async function look() {
   try {
@@ -34,6 +41,8 @@ async function look() {
     }
     while ($("output").childElementCount > MOST) $("output").firstChild.remove();
     if (told.lines.length) $("output").scrollTop = $("output").scrollHeight;
+    const said = told.lines.findLast(([, kind]) => kind === "said");
+    if (said) lastSaid = said[0];
     const ended = state.busy && !told.busy;
     state = told;
     show();
@@ -61,28 +70,65 @@ async function carryOut(text, name = "") {
 async function typed() {
   const text = $("input").value;
   if (!text.trim() || state.busy) return;
-  await carryOut(text);
+  await carryOut(text.replace(/\s+$/, text.includes("\n") ? "\n" : ""));
   if (asked.at(-1) !== text) asked.push(text);
   place = asked.length;
-  $("input").value = "";
+  type("");
+}
+
+function type(text) {
+  $("input").value = text;
+  grow();
+}
+
+/** As high as what stands in it. */
+function grow() { $("input").rows = Math.min(10, $("input").value.split("\n").length); }
+
+/** Enter: what is whole is carried out, a block of Python goes on, as at Python's own prompt. */
+async function enter() {
+  const field = $("input"), text = field.value, last = !text.slice(field.selectionEnd).includes("\n");
+  if (!text.trim() || state.busy) return;
+  if (!last) { goOn(field); return; }
+  const { whole } = await json("whole", { text, language: state.language });
+  if (field.value !== text) return;  // it was changed meanwhile
+  if (whole) await typed();
+  else goOn(field, text.length);
+}
+
+/** Another line, as far in as this one, farther behind a colon. */
+function goOn(field, at = field.selectionStart) {
+  const line = field.value.slice(field.value.lastIndexOf("\n", at - 1) + 1, at);
+  const into = /^[ \t]*/.exec(line)[0] + (line.trimEnd().endsWith(":") ? "    " : "");
+  field.setRangeText(`\n${into}`, at, field.selectionEnd > at ? field.selectionEnd : at, "end");
+  grow();
 }
 
 function recall(by) {
   place = Math.min(Math.max(place + by, 0), asked.length);
-  $("input").value = asked[place] ?? "";
+  type(asked[place] ?? "");
+}
+
+/** Whether up and down leave what is typed: on its first, or its last line. */
+function outside(field, up) {
+  const { value, selectionStart, selectionEnd } = field;
+  return selectionStart === selectionEnd && !(up ? value.slice(0, selectionStart) : value.slice(selectionEnd)).includes("\n");
 }
 
 // ---- words that fit --------------------------------------------------------------------------------------------------
 
+let questions = 0;
+
 async function complete(field) {
-  const before = field.value.slice(0, field.selectionStart), line = before.slice(before.lastIndexOf("\n") + 1);
+  const now = () => JSON.stringify([field.value, field.selectionStart, field.selectionEnd, field.id]);
+  const mine = ++questions, before = field.value.slice(0, field.selectionStart), then = now();
   const language = field === $("text") && opened.language ? opened.language : state.language;
-  const { words, last: length } = await json("complete", { line, language });
+  const { words, last: length } = await json("complete", { line: before.slice(before.lastIndexOf("\n") + 1), language });
+  if (mine !== questions || now() !== then) return;  // the answer is about another line
   const put = (word) => {
-    const at = field.selectionStart;
-    field.setRangeText(`${word} `, at - length, at, "end");
-    field.focus();
     close();
+    if (now() !== then) return;
+    field.setRangeText(`${word} `, before.length - length, before.length, "end");
+    field.focus();
     field.dispatchEvent(new Event("input"));
   };
   if (words.length === 1) { put(words[0]); return; }
@@ -126,62 +172,220 @@ function chosen(event) {
 
 // ---- scripts ---------------------------------------------------------------------------------------------------------
 
-const dirty = () => $("text").value !== opened.text;
-const sure = () => !dirty() || confirm(say("script_lost", { name: opened.name || say("script_unnamed") }));
+/** A script that is open: what of it is on the disk (saved, stamp), and what the check said. */
+class Paper {
+  constructor({ name = "", text = "", stamp = null }) {
+    Object.assign(this, { name, stamp, saved: text, language: null, wrong: null, said: "", bad: false });
+    Object.assign(this, { before: { text, from: 0, to: 0 }, older: [], newer: [], at: 0 });
+    this.root = document.createElement("div");
+    this.root.className = "paper";
+    this.numbers = document.createElement("pre");
+    this.numbers.setAttribute("aria-hidden", true);
+    this.area = document.createElement("textarea");
+    Object.assign(this.area, { spellcheck: false, autocapitalize: "off", value: text, wrap: $("wrap").checked ? "soft" : "off" });
+    this.area.addEventListener("keydown", editorKey);
+    this.area.addEventListener("input", () => { this.noted(); this.wrong = null; close(); lines(this); tabs(); });
+    this.area.addEventListener("scroll", () => { this.numbers.scrollTop = this.area.scrollTop; });
+    this.area.addEventListener("blur", close);
+    this.area.addEventListener("focus", () => { if (opened !== this) turn(this); });
+    this.root.append(this.numbers, this.area);
+    $("papers").append(this.root);
+    papers.push(this);
+  }
 
-async function list(name) {
+  get dirty() { return this.area.value !== this.saved; }
+
+  get title() { return this.name || say("script_unnamed"); }
+
+  get now() { return { text: this.area.value, from: this.area.selectionStart, to: this.area.selectionEnd }; }
+
+  /** Something was changed: what is typed in a row is undone at once. Browsers have one row for all fields of a page. */
+  noted() {
+    if (performance.now() - this.at > STRETCH || !this.older.length) this.older.push(this.before);
+    Object.assign(this, { before: this.now, newer: [], at: performance.now() });
+  }
+
+  /** Undo, or take that back. */
+  back(from, to) {
+    if (!from.length) return;
+    to.push(this.now);
+    this.before = from.pop();
+    this.area.value = this.before.text;
+    this.area.setSelectionRange(this.before.from, this.before.to);
+    this.at = 0;
+    this.wrong = null;
+    lines(this);
+    tabs();
+  }
+
+  /** Put a text in place of another, as if it were typed. */
+  replace(from, to, text) {
+    this.at = 0;
+    this.area.setRangeText(text, from, to, "select");
+    this.area.focus();
+    this.noted();
+    this.at = 0;
+  }
+
+  /** Nothing that could be lost. */
+  get blank() { return !this.name && !this.area.value; }
+}
+
+const dirty = () => papers.some((one) => one.dirty);
+
+/** Make a script the one that keys and buttons are for; it takes the place of that one unless it is on show. */
+function turn(paper) {
+  if (!seen.includes(paper)) seen = seen.length ? seen.map((one) => (one === opened ? paper : one)) : [paper];
+  opened = paper;
+  for (const one of papers) {
+    one.root.hidden = !seen.includes(one);
+    one.root.style.order = seen.indexOf(one);
+    one.root.classList.toggle("current", one === paper);
+    one.area.id = one === paper ? "text" : "";
+    one.numbers.id = one === paper ? "numbers-of-lines" : "";
+    one.area.setAttribute("aria-label", `${say("text")}: ${one.title}`);
+  }
+  result();
+  lines(paper);
+  tabs();
+}
+
+/** A tab for each script that is open, with a mark where something is not saved. */
+function tabs() {
+  $("papers-open").replaceChildren(...papers.map((one) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.role = "tab";
+    button.setAttribute("aria-selected", one === opened);
+    button.textContent = `${one.dirty ? "● " : ""}${one.title}`;
+    button.addEventListener("click", () => { turn(one); one.area.focus(); });
+    button.addEventListener("auxclick", (event) => { if (event.button === 1) guarded(shut)(one); });
+    return button;
+  }));
+  $("script-save-all").disabled = !dirty();
+  document.body.dataset.dirty = dirty();
+}
+
+function panes() {
+  const count = $("panes").value === "1" ? 1 : 2;
+  seen = seen.includes(opened) ? [opened, ...seen.filter((one) => one !== opened)].slice(0, count) : [opened];
+  if (seen.length < count) seen.push(papers.find((one) => !seen.includes(one)) ?? new Paper({}));
+  $("papers").dataset.panes = $("panes").value;
+  turn(opened);
+  for (const one of seen) lines(one);
+}
+
+async function list() {
   const { names } = await json("scripts", {});
-  const shown = name && !names.includes(name) ? [name, ...names] : names;
+  const name = opened.name, shown = name && !names.includes(name) ? [name, ...names] : names;
   $("script").replaceChildren(...["", ...shown].map((one) => new Option(one || say("script_unnamed"), one)));
   $("script").value = name;
 }
 
-function put(found) {
-  opened = found;
-  $("text").value = found.text;
-  wrong = null;
-  $("check-result").textContent = "";
-  lines();
-}
-
 async function open(name) {
-  put(name ? await json("read", { name }) : { name: "", text: "", stamp: null });
-  await list(name);
-  if (name) await check();
+  const there = name ? papers.find((one) => one.name === name) : null;
+  const before = opened;
+  turn(there ?? new Paper(name ? await json("read", { name }) : {}));
+  if (before?.blank && before !== opened && name) drop(before);
+  await list();
+  if (name && !there) await check();
 }
 
-async function save(as = false) {
-  let { name, stamp } = opened;
+async function save(as = false, paper = opened) {
+  let { name, stamp } = paper;
   if (as || !name) {
     name = prompt(say("script_name"), name || "script.sc");
     if (!name) return false;
-    if (name !== opened.name) stamp = null;
+    if (papers.some((one) => one !== paper && one.name === name)) { complain(new Error(say("script_open_twice", { name }))); return false; }
+    if (name !== paper.name) stamp = null;
   }
-  const text = $("text").value;
-  const told = await json("write", { name, text, stamp });
-  opened = { ...opened, ...told, text };
-  await list(name);
-  await check();
+  const text = paper.area.value;
+  Object.assign(paper, await json("write", { name, text, stamp }), { saved: text });
+  tabs();
+  await list();
+  await check(paper);
   return true;
 }
 
-async function check() {
-  const text = $("text").value;
-  const told = await json("check", { name: opened.name || "script.sc", text });
-  if (text !== $("text").value) return false;  // it was changed meanwhile
-  opened.language = told.language;
-  wrong = told.line;
-  $("check-result").className = told.problem ? "bad" : "";
-  $("check-result").textContent = told.problem ? (told.line ? `${told.line}: ${told.problem}` : told.problem)
-    : told.summary.split("\n")[0];
-  lines();
+/** One after the other; a script that cannot be saved keeps its mark, and the others are saved. */
+async function saveAll() {
+  let problem = null;
+  for (const one of papers.filter((paper) => paper.dirty)) {
+    try { await save(false, one); } catch (error) { problem ??= error; }
+  }
+  if (problem) throw problem;
+}
+
+async function rename() {
+  if (!opened.name) { await save(true); return; }
+  const to = prompt(say("script_rename_to", { name: opened.name }), opened.name);
+  if (!to || to === opened.name) return;
+  Object.assign(opened, await json("rename", { name: opened.name, to, stamp: opened.stamp }));
+  turn(opened);
+  await list();
+}
+
+/** Close a script; what is not saved is asked about. */
+async function shut(paper = opened) {
+  if (paper.dirty) {
+    const what = await question(say("script_closing", { name: paper.title }), ["save_and_close", "drop_changes", "cancel"]);
+    if (what === "cancel" || (what === "save_and_close" && !await save(false, paper))) return;
+  }
+  drop(paper);
+  await list();
+}
+
+function drop(paper) {
+  papers = papers.filter((one) => one !== paper);
+  paper.root.remove();
+  if (seen.includes(paper)) {
+    seen = seen.filter((one) => one !== paper);
+    const next = papers.find((one) => !seen.includes(one)) ?? seen[0] ?? new Paper({});
+    if (!seen.includes(next)) seen.push(next);
+    if (seen.length < 2 && $("panes").value !== "1") seen.push(new Paper({}));
+    if (opened === paper) opened = next;
+  }
+  turn(opened);
+}
+
+/** Ask with buttons; the name of the one that was pressed. */
+function question(text, names) {
+  const box = $("question");
+  $("question-text").textContent = text;
+  return new Promise((done) => {
+    box.querySelector(".tools").replaceChildren(...names.map((name) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.dataset.answer = name;
+      button.textContent = say(name);
+      button.addEventListener("click", () => { box.onclose = null; box.close(); done(name); });
+      return button;
+    }));
+    box.onclose = () => done("cancel");
+    box.showModal();
+  });
+}
+
+function result() {
+  $("check-result").className = opened.bad ? "bad" : "";
+  $("check-result").textContent = opened.said;
+}
+
+async function check(paper = opened) {
+  const text = paper.area.value;
+  const told = await json("check", { name: paper.name || "script.sc", text });
+  if (text !== paper.area.value) return false;  // it was changed meanwhile
+  const said = told.problem ? (told.line ? `${told.line}: ${told.problem}` : told.problem) : told.summary.split("\n")[0];
+  Object.assign(paper, { language: told.language, wrong: told.line, said, bad: Boolean(told.problem) });
+  if (paper === opened) result();
+  lines(paper);
   return !told.problem;
 }
 
 async function runAll() {
-  if ((dirty() || !opened.name) && !await save()) return;
+  if ((opened.dirty || !opened.name) && !await save()) return;
   if (!await check()) return;
-  await carryOut(opened.text, opened.name);
+  await carryOut(opened.saved, opened.name);
   tab("console");
 }
 
@@ -197,13 +401,21 @@ async function runPart() {
   await carryOut(text);
 }
 
+/** Something of the text was changed by a button. */
+function changedText(said = null) {
+  opened.wrong = null;
+  if (said !== null) Object.assign(opened, { said, bad: false });
+  result();
+  lines(opened);
+  tabs();
+}
+
 function replaceAll() {
   const find = $("find").value;
   if (!find) return;
-  const count = $("text").value.split(find).length - 1;
-  $("text").value = $("text").value.replaceAll(find, () => $("replace").value);
-  lines();
-  $("check-result").textContent = say("replaced", { n: count });
+  const field = $("text"), count = field.value.split(find).length - 1;
+  if (count) opened.replace(0, field.value.length, field.value.replaceAll(find, () => $("replace").value));
+  changedText(say("replaced", { n: count }));
 }
 
 function findNext() {
@@ -217,32 +429,32 @@ function findNext() {
   field.scrollTop = Math.max(0, (field.value.slice(0, at).split("\n").length - 4) * lineHeight());
 }
 
-/** Put # before the lines of the selection, or take it away. */
-function comment() {
+/** Put # before the lines of the selection (on), or take it away; without a word whichever is the other. */
+function comment(on = null) {
   const field = $("text");
   const from = field.value.lastIndexOf("\n", field.selectionStart - 1) + 1;
   const end = field.value.indexOf("\n", Math.max(field.selectionEnd - 1, from));
   const to = end < 0 ? field.value.length : end;
   const rows = field.value.slice(from, to).split("\n");
-  const all = rows.every((row) => !row.trim() || row.startsWith("#"));
-  field.setRangeText(rows.map((row) => all ? row.replace(/^# ?/, "") : row.trim() ? `# ${row}` : row).join("\n"), from, to, "select");
-  lines();
+  const add = on ?? !rows.every((row) => !row.trim() || row.startsWith("#"));
+  const text = rows.map((row) => add ? row.trim() ? `# ${row}` : row : row.replace(/^# ?/, "")).join("\n");
+  opened.replace(from, to, text);
+  changedText();
 }
 
 const lineHeight = () => parseFloat(getComputedStyle($("text")).lineHeight);
 
-function lines() {
-  const count = $("text").value.split("\n").length;
-  const numbers = $("numbers-of-lines");
+function lines(paper) {
+  const count = paper.area.value.split("\n").length, { numbers, wrong } = paper;
   numbers.replaceChildren(...Array.from({ length: count }, (_, k) => {
     const one = document.createElement("div");
     one.textContent = k + 1;
-    if (k + 1 === wrong) { one.className = "bad"; one.title = $("check-result").textContent; }
+    if (k + 1 === wrong) { one.className = "bad"; one.title = paper.said; }
     return one;
   }));
   numbers.hidden = $("wrap").checked;
-  numbers.scrollTop = $("text").scrollTop;
-  document.body.dataset.wrong = wrong ?? "";
+  numbers.scrollTop = paper.area.scrollTop;
+  if (paper === opened) document.body.dataset.wrong = wrong ?? "";
 }
 
 function editorKey(event) {
@@ -250,7 +462,11 @@ function editorKey(event) {
   const control = event.ctrlKey || event.metaKey;
   const field = $("text");
   if (control && event.key === " ") { event.preventDefault(); guarded(complete)(field); }
-  else if (control && event.key === "s") { event.preventDefault(); guarded(save)(); }
+  else if (control && event.key.toLowerCase() === "z") {
+    event.preventDefault();
+    if (event.shiftKey) opened.back(opened.newer, opened.older); else opened.back(opened.older, opened.newer);
+  } else if (control && event.key === "y") { event.preventDefault(); opened.back(opened.newer, opened.older); }
+  else if (control && event.key.toLowerCase() === "s") { event.preventDefault(); guarded(event.shiftKey ? saveAll : save)(); }
   else if (control && event.key === "Enter") { event.preventDefault(); guarded(runPart)(); }
   else if (control && event.key === "/") { event.preventDefault(); comment(); }
   else if (control && event.key === "f") { event.preventDefault(); $("find").focus(); }
@@ -258,9 +474,14 @@ function editorKey(event) {
 
 function consoleKey(event) {
   if (chosen(event)) return;
-  const actions = { Enter: guarded(typed), ArrowUp: () => recall(-1), ArrowDown: () => recall(1), Tab: () => guarded(complete)($("input")) };
-  if (event.ctrlKey && event.key === "c" && !String(getSelection())) { event.preventDefault(); guarded(interrupt)(); return; }
+  const field = $("input");
+  const actions = { Enter: guarded(enter), ArrowUp: () => recall(-1), ArrowDown: () => recall(1), Tab: () => guarded(complete)(field) };
+  if (event.ctrlKey && event.key === "c" && !String(getSelection()) && field.selectionStart === field.selectionEnd) {
+    event.preventDefault(); guarded(interrupt)(); return;
+  }
+  if (event.key === "Enter" && event.shiftKey) { event.preventDefault(); goOn(field); return; }
   if (!(event.key in actions) || event.shiftKey) return;
+  if (event.key.startsWith("Arrow") && !outside(field, event.key === "ArrowUp")) return;
   event.preventDefault();
   actions[event.key]();
 }
@@ -307,33 +528,39 @@ export async function begin(complained, ready) {
   on("desk-edge", "pointerdown", drag);
   for (const one of ["console", "editor"]) on(`tab-${one}`, "click", () => tab(one));
   on("input", "keydown", consoleKey);
-  on("text", "keydown", editorKey);
-  on("text", "input", () => { wrong = null; lines(); });
-  on("text", "scroll", () => { $("numbers-of-lines").scrollTop = $("text").scrollTop; });
+  on("input", "input", () => { close(); grow(); });
   on("input", "blur", close);
-  on("text", "blur", close);
   on("clear", "click", () => $("output").replaceChildren());
   on("interrupt", "click", guarded(interrupt));
   on("restart", "click", guarded(() => restart(state.language)));
   on("tongue", "change", guarded(() => restart($("tongue").value)));
-  on("script", "change", guarded(async () => { if (sure()) await open($("script").value); else $("script").value = opened.name; }));
-  on("script-new", "click", guarded(async () => { if (sure()) await open(""); }));
+  on("script", "change", guarded(() => open($("script").value)));
+  on("script-new", "click", guarded(() => open("")));
   on("script-save", "click", guarded(() => save()));
+  on("script-save-all", "click", guarded(saveAll));
   on("script-save-as", "click", guarded(() => save(true)));
-  on("script-check", "click", guarded(check));
+  on("script-rename", "click", guarded(rename));
+  on("script-close", "click", guarded(() => shut()));
+  on("script-check", "click", guarded(() => check()));
   on("script-run", "click", guarded(runAll));
   on("script-part", "click", guarded(runPart));
+  on("comment-on", "click", () => comment(true));
+  on("comment-out", "click", () => comment(false));
+  on("panes", "change", panes);
   on("replace-all", "click", replaceAll);
   on("find", "keydown", (event) => { if (event.key === "Enter") { event.preventDefault(); findNext(); } });
-  on("wrap", "change", () => { $("text").wrap = $("wrap").checked ? "soft" : "off"; lines(); });
+  on("wrap", "change", () => { for (const one of papers) { one.area.wrap = $("wrap").checked ? "soft" : "off"; lines(one); } });
   addEventListener("beforeunload", (event) => { if (dirty()) event.preventDefault(); });
   try {
     const { first } = await json("scripts", {});
     await open(first);
     if (first) tab("editor");
-  } catch (error) { complain(error); }
+  } catch (error) {
+    complain(error);
+    if (!opened) turn(new Paper({}));
+  }
   look();
 }
 
 /** Texts that the page has written itself, in the language of now. */
-export function speak() { if (!$("desk-toggle").hidden) show(); }
+export function speak() { if (!$("desk-toggle").hidden && opened) { show(); turn(opened); } }

@@ -2,24 +2,23 @@
 // under way per window, the newest wish wins; while something moves they are JPEG, at rest one finer PNG follows.
 
 import { ask, Refusal } from "./server.js";
+import * as charts from "./charts.js";
 import * as desk from "./desk.js";
 import * as words from "./words.js";
 import "./viewer_words.js";
 
 const { say } = words;
 const $ = (id) => document.getElementById(id);
-const FILES = ["png", "svg", "pdf", "dxf", "csv", "html", "gif", "mp4", "mv"];
 const REST = 180;  // ms without a wish after which the fine picture is asked for
 const LOOK = 800;  // ms between two looks at the folder
 
 let about = null;  // objects, colours, first view
-let state = { sources: [], run: null, histories: [] };
+let state = { sources: [], run: null, histories: { records: [], charts: [] } };
 let windows = [];
 let current = null;
 let playing = null;
 let theme = "auto";
 let drawn = 0;
-let history = null;
 let beginning = false;
 let shownNow = false;  // the model of the console was put on show once
 
@@ -115,6 +114,7 @@ class Window {
       const image = await createImageBitmap(header.image);
       this.shown = { header, image, box: wanted.view.camera, origin };
       this.put();
+      waiting();
       $("pictures").textContent = say("picture", { ms: Math.round(performance.now() - began) });
       document.body.dataset.pictures = ++drawn;
       document.body.dataset.fine = fine;
@@ -135,7 +135,7 @@ class Window {
     const [dx, dy] = this.shown.origin.map((v, k) => now[k] - v);
     const [l, r, b, t] = this.shown.box.map((v, k) => v + (k < 2 ? dx : dy));
     const pen = this.canvas.getContext("2d");
-    pen.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--stage");
+    pen.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--paper");
     pen.fillRect(0, 0, w, h);
     const k = w / (right - left);
     pen.drawImage(this.shown.image, (l - left) * k, (top - t) * k, (r - l) * k, (t - b) * k);
@@ -331,7 +331,7 @@ function round(length) {
 /** Numbers along the lower and the left edge; in space, where they would say nothing, the axes and a length. */
 function axes(one, pen, w, h) {
   const k = w / Math.max(1, one.root.clientWidth), [left, right, bottom, top] = one.box, scale = w / (right - left);
-  const ink = getComputedStyle(document.documentElement).getPropertyValue("--ink");
+  const style = getComputedStyle(document.documentElement), ink = style.getPropertyValue("--paper-ink");
   pen.save();
   pen.font = `${11 * k}px system-ui, sans-serif`;
   pen.fillStyle = pen.strokeStyle = ink;
@@ -340,10 +340,11 @@ function axes(one, pen, w, h) {
   const { turn } = one;
   const longer = Math.max(right - left, top - bottom);
   const [, size, unit] = about.lengths.find(([least]) => longer >= least) ?? about.lengths.at(-1);  // as in figures
-  const step = round((right - left) * 110 * k / w), digits = Math.max(0, -Math.floor(Math.log10(step / size) + 1e-9));
+  const step = round(Math.min((right - left) * 110 * k / w, (top - bottom) / 4));
+  const digits = Math.max(0, -Math.floor(Math.log10(step / size) + 1e-9));
   const write = (text, x, y) => {  // readable over the model
     pen.save();
-    pen.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--stage");
+    pen.strokeStyle = style.getPropertyValue("--paper");
     pen.lineWidth = 3 * k;
     pen.lineJoin = "round";
     pen.strokeText(text, x, y);
@@ -401,12 +402,12 @@ function legend(root, parts) {
         const swatch = document.createElement("span");
         swatch.className = "swatch";
         swatch.style.background = colour;
-        line.append(swatch, word, document.createElement("br"));
+        line.append(swatch, called("legend", word), document.createElement("br"));
         box.append(line);
       }
       return box;
     }
-    box.append(part.title, bar(part));
+    box.append(part.title.replace(part.field.replaceAll("_", " "), called("fields", part.field).replaceAll("_", " ")), bar(part));
     return box;
   }));
 }
@@ -444,6 +445,8 @@ const BAR = { width: 12, height: 160 };
 // ---- objects and their properties ------------------------------------------------------------------------------------
 
 let chosen = "";
+/** What a field, colours or a class of the legend are called in the language of now; names that are typed stay. */
+const called = (kind, name) => (words.current() === "zh" && about?.chinese[kind][name]) || name;
 const label = (layer) => layer.name || layer.object;
 const spoken = (layer) => layer.name || say(layer.object);
 const layer = () => current?.view.layers.find((one) => label(one) === chosen);
@@ -513,22 +516,24 @@ async function properties() {
   if (!one) return;
   $("properties-title").textContent = spoken(one);
   for (const name of ["opacity", "size", "arrows", "filter"]) $(name).value = one[name];
+  $("filter").rows = Math.min(8, one.filter.split("\n").length);
   for (const name of ["log", "edges"]) $(name).checked = one[name];
   $("own").checked = one.colour !== "";
   $("colour").value = one.colour || "#2f7fb5";
   $("full").checked = one.limits === "full";
   ranged(true);
-  options($("colours"), Object.keys(about.colours).map((name) => [name, name]), one.colours);
+  options($("colours"), Object.keys(about.colours).map((name) => [name, called("colours", name)]), one.colours);
   const mine = ++asked;
   let found = { fields: [], vectors: [] };
   try {
     if (one.object in about.objects) found = await json("fields", { source: current.source, frame: current.frame, object: one.object });
   } catch (error) { complain(error); }
   if (mine !== asked) return;
-  const fields = found.fields.map(([name, unit]) => [name, unit ? `${name} (${unit})` : name]);
+  const title = (name) => (called("fields", name) === name ? name : `${called("fields", name)} ${name}`);
+  const fields = found.fields.map(([name, unit]) => [name, unit ? `${title(name)} (${unit})` : title(name)]);
   if (one.field && !fields.some(([name]) => name === one.field)) fields.push([one.field, one.field]);
   options($("field"), [["", say("own_colours")], ...fields], one.field);
-  options($("vectors"), [["", say("none")], ...found.vectors.map((name) => [name, name])], one.vectors);
+  options($("vectors"), [["", say("none")], ...found.vectors.map((name) => [name, title(name)])], one.vectors);
 }
 
 function change(values, name = chosen) {
@@ -618,9 +623,9 @@ async function query(one, at) {
       ...found.values.filter(([name]) => !["x", "y", ...(turn ? ["z"] : [])].includes(name))];
     $("values").replaceChildren(...rows.map(([name, value, unit]) => {
       const row = document.createElement("tr");
-      row.title = say("copy");
+      row.title = `${name}: ${say("copy")}`;
       row.addEventListener("click", () => copied(row.cells[1].textContent));
-      for (const text of [name, `${typeof value === "number" ? short(value) : value ?? "–"} ${unit}`.trim()]) {
+      for (const text of [called("fields", name), `${typeof value === "number" ? short(value) : value ?? "–"} ${unit}`.trim()]) {
         const cell = document.createElement("td");
         cell.textContent = text;
         row.append(cell);
@@ -708,7 +713,7 @@ function controls() {
 function moment() {
   const { header } = current.shown;
   $("moment").textContent = say("moment", { step: header.step, time: short(header.time) });
-  chart();
+  charts.moment(header.step);
 }
 
 function go(frame) {
@@ -750,6 +755,7 @@ async function look() {
     const before = state.sources;
     state = await json("state", {});
     sources();
+    waiting();
     if (!about && !beginning && state.sources.length) {
       beginning = true;
       try { await begin(); } finally { beginning = false; }
@@ -771,9 +777,9 @@ async function look() {
       });
       if (rewritten) await renewed();
       controls();
-      histories();
     }
     run();
+    await charts.update(state.histories, Boolean(state.run?.running));
   } catch (error) { complain(error); }
   look.waiting = setTimeout(look, LOOK);
 }
@@ -827,6 +833,19 @@ function duration(seconds) {
   return h ? `${h}:${two(m)}:${two(s)}` : m ? `${m}:${two(s)}` : `${s} s`;
 }
 
+/** What is said where there is no picture yet: why, and what to do. */
+function waiting() {
+  const empty = !windows.some((one) => one.shown), found = state.waiting ?? {};
+  $("waiting").hidden = !empty;
+  if (!empty) return;
+  const kind = state.sources.length ? (found.drawing ? "wait_drawing" : "wait_picture") : `wait_${found.kind ?? "picture"}`;
+  $("waiting").dataset.kind = kind;
+  $("waiting").querySelector("p").textContent = say(kind, { ...found });
+  const line = state.run?.progress?.line || (found.kind === "empty" ? "" : desk.lastLine());
+  $("waiting").querySelector("pre").textContent = line;
+  $("waiting").querySelector("pre").hidden = !line;
+}
+
 async function tell(what) {
   if (what === "stop" && !confirm(say("stop_sure"))) return;
   try { told((await json("tell", { what })).said); } catch (error) { complain(error); }
@@ -838,58 +857,10 @@ function sources() {
   if (!same) options($("source"), names, current?.source ?? 0);
 }
 
-// ---- histories -------------------------------------------------------------------------------------------------------
-
-let read = "";
-async function histories() {
-  const names = state.histories.map((name) => [name, name.replace(/^history_|\.csv$/g, "")]);
-  const same = $("history").options.length === names.length + 1;
-  if (!same) options($("history"), [["", say("none")], ...names], $("history").value);
-  if ($("history").value && (state.run?.running || read !== $("history").value)) await load();
-}
-
-async function load() {
-  const name = $("history").value;
-  $("chart").hidden = !name;
-  read = name;
-  if (!name) { history = null; return; }
-  try { history = await json("history", { name }); chart(); } catch (error) { complain(error); }
-}
-
-function chart() {
-  if (!history || $("chart").hidden) return;
-  const canvas = $("chart"), pen = canvas.getContext("2d"), style = getComputedStyle(document.documentElement);
-  const k = 2;
-  canvas.width = 280 * k; canvas.height = 150 * k;
-  pen.scale(k, k);
-  const [steps, times, values] = history.columns;
-  const points = steps.map((step, n) => [times[n], values[n], step]).filter(([t, v]) => t !== null && v !== null);
-  pen.font = "10px system-ui, sans-serif";
-  pen.fillStyle = style.getPropertyValue("--faint");
-  pen.fillText(history.titles[2] ?? "", 4, 11);
-  canvas.setAttribute("aria-label", say("chart", { name: history.titles[2] ?? "" }));
-  if (!points.length) return;
-  const [t0, t1] = [points[0][0], points.at(-1)[0]];
-  const low = Math.min(...points.map((p) => p[1])), high = Math.max(...points.map((p) => p[1]));
-  const x = (t) => 8 + 264 * (t - t0) / (t1 - t0 || 1), y = (v) => 132 - 112 * (v - low) / (high - low || 1);
-  pen.fillText(short(high, 4), 4, 23);
-  pen.fillText(short(low, 4), 4, 144);
-  pen.textAlign = "right";
-  pen.fillText(`${short(t1, 4)} s`, 276, 144);
-  pen.textAlign = "left";
-  pen.strokeStyle = style.getPropertyValue("--accent");
-  pen.lineWidth = 1.3;
-  pen.beginPath();
-  points.forEach(([t, v], n) => pen[n ? "lineTo" : "moveTo"](x(t), y(v)));
-  pen.stroke();
-  const now = current?.shown?.header.time;
-  if (now >= t0 && now <= t1) {
-    pen.strokeStyle = style.getPropertyValue("--reached");
-    pen.beginPath(); pen.moveTo(x(now), 16); pen.lineTo(x(now), 134); pen.stroke();
-  }
-}
-
 // ---- files -----------------------------------------------------------------------------------------------------------
+
+const asked_file = (format) => ask("file", { source: current.source, frame: current.frame, format, label: chosen,
+  view: { ...current.view, camera: current.box }, fps: Number($("speed").value) });
 
 async function save(format) {
   if (format === "clip") { await clip(); return; }
@@ -897,24 +868,22 @@ async function save(format) {
   const name = format === "mv" ? "view.mv" : `view_${String(step).padStart(10, "0")}.${format}`;
   told(say("saving", { name }));
   try {
-    const view = { ...current.view, camera: current.box };
-    const blob = await (await ask("file", { source: current.source, frame: current.frame, view, format, label: chosen,
-      fps: Number($("speed").value) })).blob();
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(blob);
-    link.download = name;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+    const blob = await (await asked_file(format)).blob();
+    charts.offered(blob, name);
     told(say("saved", { name, size: Math.ceil(blob.size / 1024) }));
   } catch (error) { complain(error); }
 }
 
+/** The picture as it is saved: with axes, bar and title. It is made while the browser waits, as the click allows that. */
 async function clip() {
+  told(say("saving", { name: say("save_clip") }));
+  const made = asked_file("png").then((response) => response.blob());
   try {
-    const blob = await new Promise((done) => { current.canvas.toBlob(done, "image/png"); });
-    await navigator.clipboard.write([new ClipboardItem({ "image/png": blob })]);
+    await navigator.clipboard.write([new ClipboardItem({ "image/png": made })]);
     told(say("copied"));
-  } catch { told(say("not_copied"), true); }
+  } catch {
+    try { await made; told(say("not_copied_picture"), true); } catch (error) { complain(error); }
+  }
 }
 
 async function open(file) {
@@ -939,6 +908,7 @@ const dark = matchMedia("(prefers-color-scheme: dark)");
 function paint() {
   document.documentElement.dataset.theme = theme === "auto" ? (dark.matches ? "dark" : "light") : theme;
   $("theme").textContent = say(`theme_${theme}`);
+  charts.speak();
   for (const one of windows) one.redraw();
 }
 
@@ -946,13 +916,14 @@ function speak() {
   words.translate();
   $("language").textContent = say("language");
   $("language").lang = say("language_code");
-  options($("save"), [["", say("save_as")], ...[...FILES, "clip"].map((kind) => [kind, say(`save_${kind}`)])], "");
+  options($("save"), [["", say("save_as")], ...(about ? [...about.files, "clip"] : []).map((kind) => [kind, say(`save_${kind}`)])], "");
   if (about) {
     options($("add"), [["", say("add")], ...about.order.filter((name) => name in about.objects).map((name) => [name, say(name)])], "");
     tree(); controls(); run();
   }
   label_play();
   desk.speak();
+  waiting();
   paint();
 }
 
@@ -1026,7 +997,10 @@ function connect() {
   on("own", "change", own);
   on("colour", "input", () => { $("own").checked = true; own(); });
   on("apply", "click", () => change({ filter: $("filter").value }));
-  on("filter", "keydown", (event) => { if (event.key === "Enter") change({ filter: $("filter").value }); });
+  on("filter", "keydown", (event) => {
+    if (event.key === "Enter" && !event.shiftKey) { event.preventDefault(); change({ filter: $("filter").value }); }
+  });
+  on("filter", "input", () => { $("filter").rows = Math.min(8, $("filter").value.split("\n").length); });
   on("deformed", "change", () => { current.view.deformed = Number($("deformed").value) || 0; current.redraw(); });
   on("eye", "change", () => { looked(current, $("eye").value); current.fit(); moved(current); });
   on("section", "change", () => cut($("section").value.trim()));
@@ -1057,14 +1031,34 @@ function connect() {
   on("next", "click", () => go(current.frame + 1));
   on("last", "click", () => go(frames().length - 1));
   on("slider", "input", () => go(Number($("slider").value)));
-  on("history", "change", load);
   on("stop", "click", () => tell("stop"));
   on("checkpoint", "click", () => tell("save"));
   document.addEventListener("keydown", key);
 }
 
+/** The panel beside the model is there, or folded away; on a small screen it lies over the model, and begins folded. */
+function fold(on) {
+  document.body.classList.toggle("folded", on);
+  $("fold").setAttribute("aria-expanded", !on);
+}
+
+function menu(on) {
+  document.body.classList.toggle("menu", on);
+  $("menu").setAttribute("aria-expanded", on);
+}
+
 function connectFirst() {
   const on = (id, event, action) => $(id).addEventListener(event, action);
+  const narrow = matchMedia("(max-width: 700px)");
+  fold(narrow.matches || words.kept("hpcdem.folded") === "yes");
+  narrow.addEventListener("change", () => fold(narrow.matches));
+  on("fold", "click", () => {
+    fold(!document.body.classList.contains("folded"));
+    if (!narrow.matches) words.keep("hpcdem.folded", document.body.classList.contains("folded") ? "yes" : "no");
+  });
+  on("menu", "click", () => menu(!document.body.classList.contains("menu")));
+  on("stage", "pointerdown", () => { menu(false); if (narrow.matches) fold(true); });
+  charts.begin(complain);
   on("language", "click", () => { words.choose(words.current() === "en" ? "zh" : "en"); speak(); });
   on("theme", "click", () => {
     theme = { auto: "light", light: "dark", dark: "auto" }[theme] ?? "auto";

@@ -2,7 +2,8 @@
 
 The text is taken apart by Python's own parser and computed here, piece by piece, from a list of what is allowed:
 comparisons, and, or, not, + - * /, a few functions, numbers and names of fields. Nothing in it is executed. It may
-begin with a RANGE of the languages: `range x 0 2 group 'roof' and stress_xx < 0`.
+begin with a RANGE of the languages: `range x 0 2 group 'roof' and stress_xx < 0`. Lines before it may give names to
+what it is made of: `r = hypot(x, y)`.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import ast
 import math
 import operator
 import re
+from collections import ChainMap
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -29,6 +31,7 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
 """How many values each takes, and what it is."""
 GROUP = "group"
 """`group(NAME)`, or `group(NAME, SET)`: whether an object is in a group. Names may stand in quotes."""
+_GIVEN = re.compile(r"\s*[A-Za-z_]\w*\s*=(?!=)")
 _WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[^\s(),]+")
 _ARITHMETIC = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 _COMPARISONS = {
@@ -42,10 +45,38 @@ def chosen(text: str, count: int, fields: Mapping[str, np.ndarray], groups: Grou
     """(count,) bool: which objects the expression holds for. fields: values (count,) by name, read when they are asked
     for; groups: the members (count,) of a group, by its name and that of its set ("" any). HpcdemError with the text
     for what is not understood."""
-    found = _Evaluation(text, fields, groups).value(parsed(text), 0)
+    *lines, last = _lines(text)
+    own: dict[str, Any] = {}
+    evaluation = _Evaluation(text, ChainMap(own, fields), groups)  # type: ignore[arg-type]
+    for line in lines:
+        name, _, right = line.partition("=")
+        own[name.strip()] = evaluation.value(parsed(right), 0)
+    found = evaluation.value(parsed(last), 0)
     if not (isinstance(found, (np.ndarray, np.bool_, bool)) and np.asarray(found).dtype == bool):
         raise refusal(text, "expected a comparison, such as x > 1")
     return np.broadcast_to(found, (count,)).copy()
+
+
+def amount(text: str, fields: Mapping[str, np.ndarray], said: str) -> Any:
+    """The value of an expression of numbers and fields, a number or one per object. said: what the user wrote, for
+    HpcdemError."""
+    try:
+        return _Evaluation(text, fields, lambda *_: np.False_)._amount(parsed(text), 0)
+    except HpcdemError as error:
+        raise HpcdemError(f"'{said[:60]}': {str(error).partition(': ')[2].replace('a filter', 'it')}") from None
+
+
+def _lines(text: str) -> list[str]:
+    """Lines `name = ...`, and the expression behind them, which may go on over lines. HpcdemError."""
+    rest = [line for line in text.split("\n") if line.strip()]
+    lines = []
+    while len(rest) > 1 and _GIVEN.match(rest[0]):
+        lines.append(rest.pop(0))
+    if len(text) > LONGEST:
+        raise HpcdemError(f"filter: {len(text)} characters, at most {LONGEST} are read")
+    if any(map(_GIVEN.match, rest)):
+        raise refusal(text, "names come first, and a comparison such as r < 3 at the end")
+    return [*lines, " ".join(rest)]
 
 
 def parsed(text: str) -> ast.expr:
