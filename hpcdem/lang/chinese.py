@@ -878,7 +878,8 @@ def field_name(name: str) -> str:
     """
     if name in FIELDS:
         return FIELDS[name]
-    stem, ends = name, []
+    stem = name
+    ends: list[str] = []
     while "_" in stem:
         stem, _, end = stem.rpartition("_")
         ends.insert(0, end)

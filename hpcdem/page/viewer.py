@@ -153,7 +153,7 @@ class Viewer:
     def state(self) -> dict[str, Any]:
         """Frames, the run, histories; where there is no picture yet, why."""
         told = self.sources.state()
-        waiting = {"drawing": not self.warm}
+        waiting: dict[str, Any] = {"drawing": not self.warm}
         if not told["sources"]:
             waiting |= self.sources.waiting()
             if waiting["kind"] == "empty" and self.desk is not None:
@@ -366,7 +366,8 @@ def _legend(shown: Scene) -> list[dict[str, Any]]:
     for layer in shown.layers:
         if layer.scale is not None:
             told.append({
-                "label": layer.layer.label, "field": layer.layer.field, "title": layer.scale.title, "low": layer.scale.low,
+                "label": layer.layer.label, "field": layer.layer.field, "title": layer.scale.title,
+                "low": layer.scale.low,
                 "high": layer.scale.high, "log": layer.scale.log, "colours": layer.scale.colours,
                 "unit": layer.scale.unit, "ticks": layer.scale.ticks(), "below": layer.scale.below,
                 "above": layer.scale.above,

@@ -61,7 +61,7 @@ def amount(text: str, fields: Mapping[str, np.ndarray], said: str) -> Any:
     """The value of an expression of numbers and fields, a number or one per object. said: what the user wrote, for
     HpcdemError."""
     try:
-        return _Evaluation(text, fields, lambda *_: np.False_)._amount(parsed(text), 0)
+        return _Evaluation(text, fields, lambda *_: np.zeros(0, bool))._amount(parsed(text), 0)
     except HpcdemError as error:
         raise HpcdemError(f"'{said[:60]}': {str(error).partition(': ')[2].replace('a filter', 'it')}") from None
 
