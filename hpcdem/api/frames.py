@@ -68,6 +68,7 @@ class Frame:
         import matplotlib
 
         from hpcdem.io.axes import CM
+        from hpcdem.post import saved
         from hpcdem.post.view import paper, scene
 
         view = scene.default_view(self._moment)
@@ -75,8 +76,9 @@ class Frame:
             view = scene.with_field(view, self._moment, field, object, **looks)
         page = paper.Paper(dpi=width / (paper.USUAL.page * CM))
         content = io.BytesIO()
-        with matplotlib.rc_context(paper.SAVED):
-            paper.figure_of(scene.scene(self._moment, view), page).savefig(content, format="png", dpi=page.dpi)
+        with matplotlib.rc_context(saved.SAVED):
+            figure = paper.figure_of(scene.scene(self._moment, view), page)
+            saved.save(figure, content, "png", page.dpi, f"a picture {width} pixels wide")
         return content.getvalue()
 
     def show(self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Any) -> Any:

@@ -18,6 +18,7 @@ from typing import Any, ClassVar
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 from pydantic.fields import FieldInfo
 
+from hpcdem.core import validation
 from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.core.nearest import hint
 
@@ -71,6 +72,15 @@ class Case(BaseModel):
             super().__init__(**given)
         except ValidationError as error:
             raise ScriptError(*_place(), explained(type(self), error)) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        try:
+            super().__setattr__(name, value)
+        except ValidationError:
+            kind = type(self).__name__
+            raise ScriptError(
+                *_place(), f"{kind} is frozen: {name} is given when it is made, {kind}({name}={value!r})"
+            ) from None
 
     # ---- text ------------------------------------------------------------------------------------------------------
 
@@ -160,14 +170,14 @@ def explained(kind: type[Case], error: ValidationError) -> str:
     """What is wrong with the parameters, the first of them."""
     first = error.errors()[0]
     if not first["loc"]:  # several that do not go together
-        return f"{kind.__name__}: {first['msg'].removeprefix('Value error, ')}"
+        return f"{kind.__name__}: {validation.said(first)}"
     name = str(first["loc"][0])
     known = kind.model_fields
     if name not in known:
         return f"{kind.__name__} has no parameter '{name}'{hint(name, known) or '.'} There are {', '.join(known)}"
     unit = unit_of(known[name])
     what = known[name].description if unit in ("", "1") else f"{known[name].description}, {unit}"
-    expected = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ").split(", unable")[0]
+    expected = validation.said(first) or validation.expected(first)
     return f"{kind.__name__}: {name} is {first['input']}, expected {expected} ({what})"
 
 

@@ -54,7 +54,7 @@ class Creep(Case):
             raise ValueError(f"size is {self.size:g}, expected at most half of width and height, {least:g} m")
         number = 4.0 * self.width * self.height / self.size**2
         if number > MOST:
-            raise ValueError(f"size is {self.size:g}: that are {number:.2g} elements, expected at most {MOST:.0e}")
+            raise ValueError(f"size is {self.size:g}, which makes {number:.2g} elements: expected at most {MOST:.0e}")
         return self
 
     def model(self) -> str:

@@ -45,7 +45,7 @@ class Rock(Case):
         else:
             number = area * thickness * 6.0 * math.sqrt(2.0) / self.size**3
         if number > MOST:
-            raise ValueError(f"size is {self.size:g}: that are {number:.2g} elements, expected at most {MOST:.0e}")
+            raise ValueError(f"size is {self.size:g}, which makes {number:.2g} elements: expected at most {MOST:.0e}")
 
 
 ELASTIC = """

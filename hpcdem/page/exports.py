@@ -16,6 +16,8 @@ import numpy as np
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.frames import FrameFile
+from hpcdem.page.limits import LONGEST_FILM
+from hpcdem.page.server import BusyError
 from hpcdem.post import movie
 from hpcdem.post.view.model import ModelView
 from hpcdem.post.view.moment import DISCS, FACES, POLYGONS, RODS, SOLIDS, Moment, read_moment
@@ -33,6 +35,8 @@ MOST_VECTORS = 20_000
 """Objects of a page with vectors; with more it holds a picture of pixels."""
 _drawing = threading.Lock()
 """Settings of matplotlib are those of the process."""
+_filming = threading.Lock()
+"""One film at a time; pictures are drawn between its own."""
 
 
 def kinds() -> list[str]:
@@ -165,8 +169,22 @@ addEventListener("dblclick", () => { s = 1; x = y = 0; put(); });
 def film(files: Sequence[FrameFile], view: ModelView, kind: str, wanted: dict[str, Any]) -> bytes:
     """All frames at one place and with one range of colours. Raises HpcdemError."""
     fps = wanted.get("fps", 10)
-    if not isinstance(fps, (int, float)) or isinstance(fps, bool) or not 0.1 <= fps <= 60.0:
-        raise HpcdemError("fps: expected a number from 0.1 to 60")
+    if not isinstance(fps, (int, float)) or not 0.1 <= fps <= 60.0:
+        raise HpcdemError(f"fps: expected a number from 0.1 to 60, read {fps}")
+    if len(files) > LONGEST_FILM:
+        raise HpcdemError(
+            f"{len(files)} frames: a film of the page has at most {LONGEST_FILM}; "
+            f"`hpcdem draw DIR -o film.{kind}` makes longer ones"
+        )
+    if not _filming.acquire(blocking=False):
+        raise BusyError("another film is being made; try again when it is done")
+    try:
+        return _filmed(files, view, kind, float(fps))
+    finally:
+        _filming.release()
+
+
+def _filmed(files: Sequence[FrameFile], view: ModelView, kind: str, fps: float) -> bytes:
     ranges = common_spans((read_moment(file.path) for file in files), view)
     view = view.changed(layers=[
         {**layer.model_dump(), "limits": ranges.get(layer.label, layer.limits)} for layer in view.layers
@@ -180,5 +198,5 @@ def film(files: Sequence[FrameFile], view: ModelView, kind: str, wanted: dict[st
             with _drawing:
                 pictures.append(draw(one.path, Path(folder) / f"{k:06d}.png", view, Paper(dpi=150.0)))
         path = Path(folder) / f"film.{kind}"
-        (movie.write_gif if kind == "gif" else movie.write_mp4)(pictures, path, float(fps))
+        (movie.write_gif if kind == "gif" else movie.write_mp4)(pictures, path, fps)
         return path.read_bytes()

@@ -14,3 +14,19 @@ LIMITS: dict[str, tuple[float, float]] = {
 """Least and largest value of each field with a slider or a number."""
 MOST_ROWS = 60
 """Most rows of the table."""
+KINDS: dict[str, tuple[type, ...]] = {
+    **dict.fromkeys(("source", "frame", "width", "height", "number", "column", "row", "since"), (int,)),
+    **dict.fromkeys(("object", "format", "label", "name", "what", "text", "line", "language", "stamp"), (str,)),
+    **dict.fromkeys(("fine", "dark"), (bool,)),
+    "fps": (float, int), "view": (dict,),
+}  # fmt: skip
+"""Kinds of what `hpcdem view` is asked with, by name: the same in all calls; null is as if it were left out."""
+MOST_PIXELS = 3840 * 2160
+"""Pixels of a picture of `hpcdem view`; the window shows fewer, made larger, where it has more."""
+LONGEST_SIDE = 4096
+"""Of them along a side."""
+PICTURES = 16
+"""Pictures, clicks and lists of fields that are asked for at a time: the rest of the CONVERSATIONS is for what needs no
+picture, such as to interrupt a run."""
+LONGEST_FILM = 1000
+"""Frames of a film that the page makes."""

@@ -4,14 +4,23 @@ The server listens on 127.0.0.1 only. Other people on the machine do not know th
 pages of other sites do not know it either, and a name of theirs that resolves to 127.0.0.1 (DNS rebinding) is refused
 by the header Host. What can be asked for are the entries of two tables made before the first request: texts, and
 functions of a JSON object. Nothing in a request becomes the name of a file.
+
+A connection stands at the door until its first line has shown the key: nothing else of it is read before, it has a
+deadline, and where many stand there the one that came first goes for each that comes. So nobody without the key can
+keep the page from those who have it.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
+import math
 import secrets
+import socket
 import socketserver
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -19,6 +28,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import urlsplit
 
+from hpcdem.core import validation
 from hpcdem.core.errors import HpcdemError, UsageError
 
 LOOPBACK = "127.0.0.1"
@@ -26,10 +36,20 @@ NAMES = frozenset((LOOPBACK, "localhost", "::1"))
 """Host names of an address that a browser on this machine, or at the other end of `ssh -L`, opens."""
 LARGEST_REQUEST = 1024 * 1024
 """Bytes of a request's body: a script of the editor, at most."""
+LARGEST_HEAD = 64 * 1024
+"""Bytes of its first line and headers; what is beyond is not read."""
+DEEPEST = 20
+"""Lists and objects within each other, in a body."""
 CONVERSATIONS = 32
-"""Requests at a time; a browser makes six."""
-PATIENCE = 20.0
-"""Seconds for which the server waits for the next byte of a request."""
+"""Requests with the key at a time; a browser makes six."""
+DOOR = 64
+"""Connections that have not shown the key yet."""
+HEAD_SECONDS = 10.0
+"""From the connection to the end of the headers."""
+BODY_SECONDS = 20.0
+"""From there to the end of the body."""
+SLOWEST = 50e3
+"""Bytes per second at which an answer must be taken, after the first seconds (as many as a body has)."""
 HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": (
@@ -62,17 +82,29 @@ def as_json(content: Any, status: int = HTTPStatus.OK) -> Answer:
 Call = Callable[[dict[str, Any]], Answer]
 
 
+class BusyError(HpcdemError):
+    """Too much is asked for at a time; a moment later it can be done."""
+
+    status = HTTPStatus.SERVICE_UNAVAILABLE
+
+
 class PageServer(ThreadingHTTPServer):
     """texts: what GET answers, by the last part of the address ("" is the page); calls: the same of POST, functions of
-    the JSON object in the body that may raise HpcdemError (with a `status` of HTTP if it is not 422). port 0: a free
-    one."""
+    the JSON object in the body that may raise HpcdemError (with a `status` of HTTP if it is not 422); kinds: of values
+    in it, by their names (see limits.KINDS). port 0: a free one."""
 
     daemon_threads = True
-    request_queue_size = CONVERSATIONS
+    request_queue_size = DOOR
 
-    def __init__(self, texts: Mapping[str, Answer], calls: Mapping[str, Call], port: int = 0) -> None:
-        self.texts, self.calls, self.key = texts, calls, secrets.token_urlsafe(18)
+    def __init__(
+        self, texts: Mapping[str, Answer], calls: Mapping[str, Call], port: int = 0,
+        kinds: Mapping[str, tuple[type, ...]] | None = None,
+    ) -> None:  # fmt: skip
+        self.texts, self.calls, self.key, self.kinds = texts, calls, secrets.token_urlsafe(18), kinds or {}
         self.tickets: set[str] = set()
+        self.door: dict[socket.socket, None] = {}
+        """Connections that have not shown the key, in the order in which they came."""
+        self.turn = threading.Lock()
         self.free = threading.BoundedSemaphore(CONVERSATIONS)
         try:
             super().__init__((LOOPBACK, port), Conversation)
@@ -99,18 +131,29 @@ class PageServer(ThreadingHTTPServer):
         return f"http://{LOOPBACK}:{self.server_port}/open/{ticket}"
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """In a thread, if one is free; else the connection is closed."""
-        if self.free.acquire(blocking=False):
-            super().process_request(request, client_address)
-        else:
-            self.shutdown_request(request)
+        """In a thread, at the door; who came first leaves where too many stand there."""
+        with self.turn:
+            self.door[request] = None
+            eldest = next(iter(self.door)) if len(self.door) > DOOR else None
+            if eldest is not None:
+                del self.door[eldest]
+        if eldest is not None:
+            with contextlib.suppress(OSError):
+                eldest.shutdown(socket.SHUT_RDWR)  # its thread reads the end, and closes it
+        super().process_request(request, client_address)
 
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """The thread of one connection."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self.free.release()
+    def admitted(self, request: socket.socket) -> bool:
+        """Let in who has shown the key; False if as many conversations as can be are under way. `free` is released at
+        the end."""
+        with self.turn:
+            self.door.pop(request, None)
+        return self.free.acquire(blocking=False)
+
+    def shutdown_request(self, request: Any) -> None:
+        """The end of a connection."""
+        with self.turn:
+            self.door.pop(request, None)
+        super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that went away, or was too slow, is no error; others are answered by Conversation."""
@@ -124,12 +167,75 @@ class _Refused(Exception):
         self.status, self.why = status, why
 
 
+class _Incoming(io.RawIOBase):
+    """What a client sends: so many bytes, until a deadline. What is beyond is not read; TimeoutError after it."""
+
+    def __init__(self, connection: socket.socket, seconds: float, count: int) -> None:
+        super().__init__()
+        self.connection = connection
+        self.allow(seconds, count)
+
+    def allow(self, seconds: float, count: int) -> None:
+        """So much from now on."""
+        self.until, self.left = time.monotonic() + seconds, count
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Bytes that are there; 0 at the end."""
+        rest = self.until - time.monotonic()
+        if rest <= 0.0:
+            raise TimeoutError
+        self.connection.settimeout(rest)
+        count = self.connection.recv_into(memoryview(buffer)[: self.left]) if self.left else 0
+        self.left -= count
+        return count
+
+
 class Conversation(BaseHTTPRequestHandler):
     """One request and its answer (HTTP/1.0: the connection ends with it)."""
 
     server: PageServer
-    timeout = PATIENCE
     server_version, sys_version = "hpcdem", ""
+    inside = False
+    raw_requestline: bytes
+
+    def setup(self) -> None:
+        """Read with a deadline for all of a request, where the usual file has one for each piece."""
+        super().setup()
+        self.rfile.close()
+        self.incoming = _Incoming(self.connection, HEAD_SECONDS, LARGEST_HEAD)
+        self.rfile = io.BufferedReader(self.incoming)
+
+    def handle(self) -> None:
+        """One request."""
+        try:
+            super().handle()
+        finally:
+            if self.inside:
+                self.server.free.release()
+
+    def parse_request(self) -> bool:
+        """Look for the key before anything else is read."""
+        words = self.raw_requestline.decode("latin-1").split()
+        path = words[1] if len(words) > 1 else ""
+        if not (self._knows(path) or path.removeprefix("/open/") in self.server.tickets):
+            why, status = "open the address that hpcdem printed: its key is missing here", HTTPStatus.FORBIDDEN
+        elif not self.server.admitted(self.request):
+            why, status = "too many requests at a time; try again in a moment", HTTPStatus.SERVICE_UNAVAILABLE
+        else:
+            self.inside = True
+            return super().parse_request()
+        self.command, self.requestline, self.request_version = "", "", "HTTP/1.0"
+        self._answer(as_json({"error": why}, status))
+        return False
+
+    def _knows(self, path: str) -> bool:
+        """Whether an address begins with the key."""
+        key = path.partition("?")[0].removeprefix("/").partition("/")[0]
+        return secrets.compare_digest(key.encode(), self.server.key.encode())
 
     def do_GET(self) -> None:
         """The page and what belongs to it."""
@@ -180,11 +286,10 @@ class Conversation(BaseHTTPRequestHandler):
             raise _Refused(HTTPStatus.FORBIDDEN, "this server answers to 127.0.0.1 and localhost only")
 
     def _permitted(self) -> str:
-        """Last part of the address, if who asks knows the key."""
-        key, _, name = self.path.partition("?")[0].removeprefix("/").partition("/")
-        if not secrets.compare_digest(key.encode(), self.server.key.encode()):
+        """Last part of the address, after the key."""
+        if not self._knows(self.path):
             raise _Refused(HTTPStatus.FORBIDDEN, "open the address that hpcdem printed: its key is missing here")
-        return name
+        return self.path.partition("?")[0].removeprefix("/").partition("/")[2]
 
     def _content(self) -> dict[str, Any]:
         """The JSON object of the body."""
@@ -195,12 +300,18 @@ class Conversation(BaseHTTPRequestHandler):
             raise _Refused(HTTPStatus.LENGTH_REQUIRED, "expected a Content-Length")
         if len(length) > 9 or int(length) > LARGEST_REQUEST:
             raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"more than {LARGEST_REQUEST} bytes")
+        self.incoming.allow(BODY_SECONDS, int(length))
         try:
-            content = json.loads(self.rfile.read(int(length)))
-        except (ValueError, RecursionError):
-            content = None
-        if not isinstance(content, dict):
-            raise _Refused(HTTPStatus.BAD_REQUEST, "expected a JSON object")
+            text = self.rfile.read(int(length))
+        except TimeoutError:
+            raise _Refused(HTTPStatus.REQUEST_TIMEOUT, f"the request did not come within {BODY_SECONDS:g} s") from None
+        content = _read(text)
+        for name, kinds in self.server.kinds.items():
+            value = content.get(name)
+            if value is not None and type(value) not in kinds:
+                expected = validation.kind_of(kinds[0]())
+                why = f"{name}: expected {expected}, read {validation.kind_of(value)}"
+                raise _Refused(HTTPStatus.BAD_REQUEST, why)
         return content
 
     def _answer(self, answer: Answer) -> None:
@@ -211,11 +322,61 @@ class Conversation(BaseHTTPRequestHandler):
             self.send_header("Location", answer.location)
         self.send_header("Content-Type", answer.kind)
         self.send_header("Content-Length", str(len(answer.body)))
+        self.connection.settimeout(BODY_SECONDS + len(answer.body) / SLOWEST)  # for all of it
         self.end_headers()
         self.wfile.write(answer.body)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Nothing: requests hold the key."""
+
+
+def _read(text: bytes) -> dict[str, Any]:
+    """The JSON object in a body, with numbers and texts that can be answered as JSON."""
+    try:
+        content = json.loads(text, parse_int=_whole, parse_float=_finite, parse_constant=_finite)
+        _look_through(content)
+    except (ValueError, RecursionError) as problem:
+        said = str(problem) if isinstance(problem, _UnfitError) else ""
+        raise _Refused(HTTPStatus.BAD_REQUEST, said or "expected a JSON object") from None
+    if not isinstance(content, dict):
+        raise _Refused(HTTPStatus.BAD_REQUEST, "expected a JSON object")
+    return content
+
+
+class _UnfitError(ValueError):
+    """A value that no request has."""
+
+
+def _whole(text: str) -> int:
+    if len(text.lstrip("-")) > 18:
+        raise _UnfitError(f"{text[:20]}...: expected whole numbers of at most 18 digits")
+    return int(text)
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise _UnfitError(f"{text[:20]}: expected finite numbers")
+    return value
+
+
+def _look_through(content: Any) -> None:
+    """Refuse what lies too deep, and halves of characters (surrogates), which no file can hold."""
+    level = [content]
+    for _ in range(DEEPEST):
+        texts = [value for value in level if isinstance(value, str)]
+        texts += [name for value in level if isinstance(value, dict) for name in value]
+        try:
+            "".join(texts).encode()
+        except UnicodeEncodeError:
+            raise _UnfitError("expected text of whole characters") from None
+        level = [
+            inner for value in level if isinstance(value, (dict, list))
+            for inner in (value.values() if isinstance(value, dict) else value)
+        ]  # fmt: skip
+        if not level:
+            return
+    raise _UnfitError(f"more than {DEEPEST} lists and objects within each other")
 
 
 def _name(host: str) -> str | None:

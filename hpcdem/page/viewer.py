@@ -25,8 +25,10 @@ from hpcdem.page import exports
 from hpcdem.page.curves import as_csv
 from hpcdem.page.desk import Desk
 from hpcdem.page.lifetime import live, static
+from hpcdem.page.limits import KINDS as KINDS_OF_VALUES
+from hpcdem.page.limits import LONGEST_SIDE, MOST_PIXELS, PICTURES
 from hpcdem.page.maker import packed
-from hpcdem.page.server import Answer, Call, PageServer, as_json
+from hpcdem.page.server import Answer, BusyError, Call, PageServer, as_json
 from hpcdem.page.sources import Sources
 from hpcdem.post.view.model import Layer, ModelView, read_view, view_of, written
 from hpcdem.post.view.moment import BALLS, RODS, SPOTS, Moment, read_moment, unit_of
@@ -58,8 +60,6 @@ KINDS = {
     "words.js": "text/javascript; charset=utf-8",
     "server.js": "text/javascript; charset=utf-8",
 }
-LARGEST = 4096
-"""Pixels along a side of a picture."""
 KEPT = 24
 """Layers that are kept put together."""
 BYTES = 20e6
@@ -79,7 +79,9 @@ def serve(
     viewer = Viewer(Sources(paths, empty=desk is not None), read_view(view) if view is not None else None, desk)
     page = static(KINDS)
     calls = viewer.calls() | ({} if desk is None else desk.calls())
-    server = PageServer(page | {"": page["viewer.html"], "desk": as_json({"run": desk is not None})}, calls, port)
+    server = PageServer(
+        page | {"": page["viewer.html"], "desk": as_json({"run": desk is not None})}, calls, port, KINDS_OF_VALUES
+    )
     threading.Thread(target=viewer.warm_up, daemon=True).start()
     try:
         live(server, browser, say)
@@ -96,6 +98,7 @@ class Viewer:
         self.warm = False
         self.layers: OrderedDict[tuple, Painted] = OrderedDict()
         self.turn = threading.Lock()
+        self.places = threading.BoundedSemaphore(PICTURES)
         self.last: tuple[str, Any, Scene] | None = None
         """What was asked for last, its picture and scene: a click is looked up there."""
 
@@ -105,14 +108,27 @@ class Viewer:
             "state": lambda wanted: as_json(self.state()),
             "about": self._in_turn(self.about),
             "fields": self._in_turn(self.fields),
-            "picture": self.picture,
+            "picture": self._one_of_few(self.picture),
             "pick": self._in_turn(self.pick),
             "curves": self.curves,
             "presets": lambda wanted: as_json({"presets": self.sources.curves().presets()}),
             "tell": lambda wanted: as_json({"said": self.sources.tell(wanted.get("what"))}),
             "view": lambda wanted: as_json(self._view(wanted).model_dump()),
-            "file": self.file,
+            "file": self._one_of_few(self.file),
         }
+
+    def _one_of_few(self, answer: Call) -> Call:
+        """With places left for what needs no picture. BusyError where too many wait."""
+
+        def call(wanted: dict[str, Any]) -> Answer:
+            if not self.places.acquire(blocking=False):
+                raise BusyError(f"{PICTURES} pictures are being made; try again in a moment")
+            try:
+                return answer(wanted)
+            finally:
+                self.places.release()
+
+        return call
 
     def _in_turn(self, answer: Callable[[dict[str, Any]], dict[str, Any]]) -> Call:
         """One after the other: what is kept of a frame is for one at a time."""
@@ -121,7 +137,7 @@ class Viewer:
             with self.turn:
                 return as_json(answer(wanted))
 
-        return call
+        return self._one_of_few(call)
 
     def warm_up(self) -> None:
         """Have the kernels compiled, or loaded, before the first picture is asked for."""
@@ -148,6 +164,7 @@ class Viewer:
             "lengths": AXES, "order": list(OBJECTS), "displaced": moment.displacement is not None,
             "colours": {name: _stops(name) for name in COLOURS}, "box": _box(moment), "eyes": EYES,
             "files": exports.kinds(), "chinese": _in_chinese(moment),
+            "most": {"pixels": MOST_PIXELS, "side": LONGEST_SIDE},
         }  # fmt: skip
 
     def state(self) -> dict[str, Any]:
@@ -259,9 +276,9 @@ class Viewer:
         if kind == "mv":
             return Answer(written(view).encode(), "application/json")
         if kind not in exports.FORMATS:
-            raise HpcdemError(f"format: expected one of {', '.join((*exports.FORMATS, 'mv'))}")
+            raise HpcdemError(f"format: expected one of {', '.join((*exports.FORMATS, 'mv'))}, read {kind}")
         if kind in exports.FILMS:
-            source = self.sources.source(wanted.get("source"))
+            source = self.sources.source(wanted.get("source", 0))
             return Answer(exports.film(source.frames, view, kind, wanted), exports.FORMATS[kind])
         moment = read_moment(self.sources.frame(wanted.get("source", 0), wanted.get("frame", -1)).path)
         return Answer(exports.file(moment, view, kind, wanted), exports.FORMATS[kind])
@@ -289,8 +306,12 @@ class Viewer:
         key, moment = self._moment(wanted)
         view = self._view(wanted)
         width, height = (wanted.get(name) for name in ("width", "height"))
-        if not all(isinstance(v, int) and not isinstance(v, bool) and 1 <= v <= LARGEST for v in (width, height)):
-            raise UsageError(f"width and height: expected whole numbers from 1 to {LARGEST}")
+        if not all(isinstance(v, int) and 1 <= v <= LONGEST_SIDE for v in (width, height)):
+            raise UsageError(
+                f"width and height: expected whole numbers from 1 to {LONGEST_SIDE}, read {width}, {height}"
+            )
+        if width * height > MOST_PIXELS:  # type: ignore[operator]
+            raise UsageError(f"width and height: {width} x {height} pixels; a picture has at most {MOST_PIXELS:.3g}")
         fine, dark = bool(wanted.get("fine")), bool(wanted.get("dark"))
         asked = json.dumps([key, view.model_dump(), width, height, fine, dark])
         if self.last is not None and self.last[0] == asked:

@@ -20,6 +20,7 @@ from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.post import bolts, fluid, liners
+from hpcdem.post.saved import SAVED, save
 
 CRACKS, STRESS, PLASTIC, TEMPERATURE = "cracks", "stress", "plastic", "temperature"
 PANELS = (CRACKS, STRESS, PLASTIC, TEMPERATURE, *fluid.PICTURES)
@@ -176,15 +177,11 @@ def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: 
     except ImportError:
         raise HpcdemError(f"cannot draw {path}: matplotlib is not installed") from None
     kind = path.suffix.lower().removeprefix(".")
-    options: dict[str, Any] = {}
-    if kind in ("jpg", "jpeg"):
-        options["pil_kwargs"] = {"quality": 92, "subsampling": 0}
-    elif kind in ("pdf", "svg"):
-        options["metadata"] = {"CreationDate": None} if kind == "pdf" else {"Date": None}
-    with matplotlib.rc_context({"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}):
+    kind = "jpg" if kind == "jpeg" else kind
+    with matplotlib.rc_context(SAVED):
         figure = draw(state, looks, seen)
         with atomic_path(path) as temporary:
-            figure.savefig(temporary, format=kind, dpi=looks.dpi, **options)
+            save(figure, temporary, kind, looks.dpi, path)
     return path
 
 

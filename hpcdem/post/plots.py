@@ -17,7 +17,7 @@ from hpcdem.io.axes import CM, Ticks, View, particle_extent, view
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import read_frame
 from hpcdem.post.layers import USUAL, Look, coloured
-from hpcdem.post.saved import FORMATS, SAVED, saving
+from hpcdem.post.saved import FORMATS, save
 
 PAGE_WIDTH = 17.0
 """Width of a figure [cm]: that of a printed page."""
@@ -183,17 +183,14 @@ def plot_frame(
     if path.suffix.lower() not in FORMATS:
         raise HpcdemError(f"cannot draw {path}: pictures end in {', '.join(FORMATS)}")
     try:
-        import matplotlib
+        import matplotlib  # noqa: F401
     except ImportError:
         raise HpcdemError(f"cannot draw {path}: matplotlib is not installed") from None
     figure = frame_figure(frame, what, style, seen)
     kind = path.suffix.lower().removeprefix(".")
     kind = {"jpeg": "jpg", "tif": "tiff"}.get(kind, kind)
-    if kind in ("jpg", "png", "tiff") and max(figure.get_size_inches()) * dpi >= 2**16:  # the most a JPEG can have
-        raise HpcdemError(f"cannot draw {path}: more than 65535 pixels along a side; take a smaller page or dpi")
-    with matplotlib.rc_context(SAVED):
-        with atomic_path(path) as temporary:
-            figure.savefig(temporary, format=kind, dpi=dpi, **saving(kind))
+    with atomic_path(path) as temporary:
+        save(figure, temporary, kind, dpi, path)
     return path
 
 

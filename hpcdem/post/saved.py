@@ -2,14 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import IO, Any
+
+from hpcdem.core.errors import HpcdemError
 
 FORMATS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".svg")
 SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}
 """Settings of matplotlib while a file is written: texts stay texts, and an SVG's ids are the same every time."""
 
+LONGEST_SIDE = 65535
+"""Pixels of a picture along a side: the most a JPEG can have."""
+MOST_PIXELS = 250e6
+"""Of them in all: a gigabyte while it is drawn; a sheet A0 at 300 dots per inch has 140 million."""
 
-def saving(kind: str) -> dict[str, Any]:
+
+def save(figure: Any, target: str | IO[bytes], kind: str, dpi: float, picture: object = "the picture") -> None:
+    """Write a figure of matplotlib as jpg, png, tiff, pdf, svg or eps. picture: what a message calls it. HpcdemError
+    for more pixels than can be."""
+    import matplotlib
+
+    width, height = (float(side) * dpi for side in figure.get_size_inches())
+    if kind in ("jpg", "png", "tiff") and (max(width, height) > LONGEST_SIDE or width * height > MOST_PIXELS):
+        raise HpcdemError(
+            f"cannot draw {picture}: {width:.0f} x {height:.0f} pixels, at most {LONGEST_SIDE} along a side and "
+            f"{MOST_PIXELS / 1e6:.0f} million in all; take a smaller page or fewer dots per inch"
+        )
+    with matplotlib.rc_context(SAVED):
+        figure.savefig(target, format=kind, dpi=dpi, **_saving(kind))
+
+
+def _saving(kind: str) -> dict[str, Any]:
     """Options of `savefig` for jpg, png, tiff, pdf, svg or eps: the same figure gives the same file."""
     if kind == "jpg":
         return {"pil_kwargs": {"quality": 92, "subsampling": 0}}  # thin coloured layers need their full colour

@@ -32,15 +32,14 @@ def test_a_file_holds_all_of_a_view(tmp_path: Path):
     ("text", "message"),
     [
         ("", "is no view"), ("[]", 'expected "view": 1'), ("{}", 'expected "view": 1'), ('{"view": 2}', 'expected "v'),
-        ("[" * 100_000, "is no view"), ('{"view": 1, "camra": null}', "camra: Extra inputs"),
-        ('{"view": 1, "layers": [{"object": "elephants"}]}', "layers.0.object"),
-        ('{"view": 1, "layers": [{"object": "joints", "opacity": 2}]}', r"layers.0.opacity: .*read '2'"),
-        ('{"view": 1, "layers": [{"object": "joints", "limits": [1, 1]}]}', "1 is not below 1"),
-        ('{"view": 1, "layers": [{"object": "joints", "limits": [0, 1], "log": true}]}', "with log both are above 0"),
-        ('{"view": 1, "layers": [{"object": "joints", "colour": "red"}]}', "layers.0.colour"),
-        ('{"view": 1, "layers": [{"object": "joints", "size": Infinity}]}', "layers.0.size"),
+        ("[" * 100_000, "is no view"), ('{"view": 1, "camra": null}', "camra is no word of a view; did you mean"),
+        ('{"view": 1, "layers": {"a": 1}}', "layers: expected a list, read names and values"),
+        ('{"view": 1, "layers": [[]]}', "layer 1: expected names and values, read a list"),
+        ('{"view": 1, "layers": [{"object": "joints"}, {"opacity": 1}]}', "layer 2, object: expected a value"),
         ('{"view": 1, "layers": [{"object": "joints"}, {"object": "joints"}]}', "two are called 'joints'"),
-        ('{"view": 1, "camera": [1, 0, 0, 1]}', "left below right"), ('{"view": 1, "step": -1}', "step: "),
+        ('{"view": 1, "axes": "perhaps"}', "axes: expected true or false, read 'perhaps'"),
+        ('{"view": 1, "step": 1.5}', r"step: expected a whole number, read 1\.5"),
+        ('{"view": 1, "camera": [1, 0, 0, 1]}', "left below right"), ('{"view": 1, "step": -1}', "step: expected"),
     ],
 )  # fmt: skip
 def test_what_is_no_view_is_refused_with_its_file(tmp_path: Path, text: str, message: str):
@@ -49,6 +48,28 @@ def test_what_is_no_view_is_refused_with_its_file(tmp_path: Path, text: str, mes
     with pytest.raises(HpcdemError, match=message) as caught:
         read_view(path)
     assert str(caught.value).startswith(str(path))
+    assert not any(word in str(caught.value) for word in ("Input should", "valid", "layers.0", "inputs"))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ('"object": "elephants"', r"layer 1 \(elephants\), object: expected elements, .* or node-cond.*'elephants'"),
+        ('"opacity": 2', r"layer 1 \(joints\), opacity: expected at most 1, read 2"),
+        ('"name": "a", "opacity": "2 x"', r"layer 1 \(a\), opacity: expected a number, read '2 x'"),
+        ('"opcity": 1', "opcity is no word of a layer; did you mean 'opacity'"),
+        ('"limits": [0, "x"]', "limits, value 2: expected a number, read 'x'"),
+        ('"limits": [0]', "limits, value 2: expected a value"), ('"limits": [0, 1, 2]', "limits: 3, at most 2"),
+        ('"limits": [1, 1]', "limits: 1 is not below 1"),
+        ('"limits": [0, 1], "log": true', "with log both are above 0"),
+        ('"colour": "red"', "colour: expected a colour such as #d0562a, read 'red'"),
+        ('"size": Infinity', "size: expected a finite number, read inf"),
+        ('"name": "' + 70 * "a" + '"', "name: expected at most 60 characters, read 'aaa"),
+    ],
+)  # fmt: skip
+def test_what_is_no_layer_is_refused_with_its_place(tmp_path: Path, given: str, message: str):
+    text = f'{{"view": 1, "layers": [{{"object": "joints", {given}}}]}}'  # of two objects the second is read
+    test_what_is_no_view_is_refused_with_its_file(tmp_path, text, message)
 
 
 def test_files_that_cannot_be_read(tmp_path: Path):

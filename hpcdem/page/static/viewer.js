@@ -66,8 +66,10 @@ class Window {
   }
 
   get size() {
-    const k = Math.min(window.devicePixelRatio || 1, 2);
-    return [Math.max(1, Math.round(this.root.clientWidth * k)), Math.max(1, Math.round(this.root.clientHeight * k))];
+    const w = Math.max(1, this.root.clientWidth), h = Math.max(1, this.root.clientHeight);
+    const most = Math.min(Math.sqrt(about.most.pixels / (w * h)), about.most.side / Math.max(w, h));
+    const k = Math.min(window.devicePixelRatio || 1, 2, most);
+    return [Math.max(1, Math.floor(w * k)), Math.max(1, Math.floor(h * k))];
   }
 
   /** Left, right, bottom, top of what a window of this size shows. */

@@ -19,6 +19,7 @@ from hpcdem.post.measure.kinds import WEDGE_HEAD, Done, cracking, layer_series, 
 from hpcdem.post.measure.kinds import drawn as last_drawn
 from hpcdem.post.measure.scene import Plan, Stamp
 from hpcdem.post.measure.walls import Curve
+from hpcdem.post.saved import save as save_figure
 
 LEFT, RIGHT, TOP, BOTTOM, GAP = 1.75, 0.45, 0.55, 1.1, 0.45
 """Margins of a page and space between panels with a common x axis [cm]."""
@@ -53,17 +54,9 @@ def page(heights: Sequence[float], gaps: Sequence[float] | None = None, right: f
 
 def save(figure: Any, path: Path, dpi: float = 300.0) -> Path:
     """Write a figure, the same bytes every time; the kind by the suffix."""
-    import matplotlib
-
     kind = path.suffix.lower().removeprefix(".")
-    options: dict[str, Any] = {}
-    if kind in ("jpg", "jpeg"):
-        options["pil_kwargs"] = {"quality": 92, "subsampling": 0}
-    elif kind in ("pdf", "svg"):
-        options["metadata"] = {"CreationDate": None} if kind == "pdf" else {"Date": None}
-    with matplotlib.rc_context({"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}):
-        with atomic_path(path) as temporary:
-            figure.savefig(temporary, format=kind, dpi=dpi, **options)
+    with atomic_path(path) as temporary:
+        save_figure(figure, temporary, "jpg" if kind == "jpeg" else kind, dpi, path)
     return path
 
 

@@ -20,7 +20,7 @@ from hpcdem.io.axes import View
 from hpcdem.io.disk import explain
 from hpcdem.io.frames import FORMATS, earlier_stems, left_out
 from hpcdem.post.cpt import INVAR, INVAR2, VOLUME, ColourTable, read_cpt, stress_table
-from hpcdem.post.saved import SAVED, saving
+from hpcdem.post.saved import save as save_figure
 from hpcdem.post.section import read_section
 from hpcdem.post.sections import panels, survey
 from hpcdem.post.sections.files import write_grids, write_tables
@@ -189,13 +189,11 @@ def colour_tables(request: Request) -> dict[str, ColourTable]:
 
 def save(figure: Any, ss: Path, name: str, formats: Sequence[str]) -> None:
     """Write a figure: bitmaps into ss, vectors into ss/ps. Serial, the same figure gives the same bytes."""
-    import matplotlib
-
     for kind in formats:
         path = (ss if kind in BITMAPS else ss / "ps") / f"{name}.{kind}"
         written = "eps" if kind == "ps" else kind
-        with matplotlib.rc_context(SAVED), atomic_path(path) as temporary:
-            figure.savefig(temporary, format=written, dpi=DPI, **saving(written))
+        with atomic_path(path) as temporary:
+            save_figure(figure, temporary, written, DPI, path)
             if kind == "ps":
                 _without_date(temporary)
 

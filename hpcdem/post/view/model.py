@@ -13,12 +13,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
+from hpcdem.core import validation
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.looks import COLOURS, OBJECTS, eye_of, section_of
+from hpcdem.core.nearest import hint
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.disk import explain
+from hpcdem.post.view.filter import LONGEST
 
 VERSION = 1
+MOST_LAYERS = 60
+"""Pictures tell layers apart by a byte, and people by far fewer."""
 _Colour = Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")]
 _Span = tuple[FiniteFloat, FiniteFloat]
 
@@ -49,7 +54,7 @@ class Layer(_Table):
     size: Annotated[FiniteFloat, Field(gt=0.0, le=100.0)] = 1.0
     vectors: Annotated[str, Field(max_length=60)] = ""
     arrows: Annotated[FiniteFloat, Field(gt=0.0, le=100.0)] = 1.0
-    filter: str = ""
+    filter: Annotated[str, Field(max_length=LONGEST)] = ""
 
     @property
     def label(self) -> str:
@@ -76,7 +81,7 @@ class ModelView(_Table):
     a plane that cuts it, as `hpcdem.core.looks` reads them; deformed: factor on displacements, 1 as it is, 0 as it was
     in the mesh; title: over the picture, with {step} and {time}; step: of the frame, else the last one."""
 
-    layers: tuple[Layer, ...] = ()
+    layers: Annotated[tuple[Layer, ...], Field(max_length=MOST_LAYERS)] = ()
     camera: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
     eye: Annotated[str, Field(max_length=100)] = "iso"
     section: Annotated[str, Field(max_length=200)] = ""
@@ -123,11 +128,37 @@ def view_of(given: Mapping[str, Any], source: str) -> ModelView:
     try:
         return ModelView.model_validate(dict(given))
     except ValidationError as problem:
-        first = problem.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        read = "" if isinstance(first["input"], (dict, list)) else f" (read {str(first['input'])[:40]!r})"
-        said = first["msg"].removeprefix("Value error, ")
-        raise HpcdemError(f"{source}: {f'{place}: ' if place else ''}{said}{read}") from None
+        raise HpcdemError(f"{source}: {_wrong(problem.errors()[0], given)}") from None
+
+
+def _wrong(error: Mapping[str, Any], given: Mapping[str, Any]) -> str:
+    """What is wrong with a view, and where: "layer 2 (joints), opacity: expected at most 1, read 2"."""
+    place: list[str] = []
+    loc = list(error["loc"])
+    known = ModelView.model_fields
+    if loc[:1] == ["layers"] and len(loc) > 1:
+        number, loc, known = int(loc[1]), loc[2:], Layer.model_fields
+        layer = given["layers"][number]
+        called = (layer.get("name") or layer.get("object")) if isinstance(layer, Mapping) else None
+        place.append(f"layer {number + 1}{f' ({called})' if isinstance(called, str) else ''}"[:80])
+    if loc:
+        place.append(str(loc[0])[:40])
+    if len(loc) > 1:
+        place.append(f"value {int(loc[1]) + 1}")
+    where = f"{', '.join(place)}: " if place else ""
+    if rule := validation.said(error):
+        return f"{where}{rule}"
+    if error["type"] == "extra_forbidden":
+        table = "layer" if known is Layer.model_fields else "view"
+        return f"{where.removesuffix(': ')} is no word of a {table}{hint(str(loc[0]), known)}"
+    if error["type"] == "too_long":
+        return f"{where}{len(error['input'])}, {validation.expected(error)}"
+    read = (
+        validation.kind_of(error["input"]) if isinstance(error["input"], (dict, list, tuple)) else repr(error["input"])
+    )
+    return f"{where}expected {validation.expected(error)}" + (
+        "" if error["type"] == "missing" else f", read {read[:40]}"
+    )
 
 
 def read_view(path: str | os.PathLike) -> ModelView:

@@ -3,6 +3,7 @@ space are painted by screen.py, also for PDF and SVG, and set into the figure.""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from hpcdem.core.looks import COLOURS
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, View, number
 from hpcdem.post import blocks
-from hpcdem.post.saved import FORMATS, SAVED, saving
+from hpcdem.post.saved import FORMATS, SAVED, save
 from hpcdem.post.view import space
 from hpcdem.post.view.model import ModelView
 from hpcdem.post.view.moment import DISCS, POLYGONS, Moment, read_moment
@@ -31,6 +32,8 @@ EDGES = 0.5
 """Width of their edges [points]."""
 LARGEST = 8192
 """Pixels of them along a side at most."""
+MOST = 2**24
+"""Pixels of them in all: a gigabyte while they are painted."""
 _LEFT, _RIGHT, _BOTTOM, _TOP, _BAR = 1.35, 0.35, 1.05, 0.75, 1.9  # cm around the model, and for each bar of colours
 _CORNER = 2.0
 """Side of the square with the axes of space [cm]."""
@@ -70,10 +73,8 @@ def draw(
     moment = source if isinstance(source, Moment) else read_moment(source)
     with matplotlib.rc_context(SAVED):
         figure = figure_of(scene(moment, view, seen, only), paper)
-        if kind in ("jpg", "png", "tiff") and max(figure.get_size_inches()) * paper.dpi >= 2**16:
-            raise HpcdemError(f"cannot draw {picture}: more than 65535 pixels along a side; take a smaller page or dpi")
         with atomic_path(picture) as temporary:
-            figure.savefig(temporary, format=kind, dpi=paper.dpi, **saving(kind))
+            save(figure, temporary, kind, paper.dpi, picture)
     return picture
 
 
@@ -137,7 +138,7 @@ def _body(axes: Any, shown: Scene, pixels: float, dpi: float) -> None:
     from hpcdem.post.view.screen import paint
 
     seen = shown.seen
-    columns = max(1, min(round(pixels), LARGEST))
+    columns = max(1, min(round(pixels), LARGEST, math.isqrt(int(MOST * seen.width / seen.height))))
     rows = max(1, min(round(columns * seen.height / seen.width), LARGEST))
     picture = paint(shown, columns, rows, FINE, pen=EDGES * columns / pixels * dpi / 72.0)
     axes.imshow(picture.colours, extent=(seen.left, seen.right, seen.bottom, seen.top), interpolation="antialiased",
