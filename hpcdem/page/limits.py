@@ -17,8 +17,9 @@ MOST_ROWS = 60
 KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("source", "frame", "width", "height", "number", "column", "row", "since"), (int,)),
     **dict.fromkeys(("object", "format", "label", "name", "what", "text", "line", "language", "stamp"), (str,)),
+    **dict.fromkeys(("x", "chart", "to"), (str,)),
     **dict.fromkeys(("fine", "dark"), (bool,)),
-    "fps": (float, int), "view": (dict,),
+    "fps": (float, int), "view": (dict,), "y": (list,),
 }  # fmt: skip
 """Kinds of what `hpcdem view` is asked with, by name: the same in all calls; null is as if it were left out."""
 MOST_PIXELS = 3840 * 2160

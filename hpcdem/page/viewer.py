@@ -180,7 +180,7 @@ class Viewer:
     def curves(self, wanted: dict[str, Any]) -> Answer:
         """Histories over each other, or a chart of the script; as CSV all of their points."""
         curves, whole = self.sources.curves(), wanted.get("format") == "csv"
-        if "chart" in wanted:
+        if wanted.get("chart") is not None:
             told = curves.chart(wanted["chart"], whole)
         else:
             told = curves.drawn(wanted.get("x"), wanted.get("y"), whole)

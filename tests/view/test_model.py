@@ -60,6 +60,7 @@ def test_what_is_no_view_is_refused_with_its_file(tmp_path: Path, text: str, mes
         ('"opcity": 1', "opcity is no word of a layer; did you mean 'opacity'"),
         ('"limits": [0, "x"]', "limits, value 2: expected a number, read 'x'"),
         ('"limits": [0]', "limits, value 2: expected a value"), ('"limits": [0, 1, 2]', "limits: 3, at most 2"),
+        ('"limits": 2', "limits: expected two numbers or full, read 2"),
         ('"limits": [1, 1]', "limits: 1 is not below 1"),
         ('"limits": [0, 1], "log": true', "with log both are above 0"),
         ('"colour": "red"', "colour: expected a colour such as #d0562a, read 'red'"),

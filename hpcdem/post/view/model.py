@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -128,37 +128,45 @@ def view_of(given: Mapping[str, Any], source: str) -> ModelView:
     try:
         return ModelView.model_validate(dict(given))
     except ValidationError as problem:
-        raise HpcdemError(f"{source}: {_wrong(problem.errors()[0], given)}") from None
+        raise HpcdemError(f"{source}: {_wrong(problem.errors(), given)}") from None
 
 
-def _wrong(error: Mapping[str, Any], given: Mapping[str, Any]) -> str:
+_FORMS = {"limits": "two numbers", "camera": "left, right, bottom, top"}
+"""What lists of numbers are."""
+
+
+def _wrong(errors: Sequence[Mapping[str, Any]], given: Mapping[str, Any]) -> str:
     """What is wrong with a view, and where: "layer 2 (joints), opacity: expected at most 1, read 2"."""
+    first = errors[0]
+    loc, known = _place(first), ModelView.model_fields
     place: list[str] = []
-    loc = list(error["loc"])
-    known = ModelView.model_fields
     if loc[:1] == ["layers"] and len(loc) > 1:
         number, loc, known = int(loc[1]), loc[2:], Layer.model_fields
         layer = given["layers"][number]
         called = (layer.get("name") or layer.get("object")) if isinstance(layer, Mapping) else None
-        place.append(f"layer {number + 1}{f' ({called})' if isinstance(called, str) else ''}"[:80])
-    if loc:
-        place.append(str(loc[0])[:40])
+        place.append(f"layer {number + 1}{f' ({called[:60]})' if isinstance(called, str) else ''}")
+    word = str(loc[0])[:40] if loc else ""
+    place += [word] if word else []
     if len(loc) > 1:
         place.append(f"value {int(loc[1]) + 1}")
     where = f"{', '.join(place)}: " if place else ""
-    if rule := validation.said(error):
+    if rule := validation.said(first):
         return f"{where}{rule}"
-    if error["type"] == "extra_forbidden":
+    if first["type"] == "extra_forbidden":
         table = "layer" if known is Layer.model_fields else "view"
-        return f"{where.removesuffix(': ')} is no word of a {table}{hint(str(loc[0]), known)}"
-    if error["type"] == "too_long":
-        return f"{where}{len(error['input'])}, {validation.expected(error)}"
-    read = (
-        validation.kind_of(error["input"]) if isinstance(error["input"], (dict, list, tuple)) else repr(error["input"])
-    )
-    return f"{where}expected {validation.expected(error)}" + (
-        "" if error["type"] == "missing" else f", read {read[:40]}"
-    )
+        return f"{where.removesuffix(': ')} is no word of a {table}{hint(word, known)}"
+    read = first["input"]
+    if first["type"] == "too_long":
+        return f"{where}{len(read)}, {validation.expected(first)}"
+    any_of = [error for error in errors if _place(error) == _place(first)]
+    forms = [_FORMS.get(word, "a list") if e["type"] == "tuple_type" else validation.expected(e) for e in any_of]
+    told = validation.kind_of(read) if isinstance(read, (dict, list, tuple)) else repr(read)[:40]
+    return f"{where}expected {' or '.join(forms)}" + ("" if first["type"] == "missing" else f", read {told}")
+
+
+def _place(error: Mapping[str, Any]) -> list[str | int]:
+    """Where an error is: without the names of kinds that a value may be of."""
+    return [part for part in error["loc"] if isinstance(part, int) or not set(part) & set("[(")]
 
 
 def read_view(path: str | os.PathLike) -> ModelView:
