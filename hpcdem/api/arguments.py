@@ -166,7 +166,7 @@ def _one(kind: Kind, value: Any, name: str) -> Any:
     try:
         return kind.check(value)
     except (TypeError, ValueError, OverflowError):
-        meaning = "True or False" if kind.pattern == "on|off" else kind.meaning
+        meaning = "True or False" if kind.pattern.strip("[]") == "on|off" else kind.meaning
         raise ValueError(f"{name}: expected {meaning.rstrip(',')}, got {_shown(value)}") from None
 
 

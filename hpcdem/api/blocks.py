@@ -474,6 +474,10 @@ class _Modelled(Objects):
         """Change properties of the model; the others stay."""
         self._carry_out("property", properties, where)
 
+    def tell(self, *, where: Where = None) -> None:
+        """Say in the log how many there are, by model and group."""
+        self._carry_out("list summary", {}, where)
+
 
 @commands
 class Elements(_Modelled):
@@ -573,9 +577,10 @@ class Faces(_Modelled):
         """Vertical sides beyond which the ground goes on, in dynamic runs: columns beside them move with the base."""
         self._carry_out("boundary", {}, where, "free-field")
 
-    def remove_boundary(self, *, where: Where = None) -> None:
-        """Take boundary conditions back."""
-        self._carry_out("boundary remove", {}, where)
+    def remove_boundary(self, *conditions: str, where: Where = None) -> None:
+        """Take boundary conditions back. conditions: only
+        these, as pcdc element-face boundary calls them."""
+        self._carry_out("boundary remove", dict.fromkeys(conditions, True), where)
 
 
 @commands
@@ -640,11 +645,11 @@ class Nodes(Objects):
         self,
         *,
         pressure: Number | None = None,
-        flow_surface: Number | None = None,
+        flow_surface: Number | Point | None = None,
         flow_rate: Number | None = None,
         where: Where = None,
     ) -> None:
-        """One of them at flow nodes: pressure [Pa], level of a free surface [m], rate that comes in at each [m2/s].
+        """One of them at flow nodes: pressure [Pa], level [m] or point of a free surface, rate that comes in at each [m2/s].
         With `where`, pressure and level wet the free faces whose nodes all are in it."""
         given = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
         self._carry_out("boundary", given, where, "hydraulic-constant-flow-boundary")
@@ -672,13 +677,23 @@ class Nodes(Objects):
         """The same of the fluid at flow nodes, and of what is injected there."""
         self._carry_out("boundary", {"temperature": temperature}, where, "thermal-flow-boundary-condition")
 
-    def remove_boundary(self, *, where: Where = None) -> None:
-        """Take boundary conditions back, those of fluid and heat too."""
-        self._carry_out("boundary remove", {}, where)
+    def remove_boundary(self, *conditions: str, where: Where = None) -> None:
+        """Take boundary conditions back, those of fluid and heat too. conditions: only
+        these, as pcdc node boundary calls them."""
+        self._carry_out("boundary remove", dict.fromkeys(conditions, True), where)
 
-    def initial_velocity(self, velocity: Point, *, where: Where = None) -> None:
-        """The velocity of nodes now [m/s]."""
-        self._carry_out("initial", {"velocity": velocity}, where)
+    def initial_velocity(
+        self,
+        velocity: Point | None = None,
+        *,
+        vx: float | None = None,
+        vy: float | None = None,
+        vz: float | None = None,
+        where: Where = None,
+    ) -> None:
+        """The velocity of nodes now [m/s], or some components of it."""
+        given = {"velocity": velocity, "velocity_x": vx, "velocity_y": vy, "velocity_z": vz}
+        self._carry_out("initial", given, where)
 
     def initial_temperature(self, temperature: float, *, where: Where = None) -> None:
         """The temperature of nodes now, and of the fluid at them; elements around them are free of thermal stress
@@ -765,9 +780,9 @@ class BoltNodes(Objects):
         given = {"force_x": fx, "force_y": fy, "force_z": fz}
         self._carry_out("boundary", given, where, "bolt-node-force-boundary-condition")
 
-    def remove_boundary(self, *, where: Where = None) -> None:
-        """Take back what was prescribed."""
-        self._carry_out("boundary remove", {}, where)
+    def remove_boundary(self, *conditions: str, where: Where = None) -> None:
+        """Take back what was prescribed. conditions: only these, as pcdc bolt-node boundary calls them."""
+        self._carry_out("boundary remove", dict.fromkeys(conditions, True), where)
 
 
 @commands
@@ -792,6 +807,10 @@ class FlowNodes(Objects):
         proppant in it [1]. where: of nodes."""
         given = {"pressure": pressure, "saturation": saturation, "concentration": concentration}
         self._do("flow-node initial", given, chosen_by(where, g.NODE), g.NODE)
+
+    def initial_temperature(self, temperature: float, *, where: Where = None) -> None:
+        """The temperature of the fluid at them now. where: of nodes."""
+        self._do("node hydraulic-initialize", {"flow_node_temperature": temperature}, chosen_by(where, g.NODE), g.NODE)
 
 
 @commands
@@ -902,9 +921,15 @@ class Tables(Words):
 
     _word = "tables"
 
-    def create(self, name: str, values: Sequence[Point]) -> None:
-        """(time [s], coordinate [m] or plastic strain, value), the first ascending."""
-        self._do("table create", {"name": name, "values": values})
+    def create(self, name: str, values: Sequence[Point], *, relative: bool | None = None) -> None:
+        """(time [s], coordinate [m] or plastic strain, value), the first ascending. relative: times count from the
+        moment at which a condition takes the table."""
+        if relative is None:
+            self._do("table create", {"name": name, "values": values})
+            return
+        word = "relative-time" if relative else "absolute-time"
+        numbers = [number for pair in values for number in pair]
+        self._do("table", {"name": name, "data": numbers, "type": {"value": True, word: True}})
 
     def delete(self, name: str) -> None:
         """Forget a table."""
@@ -1185,18 +1210,19 @@ class BlockCommands:
     def time_step(
         self,
         *,
-        value: float | None = None,
+        value: float | str | None = None,
         auto: bool | None = None,
+        update_frequency: int | None = None,
         safety: float | None = None,
         mass_scaling: float | None = None,
         hydraulic: float | None = None,
         thermal: float | None = None,
     ) -> None:
-        """The time step of dynamic runs of blocks: given [s], estimated again and again, or reached by mass;
-        hydraulic, thermal [s]: those of flow and of heat."""
+        """The time step of dynamic runs of blocks: given [s] or by a table of time, estimated again and again (every
+        so many steps), or reached by mass; hydraulic, thermal [s]: those of flow and of heat."""
         given = {
-            "value": value, "auto": auto, "safety": safety, "mass_scaling": mass_scaling, "hydraulic": hydraulic,
-            "thermal": thermal,
+            "value": value, "auto": auto, "update_frequency": update_frequency, "safety": safety,
+            "mass_scaling": mass_scaling, "hydraulic": hydraulic, "thermal": thermal,
         }  # fmt: skip
         self._blocks("model time-step", given)
 
@@ -1207,6 +1233,47 @@ class BlockCommands:
         stable)."""
         given = {"mechanical": mechanical, "hydraulic": hydraulic, "thermal": thermal}
         self._blocks("model sub-step", given)
+
+    def run_time(self, time: float) -> None:
+        """The time [s] that `solve` takes at most from now on; 0: no end."""
+        self._blocks("model run-time", {"time": time})
+
+    def solve_check(self, steps: int) -> None:
+        """Steps between two looks at the ratio in `solve`."""
+        self._blocks("model solve-check", {"steps": steps})
+
+    def cycle_option(
+        self,
+        part: str,
+        *,
+        time_step: float | None = None,
+        cycle_number: int | None = None,
+    ) -> None:
+        """Time step [s] and number of steps of a part ("mechanical", "thermal", "hydraulic", "proppant-transport") in a
+        cycle of a coupled calculation."""
+        given = {"value": True, "time-step": time_step, "cycle-number": cycle_number}
+        self._blocks("model cycle-option", {part: {name: v for name, v in given.items() if v is not None}})
+
+    def reset_clock(
+        self,
+        part: str,
+        *,
+        current_time: float | None = None,
+        start_time: float | None = None,
+        time_step: float | None = None,
+    ) -> None:
+        """What the clock of a part shows now, from when `run_time` counts, and its time step [s]; parts: see
+        `cycle_option`."""
+        given = {"value": True, "current-time": current_time, "start-time": start_time, "time-step": time_step}
+        self._blocks("model reset", {part: {name: v for name, v in given.items() if v is not None}})
+
+    def tell_time(self, part: str) -> None:
+        """Say in the log what time a part has come to; parts: see `cycle_option`."""
+        self._blocks("model query", {part: {"value": True, "time": True}})
+
+    def tell_devices(self) -> None:
+        """Say in the log what the run computes with: ranks, threads, processors."""
+        self._blocks("device list", {})
 
     @property
     def wet_faces(self) -> dict[str, np.ndarray]:
@@ -1270,6 +1337,7 @@ class BlockCommands:
         ratio: float | None = None,
         cycles: int | None = None,
         time: float | None = None,
+        run_time: float | None = None,
         window: int | None = None,
         limit: int | None = None,
         on_failure: str | None = None,
@@ -1282,7 +1350,8 @@ class BlockCommands:
         steady: bool = False,
         auto: bool = False,
     ) -> None:
-        """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium,
+        """Steps until the first of ratio, cycles, time and run_time [s] is reached, without any ratio 1e-5 or 10 000
+        cycles; with elastic straight to static equilibrium,
         in so many steps of what is new in the loads; with hydraulic fluid flows by implicit steps of at most dt [s],
         for this time or until it is steady, through blocks in equilibrium; with thermal so does heat. With auto
         fluid flows by explicit steps, if these cost less.
@@ -1290,7 +1359,8 @@ class BlockCommands:
         A run towards a ratio that gets nowhere (window, limit) ends the program with exit code 3, unless on_failure
         is "continue"; `solved` says how it ended."""
         given = {
-            "ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit, "on_failure": on_failure,
+            "ratio": ratio, "cycles": cycles, "time": time, "run_time": run_time, "window": window, "limit": limit,
+            "on_failure": on_failure,
             "elastic": elastic, "solver": solver, "steps": steps, "hydraulic": hydraulic, "thermal": thermal, "dt": dt,
             "steady": steady, "auto": auto,
         }  # fmt: skip

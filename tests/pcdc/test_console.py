@@ -70,9 +70,9 @@ def test_exit_ends(bench):
     ("line", "words"),
     [
         ("pcdc mod", "model"),
-        ("pcdc model ", "new save restore gravity units option time-step step solve sub-step rayleigh creep"),
+        ("pcdc model s", "save step solve solve-check sub-step"),
         ("pcdc geom cr p", "polyline polygon point plane"),
-        ("pcdc model option dynamic ", "on off true false"),
+        ("pcdc model option dynamic ", "on off true false yes no"),
         ("pcdc element c-model null ", "property relax range"),
         ("pcdc element-face c-model contact-m-c property p-n 1 p", "penalty-normal penalty-shear"),
         ("pcdc mesh create from-layer 'a' refine-layer 'b' ", "size distance"),

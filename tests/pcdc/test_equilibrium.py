@@ -61,7 +61,7 @@ def test_what_gets_nowhere_ends():
 
 def test_a_loose_body_is_named_and_the_script_ends(tmp_path):
     with pytest.raises(EquilibriumError, match=rf"script.sc:8: .*for 20000 steps the ratio has not .*{LOOSE}") as told:
-        Rock(tmp_path, "young = 50e9\n" + TWO + "pcdc model solve\n")
+        Rock(tmp_path, "young = 50e9\n" + TWO + "pcdc model solve ratio 1e-5\n")
     assert told.value.exit_code == 3
 
 
@@ -95,10 +95,10 @@ def test_a_restart_in_the_middle_comes_to_the_same_end(tmp_path, monkeypatch):
 def test_a_body_that_is_soon_too_fast_is_no_wrong_time_step(tmp_path):
     """Soft ground: it goes half an edge per step before a window is over."""
     with pytest.raises(EquilibriumError, match=rf"over half an edge per static step.*{LOOSE}"):
-        Rock(tmp_path, "young = 1e5\n" + TWO + "pcdc model solve\n")
+        Rock(tmp_path, "young = 1e5\n" + TWO + "pcdc model solve ratio 1e-5\n")
     rock = Rock(tmp_path, "young = 1e5\n" + TWO + "pcdc model solve on-failure continue\n")
     assert rock.project.solved["reason"] == "runaway"
-    rock("pcdc element c-model null range group 'loose'\npcdc node reset velocity\npcdc model solve\n")
+    rock("pcdc element c-model null range group 'loose'\npcdc node reset velocity\npcdc model solve ratio 1e-5\n")
     assert rock.project.solved["reason"] == "ratio"
 
 

@@ -79,8 +79,9 @@ def choices() -> Iterator[tuple[str, Sequence[HasKeyword]]]:
 
 
 CHOICES = list(choices())
-IN_THE_MANUAL = {"m-p"}
-"""m{atrix}-p{ermeability} and m{atrix}-p{orosity}: refused with both as candidates."""
+IN_THE_MANUAL = {"m-p", "t"}
+"""m{atrix}-p{ermeability} and m{atrix}-p{orosity}: refused with both as candidates. t{ime} after a part of model query,
+and t{hermal}: the time of the part before."""
 
 
 def test_there_are_many():

@@ -159,7 +159,7 @@ REFUSED = [
     ("m new", "'m' is too short after 'pcdc'; it may mean model (at least 'mod'), mesh (at least 'mesh')"),
     ("model opt dyn off extra", "read 'extra' after 'model option', expected one of dynamic, collision"),
     ("model option dynamic", "the line ends where on or off for 'dynamic' is expected; a line that goes on"),
-    ("model option dynamic yes", "read 'yes', expected on or off for 'dynamic'"),
+    ("model option dynamic maybe", "read 'maybe', expected on or off for 'dynamic'"),
     ("model option", "'model option' needs at least one of dynamic, collision"),
     ("model option dynamic on dynamic off", "'dynamic' is given twice"),
     ("model new dim 4", "read '4', expected 2 or 3 for 'dim'"),
@@ -248,6 +248,8 @@ def test_every_example_of_the_table_is_read():
     examples = [(command.name, text) for command in PCDC.commands for text in command.example]
     assert len(examples) > 50 and {name for name, _ in examples} == {c.name for c in PCDC.commands}
     for name, text in examples:
+        if PCDC.command(name).refused:
+            continue
         dim = 3 if PCDC.command(name).dims == (3,) or re.search(r"\(\S+?,\S+?,\S+?\)", text) else 2
         assert parse(text.removeprefix("pcdc"), "a.sc", 1, text, PCDC, dim=dim).command.name == name
 

@@ -75,8 +75,18 @@ def test_words_that_do_not_go_with_equilibrium_at_once(bench, words, told):
 
 def test_static_runs_end_at_the_ratio_of_the_manual(bench, monkeypatch):
     monkeypatch.setattr(bench.blocks, "unbalanced_ratio", lambda: 0.4 / bench.blocks.clock.step)
-    bench(BOX + "pcdc model option dynamic off\npcdc model solve\n")
+    bench(BOX + "pcdc model option dynamic off\npcdc model solve on-failure stop limit 0\n")
     assert bench.blocks.clock.step == 40_000  # 0.4 / 40 000 is 1e-5
+
+
+def test_a_solve_without_an_aim_ends_after_10_000_cycles(bench, monkeypatch):
+    monkeypatch.setattr(bench.blocks, "unbalanced_ratio", lambda: 0.4 / bench.blocks.clock.step)
+    bench(BOX + "pcdc model option dynamic off\npcdc model solve\n")
+    assert bench.blocks.clock.step == 10_000 and bench.project.solved["reason"] == "cycles"
+    assert "ended after 10000 cycles, which it does without an aim, at ratio 4e-05" in bench.blocks.log.lines[-1]
+    monkeypatch.setattr(bench.blocks, "unbalanced_ratio", lambda: 4e-2 / bench.blocks.clock.step)
+    bench("pcdc model solve\n")
+    assert bench.blocks.clock.step == 10_050 and bench.project.solved["reason"] == "ratio"
 
 
 def test_what_is_recorded_does_not_change_when_it_ends(bench):

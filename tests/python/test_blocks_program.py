@@ -60,6 +60,48 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model solve ratio 1e-6 window 10 limit 0 on-failure continue",
      "sim.solve(ratio=1e-6, window=10, limit=0, on_failure='continue')"),
     ("pcdc model solve cycles 5 time 0.5", "sim.solve(cycles=5, time=0.5)"),
+    ("pcdc model solve run-time 0.5 cycle 5", "sim.solve(run_time=0.5, cycles=5)"),
+    ("pcdc model run-time 0.5", "sim.run_time(0.5)"),
+    ("pcdc model solve-check 10", "sim.solve_check(10)"),
+    ("pcdc model cycle-option mechanical time-step 1e-5 cycle-number 20",
+     "sim.cycle_option('mechanical', time_step=1e-5, cycle_number=20)"),
+    ("pcdc model cycle-option thermal time-step 1", "sim.cycle_option('thermal', time_step=1)"),
+    ("pcdc model cycle-option hydraulic cycle-number 4", "sim.cycle_option('hydraulic', cycle_number=4)"),
+    ("pcdc model cycle-option proppant-transport time-step 2",
+     "sim.cycle_option('proppant-transport', time_step=2)"),
+    ("pcdc model reset mechanical start-time 1 current-time 2 time-step 1e-5",
+     "sim.reset_clock('mechanical', start_time=1, current_time=2, time_step=1e-5)"),
+    ("pcdc model reset thermal current-time 2", "sim.reset_clock('thermal', current_time=2)"),
+    ("pcdc model reset hydraulic time-step 2", "sim.reset_clock('hydraulic', time_step=2)"),
+    ("pcdc model reset proppant-transport current-time 2", "sim.reset_clock('proppant-transport', current_time=2)"),
+    ("pcdc model query mechanical time", "sim.tell_time('mechanical')"),
+    ("pcdc model query thermal time", "sim.tell_time('thermal')"),
+    ("pcdc model query hydraulic time", "sim.tell_time('hydraulic')"),
+    ("pcdc model query proppant-transport time", "sim.tell_time('proppant-transport')"),
+    ("pcdc device list", "sim.tell_devices()"),
+    ("pcdc model time-step table 'dt'", "sim.time_step(value='dt')"),
+    ("pcdc model time-step auto on update-frequency 20", "sim.time_step(auto=True, update_frequency=20)"),
+    ("pcdc table 'v' data 0 0, 1 2 type relative-time", "sim.tables.create('v', [(0, 0), (1, 2)], relative=True)"),
+    ("pcdc node history 'h' thermal temperature every 3 range id 1",
+     "sim.histories.create('h', 'node', 'temperature', how='mean', every=3, where='id 1')"),
+    ("pcdc node thermal-initialize temperature 20", "sim.nodes.initial_temperature(20)"),
+    ("pcdc node hydraulic-initialize f-n-s 0.5 range x 0 1", "sim.flow_nodes.initial(saturation=0.5, where='x 0 1')"),
+    ("pcdc node hydraulic-initialize flow-node-temperature 20", "sim.flow_nodes.initial_temperature(20)"),
+    ("pcdc node initial velocity-x 1 velocity-y 2", "sim.nodes.initial_velocity(vx=1, vy=2)"),
+    ("pcdc node initial force-x 1 force-y 2", "sim.nodes.force(fx=1, fy=2)"),
+    ("pcdc node boundary remove mech-vel-b-c mech-f-b-c mech-m-b-c hydra-c-f-b hydra-p-b therm-s-b-c therm-f-b-c",
+     "sim.nodes.remove_boundary('mechanical-velocity-boundary-condition', 'mechanical-force-boundary-condition', "
+     "'mechanical-move-boundary-constraint', 'hydraulic-constant-flow-boundary', 'hydraulic-proppant-boundary', "
+     "'thermal-solid-boundary-condition', 'thermal-flow-boundary-condition')"),
+    ("pcdc element-face boundary remove m-s-b-c therm-c-h",
+     "sim.faces.remove_boundary('mechanical-stress-boundary-condition', 'thermal-const-heat')"),
+    ("pcdc bolt-node boundary remove b-n-c", "sim.bolt_nodes.remove_boundary('bolt-node-constrain')"),
+    ("pcdc bolt-node boundary remove b-n-f-b-c",
+     "sim.bolt_nodes.remove_boundary('bolt-node-force-boundary-condition')"),
+    ("pcdc element-face boundary mech-abs-b-c normal -1e5 range boundary",
+     "sim.faces.stress(quiet=True, normal=-1e5, where='boundary')"),
+    ("pcdc element-face list summary", "sim.faces.tell()"),
+    ("pcdc face-joint list summary range id 1 5", "sim.joints.tell(where='id 1 5')"),
     ("pcdc model solve elastic time 1e6", "sim.solve(elastic=True, time=1e6)"),
     ("pcdc model solve elastic solver direct", "sim.solve(elastic=True, solver='direct')"),
     ("pcdc model solve elastic steps 4", "sim.solve(elastic=True, steps=4)"),
@@ -396,6 +438,8 @@ IN_SPACE: list[tuple[str, str]] = [
     ("pcdc bolt-node boundary b-n-c acceleration-z 1", "sim.bolt_nodes.velocity(az=1)"),
     ("pcdc bolt-node boundary b-n-f-b-c force-z table 'v'", "sim.bolt_nodes.force(fz='v')"),
     ("pcdc node boundary mech-vel-b-c acceleration-z 1", "sim.nodes.velocity(az=1)"),
+    ("pcdc node initial velocity-z 1", "sim.nodes.initial_velocity(vz=1)"),
+    ("pcdc node initial force-z 1", "sim.nodes.force(fz=1)"),
     ("pcdc node boundary mech-f-b-c force-z 1 range z 0 1", "sim.nodes.force(fz=1, where='z 0 1')"),
     ("pcdc node boundary mech-m-b-c type 3 (0,1,1)", "sim.nodes.move(3, (0, 1, 1))"),
     ("pcdc node initial velocity (1,2,3)", "sim.nodes.initial_velocity((1, 2, 3))"),
@@ -448,6 +492,8 @@ def test_every_command_has_a_method() -> None:
             names |= {statement.arguments["model"], *statement.arguments["properties"]}
         said.setdefault(statement.command.name, set()).update(names)
     for command in PCDC.commands:
+        if command.idle or command.refused:
+            continue
         assert command.name in said, command.name
         of_models = {
             "element property",
@@ -463,7 +509,8 @@ def test_every_command_has_a_method() -> None:
         assert wanted - said[command.name] <= NOT_IN_PYTHON.get(command.name, set()), command.name
 
 
-NOT_IN_PYTHON: dict[str, set[str]] = {}
+NOT_IN_PYTHON: dict[str, set[str]] = {"model option": {"creep", "ecda"}}
+"""`sim.creep` says the one, and the other is on."""
 
 
 def test_every_way_to_look(bench: Bench) -> None:

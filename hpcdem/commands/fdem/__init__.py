@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         bolts,
         charts,
         checkpoints,
+        clocks,
         coupling,
         cracks,
         flow,
@@ -35,8 +36,9 @@ if TYPE_CHECKING:
     from hpcdem.commands.fdem.project import Project
 
 __all__ = [
-    "Project", "assignments", "bolts", "charts", "checkpoints", "coupling", "cracks", "flow", "frames", "geometry",
-    "heat", "histories", "liners", "meshes", "pictures", "queries", "settings", "steps", "summary", "supports",
+    "Project", "assignments", "bolts", "charts", "checkpoints", "clocks", "coupling", "cracks", "flow", "frames",
+    "geometry", "heat", "histories", "liners", "meshes", "pictures", "queries", "settings", "steps", "summary",
+    "supports",
 ]  # fmt: skip
 
 

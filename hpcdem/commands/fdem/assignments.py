@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import changes, sides, user_functions, user_laws
+from hpcdem.physics.fdem import changes, node_conditions, sides, user_functions, user_laws
 from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
@@ -148,8 +148,8 @@ def initial_stress(
     project.ready().initial_stress(chosen(project, ELEMENT, where), **stress, gradient=gradient or None)
 
 
-def initial_velocity(project: Project, velocity: tuple[float, ...], where: Range | None = None) -> None:
-    """Velocity (2,), in space (3,), [m/s] of nodes now."""
+def initial_velocity(project: Project, velocity: tuple[float | None, ...], where: Range | None = None) -> None:
+    """Velocity (2,), in space (3,), [m/s] of nodes now; None: this component stays."""
     if len(velocity) != project.dim:
         raise CommandError(f"velocity: a vector of {project.dim} numbers is needed, got {len(velocity)}")
     changes.set_velocity(project.ready(), chosen(project, NODE, where), *velocity)
@@ -170,7 +170,9 @@ def velocity(
 ) -> None:
     """Velocity [m/s] or acceleration [m/s2] of nodes; a text is the name of a table of time."""
     _known(project, vx, vy, ax, ay, vz, az)
-    project.ready().velocity_condition(chosen(project, NODE, where), vx, vy, ax, ay, vz, az)
+    blocks, given = project.ready(), {"vx": vx, "vy": vy, "ax": ax, "ay": ay, "vz": vz, "az": az}
+    nodes = chosen(project, NODE, where)
+    blocks.velocity_condition(nodes, **from_now(project, blocks.time_now(), given))
 
 
 def force(
@@ -182,7 +184,8 @@ def force(
 ) -> None:
     """Force on each node [N per m of thickness, in space N]."""
     _known(project, fx, fy, fz)
-    project.ready().force_condition(chosen(project, NODE, where), fx, fy, fz)
+    blocks, nodes = project.ready(), chosen(project, NODE, where)
+    blocks.force_condition(nodes, **from_now(project, blocks.time_now(), {"fx": fx, "fy": fy, "fz": fz}))
 
 
 def move(project: Project, kind: int, direction: tuple[float, ...] = (0.0, 0.0), where: Range | None = None) -> None:
@@ -210,10 +213,12 @@ def stress(
     Without a range: all faces on the surface of the model."""
     _known(project, xx, yy, zz, normal, incoming_x, incoming_y, incoming_z)
     faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
-    project.ready().stress_condition(
-        faces, xx=xx, yy=yy, zz=zz, normal=normal, quiet=quiet, incoming_x=incoming_x, incoming_y=incoming_y,
-        incoming_z=incoming_z,
-    )  # fmt: skip
+    blocks = project.ready()
+    given = {
+        "xx": xx, "yy": yy, "zz": zz, "normal": normal, "incoming_x": incoming_x, "incoming_y": incoming_y,
+        "incoming_z": incoming_z,
+    }  # fmt: skip
+    blocks.stress_condition(faces, quiet=quiet, **from_now(project, blocks.time_now(), given))
 
 
 def free_field(project: Project, where: Range | None = None) -> None:
@@ -223,9 +228,11 @@ def free_field(project: Project, where: Range | None = None) -> None:
     FreeField.create(project.ready(), chosen(project, FACE, (OnBoundary(),) if where is None else where))
 
 
-def remove_node_conditions(project: Project, where: Range | None = None) -> None:
-    """Nodes are free again."""
-    project.ready().remove_conditions(chosen(project, NODE, where))
+def remove_node_conditions(
+    project: Project, where: Range | None = None, kinds: Sequence[str] = node_conditions.KINDS
+) -> None:
+    """Nodes are free again of these kinds of conditions."""
+    project.ready().remove_conditions(chosen(project, NODE, where), kinds)
 
 
 def remove_face_conditions(project: Project, where: Range | None = None) -> None:
@@ -245,9 +252,32 @@ def _known(project: Project, *values: Number | None) -> None:
 # ---- tables --------------------------------------------------------------------------------------------------------
 
 
-def table(project: Project, name: str, pairs: list[tuple[float, float]]) -> None:
-    """A function of time, linear from point to point."""
-    project.blocks.table(name, pairs)
+def table(
+    project: Project, name: str, pairs: list[tuple[float, float]] | None = None, relative: bool | None = None
+) -> None:
+    """A function of time, linear from point to point; relative: its times count from when a condition takes it. What is
+    not given stays."""
+    if pairs is not None:
+        project.blocks.table(name, pairs)
+    elif name not in project.blocks.tables:
+        raise CommandError(f"there is no table '{name}' yet: data makes it")
+    if relative is not None:
+        (project.relative.add if relative else project.relative.discard)(name)
+
+
+def from_now(project: Project, now: float, given: Mapping[str, Any]) -> dict[str, Any]:
+    """What conditions are given at this time [s]: tables that begin with it in place of relative ones."""
+    return {name: _begun(project, now, value) for name, value in given.items()}
+
+
+def _begun(project: Project, now: float, value: Any) -> Any:
+    if not isinstance(value, str) or value not in project.relative or value not in project.blocks.tables:
+        return value
+    name, of = f"{value} from {now!r}", project.blocks.tables[value]
+    pairs = [(time + now, one) for time, one in zip(of.times.tolist(), of.values.tolist())]
+    if name not in project.blocks.tables or project.blocks.tables[name].pairs() != [list(pair) for pair in pairs]:
+        project.blocks.table(name, pairs)
+    return name
 
 
 def random_field(project: Project, name: str, **about: Any) -> None:
@@ -264,4 +294,7 @@ def remove_table(project: Project, name: str) -> None:
     """Forget a table."""
     if name not in project.blocks.tables:
         _known(project, name)
+    if name == project.step_table:
+        raise CommandError(f"table '{name}' is used by the time step: model time-step value 0 comes first")
     project.blocks.remove_table(name)
+    project.relative.discard(name)

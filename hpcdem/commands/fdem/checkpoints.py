@@ -26,9 +26,17 @@ FORMAT = 1
 """Of what is saved beside the simulation."""
 
 
+SUFFIX = ".sav"
+
+
+def named(path: str) -> str:
+    """The file of a name without an ending."""
+    return path if Path(path).suffix else path + SUFFIX
+
+
 def save(project: Project, path: str) -> None:
-    """The whole state to a file beside the script. Collective."""
-    _write(project, project.to_write(project.path(path)), {"names": project.names()})
+    """The whole state to a file beside the script, `SUFFIX` behind a name without an ending. Collective."""
+    _write(project, project.to_write(project.path(named(path))), {"names": project.names()})
 
 
 def write_checkpoint(project: Project, automatic: bool = False) -> Path:
@@ -62,6 +70,12 @@ def _write(project: Project, path: Path, more: dict[str, Any]) -> None:
         project.blocks.stop.saved(time.perf_counter() - began)
 
 
+def found(project: Project, path: str) -> str:
+    """The name of a file that is there: as it is said, or with the ending that `save` gives. Collective."""
+    there = project.comm.bcast(project.path(path).exists() if project.comm.rank == 0 else None)
+    return path if there else named(path)
+
+
 def restore(project: Project, path: str) -> dict[str, Any]:
     """The state of a file; returns the names (of variables and functions) that were saved with it. Collective.
 
@@ -69,7 +83,7 @@ def restore(project: Project, path: str) -> dict[str, Any]:
     """
     project.refuse_inside("model restore")
     flush(project)
-    file = project.to_read(path)
+    file = project.to_read(found(project, path))
     names = dict(_restored(project, file).get("names") or {})
     coupled.leave(project.blocks)
     project.restored = file, project.step
@@ -166,6 +180,13 @@ def _state(project: Project) -> dict[str, Any]:
         "framed": project.framed,
         "dynamic": project.dynamic,
         "adapts": project.adapts,
+        "clocks": {
+            "run_time": project.run_time,
+            "began": project.began,
+            "look": project.look,
+            "step_table": project.step_table,
+            "relative": sorted(project.relative),
+        },
         "in_use": project.in_use,
         "networks": project.networks,
         "units": project.units,
@@ -200,6 +221,10 @@ def _take(project: Project, state: dict[str, Any]) -> None:
     solved = state.get("solved", {})  # versions before did not keep it
     project.solved = {name: math.nan if value is None else value for name, value in solved.items()}
     project.adapts = bool(state["adapts"])
+    clocks = state.get("clocks", {})
+    project.run_time, project.look = float(clocks.get("run_time", 0.0)), int(clocks.get("look", 0))
+    project.began = {name: float(time) for name, time in clocks.get("began", {}).items()}
+    project.step_table, project.relative = str(clocks.get("step_table", "")), set(clocks.get("relative", ()))
     project.dynamic, project.in_use, project.taken = bool(state["dynamic"]), bool(state["in_use"]), mesh is not None
 
 

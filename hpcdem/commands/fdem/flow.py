@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from hpcdem.commands.fdem import assignments
 from hpcdem.commands.fdem.choices import chosen, points
@@ -65,8 +65,9 @@ def proppant_condition(
             "proppant that comes in at a flow node has one of proppant-volumetric-concentration, "
             "proppant-volumetric-flow-rate"
         )
-    kind, value = said.popitem()
-    _proppant(project).prescribe(points(project, where), kind, value)
+    proppant = _proppant(project)
+    kind, value = assignments.from_now(project, proppant.time, said).popitem()
+    proppant.prescribe(points(project, where), kind, value)
 
 
 def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
@@ -98,23 +99,39 @@ def _flow(project: Project) -> Flow:
 def condition(
     project: Project,
     pressure: Number | None = None,
-    flow_surface: Number | None = None,
+    flow_surface: Number | tuple[float, ...] | None = None,
     flow_rate: Number | None = None,
     where: Range | None = None,
 ) -> None:
-    """Pressure [Pa], level of a free surface [m] or rate [m2/s, of each node] at flow nodes; the last one holds."""
-    given = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
+    """Pressure [Pa], level of a free surface [m], or a point of it, or rate [m2/s, of each node] at flow nodes; the
+    last one holds."""
+    if isinstance(flow_surface, (tuple, list)):
+        flow_surface = _level(project, flow_surface)
+    given: dict[str, Number | None] = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
     said = {name: value for name, value in given.items() if value is not None}
     if len(said) != 1:
         raise CommandError(f"a flow node has one of {', '.join(given)}, got {' and '.join(said) or 'none'}")
-    name, value = said.popitem()
-    _flow(project).prescribe(points(project, where), _DOES[name], value)
+    flow = _flow(project)
+    name, value = assignments.from_now(project, flow.time, said).popitem()
+    flow.prescribe(points(project, where), _DOES[name], value)
 
 
-def remove_conditions(project: Project, where: Range | None = None) -> None:
+def _level(project: Project, point: Sequence[float]) -> float:
+    """How high a point [m] lies, against gravity."""
+    if len(point) != project.dim:
+        raise CommandError(f"flow-surface: a point of {project.dim} numbers is needed, got {len(point)}")
+    o = project.blocks.options
+    down = (o.gx, o.gy, o.gz)[: project.dim]
+    size = math.hypot(*down)
+    if size == 0.0:
+        raise CommandError("flow-surface by a point needs gravity, which says what is up: model gravity comes first")
+    return -math.fsum(a * b for a, b in zip(point, down)) / size
+
+
+def remove_conditions(project: Project, where: Range | None = None, fluid: bool = True, grains: bool = True) -> None:
     """Nothing is prescribed at flow nodes any more; without fluid there is nothing to do."""
-    for found in (Flow.there(project.ready()), Proppant.there(project.ready())):
-        if found is not None:
+    for wanted, found in ((fluid, Flow.there(project.ready())), (grains, Proppant.there(project.ready()))):
+        if wanted and found is not None:
             found.remove_conditions(points(project, where))
 
 
@@ -155,7 +172,7 @@ def stage(
     said = {does: value for does, value in given.items() if value is not None}
     if len(said) != 1:
         raise CommandError(f"a stage of a well is one of rate, pressure, shut_in, got {' and '.join(said) or 'none'}")
-    does, value = said.popitem()
+    does, value = assignments.from_now(project, _flow(project).time, said).popitem()
     duration, most = (math.inf if one is None else one for one in (time, limit))
     _flow(project).stage(name, does, value, duration, most)
 

@@ -67,12 +67,20 @@ def of_heat(project: Project) -> Heat:
 
 def condition(project: Project, temperature: Number, where: Range | None = None) -> None:
     """Temperature of nodes."""
-    of_heat(project).prescribe(points(project, where), temperature)
+    heat = of_heat(project)
+    heat.prescribe(points(project, where), **assignments.from_now(project, heat.time, {"temperature": temperature}))
 
 
 def fluid_condition(project: Project, temperature: Number, where: Range | None = None) -> None:
     """Temperature of the fluid at flow nodes."""
-    of_heat(project).prescribe_fluid(points(project, where), temperature)
+    heat = of_heat(project)
+    given = assignments.from_now(project, heat.time, {"temperature": temperature})
+    heat.prescribe_fluid(points(project, where), **given)
+
+
+def initial_fluid(project: Project, temperature: float, where: Range | None = None) -> None:
+    """Temperature of the fluid at flow nodes now."""
+    of_heat(project).of_fluid().initial(project.blocks.numbers_of_nodes(points(project, where)), temperature)
 
 
 def face_condition(
@@ -88,14 +96,16 @@ def face_condition(
     said = {name: value for name, value in given.items() if value is not None}
     if not said:
         raise CommandError("heat through faces is one of heat_flux, transfer_coeficient, environment_temperature")
-    of_heat(project).expose(chosen(project, FACE, (OnBoundary(),) if where is None else where), **said)
+    heat = of_heat(project)
+    faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
+    heat.expose(faces, **assignments.from_now(project, heat.time, said))
 
 
-def remove_conditions(project: Project, where: Range | None = None) -> None:
+def remove_conditions(project: Project, where: Range | None = None, rock: bool = True, fluid: bool = True) -> None:
     """No temperature of nodes and their fluid is prescribed any more; without heat there is nothing to do."""
     found = Heat.there(project.ready())
     if found is not None:
-        found.remove_conditions(points(project, where))
+        found.remove_conditions(points(project, where), rock, fluid)
 
 
 def remove_face_conditions(project: Project, where: Range | None = None) -> None:

@@ -34,6 +34,9 @@ class Project:
     alive (ne,) bool: elements that are not null; histories, charts and frames (steps between two by name) that are kept
     up; cracks_filed: broken joints that are in their file, None: the file is not of this model yet; framed: step of the
     last frame by name;
+    run_time: that model solve takes at most [s], 0: no end; began: times from which it counts, by part (clocks.PARTS);
+    look: steps between two looks at the ratio, 0: as usual; step_table: a table of the time step over time, "";
+    relative: tables whose times count from when a condition takes them;
     dynamic: motion in time, not towards equilibrium; adapts: the time step may change during a run; networks: sets of
     fractures made so far; units: that were declared (core.units.SYSTEMS), "" none;
     solved: how the last `model solve` ended, reason, ratio and steps; line:
@@ -124,6 +127,11 @@ class Project:
         self.framed: dict[str, int] = {}
         self.dynamic = True
         self.adapts = False
+        self.run_time = 0.0
+        self.began: dict[str, float] = {}
+        self.look = 0
+        self.step_table = ""
+        self.relative: set[str] = set()
         self.networks = 0
         self.units = ""
         self.solved: dict[str, Any] = {}

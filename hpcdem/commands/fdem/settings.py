@@ -77,24 +77,38 @@ def option(
 
 def time_step(
     project: Project,
-    value: float | None = None,
+    value: float | str | None = None,
     auto: bool | None = None,
     safety: float | None = None,
     mass_scaling: float | None = None,
     hydraulic: float | None = None,
     thermal: float | None = None,
+    update_frequency: int | None = None,
 ) -> None:
-    """The time step of dynamic runs [s]; see `Blocks.time_step`. hydraulic, thermal: of flow and of heat, see
-    `Blocks.flow_clock`, `Blocks.heat_clock`."""
+    """The time step of dynamic runs [s], or the name of a table of it over time; see `Blocks.time_step`. hydraulic,
+    thermal: of flow and of heat, see `Blocks.flow_clock`, `Blocks.heat_clock`; update_frequency: steps after which an
+    automatic one is estimated again."""
+    table = value if isinstance(value, str) else ""
+    number = None if isinstance(value, str) else value
+    if table:
+        if table not in project.blocks.tables:
+            raise CommandError(f"time-step: there is no table '{table}'")
+        if (project.blocks.tables[table].values <= 0.0).any():
+            raise CommandError(f"time-step: table '{table}' has a value that is not above 0")
+        number = project.blocks.tables[table](project.blocks.clock.time)
     if hydraulic is not None:
         project.blocks.flow_clock(dt=hydraulic)
     if thermal is not None:
         project.blocks.heat_clock(dt=thermal)
-    if (value, auto, safety, mass_scaling) == (None, None, None, None):
+    if (value, auto, safety, mass_scaling, update_frequency) == (None,) * 5:
         return
-    project.blocks.time_step(value=value, auto=auto, safety=safety, mass_scaling=mass_scaling)
+    project.blocks.time_step(value=number, auto=auto, safety=safety, mass_scaling=mass_scaling)
+    if update_frequency is not None:
+        project.blocks.estimate_every(update_frequency)
+    if value is not None or mass_scaling is not None or auto:
+        project.step_table = table
     if value or mass_scaling or auto is not None:
-        project.adapts = bool(auto)
+        project.adapts = bool(auto or table)
 
 
 def rayleigh(project: Project, ratio: float, frequency: float | None = None, part: str = "both") -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.commands.fdem import checkpoints, coupling, cracks, frames, histories
+from hpcdem.commands.fdem import clocks as clocks_of
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.io.behind import under_way
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 LOOK_STATIC, LOOK_DYNAMIC = 50, 100
-"""Steps between two looks at the ratio, counted from the beginning of the command."""
+"""Steps between two looks at the ratio, counted from the beginning of the command, unless model solve-check says so."""
+CYCLES = 10_000
+"""Steps of a model solve that is given no aim, if it does not come to RATIO before."""
 STRIDE = 100
 """Steps at most between two looks at the model time, as the time step may change."""
 CONTINUE = "continue"
@@ -72,19 +75,29 @@ def solve(
     window: int | None = None,
     limit: int | None = None,
     on_failure: str = "stop",
+    run_time: float | None = None,
 ) -> None:
     """Steps until the unbalanced forces are so small, so many are done, or so much time [s] has passed: whatever comes
-    first. Without any of them: until the ratio is RATIO.
+    first. run_time: as `clocks.run_time`, for this call. Without any of them: until the ratio is RATIO, and if nobody
+    watches (window, limit, on_failure) CYCLES at most.
 
     window, limit [steps]: when a run towards a ratio has failed, see `convergence.watch`; it ends the script with an
     EquilibriumError, or, with on_failure CONTINUE, with a warning. project.solved says how it ended.
     """
+    bare = (ratio, cycles, time) == (None, None, None)
+    if (run := run_time or project.run_time) and _time_passes(project):
+        left = _left(project, run)
+        if left <= 0.0 and project.progress is None:
+            _tell_no_time(project, run)
+            return
+        time, bare = left if time is None else min(time, left), False
     command = "solve", {"ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit,
                         "on_failure": on_failure}  # fmt: skip
     words = [f"{name} {value:g}" for name, value in (("ratio", ratio), ("cycles", cycles), ("time", time)) if value]
-    if ratio is None and cycles is None and time is None:
-        ratio = RATIO
-        words = [f"ratio {ratio:g}"]
+    if bare:
+        watched = (window, limit, on_failure) != (None, None, "stop")
+        ratio, cycles = RATIO, None if watched else CYCLES
+        words = [f"ratio {ratio:g}"] + [f"cycles {CYCLES}"] * (not watched)
     if time is not None and not project.dynamic:
         _check_creep(project, time, cycles)
     if ratio is not None and not project.blocks.options.mechanical:
@@ -104,10 +117,34 @@ def solve(
                 f"{_where(project)}balance was found while table '{name}' of a condition goes on to change with each "
                 "static step: model solve cycles, or model step, goes on to its end"
             )
+    if bare and reason == "cycles" and project.log is not None:
+        project.log.warn(
+            f"{_where(project)}model solve ended after {CYCLES} cycles, which it does without an aim, at ratio "
+            f"{found:.3g}: model solve ratio {RATIO:g} goes on to balance"
+        )
     if text and on_failure != CONTINUE:
         raise EquilibriumError(text)
     if text and project.log is not None:
         project.log.warn(text)
+
+
+def _time_passes(project: Project) -> bool:
+    return project.dynamic or project.blocks.creep.on
+
+
+def _left(project: Project, run: float) -> float:
+    """Time [s] until the end of a run-time."""
+    if clocks_of.MECHANICAL not in project.began:
+        return run
+    now = project.blocks.clock.time if project.dynamic else project.blocks.creep.time
+    return project.began[clocks_of.MECHANICAL] + run - now
+
+
+def _tell_no_time(project: Project, run: float) -> None:
+    project.solved = {"reason": "time", "ratio": math.nan, "steps": 0}
+    if project.log is not None:
+        begin = project.began[clocks_of.MECHANICAL]
+        project.log.warn(f"{_where(project)}run-time {run:g} s from {begin:g} s on has passed: no step is done")
 
 
 def solve_elastic(
@@ -417,6 +454,8 @@ def _run(
     project.refuse_inside(f"model {name}")
     coupling.take_up(project)
     clock = project.ready().clock
+    if project.progress is None:
+        _follow_step_table(project)
     _settle_time_step(project)
     creeps, log = time is not None and not project.dynamic, project.log
     if time is not None and not creeps and project.progress is None and time <= 0.5 * clock.dt and log is not None:
@@ -458,7 +497,7 @@ def _advance(
     # A checkpoint of a version that did not watch has none.
     watch = Watch(**progress["watch"]) if progress.get("watch") else Watch(0, 0, first)
     reason, found = progress.get("ended", ["", math.nan])
-    look = LOOK_DYNAMIC if project.dynamic else LOOK_STATIC
+    look = project.look or (LOOK_DYNAMIC if project.dynamic else LOOK_STATIC)
     report, creeps = _Report(project, name, last), "creep" in progress
     if not creeps:
         frames.write_due(project)
@@ -477,6 +516,8 @@ def _advance(
             cracks.flush(project)
             frames.write_last(project)
             raise
+        if (clock.step - first) % STRIDE == 0:
+            _follow_step_table(project)
         _settle_time_step(project)
         more = not request and clock.step < last and clock.time < end - 0.5 * clock.dt
         if not creeps:
@@ -523,6 +564,15 @@ def _what_moves(project: Project) -> str:
     if body is None:
         return "no body slides away: joints may go on to yield, loads to change, or rounding allows no better balance"
     return f"{body} {'m/s' if project.dynamic else 'm per step'}: hold it, or give it time to come to rest (window)"
+
+
+def _follow_step_table(project: Project) -> None:
+    """The time step becomes what its table says, if it follows one."""
+    if not project.step_table or not project.dynamic:
+        return
+    wanted = project.blocks.tables[project.step_table](project.blocks.clock.time)
+    if wanted != project.blocks.options.dt:
+        project.blocks.time_step(value=wanted)
 
 
 def _settle_time_step(project: Project) -> None:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
+import numpy as np
+
 from hpcdem.commands.fdem import frames, histories
+from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.engine import output
 from hpcdem.io.agreed import on_first
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, Range
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import Proppant
@@ -165,3 +170,23 @@ def last_figure(project: Project) -> Path:
 
         on_first(project.comm, draw)
     return path
+
+
+def listed(project: Project, kind: str, where: Range | None = None) -> None:
+    """Say in the log how many elements, faces or joints there are among those that a range chooses, with which models
+    and in which groups. Collective."""
+    numbers, blocks = everything(project, kind, where), project.ready(use=False)
+    row, rows = {
+        ELEMENT: (blocks.element_row, blocks.element_rows), FACE: (blocks.face_row, blocks.face_rows),
+        JOINT: (blocks.joint_row, blocks.joint_rows),
+    }[kind]  # fmt: skip
+    models = Counter(rows.rows[r][0].replace("_", "-") or "without model" for r in row[numbers].tolist())
+    parts = [f"{count} {name}" for name, count in sorted(models.items())]
+    if kind == JOINT:
+        parts.append(f"{int((blocks.broken[numbers] > 0).sum())} broken")
+    for set_name, of in sorted(project.groups[kind].sets.items()):
+        for name, members in sorted(of.items()):
+            if count := int(np.isin(members, numbers).sum()):
+                parts.append(f"{count} in group '{name}'" + ("" if set_name == "default" else f" of set '{set_name}'"))
+    if project.log is not None:
+        project.log.info(f"{len(numbers)} {kind}s: {', '.join(parts)}")

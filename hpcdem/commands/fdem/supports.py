@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
+from hpcdem.commands.fdem.assignments import from_now
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.physics.fdem.groups import Range
@@ -26,10 +28,15 @@ def delete(project: Project, kind: str, where: Range | None) -> None:
 def condition(project: Project, kind: str, changes: Mapping[str, Any], where: Range | None) -> None:
     """Prescribe components of nodes of this kind, see the class of their conditions."""
     nodes = everything(project, kind, where)
-    of(project.ready(), kind).condition(nodes, **changes)
+    blocks = project.ready()
+    of(blocks, kind).condition(nodes, **from_now(project, blocks.time_now(), changes))
 
 
-def remove_conditions(project: Project, kind: str, where: Range | None = None) -> None:
-    """Nodes of this kind are free again."""
-    nodes = everything(project, kind, where)
-    of(project.ready(), kind).remove_conditions(nodes)
+def remove_conditions(project: Project, kind: str, where: Range | None = None, stems: tuple[str, ...] = ()) -> None:
+    """Nodes of this kind are free again; stems: only these of what may be prescribed, does and at, or force."""
+    nodes, support = everything(project, kind, where), of(project.ready(), kind)
+    if not stems:
+        support.remove_conditions(nodes)
+        return
+    blank = asdict(support.conditions[0])
+    support.condition(nodes, **{name: value for name, value in blank.items() if name.partition("_")[0] in stems})

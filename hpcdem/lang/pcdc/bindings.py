@@ -10,16 +10,24 @@ from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import FunctionName, TableName
 from hpcdem.lang.pcdc.table import (
+    ABSORB,
+    BOLT_FORCE,
+    BOLT_VELOCITY,
     CONST_HEAT,
     FLOW_CONDITION,
     FLUID_HEAT,
     FLUID_TEMPERATURE,
+    FORCE,
     ISO_HEAT,
+    MOVE,
     POROUS,
     PROPPANT,
     PROPPANT_CONDITION,
+    STRESS,
     TEMPERATURE,
+    VELOCITY,
     Command,
+    Model,
 )
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
@@ -256,22 +264,62 @@ def _node_condition(call: Call) -> None:
             fdem.heat.fluid_condition(call.project, **_over_time(call), where=call.where)
 
 
+_KINDS = {VELOCITY: "motion", FORCE: "force", MOVE: "constraint"}
+
+
+def _removed(call: Call, *conditions: Model) -> list[bool]:
+    """Which of these conditions are taken back: those that are named, or all."""
+    return [one.keyword.name in call.arguments or not call.arguments for one in conditions]
+
+
 def _free_nodes(call: Call) -> None:
-    fdem.assignments.remove_node_conditions(call.project, call.where)
-    fdem.flow.remove_conditions(call.project, call.where)
-    fdem.heat.remove_conditions(call.project, call.where)
+    kinds = [kind for (one, kind) in _KINDS.items() if _removed(call, one) == [True]]
+    if kinds:
+        fdem.assignments.remove_node_conditions(call.project, call.where, kinds)
+    if any(of_flow := _removed(call, FLOW_CONDITION, PROPPANT_CONDITION)):
+        fdem.flow.remove_conditions(call.project, call.where, *of_flow)
+    if any(of_heat := _removed(call, TEMPERATURE, FLUID_TEMPERATURE)):
+        fdem.heat.remove_conditions(call.project, call.where, *of_heat)
 
 
 def _free_faces(call: Call) -> None:
-    fdem.assignments.remove_face_conditions(call.project, call.where)
-    fdem.heat.remove_face_conditions(call.project, call.where)
+    stress, heat = _removed(call, STRESS, CONST_HEAT)
+    if stress:
+        fdem.assignments.remove_face_conditions(call.project, call.where)
+    if heat:
+        fdem.heat.remove_face_conditions(call.project, call.where)
+
+
+def _free_bolt_nodes(call: Call) -> None:
+    motion, force = _removed(call, BOLT_VELOCITY, BOLT_FORCE)
+    stems = () if motion and force else ("does", "at") if motion else ("force",)
+    fdem.supports.remove_conditions(call.project, g.BOLT_NODE, call.where, stems)
 
 
 def _initial_nodes(call: Call) -> None:
     if "velocity" in call.arguments:
         fdem.assignments.initial_velocity(call.project, call["velocity"], call.where)
+    axes = "xyz"[: call.project.dim]
+    speeds = tuple(call.get(f"velocity-{axis}") for axis in axes)
+    if any(speed is not None for speed in speeds):
+        fdem.assignments.initial_velocity(call.project, speeds, call.where)
+    forces = {f"f{axis}": call[f"force-{axis}"] for axis in axes if f"force-{axis}" in call.arguments}
+    if forces:
+        fdem.assignments.force(call.project, **forces, where=call.where)
     if "temperature" in call.arguments:
         fdem.heat.initial(call.project, call["temperature"], call.where)
+
+
+def _initial_fluid(call: Call) -> None:
+    if "flow-node-saturation" in call.arguments:
+        fdem.flow.initial(call.project, saturation=call["flow-node-saturation"], where=call.where)
+    if "flow-node-temperature" in call.arguments:
+        fdem.heat.initial_fluid(call.project, call["flow-node-temperature"], call.where)
+
+
+def _node_history(call: Call) -> None:
+    fdem.histories.create(call.project, call["name"], g.NODE, "temperature", how="mean", every=call.get("every", 1),
+                          where=call.where)  # fmt: skip
 
 
 def _short(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -287,6 +335,8 @@ def _face_condition(call: Call) -> None:
         fdem.heat.face_condition(call.project, **_over_time(call), where=call.where)
         return
     given = {name.removeprefix("stress_"): value for name, value in call.properties().items()}
+    if call["model"] == ABSORB.keyword.name:
+        given["quiet"] = True
     fdem.assignments.stress(call.project, **given, where=call.where)
 
 
@@ -359,6 +409,48 @@ def _history(call: Call) -> None:
     )  # fmt: skip
 
 
+def _option(call: Call) -> None:
+    given = call.given("creep", "ecda")
+    if call.get("ecda") is False:
+        raise CommandError(
+            "ecda off: faces of a joint that is whole are no contacts besides here, its penalty-overlay holds them "
+            "apart; leave ecda on"
+        )
+    if given.get("collision") == ():  # the word before ecda
+        del given["collision"]
+    if given:
+        fdem.settings.option(call.project, **given)
+    if "creep" in call.arguments:
+        fdem.settings.creep(call.project, call["creep"])
+
+
+def _time_step(call: Call) -> None:
+    given = call.given()
+    if given.get("auto") == ():
+        given["auto"] = True
+    if isinstance(given.get("value"), TableName):
+        given["value"] = given["value"].name
+    fdem.settings.time_step(call.project, **given)
+
+
+def _parts(call: Call) -> dict[str, dict[str, Any]]:
+    """What is said of parts of a calculation, by the part."""
+    return {python(part): {python(name): value for name, value in given.items() if name != "value"}
+            for part, given in call.arguments.items()}  # fmt: skip
+
+
+def _table(call: Call) -> None:
+    numbers, said = call.get("data"), call.get("type", {})
+    if numbers is not None and len(numbers) % 2:
+        raise CommandError(f"data are pairs of numbers, time and value; there are {len(numbers)} numbers")
+    kinds = {"relative-time": True, "absolute-time": False}
+    given = [value for name, value in kinds.items() if name in said]
+    if "type" in call.arguments and len(given) != 1:
+        raise CommandError("type is relative-time or absolute-time")
+    pairs = None if numbers is None else list(zip(numbers[::2], numbers[1::2]))
+    fdem.assignments.table(call.project, call["name"], pairs, given[0] if given else None)
+
+
 def _solve(call: Call) -> None:
     if "elastic" in call.arguments:
         fdem.steps.solve_elastic(call.project, **call.given("elastic"))
@@ -403,8 +495,18 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "model restore": _restore,
     "model gravity": lambda c: fdem.settings.gravity(c.project, c["gravity"]),
     "model units": lambda c: fdem.settings.units(c.project, c["system"]),
-    "model option": lambda c: fdem.settings.option(c.project, **c.given()),
-    "model time-step": lambda c: fdem.settings.time_step(c.project, **c.given()),
+    "model option": _option,
+    "model time-step": _time_step,
+    "model run-time": lambda c: fdem.clocks.run_time(c.project, c["time"]),
+    "model solve-check": lambda c: fdem.clocks.solve_check(c.project, c["steps"]),
+    "model cycle-option": lambda c: fdem.clocks.cycle_option(c.project, **_parts(c)),
+    "model reset": lambda c: fdem.clocks.reset(c.project, **_parts(c)),
+    "model query": lambda c: fdem.clocks.query(c.project, *_parts(c)),
+    "device list": lambda c: fdem.clocks.devices(c.project),
+    "node thermal-initialize": lambda c: fdem.heat.initial(c.project, c["temperature"], c.where),
+    "node hydraulic-initialize": _initial_fluid,
+    "node history": _node_history,
+    "table": _table,
     "model sub-step": lambda c: fdem.flow.sub_step(c.project, **c.given()),
     "model rayleigh": lambda c: fdem.settings.rayleigh(c.project, **c.given()),
     "model creep": lambda c: fdem.settings.creep(c.project, **c.given()),
@@ -454,6 +556,8 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "element reset state": lambda c: fdem.settings.reset_elements(c.project, c.where),
     "element reset kelvin-strain": lambda c: fdem.settings.reset_kelvin_strain(c.project, c.where),
     "element-face group": _group(g.FACE),
+    "element-face list summary": lambda c: fdem.summary.listed(c.project, g.FACE, c.where),
+    "face-joint list summary": lambda c: fdem.summary.listed(c.project, g.JOINT, c.where),
     "element-face c-model": _face_model,
     "element-face property": lambda c: fdem.assignments.face_property(c.project, c.given(), c.where),
     "element-face boundary": _face_condition,
@@ -478,7 +582,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "bolt-element group": _group(g.BOLT_ELEMENT),
     "bolt-node group": _group(g.BOLT_NODE),
     "bolt-node boundary": _bolt_node_condition,
-    "bolt-node boundary remove": lambda c: fdem.supports.remove_conditions(c.project, g.BOLT_NODE, c.where),
+    "bolt-node boundary remove": _free_bolt_nodes,
     "liner create": lambda c: fdem.liners.create(c.project, **c.group(), where=c.where),
     "liner c-model": lambda c: fdem.supports.assign(c.project, g.LINER_ELEMENT, c.properties(), c.where),
     "liner delete": lambda c: fdem.supports.delete(c.project, g.LINER_ELEMENT, c.where),
@@ -510,7 +614,11 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
 
 
 def carry_out(command: Command, call: Call) -> None:
-    """The function of a command, then a look at its values in the units declared."""
+    """The function of a command, then a look at its values in the units declared. What has no effect is said once."""
+    if command.idle:
+        if call.project.log is not None:
+            call.project.log.warn_once(command.name, f"{command.name} has no effect here: {command.idle}")
+        return
     BINDINGS[command.name](call)
     if call.project.units:
         units.look(call.project.units, call.project.log, _measured(command, call.arguments))
@@ -528,8 +636,8 @@ def _measured(command: Command, arguments: Mapping[str, Any]) -> Iterator[units.
 
 
 PASSED_OVER: dict[str, Callable[[Any, str], Any]] = {
-    "model save": lambda project, file: project.to_write(project.path(file)),
-    "model restore": lambda project, file: project.to_read(file),
+    "model save": lambda project, file: project.to_write(project.path(fdem.checkpoints.named(file))),
+    "model restore": lambda project, file: project.to_read(fdem.checkpoints.found(project, file)),
     "geometry import": lambda project, file: project.to_read(file),
     "mesh import": lambda project, file: project.to_read(file),
     "history export": lambda project, file: project.to_write(project.result(file)),

@@ -155,9 +155,12 @@ def _file(value: Any) -> str:
     return text
 
 
+_TRUE, _FALSE = ("on", "true", "yes"), ("off", "false", "no")
+
+
 def _boolean(value: Any) -> bool:
-    if isinstance(value, str) and value.lower() in ("on", "true", "off", "false"):
-        return value.lower() in ("on", "true")
+    if isinstance(value, str) and value.lower() in _TRUE + _FALSE:
+        return value.lower() in _TRUE
     if type(value).__name__ not in ("bool", "bool_"):
         raise Unfit
     return bool(value)
@@ -183,6 +186,18 @@ def _vector(*sizes: int) -> Callable[[Any], tuple[float, ...]]:
     return check
 
 
+def _either(one: Callable[[Any], Any], other: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """A check for what either takes."""
+
+    def check(value: Any) -> Any:
+        try:
+            return one(value)
+        except Unfit:
+            return other(value)
+
+    return check
+
+
 def _listed(check: Callable[[Any], Any]) -> Callable[[Any], list]:
     """A check for a list of such values."""
 
@@ -200,6 +215,7 @@ PART = Kind("<f>", "a number above 0, at most 1", number(0.0, 1.0, above=True))
 NOT_NEGATIVE = Kind("<f>", "a number, not negative", number(0.0))
 ANGLE = Kind("<f>", "an angle from 0 to below 90 [degrees]", number(0.0, 90.0 - 1e-9))
 TABLED = Kind("<f>|table <s>|function <s>", "a number, table 'name' or function 'file.py:name'", number(), tabled=True)
+TABLED_STEP = Kind("<f>|table <s>", "a number, not negative, or table 'name'", number(0.0), tabled=True)
 COUNT = Kind("<i>", "a whole number above 0", whole(1))
 ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0))
 POINTS = Kind("3", "3, the points of a joint,", whole(3, 3))
@@ -209,7 +225,9 @@ SPLIT = Kind("5|6|12", "5, 6 or 12", _one_of(5, 6, 12))
 LAST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True)
 STRING = Kind("<s>", "a text in quotes", _string)
 FILE = Kind("<s>", "the name of a file in quotes", _file)
-BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false"))
+BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false", "yes", "no"))
+OPTIONAL_BOOL = replace(BOOL, pattern="[on|off]", optional=True)
+PAIRS = Kind("<f> <f>, <f> <f> ...", "pairs of numbers, time and value", number(), many=True)
 VECTOR = Kind("<v>", "a vector (x,y)", _vector(2))
 OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True)
 VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True)
@@ -223,14 +241,29 @@ SECTION = Kind("<s>", "a plane, 'x=1.5', 'x<1.5', 'x>1.5', or a point and a norm
 THIRD_COUNT, THIRD_POSITIVE = (replace(kind, dims=(3,)) for kind in (COUNT, POSITIVE))
 """One more in three dimensions."""
 _FREEDOM = replace(FREEDOM, meaning="0 free, 1 held, 2 along a vector or 3 across it", check=whole(0, 3))
-_IN_SPACE = {FREEDOM.pattern: _FREEDOM} | {
-    kind.pattern: replace(kind, meaning=kind.meaning.replace("(x,y)", "(x,y,z)"), check=_vector(3))
-    for kind in (VECTOR, OPTIONAL_VECTOR, PLACES)
-}
-_IN_ANY = {FREEDOM.pattern: _FREEDOM} | {
-    kind.pattern: replace(kind, meaning=f"{kind.meaning} or (x,y,z)", check=_vector(2, 3))
-    for kind in (VECTOR, OPTIONAL_VECTOR, PLACES)
-}
+LEVEL = Kind(
+    "<f>|<v>|table <s>", "a number, a vector (x,y) or table 'name'", _either(number(), _vector(2)), tabled=True
+)
+_IN_SPACE = (
+    {FREEDOM.pattern: _FREEDOM}
+    | {
+        kind.pattern: replace(kind, meaning=kind.meaning.replace("(x,y)", "(x,y,z)"), check=_vector(3))
+        for kind in (VECTOR, OPTIONAL_VECTOR, PLACES)
+    }
+    | {
+        LEVEL.pattern: replace(
+            LEVEL, meaning=LEVEL.meaning.replace("(x,y)", "(x,y,z)"), check=_either(number(), _vector(3))
+        )
+    }
+)
+_IN_ANY = (
+    {FREEDOM.pattern: _FREEDOM}
+    | {
+        kind.pattern: replace(kind, meaning=f"{kind.meaning} or (x,y,z)", check=_vector(2, 3))
+        for kind in (VECTOR, OPTIONAL_VECTOR, PLACES)
+    }
+    | {LEVEL.pattern: replace(LEVEL, check=_either(number(), _vector(2, 3)))}
+)
 
 
 def fitting(kind: Kind, dim: int | None) -> Kind:

@@ -80,12 +80,14 @@ class Text:
 
 @dataclass(frozen=True)
 class Vector:
-    """Components in round brackets."""
+    """Components in round brackets; bare: between commas alone."""
 
     items: tuple[Number | Escape, ...]
+    bare: bool = False
 
     def __str__(self) -> str:
-        return "'(" + short(",".join(str(item).strip("'") for item in self.items)) + ")'"
+        inside = short(",".join(str(item).strip("'") for item in self.items))
+        return f"'{inside}'" if self.bare else f"'({inside})'"
 
 
 Token = Word | Number | Escape | Text | Vector
@@ -97,10 +99,31 @@ def tokens(line: str) -> list[Token]:
     at = 0
     while (at := _skip_blanks(line, at)) < len(line) and line[at] != "#":
         token, at = _token(line, at)
+        comma = _skip_blanks(line, at)
+        if line[comma : comma + 1] == "," and not isinstance(token, Word):
+            token, at = _listed(line, token, comma)
         found.append(token)
-        if at < len(line) and not line[at].isspace() and line[at] not in "#(":
+        if at < len(line) and not line[at].isspace() and line[at] not in "#(" + QUOTES * (line[at - 1] == ","):
             _fail_after(line, at, token)
     return found
+
+
+def _listed(line: str, token: Token, at: int) -> tuple[Token, int]:
+    """What a comma at `at` makes of the token before it: numbers and expressions are components of a vector, others
+    items of a list, which stand by themselves."""
+    items = [token]
+    while line[at : at + 1] == ",":
+        after = _skip_blanks(line, at + 1)
+        if after >= len(line) or line[after] in ",#":
+            raise LexicalError(f"read ',' after {items[-1]}, expected one more value behind it")
+        if not isinstance(token, (Number, Escape)):
+            return token, at + 1
+        item, end = _token(line, after)
+        if not isinstance(item, (Number, Escape)):
+            raise LexicalError(f"read {item} in a vector, expected a number or an expression of Python in [ ]")
+        items.append(item)
+        at = _skip_blanks(line, end)
+    return Vector(tuple(items), bare=True), end  # type: ignore[arg-type]
 
 
 def _token(line: str, at: int) -> tuple[Token, int]:

@@ -10,7 +10,7 @@ from hpcdem.core.nearest import hint
 from hpcdem.lang.pcdc import kinds, lexer, rules, trial
 from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
 from hpcdem.lang.pcdc.kinds import Pending
-from hpcdem.lang.pcdc.lexer import Escape, Token, Word
+from hpcdem.lang.pcdc.lexer import Escape, Token, Vector, Word
 from hpcdem.lang.pcdc.statement import Statement, resolved, shown
 from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, Way, distinct
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
@@ -164,7 +164,7 @@ class _Line:
     def _is_unknown(self, command: Command) -> bool:
         """Is the next word none that this command may go on with, where its last word is left out?"""
         token = self.peek()
-        rows = (*command.options, *command.models)
+        rows: tuple[Any, ...] = (*command.options, *command.models)
         return token is None or (isinstance(token, Word) and not matching(token.text, rows))
 
     def _allowed(self, way: Way) -> Command:
@@ -179,13 +179,15 @@ class _Line:
         if self.dim is not None and self.dim not in dims:
             numbers = {2: "two", 3: "three"}
             advice = "; model new dim 3 makes a model of three" if self.dim == 2 else " in this version"
-            raise ValueError(f"'{word}' is for {numbers[dims[0]]} dimensions{advice}")
+            raise Refused(f"'{word}' is for {numbers[dims[0]]} dimensions{advice}")
 
     def leading(self, option: Option, arguments: dict[str, Any]) -> None:
         if not option.required and self.peek() is None:
             return
-        if not option.required and isinstance(self.peek(), Word) and not option.values[0].words:
-            return
+        token, kind = self.peek(), option.values[0]
+        if not option.required and isinstance(token, Word) and token.text.lower() not in kind.words:
+            if not (kind.tabled and matching(token.text, [_TABLE])):
+                return
         arguments[option.name] = self.values(option)
 
     def model(self, command: Command) -> Model:
@@ -256,7 +258,7 @@ class _Line:
         for kind in option.values:
             if self.dim not in (None, *kind.dims):
                 continue
-            if (kind.optional or (self.dim is None and len(kind.dims) == 1)) and not self._value_follows():
+            if (kind.optional or (self.dim is None and len(kind.dims) == 1)) and not self._may_be(kind):
                 break
             read.append(self.one(kinds.fitting(kind, self.dim), option))
         value = read[0] if len(option.values) == 1 and read else tuple(read) if option.values else True
@@ -276,8 +278,25 @@ class _Line:
         self.context = outer
         return given
 
+    def _may_be(self, kind: kinds.Kind) -> bool:
+        """A value follows, or a word that stands for one."""
+        token = self.peek()
+        return self._value_follows() or (isinstance(token, Word) and token.text.lower() in kind.words)
+
+    def _spread(self, kind: kinds.Kind) -> None:
+        """Numbers between commas are a vector only where one is expected."""
+        at = self.at
+        while at < len(self.tokens) and not isinstance(token := self.tokens[at], Word):
+            if isinstance(token, Vector) and token.bare:
+                self.tokens[at : at + 1] = token.items
+            at += 1
+            if not kind.many:
+                return
+
     def one(self, kind: kinds.Kind, option: Option) -> Any:
         what = f"'{option.keyword}'"
+        if "<v>" not in kind.pattern and kind.pattern.startswith(("<f>", "<i>", "[<f>", "[<i>")):
+            self._spread(kind)
         if self.peek() is None:
             self.wanted = [Level(Keyword(word)) for word in kind.words]
         if kind.many:
@@ -300,7 +319,7 @@ class _Line:
                 kinds.STRING, self.next("the name of a table in quotes"), "'table'", self.expressions
             )
             return _later(kinds.TableName, name)
-        if kind.tabled and isinstance(token, Word) and matching(token.text, [_FUNCTION]):
+        if "function" in kind.pattern and isinstance(token, Word) and matching(token.text, [_FUNCTION]):
             name = kinds.read_value(
                 kinds.FILE, self.next("the name of a function in quotes"), "'function'", self.expressions
             )

@@ -90,11 +90,20 @@ def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
 
 def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     ways = {"value": "value", "auto": "auto on", "mass-scaling": "mass-scaling"}
+    if "auto" in arguments and arguments["auto"] == ():
+        arguments = {**arguments, "auto": True}
+    if "update-frequency" in arguments and arguments.get("auto") is not True:
+        raise ValueError("update-frequency goes with auto on")
     said = [told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)]
     if len(said) > 1:
         raise ValueError(f"{said[0]} and {said[1]} exclude each other: both say what the time step is")
     if said == ["value"] and "safety" in arguments:
         raise ValueError("value and safety exclude each other: a time step that is given is taken as it is")
+
+
+def _option(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    if arguments.get("collision") == () and "ecda" not in arguments:
+        raise ValueError("collision is on or off")
 
 
 def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -178,6 +187,7 @@ _RULES = {
     "mesh structured": _structured,
     "field create": _field,
     "flow-node initial": _fluid,
+    "model option": _option,
     "model time-step": _time_step,
     "model creep": _creep,
     "model rayleigh": _rayleigh,

@@ -109,16 +109,16 @@ def _dimensions(statement: Statement, before: int | None) -> int | None:
 
 
 def _logical(lines: list[str], number: int, words: str) -> tuple[int, str]:
-    """The words of a command and the number of its last line: a backslash at the end of a line goes on with the
-    next."""
-    while (end := _backslash(words)) is not None and number + 1 < len(lines):
+    """The words of a command and the number of its last line: a backslash, or three dots, at the end of a line goes on
+    with the next."""
+    while (end := _goes_on(words)) is not None and number + 1 < len(lines):
         number += 1
         words = words[:end] + " " + lines[number]
     return number, words
 
 
-def _backslash(words: str) -> int | None:
-    """Place of the backslash that ends the line, if it stands outside of texts and comments."""
+def _goes_on(words: str) -> int | None:
+    """Place of the backslash, or the three dots, that end the line, if they stand outside of texts and comments."""
     at = 0
     while at < len(words):
         char = words[at]
@@ -129,7 +129,7 @@ def _backslash(words: str) -> int | None:
             if end < 0:
                 return None
             at = end
-        elif char == "\\" and not words[at + 1 :].strip():
+        elif words[at:].rstrip() in ("\\", "..."):
             return at
         at += 1
     return None

@@ -29,8 +29,11 @@ from hpcdem.lang.pcdc.kinds import (
     FLOAT,
     FREEDOM,
     LAST_ID,
+    LEVEL,
     NOT_NEGATIVE,
+    OPTIONAL_BOOL,
     OPTIONAL_VECTOR,
+    PAIRS,
     PART,
     PLACES,
     POINTS,
@@ -40,6 +43,7 @@ from hpcdem.lang.pcdc.kinds import (
     STRING,
     STRINGS,
     TABLED,
+    TABLED_STEP,
     THIRD_COUNT,
     THIRD_POSITIVE,
     VECTOR,
@@ -172,6 +176,7 @@ class Way:
 
 _SPELLINGS = {
     "c-m{odel}": ("c{onstitutive}-m{odel}",), "init{ial}": ("init{ialize}",), "r{emove}": ("r{move}",),
+    "p{lot}-f{requency}": ("p{lot}-f{renquency}",),
 }  # fmt: skip
 """Words of commands that may be written otherwise, too."""
 
@@ -288,7 +293,8 @@ BURGERS = Model(
     one_of=(("young", "poisson-ratio"), ("bulk", "maxwell-shear")), of=properties.MECH_BURGERS, dims=BOTH,
 )  # fmt: skip
 _COEFFICIENTS = {
-    "transfer-coeficient": ("t{ransfer}-c{oefficient}",), "expansion-coeficient": ("e{xpansion}-c{oefficient}",),
+    "transfer-coeficient": ("t{ransfer}-c{oefficient}", "t{ransfer}-c{oefficent}"),
+    "expansion-coeficient": ("e{xpansion}-c{oefficient}",),
 }  # fmt: skip
 ISO_HEAT = Model(
     "therm{al}-iso-h{eat}", "12",
@@ -328,15 +334,17 @@ MOVE = Model(
     (Option("t{ype}", (FREEDOM, OPTIONAL_VECTOR),
             "0 free (takes constraints back), 1 held, 2 moves along the vector only, 3 (in three dimensions) across it "
             "only (type 0 and 1 take a vector and do not use it)", required=True),), dims=BOTH,
+    also=("mech{anical}-m{ove}-c{onstrain}",),
 )  # fmt: skip
 STRESS = Model(
     "m{echanical}-s{tress}-b{oundary}-c{ondition}", "6",
     "Traction on surfaces: stress times the present normal. Tension is positive. Where it is not 0 it is the total: "
     "water before the face does not push besides.",
-    (Option("s{tress}-x{x}", (TABLED,), "stress xx", "Pa"), Option("s{tress}-y{y}", (TABLED,), "stress yy", "Pa"),
-     Option("s{tress}-z{z}", (TABLED,), "stress zz", "Pa", dims=SPACE),
+    (Option("s{tress}-x{x}", (TABLED,), "stress xx", "Pa", also=("x{x}",)),
+     Option("s{tress}-y{y}", (TABLED,), "stress yy", "Pa", also=("y{y}",)),
+     Option("s{tress}-z{z}", (TABLED,), "stress zz", "Pa", dims=SPACE, also=("z{z}",)),
      Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
-            "pressure", "Pa"),
+            "pressure", "Pa", also=("n{ormal}",)),
      Option("q{uiet}", (BOOL,), "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress "
             "given beside it enters as a wave of half its size"),
      Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s"),
@@ -344,17 +352,24 @@ STRESS = Model(
      Option("inc{oming}-z", (TABLED,), "the same along z", "m/s", dims=SPACE)),
     any_of=True, dims=BOTH, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
 )  # fmt: skip
+ABSORB = Model(
+    "mech{anical}-abs{orb}-b{oundary}-c{ondition}", "", "Surfaces through which waves leave, as m-s-b-c quiet on.",
+    (Option("n{ormal}", (TABLED,), "stress along the normal, which enters as a wave of half its size", "Pa"),),
+    dims=BOTH,
+)  # fmt: skip
 FLOW_CONDITION = Model(
     "hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11",
     "Fluid at nodes, one of the three at each; times of tables are those of flow. With a range, pressure and "
     "flow-surface wet the free faces whose nodes all lie in it: water stands before them and pushes on them, whether "
     "channels end there or not. Without one they are said of the fluid in joints alone.",
     (Option("p{ressure}", (TABLED,), "pressure, not negative", "Pa"),
-     Option("f{low}-s{urface}", (TABLED,), "level of water that stands at the nodes, against gravity: hydrostatic "
-            "pressure below it; above it water can leave (seepage)", "m"),
+     Option("f{low}-s{urface}", (LEVEL,), "level of water that stands at the nodes, against gravity, or a point of "
+            "its surface: hydrostatic pressure below it; above it water can leave (seepage)", "m",
+            also=("f{luid}-s{urface}",)),
      Option("f{low}-r{ate}", (TABLED,), "volume that comes in at each node; negative: is taken out, as far as there is "
             "fluid; in space m3/s", "m2/s")),
-    any_of=True, also=("hydr{aulic}-c{onstant}-f{low}-b{oundary}",), dims=BOTH,
+    any_of=True, dims=BOTH,
+    also=("hydr{aulic}-c{onstant}-f{low}-b{oundary}", "hydra{ulic}-c{onstant}-f{luid}-b{oundary}"),
 )  # fmt: skip
 FREE_FIELD = Model(
     "free-f{ield}", "", "Vertical sides beyond which the ground goes on: a column with the elements of the side and "
@@ -364,12 +379,14 @@ FREE_FIELD = Model(
 )  # fmt: skip
 TEMPERATURE = Model(
     "therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes; times of tables are those of heat.",
-    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),), dims=BOTH,
+    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True, also=("t{mperature}",)),), dims=BOTH,
+    also=("therm{al}-n{ode}-b{oundary}-c{ondition}",),
 )  # fmt: skip
 FLUID_TEMPERATURE = Model(
     "therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of the fluid at flow nodes, as of what is injected "
     "there; times of tables are those of heat.",
-    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),), dims=BOTH,
+    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True, also=("t{mperature}",)),), dims=BOTH,
+    also=("therm{al}-c{avity}-b{oundary}-c{ondition}",),
 )  # fmt: skip
 PROPPANT_CONDITION = Model(
     "hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that comes in at flow nodes, of wells too, one of these; "
@@ -386,7 +403,8 @@ CONST_HEAT = Model(
     "Times of tables are those of heat.",
     (Option("h{eat}-f{lux}", (TABLED,), "heat that comes in", "W/m2"),
      Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer to the environment", "W/(m2 K)",
-            "that of the elements", also=_COEFFICIENTS["transfer-coeficient"]),
+            "that of the elements",
+            also=(*_COEFFICIENTS["transfer-coeficient"], "h{eat}-t{ransfer}-c{oefficent}")),
      Option("e{nvironment}-t{emperature}", (TABLED,), "temperature of the environment", "K")), any_of=True, dims=BOTH,
 )  # fmt: skip
 
@@ -417,7 +435,8 @@ _POROUS = tuple(
         POROUS_PROPERTIES, "f{luid}-den{sity}", "f{luid}-b{ulk}", "vis{cosity}", "a{perature}-i{nitial}",
         "a{perature}-min{umum}", "a{perature}-max{imum}", "leak-off", "m{atrix}-p{ore}-p{ressure}",
         "m{atrix}-p{ermeability}", "m{atrix}-p{orosity}-c{ompressibility}", "m{atrix}-p{orosity}", "sh{ear}-d{ilation}",
-        "sh{ear}-d{ilation}-l{imit}", also=_APERTURES,
+        "sh{ear}-d{ilation}-l{imit}",
+        also={**_APERTURES, "matrix-porosity-compressibility": ("m{atrix}-p{orosity}-c{ompressiblity}",)},
     )
 )  # fmt: skip
 POROUS = Model(
@@ -434,8 +453,10 @@ FLUID_HEAT = Model(
     "its node.",
     tuple(replace(o, values=(BOOL,), unit="", default="off") if o.name == "second-order" else o for o in declared(
         FLUID_HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "sec{ond}-o{rder}",
-        also={"transfer-coeficient": _COEFFICIENTS["transfer-coeficient"]})),
-    of=FLUID_HEAT_PROPERTIES, dims=BOTH,
+        also={"transfer-coeficient": (*_COEFFICIENTS["transfer-coeficient"],
+                                      "c{onvective}-h{eat}-t{ransfer}-c{oefficient}"),
+              "capacity": ("h{eat}-cap{acity}",)})),
+    of=FLUID_HEAT_PROPERTIES, dims=BOTH, also=("f{luid}-t{hermal}",),
 )  # fmt: skip
 _GRAINS = tuple(
     replace(o, values=(BOOL,), unit="", default="off") if o.name == "proppant-stokes" else o for o in declared(
@@ -484,7 +505,7 @@ BOLT_VELOCITY = Model(
 )  # fmt: skip
 BOLT_FORCE = Model(
     "b{olt}-n{ode}-f{orce}-b{oundary}-c{ondition}", "21", "Force on each node of one bolt; across the bar the rock "
-    "takes it.", FORCE.options, any_of=True, dims=BOTH,
+    "takes it.", FORCE.options, any_of=True, dims=BOTH, also=("b{olt}-n{ode}-f{orce}-b{oundary}-c{onditio}",),
 )  # fmt: skip
 
 # ---- liners, beyond the manual -------------------------------------------------------------------------------------
@@ -608,12 +629,26 @@ def _leading(name: str, kind: Kind, doc: str, unit: str = "", required: bool = T
     return Option(name, (kind,), doc, unit, required=required)
 
 
+def _removed(*conditions: Model) -> tuple[Option, ...]:
+    """Which conditions are taken back; none that is named: all."""
+    return tuple(
+        Option(one.notation, (), f"only {one.keyword.name}", also=one.also, dims=one.dims) for one in conditions
+    )
+
+
 def _group_command(kind: str, notation: str) -> Command:
     return Command(
         f"{notation} g{{roup}}", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the "
         "one it was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
         (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
         dims=BOTH if kind in ("element", "element-face", "face-joint", "node", "bolt-element", "bolt-node") else PLANE,
+    )  # fmt: skip
+
+
+def _list_command(kind: str, notation: str) -> Command:
+    return Command(
+        f"{notation} l{{ist}} sum{{mary}}", f"Says in the log how many {kind}s there are, by model and group.",
+        (f"pcdc {kind} list summary range x 0 5",), ranged=kind, dims=BOTH, also=(f"{notation} l{{ist}}",),
     )  # fmt: skip
 
 
@@ -635,6 +670,21 @@ _OF_SOLIDS = (
     _PARAMETER,
 )  # fmt: skip
 
+_PARTS = (
+    ("m{echanical}", "the blocks"), ("t{hermal}", "heat"), ("h{ydraulic}", "fluid"),
+    ("p{roppant}-t{ransport}", "proppant, which has the clock of the fluid"),
+)  # fmt: skip
+_STEPS = (
+    Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "time step", "s"),
+    Option("c{ycle}-n{umber}", (COUNT,), "steps in a cycle"),
+)  # fmt: skip
+_CLOCKS = (
+    Option("s{tart}-t{ime}", (FLOAT,), "time from which model run-time counts", "s"),
+    Option("c{urrent}-t{ime}", (FLOAT,), "what the clock shows now", "s"),
+    Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "time step", "s"),
+)  # fmt: skip
+_WINDOW = "hpcdem view shows a run while it steps, at its own pace"
+
 _MODEL = (
     Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
             ("pcdc model new", "pcdc model new dim 3"),
@@ -655,7 +705,10 @@ _MODEL = (
             ("pcdc model option dynamic off", "pcdc model option collision on"),
             options=(
                 Option("dyn{amic}", (BOOL,), "true motion in time; off: static, towards equilibrium", default="on"),
-                Option("col{lision}", (BOOL,), "contact of surfaces", default="on"),
+                Option("col{lision}", (OPTIONAL_BOOL,), "contact of surfaces", default="on"),
+                Option("ecda", (BOOL,), "on: joints that are whole are no contacts besides; nothing else is there, so "
+                       "off is refused", default="on"),
+                Option("cr{eep}", (BOOL,), "as model creep", default="off"),
                 Option("over{lap}", (choice("refuse", "relax", "keep"),), "of bodies that overlap before the first "
                        "step: refuse it, with the places; let a static stage move them apart; or start as they are",
                        default="refuse"),
@@ -675,16 +728,21 @@ _MODEL = (
                 Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
                        "the stress that they bring, stay as they are", default="on"),
                 Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
-                       "where they are", default="on")),
-            needs_option=True, manual=True, dims=BOTH),
+                       "where they are", default="on", also=("p{roppant}-t{ransport}",))),
+            needs_option=True, manual=True, dims=BOTH, also=("mod{el}",)),
     Command("mod{el} t{ime}-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. "
             "Without this command it is estimated at the first step and after each change of the model. Of value, "
             "mass-scaling and auto on the one said last holds and ends the others.",
-            ("pcdc model time-step auto off", "pcdc model time-step value 1e-7", "pcdc model time-step value 0"),
-            options=(
-                Option("value", (NOT_NEGATIVE,), "the time step itself; 0: estimated again", "s"),
-                Option("auto", (BOOL,), "on: estimated again every 100 steps; off: at the first step and after changes "
-                       "of the model only; a value stays", default="off"),
+            ("pcdc model time-step auto off", "pcdc model time-step 1e-7", "pcdc model time-step value 0",
+             "pcdc model time-step table 'dt'", "pcdc model time-step auto update-frequency 20"),
+            (_leading("value", TABLED_STEP, "as the word value", "s", False),),
+            (
+                Option("value", (TABLED_STEP,), "the time step itself; 0: estimated again; a table over the time is "
+                       "looked at every 100 steps", "s"),
+                Option("auto", (OPTIONAL_BOOL,), "on: estimated again every 100 steps; off: at the first step and "
+                       "after changes of the model only; a value stays", default="off"),
+                Option("u{pdate}-f{requency}", (COUNT,), "with auto: steps after which it is estimated again",
+                       default="100"),
                 Option("safe{ty}", (PART,), "part of the stability limit that is taken, by estimates and mass-scaling",
                        "1", "0.8"),
                 Option("mass-s{caling}", (NOT_NEGATIVE,), "nodes get as much mass as this time step needs; 0: none, "
@@ -698,11 +756,12 @@ _MODEL = (
             needs_option=True, manual=True, dims=BOTH),
     Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
             (_leading("steps", ZERO_OR_MORE, "number of steps"),), dims=BOTH),
-    Command("mod{el} sol{ve}", "Steps until the first of ratio, cycles and time is reached. Static runs without any "
-            "stop at ratio 1e-5. With elastic: straight to static equilibrium by Newton's method, for blocks that are "
-            "elastic or yield, whose joints stay before their peak and whose surfaces do not touch. A run towards a "
-            "ratio that gets nowhere (window, limit) ends the script with exit code 3 and names the body that slides "
-            "away; `pcdc.solved['reason']` says how a run ended.",
+    Command("mod{el} sol{ve}", "Steps until the first of ratio, cycles, time and run-time is reached. Without any of "
+            "them it is ratio 1e-5 or 10 000 cycles; a warning says if it was the cycles. With elastic: "
+            "straight to static equilibrium by Newton's method, for blocks that are elastic or yield, whose joints "
+            "stay before their peak and whose surfaces do not touch. A run towards a ratio that gets nowhere (window, "
+            "limit) ends the script with exit code 3 and names the body that slides away; `pcdc.solved['reason']` says "
+            "how a run ended.",
             ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic time 1e6",
              "pcdc model solve elastic steps 10", "pcdc model solve hydraulic time 5 dt 0.01",
              "pcdc model solve hydraulic steady", "pcdc model solve hydraulic auto time 3600",
@@ -712,8 +771,9 @@ _MODEL = (
                             "as far below as rounding allows", "1"),
                      Option("c{ycles}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
                             "velocities act"),
-                     Option("time", (POSITIVE,), "time that passes; in static runs creep time, each creep step to its "
-                            "ratio (1e-5), or with elastic at once", "s"),
+                     Option("t{ime}", (POSITIVE,), "time that passes; in static runs creep time, each creep step to "
+                            "its ratio (1e-5), or with elastic at once", "s"),
+                     Option("r{un}-t{ime}", (POSITIVE,), "as model run-time, for this command alone", "s"),
                      Option("win{dow}", (ZERO_OR_MORE,), "towards a ratio: it has failed when the least ratio has not "
                             "fallen by a tenth in so many steps, nor in as many as the progress so far took; 0: "
                             "never", default="static runs: ten times as many as a wave takes there and back, at least "
@@ -742,6 +802,50 @@ _MODEL = (
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
                             "halved", "", "1")), dims=BOTH),
+    Command("mod{el} r{un}-t{ime}", "The time that model solve takes at most from now on, from its beginning or from "
+            "the start-time of model reset; without another aim each model solve goes on for it. In static runs "
+            "without creep no time passes.", ("pcdc model run-time 0.1", "pcdc model run-time 0"),
+            (_leading("time", NOT_NEGATIVE, "0: no end any more", "s"),), dims=BOTH),
+    Command("mod{el} s{olve}-c{heck}", "Steps between two looks at the ratio in model solve.",
+            ("pcdc model solve-check 10",), (_leading("steps", COUNT, "in static runs 50, in dynamic ones 100 without "
+                                                      "this command"),), dims=BOTH),
+    Command("mod{el} c{ycle}-o{ption}", "Time step and number of steps of each part in a cycle of a coupled "
+            "calculation: those of the blocks as model time-step value and model sub-step mechanical, those of fluid "
+            "and heat as model time-step and model sub-step with these words. Proppant moves with the fluid, in its "
+            "steps.", ("pcdc model cycle-option mechanical cycle-number 20 hydraulic time-step 0.5 cycle-number 4",),
+            options=tuple(Option(word, (), f"of {what}", more=_STEPS) for word, what in _PARTS),
+            needs_option=True, dims=BOTH),
+    Command("mod{el} reset", "Sets the clocks of the parts. Tables of conditions, stages of wells and leak-off go by "
+            "them.", ("pcdc model reset mechanical current-time 0", "pcdc model reset hydraulic current-time 0 "
+                      "time-step 0.5"),
+            options=tuple(Option(word, (), f"of {what}", more=_CLOCKS) for word, what in _PARTS),
+            needs_option=True, dims=BOTH),
+    Command("mod{el} query", "Says in the log what time a part has come to, and its time step.",
+            ("pcdc model query mechanical time",),
+            options=tuple(Option(word, (), f"of {what}", more=(Option("t{ime}", (), "its clock", required=True),))
+                          for word, what in _PARTS),
+            needs_option=True, dims=BOTH),
+    Command("mod{el} pl{ane}-strain", "What models of the plane are in.", ("pcdc model plane-strain",),
+            idle="models of the plane are in plane strain", dims=BOTH),
+    Command("mod{el} pl{ane}-stress", "Stress in the plane.", ("pcdc model plane-stress",),
+            dims=BOTH, refused="models of the plane are in plane strain. For an elastic plate in plane stress give element "
+            "c-model young E (1 + 2 nu) / (1 + nu)^2 and poisson-ratio nu / (1 + nu): displacements and stresses in "
+            "the plane are those of the plate"),
+    Command("mod{el} p{lot}-f{requency}", "Steps between two pictures of the window.", ("pcdc model p-f 10",),
+            (_leading("steps", COUNT, "steps"),), dims=BOTH, idle=_WINDOW),
+    Command("mod{el} r{ender}-i{nterval}", "The same.", ("pcdc model render-interval 10",),
+            (_leading("steps", COUNT, "steps"),), dims=BOTH, idle=_WINDOW),
+    Command("mod{el} r{ender}-a{uto}", "The same by itself.", ("pcdc model render-auto",),
+            (_leading("on", BOOL, "whether it is", required=False),), dims=BOTH, idle=_WINDOW),
+    Command("mod{el} c{ollision}-d{etect}", "How contacts are searched.", ("pcdc model collision-detect bvh",),
+            options=tuple(Option(word, (), doc) for word, doc in (
+                ("bvh", "by a tree of boxes"), ("sap", "along an axis"), ("unif{orm}", "by cells"),
+                ("unform", "the same"), ("b{roken}-j{oint}-p{air}", "between broken faces"))),
+            needs_option=True, dims=BOTH, idle="there is one search, which finds every contact in time"),
+    Command("mod{el} c{ollision}-c{ompute}", "How the force of a contact is computed.",
+            ("pcdc model collision-compute accurate",),
+            options=(Option("accurate", (), "over the overlap"), Option("iterate", (), "step by step")),
+            needs_option=True, dims=BOTH, idle="the force of a contact is always that over its whole overlap"),
     Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.",
             ("pcdc model sub-step mechanical 10 hydraulic 5", "pcdc model sub-step mechanical 100 thermal 1"),
             options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow, and of heat",
@@ -1045,11 +1149,11 @@ _OBJECTS = (
             ("pcdc element initial stress-xx -5e6 stress-yy -10e6",
              "pcdc element initial stress-yy 0 gradient (0,25e3)"),
             options=tuple(
-                Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa",
-                       more=(Option("grad{ient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
+                Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa", also=(f"s{{stress}}-{c}",),
+                       more=(Option("g{radient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
                 for c in ("xx", "yy", "xy", "zz")) + tuple(
-                Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa", dims=SPACE,
-                       more=(Option("grad{ient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
+                Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa", dims=SPACE, also=(f"s{{stress}}-{c}",),
+                       more=(Option("g{radient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
                 for c in ("xz", "yz")), ranged="element", needs_option=True, dims=BOTH),
     Command("e{lement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
             "log says that nothing was changed. Stresses stay; plastic strain is counted from here on.",
@@ -1058,6 +1162,7 @@ _OBJECTS = (
             "here on. Stresses and displacements stay.", ("pcdc element reset kelvin-strain",), ranged="element",
             dims=BOTH),
     _group_command("element-face", "e{lement}-f{ace}"),
+    _list_command("element-face", "e{lement}-f{ace}"),
     Command("e{lement}-f{ace} c-m{odel}", "The contact model of surfaces.",
             ("pcdc element-face c-model contact-m-c property pen-shear 5e11 pen-normal 5e11 friction 30",),
             models=(CONTACT,), ranged="element-face", manual=True, dims=BOTH),
@@ -1069,11 +1174,15 @@ _OBJECTS = (
              "pcdc element-face boundary m-s-b-c quiet on incoming-x table 'wave' range boundary y 0 0",
              "pcdc element-face boundary free-field range boundary x 0 0",
              "pcdc element-face boundary therm-c-h transfer-coeficient 25 environment-temperature 10 range boundary"),
-            models=(STRESS, FREE_FIELD, CONST_HEAT), ranged="element-face", dims=BOTH,
+            models=(STRESS, ABSORB, FREE_FIELD, CONST_HEAT), ranged="element-face", dims=BOTH,
             also=("e{lement}-f{ace} b{oundary} a{pply}", "e{lement}-f{ace} a{pply}")),
     Command("e{lement}-f{ace} b{oundary} r{emove}", "Takes boundary conditions of surfaces back.",
-            ("pcdc element-face boundary remove range geometry 'hole'",), ranged="element-face", dims=BOTH),
+            ("pcdc element-face boundary remove range geometry 'hole'",
+             "pcdc element-face boundary remove therm-c-h range geometry 'hole'"),
+            options=_removed(STRESS, CONST_HEAT), ranged="element-face", dims=BOTH,
+            also=("e{lement}-f{ace} r{emove}",)),
     _group_command("face-joint", "f{ace}-j{oint}"),
+    _list_command("face-joint", "f{ace}-j{oint}"),
     Command("f{ace}-j{oint} c-m{odel}", "The model of the joints between elements. Joints without one hold for ever.",
             ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",
              "pcdc face-joint c-model hydr-p-m property fluid-density 1000 fluid-bulk 2.2e9 viscosity 1e-6 "
@@ -1101,13 +1210,36 @@ _OBJECTS = (
             "giving it to a condition: for a script that begins with model restore.",
             ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
     Command("n{ode} bou{ndary} r{emove}", "Takes boundary conditions of nodes back.",
-            ("pcdc node boundary remove range group 'platen' set 'bc'",), ranged="node", dims=BOTH),
+            ("pcdc node boundary remove range group 'platen' set 'bc'",
+             "pcdc node boundary remove mech-vel-b-c range group 'platen' set 'bc'"),
+            options=_removed(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE),
+            ranged="node", dims=BOTH, also=("n{ode} rem{ove}",)),
     Command("n{ode} init{ial}", "The velocity or temperature of nodes now.",
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
+                     *(Option(f"vel{{ocity}}-{axis}", (FLOAT,), f"velocity along {axis}; the other components stay",
+                              "m/s", dims=SPACE if axis == "z" else BOTH) for axis in "xyz"),
+                     *(Option(f"f{{orce}}-{axis}", (FLOAT,), f"force along {axis} on each node from now on, as the "
+                              "force condition", "N", dims=SPACE if axis == "z" else BOTH) for axis in "xyz"),
                      Option("temp{erature}", (FLOAT,), "temperature, of the fluid at them too; before, it is 0. "
                             "Elements around the nodes are free of thermal stress then", "K")), ranged="node",
             needs_option=True, dims=BOTH),
+    Command("n{ode} therm{al}-init{ialize}", "The temperature of nodes now, as node initial temperature.",
+            ("pcdc node thermal-initialize temperature 15 range x 0 1",),
+            options=(Option("t{emperature}", (FLOAT,), "temperature, of the fluid at them too", "K", required=True),),
+            ranged="node", dims=BOTH),
+    Command("n{ode} hydr{aulic}-init{ialize}", "Fluid that flow nodes hold now, and its temperature.",
+            ("pcdc node hydraulic-initialize flow-node-saturation 0.5",),
+            options=(Option("f{low}-n{ode}-s{aturation}", (limited(0.0, 1.0, True),), "part of the room that is "
+                            "filled", "1", also=("f{luid}-c{avity}-s{aturation}",)),
+                     Option("f{low}-n{ode}-t{emperature}", (FLOAT,), "of the fluid alone", "K",
+                            also=("f{luid}-c{avity}-t{emperature}",))),
+            ranged="node", needs_option=True, dims=BOTH),
+    Command("n{ode} hist{ory}", "A history of the temperature of a node, of several their mean.",
+            ("pcdc node history 'gauge' thermal temperature range id 3",), (_NAME,),
+            options=(Option("therm{al}", (), "of heat", required=True,
+                            more=(Option("temp{erature}", (), "temperature", required=True),)), _EVERY),
+            ranged="node", dims=BOTH),
     Command("n{ode} re{set} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True,
     dims=BOTH),
     Command("n{ode} re{set} dis{placement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
@@ -1162,7 +1294,10 @@ _OBJECTS = (
             models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH,
             also=("b{olt}-n{ode} bou{ndary} a{pply}", "b{olt}-n{ode} a{pply}")),
     Command("b{olt}-n{ode} bou{ndary} r{emove}", "Takes it back.",
-            ("pcdc bolt-node boundary remove range group 'heads'",), ranged="bolt-node", dims=BOTH),
+            ("pcdc bolt-node boundary remove range group 'heads'",
+             "pcdc bolt-node boundary remove b-n-f-b-c range group 'heads'"),
+            options=_removed(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH,
+            also=("b{olt}-n{ode} r{emove}",)),
     Command("bolt del{ete}", "Takes elements of bolts out at once, with their part of the grout. Their numbers go with "
             "them, those of the others stay; without RANGE all of them.",
             ("pcdc bolt delete range group 'roof'",), ranged="bolt-element", dims=BOTH),
@@ -1200,6 +1335,14 @@ _RECORDS = (
              "pcdc table create 'c_of_strain' values (0,2e6) (0.01,2e5)"),
             (_NAME,), (Option("val{ues}", (VECTORS,), "(time or coordinate, value), the first ascending", "s or m",
                               required=True),), dims=BOTH),
+    Command("tab{le}", "The same in pairs of numbers. With relative-time the table begins when a condition takes it: "
+            "its times count from that moment.",
+            ("pcdc table 'ramp' data 0 0, 0.1 2e6, 1 2e6", "pcdc table 'ramp' data 0 0 0.1 2e6 type relative-time"),
+            (_NAME,), (Option("d{ata}", (PAIRS,), "time and value, in turn", "s"),
+                       Option("t{ype}", (), "what its times count from",
+                              more=(Option("r{elative}-t{ime}", (), "the moment at which a condition takes it"),
+                                    Option("a{bsolute}-t{ime}", (), "the beginning of the model")))),
+            needs_option=True, dims=BOTH),
     Command("tab{le} del{ete}", "Forgets a table.", ("pcdc table delete 'blast'",), (_NAME,), dims=BOTH),
     Command("field cr{eate}", "A random field: properties that differ from element to element, face to face, joint to "
             "joint. Where several properties take the same field they are drawn together; another seed is another, "
@@ -1308,5 +1451,25 @@ _RECORDS = (
              Option("title", (STRING,), "over the picture; {step} and {time} are filled in")), ranged="any", dims=BOTH),
 )  # fmt: skip
 
-COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_ELEMENT_CREATE, *_OBJECTS, *_RECORDS)
+_ONLINE = (
+    Command("dev{ice} l{ist}", "Says in the log what the run computes with: ranks, threads, cores.",
+            ("pcdc device list",), dims=BOTH),
+    Command("dev{ice} s{witch}-t{o}", "Another device.", ("pcdc device switch-to 'GPU 0'",),
+            (_leading("name", STRING, "its name"),), dims=BOTH,
+            idle="a run computes with the ranks and threads that it was started with (mpirun -n, -j)"),
+    Command("v{iew}", "What a window shows.", ("pcdc view 'stress' target element name 'stress-yy'",), (_NAME,),
+            options=(Option("t{arget}", (), "of what", more=tuple(
+                Option(word, (), doc, more=(Option("n{ame}", (STRING,), "the field"),)) for word, doc in (
+                    ("e{lement}", "elements"), ("f{ace}-j{oint}", "joints"), ("geo{metry}", "layers"),
+                    ("b{olt}", "bolts"), ("f{low}-c{hannel}", "channels")))),
+                     Option("u{pdate}", (), "draws it again")),
+            needs_option=True, dims=BOTH,
+            idle="hpcdem view shows any field of a run while it steps; output image draws one into a file"),
+    Command("b{oundary}-m{odel}", "Conditions in code of C#.", ("pcdc boundary-model create s-b-c name 'a' code 'b'",),
+            dims=BOTH, refused="no code of C# is run. A stress or velocity that depends on place and time is a "
+            "function in Python: element-face boundary m-s-b-c stress-normal function 'file.py:name', "
+            "node boundary mech-vel-b-c velocity-x function 'file.py:name'"),
+)  # fmt: skip
+
+COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_ELEMENT_CREATE, *_OBJECTS, *_RECORDS, *_ONLINE)
 PCDC = Table(COMMANDS, RANGE_TERMS)

@@ -88,12 +88,13 @@ TRACTIONS = {
 @dataclass(frozen=True)
 class Options:
     """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
-    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`, deep_overlap: of `DEEP_OVERLAP`; potential: of
-    `POTENTIAL`, in space. mechanical, hydraulic: blocks move, fluid flows; one_way: fluid does not push; proppant:
-    grains move in it; flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps (0: as many
-    as are needed) of flow_dt [s] (0: the time of those steps, or a stable one); thermal: heat flows, in cycles as often
-    as those of flow, of heat_steps sub-steps of heat_dt [s] likewise. mass_damping [1/s], stiffness_damping [s]:
-    Rayleigh damping, of dynamic runs. static_since: step at which static mode was switched on."""
+    of dt, auto and mass_scaling is set; auto_every: steps between two estimates. overlap: one of `OVERLAP`,
+    deep_overlap: of `DEEP_OVERLAP`; potential: of `POTENTIAL`, in space. mechanical, hydraulic: blocks move, fluid
+    flows; one_way: fluid does not push; proppant: grains move in it; flow_every: steps of the blocks between two cycles
+    of flow, of flow_steps sub-steps (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable
+    one); thermal: heat flows, in cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise.
+    mass_damping [1/s], stiffness_damping [s]: Rayleigh damping, of dynamic runs. static_since: step at which static
+    mode was switched on."""
 
     gx: float = 0.0
     gy: float = 0.0
@@ -103,6 +104,7 @@ class Options:
     large_strain: bool = True
     dt: float = 0.0
     auto: bool = False
+    auto_every: int = 100
     safety: float = SAFETY
     mass_scaling: float = 0.0
     overlap: str = REFUSE
@@ -1007,12 +1009,16 @@ class ModelDefinition:
         for row in np.unique(old).tolist():
             column[at[old == row]] = _row_of(rows, replace(rows[row], **changes))
 
-    def remove_conditions(self, nodes: Numbers = None) -> None:
-        """Take back velocities, accelerations, forces and constraints of nodes; None: of all, those too that have no
-        element at this moment."""
+    def remove_conditions(self, nodes: Numbers = None, kinds: Sequence[str] = node_conditions.KINDS) -> None:
+        """Take back velocities and accelerations, forces, constraints of nodes (these kinds); None: of all, those too
+        that have no element at this moment."""
         at = self.corners_of_nodes(nodes, whole=True) if nodes is not None else slice(None)
         self.before_change()
-        self.corner_row[at] = 0
+        column = self.corner_row[at]
+        for row in np.unique(column).tolist():
+            left = node_conditions.without(self.conditions[row], kinds)
+            column[self.corner_row[at] == row] = _row_of(self.conditions, left)
+        self.corner_row[at] = column
         self._acting = None
         self.changed(stiffness=False)
 
@@ -1116,8 +1122,9 @@ class ModelDefinition:
         changes of the model.
 
         value [s]: it is this. mass_scaling [s]: it is this, and nodes get the mass that makes it stable. auto on: it is
-        estimated again every 100 steps, too. Of these three the one that was said last holds and ends the other two;
-        0 (off) takes it back. safety (0.8): part of the stability limit that is used, by estimates and mass scaling.
+        estimated again every 100 steps (`estimate_every`), too. Of these three the one that was said last holds and
+        ends the other two; 0 (off) takes it back. safety (0.8): part of the stability limit that is used, by estimates
+        and mass scaling.
 
         CommandError for two of the three at once, and for a safety factor beside a value.
         """
@@ -1142,6 +1149,12 @@ class ModelDefinition:
         if wanted:
             changes = {"dt": 0.0, "mass_scaling": 0.0, "auto": False, **changes}
         self._set(**changes)
+
+    def estimate_every(self, steps: int) -> None:
+        """Steps after which an automatic time step is estimated again (100)."""
+        if steps < 1:
+            raise CommandError(f"steps between two estimates of the time step: at least 1 is needed, got {steps}")
+        self._set(auto_every=int(steps))
 
     def rayleigh(self, ratio: float, frequency: float | None = None, part: str = "both") -> None:
         """Rayleigh damping C = alpha M + beta K, dynamic runs: `ratio` of the critical one at `frequency` [Hz].

@@ -64,6 +64,21 @@ class NodeCondition:
         return f"force-{axis} {_told(getattr(self, f'force_{axis}'))}"
 
 
+KINDS = "motion", "force", "constraint"
+"""What may be taken back by itself."""
+
+
+def without(one: NodeCondition, kinds: Sequence[str]) -> NodeCondition:
+    """The rest of a condition when these kinds of it are taken back."""
+    blank, left = NodeCondition(), one
+    of = {"motion": ("does", "at"), "force": ("force", "side", "part")}
+    for kind, bits in (("motion", 7), ("force", 56)):
+        if kind in kinds:
+            names = [f"{stem}_{axis}" for stem in of[kind] for axis in "xyz"]
+            left = replace(left, older=left.older & ~bits, **{name: getattr(blank, name) for name in names})
+    return replace(left, constraint=blank.constraint, way=blank.way) if "constraint" in kinds else left
+
+
 _CONSTRAINTS = {
     moving.FIXED: "held (type 1)",
     moving.ALONG: "bound to the direction {} (type 2)",

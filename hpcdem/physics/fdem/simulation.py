@@ -67,8 +67,6 @@ LOCKS = 0.45
 """Poisson's ratio above which tetrahedra are said to lock."""
 OWN_CLOCK = ("fluid", "proppant", "heat")
 """Physics whose conditions follow tables over a time of their own."""
-AUTO = 100
-"""Steps after which an automatic time step is estimated again."""
 
 
 class Blocks(State):
@@ -329,7 +327,11 @@ class Blocks(State):
         with timers("halo"):
             halo.finish()
         self.surface_loads.follow()
-        if self.options.auto and self.options.dynamic and self.clock.step - rebuild_state.estimated >= AUTO:
+        if (
+            self.options.auto
+            and self.options.dynamic
+            and self.clock.step - rebuild_state.estimated >= self.options.auto_every
+        ):
             rebuild_state.dt, stale = 0.0, True
         if stale or outdated:
             if not outdated or (budget is not None and self.masses_change()):

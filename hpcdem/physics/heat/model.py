@@ -279,11 +279,18 @@ class Heat(SurfaceLoad):
         self.blocks._change_rows(self.faces, self.face, at, changes)
         self.blocks.changed(stiffness=False)
 
-    def remove_conditions(self, nodes: np.ndarray | None) -> None:
+    def set_clock(self, time: float) -> None:
+        """The clock of heat shows this time [s]."""
+        self.blocks.before_change()
+        self.time = time
+        self.blocks.changed(stiffness=False)
+
+    def remove_conditions(self, nodes: np.ndarray | None, rock: bool = True, fluid: bool = True) -> None:
         """Nodes (None: all) are no longer held, nor is the fluid at them."""
         self.blocks.before_change()
-        self.held[slice(None) if nodes is None else nodes] = 0
-        if self.fluid is not None:
+        if rock:
+            self.held[slice(None) if nodes is None else nodes] = 0
+        if fluid and self.fluid is not None:
             self.fluid.held[slice(None) if nodes is None else nodes] = 0
         self.blocks.changed(stiffness=False)
 

@@ -1,0 +1,114 @@
+"""Time in a model of blocks: how long a run takes, the clocks of blocks, fluid and heat, and how far they step."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hpcdem.commands.fdem import flow, settings
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.proppant.model import Proppant
+
+MECHANICAL, THERMAL, HYDRAULIC, PROPPANT = PARTS = "mechanical", "thermal", "hydraulic", "proppant_transport"
+"""What has a clock; that of proppant is the one of the fluid."""
+
+
+def run_time(project: Project, time: float) -> None:
+    """The time that model solve takes at most from now on [s]; 0: no end."""
+    if time < 0.0:
+        raise CommandError(f"a run-time must not be negative, got {time:g}")
+    project.run_time = time
+
+
+def solve_check(project: Project, steps: int) -> None:
+    """Steps between two looks at the ratio."""
+    if steps < 1:
+        raise CommandError(f"solve-check: a whole number above 0 is needed, got {steps}")
+    project.look = steps
+
+
+def cycle_option(project: Project, **parts: Mapping[str, Any]) -> None:
+    """time_step [s] and cycle_number of each part in a cycle, see `PARTS`."""
+    for part in (HYDRAULIC, PROPPANT):
+        other = parts.get(HYDRAULIC if part == PROPPANT else PROPPANT, {})
+        for name, value in parts.get(part, {}).items():
+            if other.get(name, value) != value:
+                raise CommandError(
+                    f"proppant moves in the steps of the fluid: {name} is {parts[HYDRAULIC][name]:g} for hydraulic "
+                    f"and {parts[PROPPANT][name]:g} for proppant-transport"
+                )
+    for part, given in parts.items():
+        if "time_step" in given:
+            _time_step(project, part, given["time_step"])
+        if "cycle_number" in given:
+            word = HYDRAULIC if part == PROPPANT else part
+            flow.sub_step(project, **{word: given["cycle_number"]})
+
+
+def _time_step(project: Project, part: str, value: float) -> None:
+    settings.time_step(project, **{{MECHANICAL: "value", THERMAL: THERMAL}.get(part, HYDRAULIC): value})
+
+
+def reset(project: Project, **parts: Mapping[str, Any]) -> None:
+    """start_time, from which run-time counts, current_time and time_step [s] of parts, see `PARTS`. Collective."""
+    project.refuse_inside("model reset")
+    for part, given in parts.items():
+        if "current_time" in given:
+            _set_clock(project, part, given["current_time"])
+        if "time_step" in given:
+            _time_step(project, part, given["time_step"])
+        if "start_time" in given:
+            if part != MECHANICAL:
+                _physics(project, part)
+            project.began[part] = given["start_time"]
+
+
+def _set_clock(project: Project, part: str, time: float) -> None:
+    if not np.isfinite(time):
+        raise CommandError(f"a time must be finite, got {time}")
+    blocks = project.ready()
+    if part == MECHANICAL:
+        blocks.before_change()
+        blocks.clock.time = time
+        blocks.changed(stiffness=False)
+        return
+    _physics(project, part).set_clock(time)
+
+
+def _physics(project: Project, part: str) -> Any:
+    """Whose clock it is; CommandError if it is not there."""
+    blocks = project.ready(use=False)
+    found = Heat.there(blocks) if part == THERMAL else Flow.there(blocks)
+    if found is None or (part == PROPPANT and Proppant.there(blocks) is None):
+        lacking = {
+            THERMAL: "heat yet: element c-model thermal-iso-heat",
+            HYDRAULIC: "fluid yet: face-joint c-model hydraulic-porous-medium",
+            PROPPANT: "proppant yet: face-joint c-model hydraulic-porous-proppant-medium",
+        }[part]
+        raise CommandError(f"there is no {lacking} comes first")
+    return found
+
+
+def query(project: Project, *parts: str) -> None:
+    """Say in the log what time these parts have come to, and their time step. Collective."""
+    for part in parts:
+        of = project.blocks.clock if part == MECHANICAL else _physics(project, part)
+        step = f", time step {of.dt:.6g} s" if of.dt else ""
+        if project.log is not None:
+            project.log.info(f"{part.replace('_', '-')} time {of.time:.9g} s{step}")
+
+
+def devices(project: Project) -> None:
+    """Say in the log what a run computes with. Collective."""
+    ranks, threads = project.comm.size, project.blocks.threads
+    if project.log is not None:
+        project.log.info(
+            f"{ranks} rank{'s' * (ranks > 1)} of {threads} thread{'s' * (threads > 1)} each; this host has "
+            f"{os.cpu_count()} processors"
+        )
