@@ -649,8 +649,8 @@ class Nodes(Objects):
         flow_rate: Number | None = None,
         where: Where = None,
     ) -> None:
-        """One of them at flow nodes: pressure [Pa], level [m] or point of a free surface, rate that comes in at each [m2/s].
-        With `where`, pressure and level wet the free faces whose nodes all are in it."""
+        """One of them at flow nodes: pressure [Pa], level [m] or point of a free surface, rate that comes in at each
+        [m2/s]. With `where`, pressure and level wet the free faces whose nodes all are in it."""
         given = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
         self._carry_out("boundary", given, where, "hydraulic-constant-flow-boundary")
 

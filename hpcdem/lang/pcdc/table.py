@@ -828,8 +828,8 @@ _MODEL = (
     Command("mod{el} pl{ane}-strain", "What models of the plane are in.", ("pcdc model plane-strain",),
             idle="models of the plane are in plane strain", dims=BOTH),
     Command("mod{el} pl{ane}-stress", "Stress in the plane.", ("pcdc model plane-stress",),
-            dims=BOTH, refused="models of the plane are in plane strain. For an elastic plate in plane stress give element "
-            "c-model young E (1 + 2 nu) / (1 + nu)^2 and poisson-ratio nu / (1 + nu): displacements and stresses in "
+            dims=BOTH, refused="models of the plane are in plane strain. For an elastic plate in plane stress give "
+            "element c-model young E (1 + 2 nu) / (1 + nu)^2 and poisson-ratio nu / (1 + nu): displacements and stresses in "
             "the plane are those of the plate"),
     Command("mod{el} p{lot}-f{requency}", "Steps between two pictures of the window.", ("pcdc model p-f 10",),
             (_leading("steps", COUNT, "steps"),), dims=BOTH, idle=_WINDOW),
