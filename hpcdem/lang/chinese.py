@@ -34,6 +34,28 @@ ZDEM = {
 }
 
 PCDC = {
+    "model run-time": "此后 model solve 最多计算的时间,从其开始或从 model reset 的 start-time 起算;没有其他目标时,每次 model solve 计算这么长时间。",
+    "model solve-check": "model solve 中两次检查不平衡力比率之间的步数。",
+    "model cycle-option": "耦合计算的一个循环里,各模块的时间步和步数;支撑剂与流体同步。",
+    "model reset": "设置各模块的时钟;边界条件的表、井的阶段和滤失都按它计时。",
+    "model query": "在日志中说明某个模块算到的时间及其时间步。",
+    "model plane-strain": "平面模型即为平面应变,此命令没有别的作用。",
+    "model plane-stress": "平面应力:拒绝,并说明如何换算弹性参数。",
+    "model plot-frequency": "窗口刷新的步数:此处没有作用。",
+    "model render-interval": "同上。",
+    "model render-auto": "自动刷新:此处没有作用。",
+    "model collision-detect": "接触搜索的方法:此处没有作用。",
+    "model collision-compute": "接触力的算法:此处没有作用。",
+    "element-face list summary": "在日志中列出面的数目,按模型和组。",
+    "face-joint list summary": "在日志中列出节理的数目,按模型和组。",
+    "node thermal-initialize": "节点现在的温度,同 node initial temperature。",
+    "node hydraulic-initialize": "流动节点现在的流体及其温度。",
+    "node history": "监测节点的温度,多个节点时取平均。",
+    "table": "由成对的数给出的表;relative-time:从边界条件采用它的时刻起计时。",
+    "device list": "在日志中说明计算所用的进程、线程和处理器。",
+    "device switch-to": "换计算设备:此处没有作用。",
+    "view": "窗口的显示:此处没有作用,见 hpcdem view。",
+    "boundary-model": "C# 代码的边界条件:拒绝,改用 Python 函数。",
     "model new": "新模型:除 Python 变量外,之前的内容全部不保留。",
     "model save": "把整个状态存盘:网格、模型、运动、裂纹、监测,以及名称以 m_ 开头的变量和函数。",
     "model restore": "恢复存盘的状态及其 m_ 变量和函数。",
@@ -131,6 +153,7 @@ PCDC = {
 }
 
 MODELS = {
+    "mechanical-absorb-boundary-condition": "波可以穿出的面,同 m-s-b-c quiet on。",
     "mechanical-iso-elastic": "各向同性线弹性,大转动。",
     "null": "开挖:移去单元,旁边的面成为自由面;再赋其他模型即回填。",
     "mechanical-mohr-coulomb": "弹性,到 Mohr–Coulomb 强度或抗拉强度后塑性,大转动。",
@@ -320,6 +343,56 @@ ZDEM_KEYWORDS = {
 """Meanings of keywords of ZDEM by their English."""
 
 PCDC_KEYWORDS = {
+    "on: joints that are whole are no contacts besides; nothing else is there, so off is refused": "on:完好的节理不另作接触;只有这一种,off 被拒绝",
+    "as model creep": "同 model creep",
+    "as the word value": "同 value",
+    "the time step itself; 0: estimated again; a table over the time is looked at every 100 steps": "时间步本身;0:重新估计;随时间变化的表每 100 步取一次",
+    "with auto: steps after which it is estimated again": "与 auto 同用:重新估计的步数",
+    "as model run-time, for this command alone": "同 model run-time,只用于本命令",
+    "0: no end any more": "0:不再限制",
+    "in static runs 50, in dynamic ones 100 without this command": "没有此命令时静力 50,动力 100",
+    "of the blocks": "块体",
+    "of heat": "热",
+    "of fluid": "流体",
+    "of proppant, which has the clock of the fluid": "支撑剂,与流体同一时钟",
+    "steps": "步数",
+    "whether it is": "是否",
+    "by a tree of boxes": "用包围盒树",
+    "along an axis": "沿一个轴",
+    "by cells": "按格子",
+    "by cells, too": "同样按格子",
+    "between broken faces": "断开的面之间",
+    "over the overlap": "按重叠",
+    "step by step": "逐步",
+    "stress along the normal, which enters as a wave of half its size": "法向应力,以其一半大小的波进入",
+    "only this condition": "只取消这一种条件",
+    "level of water that stands at the nodes, against gravity, or a point of its surface: hydrostatic pressure below "
+    "it; above it water can leave (seepage)":
+    "节点处的水位(逆重力方向),或水面上的一点:其下为静水压力,其上水可以渗出",
+    "velocity along x; the other components stay": "沿 x 的速度,其他分量不变",
+    "velocity along y; the other components stay": "沿 y 的速度,其他分量不变",
+    "velocity along z; the other components stay": "沿 z 的速度,其他分量不变",
+    "force along x on each node from now on, as the force condition": "此后每个节点沿 x 的力,同力边界条件",
+    "force along y on each node from now on, as the force condition": "此后每个节点沿 y 的力,同力边界条件",
+    "force along z on each node from now on, as the force condition": "此后每个节点沿 z 的力,同力边界条件",
+    "temperature, of the fluid at them too": "温度,也是其处流体的温度",
+    "of the fluid alone": "仅流体的温度",
+    "time and value, in turn": "时间和值,依次成对",
+    "what its times count from": "时间的起点",
+    "of what": "对象",
+    "draws it again": "重画",
+    "time step": "时间步",
+    "steps in a cycle": "一个循环中的步数",
+    "time from which model run-time counts": "model run-time 的起算时间",
+    "what the clock shows now": "时钟现在的时间",
+    "its clock": "其时钟",
+    "the moment at which a condition takes it": "边界条件采用它的时刻",
+    "the beginning of the model": "模型的开始",
+    "elements": "单元",
+    "joints": "节理",
+    "layers": "几何层",
+    "bolts": "锚杆",
+    "channels": "通道",
     "dimensions of space; in three not everything is there, see the end of the reference":
     "空间维数;三维中并非全部功能都有,见页末的“三维”",
     "name of the file, beside the script": "文件名,位于脚本旁",
@@ -350,7 +423,6 @@ PCDC_KEYWORDS = {
     "热在有热模型的单元中传导;off:温度及其引起的应力保持不变",
     "grains move in the fluid of channels that carry them; off: they stay where they are":
     "支撑剂颗粒随通道中的流体运移;off:颗粒停在原处",
-    "the time step itself; 0: estimated again": "时间步的值;0:重新估算",
     "on: estimated again every 100 steps; off: at the first step and after changes of the model only; a value stays":
     "on:每 100 步重新估算;off:只在第一步和模型改变后估算;已给定的值不变",
     "part of the stability limit that is taken, by estimates and mass-scaling":
@@ -636,9 +708,6 @@ PCDC_KEYWORDS = {
     "0 and 1 take a vector and do not use it)":
     "0 自由(撤销约束),1 固定,2 只能沿向量运动,3(三维)只能垂直于向量运动(0 和 1 可写向量,但不用)",
     "pressure, not negative": "压力,不为负",
-    "level of water that stands at the nodes, against gravity: hydrostatic pressure below it; above it water can "
-    "leave (seepage)":
-    "节点处的水位,沿重力反方向:水位以下为静水压力;以上水可流出(渗出面)",
     "volume that comes in at each node; negative: is taken out, as far as there is fluid; in space m3/s":
     "每个节点流入的流量;负值:抽出,以有流体为限;三维中单位为 m3/s",
     "concentration of the slurry that conditions and wells bring: volume of grains over that of the slurry":

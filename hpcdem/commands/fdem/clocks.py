@@ -52,7 +52,8 @@ def cycle_option(project: Project, **parts: Mapping[str, Any]) -> None:
 
 
 def _time_step(project: Project, part: str, value: float) -> None:
-    settings.time_step(project, **{{MECHANICAL: "value", THERMAL: THERMAL}.get(part, HYDRAULIC): value})
+    word: dict[str, Any] = {{MECHANICAL: "value", THERMAL: THERMAL}.get(part, HYDRAULIC): value}
+    settings.time_step(project, **word)
 
 
 def reset(project: Project, **parts: Mapping[str, Any]) -> None:
@@ -78,6 +79,8 @@ def _set_clock(project: Project, part: str, time: float) -> None:
         blocks.clock.time = time
         blocks.changed(stiffness=False)
         return
+    if (grains := Proppant.there(blocks)) is not None and part != THERMAL:
+        grains.time = time
     _physics(project, part).set_clock(time)
 
 

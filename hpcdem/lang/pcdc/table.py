@@ -631,9 +631,7 @@ def _leading(name: str, kind: Kind, doc: str, unit: str = "", required: bool = T
 
 def _removed(*conditions: Model) -> tuple[Option, ...]:
     """Which conditions are taken back; none that is named: all."""
-    return tuple(
-        Option(one.notation, (), f"only {one.keyword.name}", also=one.also, dims=one.dims) for one in conditions
-    )
+    return tuple(Option(one.notation, (), "only this condition", also=one.also, dims=one.dims) for one in conditions)
 
 
 def _group_command(kind: str, notation: str) -> Command:
@@ -829,8 +827,8 @@ _MODEL = (
             idle="models of the plane are in plane strain", dims=BOTH),
     Command("mod{el} pl{ane}-stress", "Stress in the plane.", ("pcdc model plane-stress",),
             dims=BOTH, refused="models of the plane are in plane strain. For an elastic plate in plane stress give "
-            "element c-model young E (1 + 2 nu) / (1 + nu)^2 and poisson-ratio nu / (1 + nu): displacements and stresses in "
-            "the plane are those of the plate"),
+            "element c-model young E (1 + 2 nu) / (1 + nu)^2 and poisson-ratio nu / (1 + nu): displacements and "
+            "stresses in the plane are those of the plate"),
     Command("mod{el} p{lot}-f{requency}", "Steps between two pictures of the window.", ("pcdc model p-f 10",),
             (_leading("steps", COUNT, "steps"),), dims=BOTH, idle=_WINDOW),
     Command("mod{el} r{ender}-i{nterval}", "The same.", ("pcdc model render-interval 10",),
@@ -840,7 +838,7 @@ _MODEL = (
     Command("mod{el} c{ollision}-d{etect}", "How contacts are searched.", ("pcdc model collision-detect bvh",),
             options=tuple(Option(word, (), doc) for word, doc in (
                 ("bvh", "by a tree of boxes"), ("sap", "along an axis"), ("unif{orm}", "by cells"),
-                ("unform", "the same"), ("b{roken}-j{oint}-p{air}", "between broken faces"))),
+                ("unform", "by cells, too"), ("b{roken}-j{oint}-p{air}", "between broken faces"))),
             needs_option=True, dims=BOTH, idle="there is one search, which finds every contact in time"),
     Command("mod{el} c{ollision}-c{ompute}", "How the force of a contact is computed.",
             ("pcdc model collision-compute accurate",),

@@ -337,16 +337,13 @@ class Flow(SurfaceLoad):
         return float(well.number(self.time) if quantity == "stage" else getattr(well, quantity))
 
     def set_clock(self, time: float) -> None:
-        """The clock of flow, and of proppant, shows this time [s]; stages of wells and leak-off go on as they were."""
+        """The clock of flow shows this time [s]; stages of wells and leak-off go on as they were."""
         self.blocks.before_change()
         ahead = time - self.time
         self.since += ahead
         for well in self.wells:
             well.stages = [replace(one, begin=one.begin + ahead, end=one.end + ahead) for one in well.stages]
         self.time = time
-        grains = next((one for one in self.blocks.surface_loads if one.name == "proppant"), None)
-        if grains is not None:
-            grains.time = time
         self.blocks.changed(stiffness=False)
 
     def remove_conditions(self, nodes: np.ndarray | None) -> None:
