@@ -36,6 +36,11 @@ class Record:
     title: str
     unit: str
 
+    @property
+    def label(self) -> str:
+        """What it is called in a chart: histories of particles have numbers for names."""
+        return self.title if self.name.isdigit() else self.name
+
 
 class Curves:
     """Of a folder of results."""
@@ -58,17 +63,18 @@ class Curves:
 
     def charts(self) -> list[str]:
         """Names of the charts that the script wrote as CSV."""
-        return sorted(path.name for path in self.folder.glob("*.csv") if self._head(path)[:1] == ["curve"])
+        heads = {path.name: self._head(path) for path in self.folder.glob("*.csv")}
+        return sorted(name for name, head in heads.items() if head[:1] == ["curve"] and len(head) == 3)
 
     def state(self) -> dict[str, Any]:
         """What there is to draw."""
         return {
-            "records": [[one.name, one.title, one.unit] for one in self.records()], "charts": self.charts(),
+            "records": [[one.name, one.title, one.label] for one in self.records()], "charts": self.charts(),
         }  # fmt: skip
 
     def presets(self) -> list[dict[str, Any]]:
-        """What a laboratory draws: stress over strain, or the load over how far it has moved. x and y as `drawn` takes
-        them."""
+        """Charts of the script, and what a laboratory draws: stress over strain first, the load over how far it has moved
+        last. chart: as `chart` takes it; x and y: as `drawn` does."""
         records = self.records()
 
         def of(word: str) -> list[Record]:
@@ -83,6 +89,11 @@ class Curves:
                 found.append(
                     {"kind": "stress_strain", "x": _quoted(strain), "y": [_quoted(one) for one in along[:MOST]]}
                 )
+        for name in self.charts():
+            x, y = (title.lower() for title in self._head(self.folder / name)[1:3])
+            kind = "stress_strain" if "strain" in x and "stress" in y else "of_script"
+            found.append({"kind": kind, "chart": name})
+        found.sort(key=lambda one: one["kind"] != "stress_strain")
         for axis in "xyz":
             ways, loads = (
                 [one for one in records if one.title == f"{word} {axis}"] for word in ("displacement", "reaction")
@@ -155,7 +166,7 @@ class Curves:
             return text, OWN[text], text
         name = text.strip("'\"")
         if name in records:
-            return records[name].name, records[name].unit, _quoted(records[name])
+            return records[name].label, records[name].unit, _quoted(records[name])
         if found := _NAMED.fullmatch(text):
             title, unit = _parted(found[1].strip())
             return title, unit, found[2].strip()

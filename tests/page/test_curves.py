@@ -76,9 +76,15 @@ def test_the_loads_of_a_laboratory_are_ready_made(tmp_path: Path):
     assert told["curves"][0]["x"][-1] == pytest.approx(3e-6 * 40) and told["x"]["title"] == "shortening"
     write(tmp_path, "1", "ystrain wall 0|3 [1]", {0: 0.0, 10: 1e-3}, "hist")
     write(tmp_path, "2", "ystress wall 3 [Pa]", {0: 0.0, 10: 2e6}, "hist")
-    first = curves.presets()[0]
+    (tmp_path / "ucs.csv").write_text("curve,axial strain (%),axial stress (MPa)\nspecimen,0.0,1.0\n")
+    (tmp_path / "any.csv").write_text("curve,x,y\na,0.0,1.0\n")
+    first, *others = curves.presets()
+    assert [(one["kind"], one.get("chart")) for one in others] == [
+        ("stress_strain", "ucs.csv"), ("of_script", "any.csv"), ("load_way", None),
+    ]  # fmt: skip
     assert first == {"kind": "stress_strain", "x": "'1'", "y": ["'2'"]}
-    assert curves.drawn(first["x"], first["y"])["curves"][0]["y"] == [0.0, 2e6]
+    told = curves.drawn(first["x"], first["y"])
+    assert told["curves"][0]["y"] == [0.0, 2e6] and told["curves"][0]["title"] == "ystress wall 3", "not its number"
 
 
 def test_a_line_that_is_being_written_is_left_out(tmp_path: Path):

@@ -54,8 +54,9 @@ function element(name, attributes = {}, text = "") {
   return e;
 }
 
+const OWN = ["time", "step", "load", "shortening"];  // titles that are not the user's
 const named = (part) => {
-  const title = { time: say("chart_time"), step: say("chart_step") }[part.title] ?? part.title;
+  const title = OWN.includes(part.title) ? say(`chart_${part.title}`) : part.title;
   return part.shown ? `${title} (${part.shown})` : title;
 };
 
@@ -140,12 +141,11 @@ function choices() {
     return options.length ? [one] : [];
   };
   $("history").replaceChildren(option("", say("none")),
-    ...group("chart_ready", [...presets.map((one, n) => option(`preset ${n}`, say(`chart_${one.kind}`))),
-      ...there.charts.map((name) => option(`chart ${name}`, say("chart_of_script", { name: name.replace(/\.csv$/, "") })))]),
-    ...group("chart_over_time", there.records.map(([name, title]) => option(`history ${name}`, title && title !== name ? `${name}: ${title}` : name))));
+    ...group("chart_ready", presets.map((one, n) => option(`preset ${n}`, say(`chart_${one.kind}`, { name: one.chart?.replace(/\.csv$/, "") })))),
+    ...group("chart_over_time", there.records.map(([name, title, label]) => option(`history ${name}`, title === label ? label : `${name}: ${title}`))));
   $("history").value = [...$("history").options].some((one) => one.value === value) ? value : "";
   if (wish && !$("history").value) own();
-  const ready = $("history").querySelector("option[value^=preset], option[value^=chart]");
+  const ready = $("history").querySelector("option[value^=preset]");
   $("chart-ready").hidden = !ready || Boolean(wish);
   if (ready) { $("chart-ready").textContent = ready.text; $("chart-ready").value = ready.value; }
   columns();
@@ -159,13 +159,13 @@ function own() {
 
 /** What stands along x, and the curves, to be chosen one by one. */
 function columns() {
-  const all = [["time", say("chart_time")], ["step", say("chart_step")], ...there.records.map(([name]) => [quoted(name), name])];
+  const all = [["time", say("chart_time")], ["step", say("chart_step")], ...there.records.map(([name, , label]) => [quoted(name), label])];
   const x = wish?.x ?? "time", y = wish?.y ?? [];
   if (wish?.x && !all.some(([key]) => key === x)) all.push([x, x]);
   $("chart-x").replaceChildren(...all.map(([key, text]) => new Option(text, key)));
   $("chart-x").value = x;
   $("chart-columns").hidden = !there.records.length || !$("history").value || wish?.chart !== undefined;
-  const pairs = [...there.records.map(([name]) => [quoted(name), name]), ...y.filter((one) => !there.records.some(([name]) => quoted(name) === one)).map((one) => [one, one])];
+  const pairs = [...all.slice(2, 2 + there.records.length), ...y.filter((one) => !there.records.some(([name]) => quoted(name) === one)).map((one) => [one, one])];
   $("chart-y").replaceChildren(...pairs.map(([key, text]) => {
     const line = document.createElement("label"), box = document.createElement("input");
     line.className = "check";
@@ -176,7 +176,7 @@ function columns() {
     line.append(box, text);
     return line;
   }));
-  $("chart-count").textContent = y.length === 1 ? named({ title: y[0].replace(/^['"]|['"]$/g, "").split("=")[0] }) : say("chart_some", { n: y.length });
+  $("chart-count").textContent = y.length === 1 ? pairs.find(([key]) => key === y[0])[1].split("=")[0] : say("chart_some", { n: y.length });
 }
 
 function change(values) {
@@ -188,7 +188,7 @@ function change(values) {
 async function choose() {
   const [kind, ...rest] = $("history").value.split(" "), name = rest.join(" ");
   if (kind === "own") return;
-  wish = { preset: () => ({ x: presets[name].x, y: presets[name].y }), chart: () => ({ chart: name }),
+  wish = { preset: () => { const { kind: _, ...one } = presets[name]; return one; },
     history: () => ({ x: "time", y: [quoted(name)] }) }[kind]?.() ?? null;
   await load();
   $("chart").scrollIntoView({ block: "nearest" });

@@ -14,7 +14,7 @@ from hpcdem.io.axes import View
 from hpcdem.post.view.moment import DISCS, FACES, POLYGONS
 from hpcdem.post.view.scene import Painted, Scene
 
-GROUND, DARK_GROUND, RIM = (255, 255, 255), (211, 216, 215), (60, 60, 60)
+GROUND, DARK_GROUND, RIM = (255, 255, 255), (240, 241, 239), (60, 60, 60)
 DOT = 96.0 / 72.0
 """Pixels of a point, at one pixel per pixel of the page."""
 NOTHING = -1
