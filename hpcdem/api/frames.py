@@ -46,10 +46,8 @@ class Frame:
         objects = self._moment.of(object or self._main())
         columns = {axis: part for axis, part in zip("xyz", objects.centres().T)}
         for name in objects.known():
-            if name in objects.vectors:
-                columns |= {f"{name}_{axis}": part for axis, part in zip("xyz", objects.vectors[name].T)}
-            else:
-                columns[name] = np.asarray(objects.fields[name])
+            if name not in objects.vectors:  # the lengths of vectors are not in tables, their components are
+                columns[name] = np.asarray(objects.values(name, ""))
         return columns
 
     def pandas(self, object: str | None = None) -> Any:

@@ -46,7 +46,7 @@ LOOKS = {
 )
 @click.option("--colour", metavar="#RRGGBB", help="One colour for all.")
 @click.option("--opacity", type=FINITE, metavar="N", help="From 0 to 1 [1].")
-@click.option("--edges", is_flag=True, default=None, help="Outlines of elements and particles.")
+@click.option("--edges/--no-edges", default=None, help="Outlines of elements and particles [of small meshes].")
 @click.option("--size", type=FINITE, metavar="N", help="Factor on radii of particles and widths of lines [1].")
 @click.option("--vectors", metavar="NAME", help="Arrows of this field: displacement, velocity, force.")
 @click.option("--arrows", type=FINITE, metavar="N", help="Factor on the length of arrows [1].")
@@ -228,5 +228,5 @@ def _list(files: Sequence[Path]) -> None:
     for name, objects in moment.objects.items():
         click.echo(f"{name} ({objects.count})")
         for field in objects.known():
-            kind = "vector" if field in objects.vectors else ", ".join(objects.names.get(field, ()))
+            kind = "length of the vector" if field in objects.vectors else ", ".join(objects.names.get(field, ()))
             click.echo(f"  {field:<24} {unit_of(field, moment.dim):<6} {kind}".rstrip())

@@ -160,18 +160,19 @@ IN_PLANE = ("show", "xmin", "xmax", "ymin", "ymax")
 
 
 def jobs_in_space(files: list[Path], options: dict[str, Any], scratch: Path) -> list[ViewJob]:
-    """What is to be drawn of frames of bodies in space: their displacement, as at the end of a run."""
+    """What is to be drawn of frames of bodies in space: what has happened to them, as at the end of a run."""
     from hpcdem.cli.draw import common
     from hpcdem.core.errors import UsageError
     from hpcdem.post.series import ViewJob
     from hpcdem.post.view.moment import read_moment
     from hpcdem.post.view.paper import Paper
-    from hpcdem.post.view.scene import view_in_space
+    from hpcdem.post.view.scene import default_view
 
     for name in IN_PLANE:
         if options[name] is not None:
             raise UsageError(f"--{name} is for two dimensions; hpcdem draw DIR --field NAME -o FILE.gif draws three")
-    view = view_in_space(read_moment(files[-1]), style_of(options, options["folder"], PAGE, 1.0).title or "")
+    title = style_of(options, options["folder"], PAGE, 1.0).title or ""
+    view = default_view(read_moment(files[-1])).changed(title=title)
     seen, ranges = common(files, view)
     if "elements" in ranges:
         view = view.with_layer("elements", limits=ranges["elements"])

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.core import units
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.looks import COLOURS, EYES, OBJECTS
 from hpcdem.io.axes import UNITS as AXES
@@ -193,7 +194,9 @@ class Viewer:
         waiting = objects.waiting()
         return {
             "fields": [
-                [name, unit_of(name, moment.dim)] for name in objects.fields if name in waiting or objects.filled(name)
+                [name, unit_of(name, moment.dim)]
+                for name in (*objects.fields, *objects.of_vectors())
+                if name in waiting or objects.filled(name)
             ],
             "vectors": list(objects.vectors),
         }
@@ -247,7 +250,8 @@ class Viewer:
                 told = f"({', '.join(f'{part:.6g}' for part in value)})"
             else:
                 told = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
-            values.append([name, told, unit_of(name, shown.moment.dim)])
+            unit = unit_of(name, shown.moment.dim)
+            values.append([name, told, unit, _said(told if names else value, unit)])
         told_of = {"point": None if picture.near is None else self._hit(shown, picture, int(column), int(row))}
         number = objects.value(objects.number, which) if objects.number in objects.fields else which
         place_of = {axis: float(v) for axis, v in zip("xyz", objects.centre(which))}
@@ -402,6 +406,20 @@ def _stops(name: str) -> list[str]:
     """Some colours of a field, for the bar on the page."""
     shades = np.rint(255.0 * shades_of(name)[:: 256 // 16]).astype(int)
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in [*shades, np.rint(255.0 * shades_of(name)[-1]).astype(int)]]
+
+
+def _said(value: Any, unit: str) -> str:
+    """A value as it is read: with the prefix of its size, of a vector its length and its components."""
+    if value is None or isinstance(value, str):
+        return value or "–"
+    if np.ndim(value):
+        length = float(np.sqrt((np.asarray(value) ** 2).sum()))
+        size, name = units.scale(length, unit)
+        parts = ", ".join(f"{part / size:.6g}" for part in value)
+        return f"{length / size:.6g} {units.printed(name)} ({parts})"
+    if np.asarray(value).dtype.kind in "iub":
+        return str(int(value))
+    return units.printed(units.with_prefix(float(value), unit, 6)) if np.isfinite(value) else "–"
 
 
 def _number(value: float) -> float | None:

@@ -117,7 +117,10 @@ def test_objects_and_fields_of_blocks(rock: Moment):
         "elements": 10, "joints": 3, "channels": 2, "bolts": 2, "liners": 1
     }  # fmt: skip
     elements = rock.of("elements")
-    assert elements.known() == ["group_rock", "number", "stress_yy", "displacement", "velocity"]
+    assert elements.known() == [
+        "group_rock", "number", "stress_yy", "displacement", "displacement_x", "displacement_y", "velocity",
+        "velocity_x", "velocity_y",
+    ]  # fmt: skip
     np.testing.assert_array_equal(elements.values("stress_yy", ""), -1e6 * np.arange(1.0, 11.0))
     np.testing.assert_allclose(elements.values("displacement", ""), 0.1 * np.arange(10.0), atol=1e-15)
     np.testing.assert_allclose(elements.centres()[1], [0.1 + 1 / 3, 2 / 3])
@@ -234,7 +237,8 @@ def test_joints_have_the_colours_of_the_way_they_broke(rock: Moment):
 @pytest.mark.parametrize(
     ("values", "kind"),
     [
-        ({"visible": False}, "elements"), ({"field": "stress_yy"}, "elements"), ({"colour": "#ff00ff"}, "elements"),
+        ({"visible": False}, "elements"), ({"field": "stress_yy"}, "elements"),
+        ({"colour": "#ff00ff", "field": ""}, "elements"),
         ({"opacity": 0.3}, "elements"), ({"edges": True}, "elements"), ({"filter": "x > 1.5"}, "elements"),
         ({"filter": "group(roof)"}, "elements"), ({"vectors": "velocity"}, "elements"), ({"size": 4.0}, "joints"),
         ({"opacity": 0.3}, "joints"), ({"field": "number"}, "joints"), ({"visible": False}, "bolts"),

@@ -219,7 +219,7 @@ def test_von_mises_in_the_plane_too():
 WORDS = [
     ("--eye=-y",), ("--eye=1,-2,0.3",), ("--section=x=2",), ("--section=2,1,1,1,1,1",), ("--section=x<1.5",),
     ("--deformed=3",), ("--camera=-2,2,-1,1",), ("--title=a",), ("--no-axes",), ("--no-legend",), ("--range=-1e8,0",),
-    ("--colours=plasma",), ("--opacity=0.4",), ("--edges",), ("--vectors=displacement",), ("--filter=z > 1",),
+    ("--colours=plasma",), ("--opacity=0.4",), ("--no-edges",), ("--vectors=displacement",), ("--filter=z > 1",),
     ("--page=10",), ("--font=14",), ("--dpi=70",), ("--hide=elements",),
 ]  # fmt: skip
 

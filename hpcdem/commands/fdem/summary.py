@@ -164,7 +164,7 @@ def last_figure(project: Project) -> Path:
             assert whole is not None
             if project.blocks.dim == 3:
                 found = moment.of_blocks(whole)
-                paper.draw(found, path, scene.view_in_space(found))
+                paper.draw(found, path, scene.default_view(found))
             else:
                 blocks.plot(whole, path)
 

@@ -49,7 +49,7 @@ async function unpacked(response) {
 
 class Window {
   constructor(view, camera, source, frame) {
-    this.view = structuredClone(view);
+    this.begin(view);
     this.camera = { ...camera };
     this.source = source;
     this.frame = frame;
@@ -63,6 +63,18 @@ class Window {
     this.wish = null;
     this.points = [];
     listen(this);
+  }
+
+  /** Take a view that nobody has changed yet. */
+  begin(view) {
+    this.view = structuredClone(view);
+    this.begun = JSON.stringify(this.view);
+  }
+
+  /** Whether the view is the one it began with, from before anything had happened to the elements. */
+  get waits() {
+    const { layers } = this.view;
+    return this.begun === JSON.stringify(this.view) && layers.every((one) => one.object !== "elements" || !one.field);
   }
 
   get size() {
@@ -621,15 +633,15 @@ async function query(one, at) {
     if (!found.object) { told(say("nothing")); return; }
     told("");
     $("answer-title").textContent = say("number", { object: found.label === found.object ? say(found.object) : found.label, number: found.number });
-    const rows = [["x", short(found.x), "m"], ["y", short(found.y), "m"], ...(turn ? [["z", short(found.z), "m"]] : []),
-      ...found.values.filter(([name]) => !["x", "y", ...(turn ? ["z"] : [])].includes(name))];
-    $("values").replaceChildren(...rows.map(([name, value, unit]) => {
+    const rows = [...["x", "y", ...(turn ? ["z"] : [])].map((axis) => [axis, `${short(found[axis])} m`]),
+      ...found.values.filter(([name]) => !["x", "y", ...(turn ? ["z"] : [])].includes(name)).map(([name, , , text]) => [name, text])];
+    $("values").replaceChildren(...rows.map(([name, text]) => {
       const row = document.createElement("tr");
       row.title = `${name}: ${say("copy")}`;
       row.addEventListener("click", () => copied(row.cells[1].textContent));
-      for (const text of [called("fields", name), `${typeof value === "number" ? short(value) : value ?? "–"} ${unit}`.trim()]) {
+      for (const part of [called("fields", name), text]) {
         const cell = document.createElement("td");
-        cell.textContent = text;
+        cell.textContent = part;
         row.append(cell);
       }
       return row;
@@ -763,7 +775,7 @@ async function look() {
       try { await begin(); } finally { beginning = false; }
     }
     if (about) {
-      let rewritten = false;
+      let rewritten = false, grown = false;
       windows.forEach((one) => {
         const old = before[one.source];
         const found = state.sources.findIndex((source) => source.name === old?.name);
@@ -774,10 +786,12 @@ async function look() {
         if (now.stamp === old.stamp && n === old.frames.length) return;
         if (now.stamp !== old.stamp && n === old.frames.length) rewritten = true;
         else if (!$("follow").checked) return;
+        grown ||= one === current;
         one.frame = n - 1;
         one.redraw();
       });
       if (rewritten) await renewed();
+      else if (grown && current.waits && "elements" in about.objects) await renewed();
       controls();
     }
     run();
@@ -790,6 +804,7 @@ async function look() {
 async function renewed() {
   const { whole, box } = about;
   about = { ...await json("about", { source: current.source, frame: -1 }), colours: about.colours };
+  for (const one of windows) if (one.waits) one.begin({ ...about.view, camera: null });
   if (JSON.stringify([whole, box]) !== JSON.stringify([about.whole, about.box])) {
     for (const one of windows) {
       for (const layer of about.view.layers) {
@@ -931,8 +946,7 @@ function speak() {
 
 async function begin() {
   about = await json("about", { source: 0, frame: -1 });
-  const { camera, step, ...view } = about.view;
-  view.camera = null;
+  const { camera, step } = about.view, view = { ...about.view, camera: null };
   const list = state.sources[0].frames;
   const found = step === null ? -1 : list.findIndex(([one]) => one === step);
   windows = [new Window(view, { x: 0, y: 0, width: 1 }, 0, found < 0 ? list.length - 1 : found)];
@@ -952,7 +966,7 @@ async function switched() {
     about = { ...await json("about", { source, frame: -1 }), colours: about.colours };
     current.source = source;
     current.frame = frames().length - 1;
-    current.view = { ...about.view, camera: null };
+    current.begin({ ...about.view, camera: null });
     current.fit();
     speak();
     current.redraw();
@@ -989,15 +1003,15 @@ function modes() {
 
 function connect() {
   const on = (id, event, action) => $(id).addEventListener(event, action);
-  on("field", "change", () => { change({ field: $("field").value, limits: null }); $("low").value = $("high").value = ""; });
+  on("field", "change", () => { change({ field: $("field").value, limits: null, colour: "" }); properties(); $("low").value = $("high").value = ""; });
   for (const id of ["low", "high"]) on(id, "change", limits);
   on("full", "change", () => { change({ limits: $("full").checked ? "full" : null }); properties(); });
   for (const id of ["log", "edges"]) on(id, "change", () => change({ [id]: $(id).checked }));
   for (const id of ["colours", "vectors"]) on(id, "change", () => change({ [id]: $(id).value }));
   for (const id of ["opacity", "size", "arrows"]) on(id, "input", () => { if ($(id).value) change({ [id]: Number($(id).value) }); });
-  const own = () => change({ colour: $("own").checked ? $("colour").value : "" });
-  on("own", "change", own);
-  on("colour", "input", () => { $("own").checked = true; own(); });
+  const own = () => change($("own").checked ? { colour: $("colour").value, field: "" } : { colour: "" });
+  on("own", "change", () => { own(); properties(); });
+  on("colour", "input", () => { $("own").checked = true; own(); $("field").value = ""; });
   on("apply", "click", () => change({ filter: $("filter").value }));
   on("filter", "keydown", (event) => {
     if (event.key === "Enter" && !event.shiftKey) { event.preventDefault(); change({ filter: $("filter").value }); }

@@ -117,30 +117,46 @@ class Objects:
         return part(self.fields if name in self.fields else self.vectors, name, slice(row, row + 1))[0]
 
     def values(self, name: str, label: str) -> np.ndarray:
-        """(n,) a field, or the length of a vector. HpcdemError that names what there is."""
+        """(n,) a field, the length of a vector (velocity), or a component (velocity_x). HpcdemError that names what
+        there is."""
         if name in self.fields:
             return self.fields[name]
         if name in self.vectors:
             return lengths(self.vectors[name])
+        stem, axis = self.component(name)
+        if stem:
+            return np.asarray(self.vectors[stem])[:, axis]
         raise self.lack(name, label)
+
+    def component(self, name: str) -> tuple[str, int]:
+        """The vector of which this is a component, "" if it is none, and which."""
+        stem, _, axis = name.rpartition("_")
+        there = stem in self.vectors and axis in tuple("xyz"[: self.dim])
+        return (stem, "xyz".index(axis)) if there else ("", 0)
 
     def lack(self, name: str, label: str) -> HpcdemError:
         """What is said about a field that is not there."""
         return HpcdemError(f"{label} have no field {name} in this frame; they have {', '.join(self.known())}")
 
     def has(self, name: str) -> bool:
-        """Whether there is a field or vector of this name."""
-        return name in self.fields or name in self.vectors
+        """Whether there is a field, a vector or a component of this name."""
+        return name in self.fields or name in self.vectors or bool(self.component(name)[0])
 
     def filled(self, name: str) -> bool:
         """Whether it has a value somewhere."""
-        if name in self.vectors:
-            return True
+        if name not in self.fields:
+            return self.has(name)
         return any(there(part(self.fields, name, slice(first, first + CHUNK))) for first in range(0, self.count, CHUNK))
 
     def known(self) -> list[str]:
-        """Names of fields and vectors that have a value somewhere."""
-        return [*(name for name in self.fields if self.filled(name)), *self.vectors]
+        """Names of fields that have a value somewhere, of vectors (their lengths) and of their components."""
+        return [*(name for name in self.fields if self.filled(name)), *self.of_vectors()]
+
+    def of_vectors(self) -> list[str]:
+        """Names of vectors, each with its components, but those that are fields too."""
+        axes = "xyz"[: self.dim]
+        every = (name for vector in self.vectors for name in (vector, *(f"{vector}_{axis}" for axis in axes)))
+        return [name for name in every if name not in self.fields]
 
     def waiting(self) -> set[str]:
         """Slow fields that nobody has asked for yet."""

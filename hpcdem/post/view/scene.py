@@ -54,6 +54,8 @@ CATEGORIES = (
     "#44aa99",
 )
 """Of groups: ten that the colour-blind tell apart (Tol 2021, with three more)."""
+PALE = ("#77aadd", "#eedd88", "#ee8866", "#44bb99", "#ffaabb", "#bbcc33", "#99ddff", "#aaaa00")
+"""The same of elements, on which joints and bolts are seen (Tol 2021, light)."""
 CLASSES = 12
 """Integer fields with names have a legend of at most so many."""
 
@@ -132,23 +134,54 @@ class Scene:
         return self.view.title.replace("{step}", str(self.moment.step)).replace("{time}", f"{self.moment.time:.6g}")
 
 
+STILL = 1e-9
+"""Over the size of a model: what has not moved farther has not moved."""
+
+
 def default_view(moment: Moment) -> ModelView:
-    """Everything that the frame has, as it is usually shown; `HIDDEN` is there, and hidden. Rods shine through the
-    elements around them."""
+    """Everything that the frame has, as it is usually shown: discs by their colours, elements by what has happened to
+    them (`telling`), channels by the pressure in them, joints by the way they broke; `HIDDEN` is there, and hidden.
+    Rods shine through the elements around them. Of many frames the last one says what is shown in all of them."""
     inside = any(objects.kind == RODS and name not in HIDDEN for name, objects in moment.objects.items())
+    looks: dict[str, dict[str, Any]] = {}
+    if "elements" in moment.objects:
+        field = telling(moment)
+        small = moment.of("elements").count <= blocks.MOST_EDGES
+        looks["elements"] = {
+            "field": field, "edges": small and (not field or moment.dim == 3), "opacity": THROUGH if inside else 1.0
+        }  # fmt: skip
+    if "channels" in moment.objects and _varies(moment.of("channels"), "fluid_pressure"):
+        looks["channels"] = {"field": "fluid_pressure", "colours": "blue-red"}
     return ModelView(
         layers=tuple(
-            Layer(object=name, visible=name not in HIDDEN, opacity=THROUGH if inside and name == "elements" else 1.0)
+            Layer(object=name, visible=name not in HIDDEN, **looks.get(name, {}))
             for name in OBJECTS if name in moment.objects
         )
     )  # fmt: skip
 
 
-def view_in_space(moment: Moment, title: str | None = None) -> ModelView:
-    """Bodies in space as they are usually drawn: coloured by how far they have moved."""
-    edges = moment.of("elements").count <= blocks.MOST_EDGES
-    view = with_field(default_view(moment), moment, "displacement", "elements", edges=edges)
-    return view if title is None else view.changed(title=title)
+def telling(moment: Moment) -> str:
+    """The field that tells what has happened to elements: displacement if they have moved, else stress if there is
+    some, else temperature if it differs; "", their groups, if nothing has happened yet."""
+    elements = moment.of("elements")
+    if moment.displacement is not None and elements.count:
+        most = np.nanmax(np.abs(moment.displacement()), initial=0.0)
+        points = elements.read()[0]
+        if most > STILL * max(float(np.nanmax(points) - np.nanmin(points)), 1e-300):
+            return "displacement"
+    for name in ("stress_min", "stress_mises", *(f"stress_{c}" for c in ("yy", "xx", "zz"))):
+        if elements.has(name) and np.any(np.nan_to_num(elements.values(name, ""))):
+            return name
+    return "temperature" if _varies(elements, "temperature") else ""
+
+
+def _varies(objects: Objects, name: str) -> bool:
+    """Whether there is such a field, and not of one value."""
+    if not objects.has(name):
+        return False
+    values = objects.values(name, "")
+    values = values[np.isfinite(values)]
+    return bool(len(values)) and float(values.min()) < float(values.max())
 
 
 def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None, **looks: Any) -> ModelView:
@@ -184,8 +217,9 @@ def adjusted(
         labels = [layer.label for layer in view.layers if layer.object == on]
         if not labels:
             raise HpcdemError(f"the view shows no {on}")
+        plain = {"field": ""} if looks.get("colour") else {}  # in the place of the field of the default view
         for label in labels:
-            view = view.with_layer(label, visible=True, **looks)
+            view = view.with_layer(label, visible=True, **plain, **looks)
     elif looks:
         word = "range" if "limits" in looks else next(iter(looks))
         raise UsageError(f"{word} goes with field or object, which say of what")
@@ -279,11 +313,8 @@ class _Words(Mapping[str, np.ndarray]):
         axes = "xyz"[: objects.dim]
         if name in tuple(axes):
             return objects.centres()[:, axes.index(name)]
-        stem, _, part = name.rpartition("_")
-        if part in tuple(axes) and stem in objects.vectors:
-            return objects.vectors[stem][:, axes.index(part)]
-        if name in objects.vectors:
-            return lengths(objects.vectors[name])
+        if objects.has(name):
+            return objects.values(name, "")
         raise KeyError(name)
 
     def __iter__(self) -> Any:
@@ -450,13 +481,15 @@ def _by_field(result: Painted, objects: Objects, dim: int) -> None:
     result.shades = np.concatenate([shades_of(layer.colours), rgb([NOTHING])])
 
 
-def _by_name(result: Painted, values: np.ndarray, names: Sequence[str]) -> None:
+def _by_name(
+    result: Painted, values: np.ndarray, names: Sequence[str], palette: Sequence[str] = CATEGORIES
+) -> None:  # fmt: skip
     """Colours of groups."""
     there = [int(v) for v in np.unique(values) if 0 <= v < len(names)]
-    result.shades = rgb([*CATEGORIES, NOTHING])
-    result.kind = np.where((values >= 0) & (values < len(names)), values % len(CATEGORIES), len(CATEGORIES))
+    result.shades = rgb([*palette, NOTHING])
+    result.kind = np.where((values >= 0) & (values < len(names)), values % len(palette), len(palette))
     result.values = values.astype(float)
-    result.legend = [(names[v], CATEGORIES[v % len(CATEGORIES)]) for v in there[:CLASSES]]
+    result.legend = [(names[v], palette[v % len(palette)]) for v in there[:CLASSES]]
     if len(there) > CLASSES:
         result.legend.append((f"and {len(there) - CLASSES} more", NOTHING))
 
@@ -477,9 +510,10 @@ def _as_usual(result: Painted, objects: Objects) -> None:
     elif name == "elements":
         sets = {column: np.asarray(objects.fields[column]) for column in objects.names}
         best = max(sets, key=lambda column: len(np.unique(sets[column])), default=None)
-        result.shades = rgb(blocks.GROUPS)
-        group = np.zeros(objects.count, np.int64) if best is None else np.unique(sets[best], return_inverse=True)[1]
-        result.kind = group[rows] % len(blocks.GROUPS)
+        if best is None:
+            _one_colour(result, PALE[0])
+        else:
+            _by_name(result, sets[best][rows], objects.names[best], PALE)
     elif name == "joints":
         kinds = blocks._kinds(np.asarray(objects.fields["state"])[rows], np.asarray(objects.fields["mode"])[rows])
         shown = [part for part, *_ in kinds]
