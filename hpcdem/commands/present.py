@@ -31,7 +31,8 @@ def particles(sim: Simulation) -> Path | None:
 
 
 def blocks(project: Project) -> Path | None:
-    """`now/now_<step>.vtkhdf` of blocks; None as long as they cannot be simulated. Collective, for one rank."""
+    """`now/now_<step>.vtkhdf` of blocks, before they have models of their mesh; None without one. Collective, for one
+    rank."""
     try:
         project.ready(use=False)
     except CommandError:

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from hpcdem.commands import present
 from hpcdem.core.errors import HpcdemError
+from hpcdem.post.view.moment import read_moment
+from hpcdem.post.view.scene import default_view
 from tests.conftest import Launcher
 from tests.pcdc.test_plastic import run
 
@@ -39,6 +42,38 @@ def test_each_word_alone_changes_the_picture(tmp_path: Path) -> None:
     assert (data / "usual_0000000020.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_mesh_is_seen_before_it_has_a_model(tmp_path: Path, dim: int) -> None:
+    """Its groups, by picture, by frame and for the page that shows the model while commands are typed; as soon as it has
+    models these are shown, and nothing of the model is said by having looked at it."""
+    mesh = ["(0,0) (2,1) cells 4 2", "(0,0,0) (2,1,1) cells 4 2 2"][dim - 2]
+    text = (
+        f"pcdc model new dim {dim}\npcdc mesh structured {mesh} group 'rock'\n"
+        "pcdc element group 'left' set 'side' range x 0 1\npcdc output image 'mesh.svg'\npcdc output vtk 'rock'\n"
+        "pcdc mesh structured " + mesh.replace("(0,", "(3,").replace("(2,", "(5,") + " group 'more'\n"
+        "pcdc output image 'both.svg' object elements range group 'more'\n"
+    )
+    project = run(tmp_path, text).project
+    data = tmp_path / "data"
+    first, both = ((data / f"{name}_0000000000.svg").read_text() for name in ("mesh", "both"))
+    assert "left" in first and "in no group" in first and first != both
+    moment = read_moment(data / "rock_0000000000.vtkhdf")
+    assert moment.of("elements").count == len(project.whole_mesh().cells) / 2
+    assert default_view(moment).layer("elements").field == ""  # type: ignore[union-attr]
+    path = present.blocks(project)
+    assert path is not None and read_moment(path).of("elements").count == len(project.whole_mesh().cells)
+    assert not project.in_use
+
+
+def test_cracks_of_a_mesh_are_seen_with_it(tmp_path: Path) -> None:
+    text = (
+        "pcdc mesh structured (0,0) (1,1) cells 4 4\npcdc geometry create polyline (0.25,0.5) (0.75,0.5) as-layer 'c'\n"
+        "pcdc mesh intersect layer 'c'\npcdc output image 'mesh.svg'\n"
+    )
+    run(tmp_path, text)
+    assert "initial" in (tmp_path / "data" / "mesh_0000000000.svg").read_text()
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -63,7 +98,13 @@ def test_what_cannot_be_is_refused_with_its_line(tmp_path: Path, words: str, mes
 
 @pytest.mark.mpi
 def test_the_same_picture_on_two_ranks(launch: Launcher, tmp_path: Path) -> None:
-    script = MODEL + "pcdc model step 20\npcdc output image 'a' field 'displacement' vectors 'velocity'\n"
+    mesh, rest = MODEL.split("pcdc element c-model")
+    script = (
+        mesh
+        + "pcdc output image 'mesh'\npcdc element c-model"
+        + rest
+        + "pcdc model step 20\npcdc output image 'a' field 'displacement' vectors 'velocity'\n"
+    )
     found = []
     for ranks in (1, 2):
         folder = tmp_path / str(ranks)
@@ -71,5 +112,5 @@ def test_the_same_picture_on_two_ranks(launch: Launcher, tmp_path: Path) -> None
         (folder / "a.sc").write_text(script)
         done = launch(ranks, "a.sc", "--no-figure", cwd=folder, env={"DISPLAY": ""})
         assert done.returncode == 0, done.stderr
-        found.append((folder / "data" / "a_0000000020.png").read_bytes())
+        found.append([(folder / "data" / name).read_bytes() for name in ("mesh_0000000000.png", "a_0000000020.png")])
     assert found[0] == found[1]

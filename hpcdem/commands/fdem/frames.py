@@ -186,9 +186,43 @@ def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, n
     return found
 
 
-def frame(project: Project, sound: bool = True) -> MeshFrame:
-    """What is written at this moment; sound: with what elements do to each other and what acts on them. Collective."""
+def _with_groups(project: Project, elements: dict[str, np.ndarray]) -> dict[str, list[str]]:
+    """Give elements a column for each set of groups, and how many corners they have; the names of the groups."""
+    mesh = project.whole_mesh()
+    elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
+    names: dict[str, list[str]] = {}
+    for set_name, groups in project.groups[ELEMENT].sets.items():
+        column = f"group_{set_name}"
+        code = np.full(len(mesh.cells), -1, np.int32)
+        for k, members in enumerate(groups.values()):
+            code[members] = k
+        elements[column] = code[elements["number"]]
+        names[column] = list(groups)
+    return names
+
+
+def _of_mesh(project: Project) -> MeshFrame:
+    """The mesh with its groups and cracks, of which each rank has an equal share of the elements. Collective."""
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
+    number = np.array_split(np.flatnonzero(blocks.alive), comm.size)[comm.rank]
+    row, k = np.nonzero(mesh.cells[number] >= 0)
+    node = mesh.cells[number[row], k].astype(np.int64)
+    corners = {"number": 4 * number[row] + k} | dict(zip("xyz", mesh.points[node].T.copy())) | {"node": node}
+    elements = {"number": number, {2: "area", 3: "volume"}[mesh.dim]: blocks.areas[number]}
+    none = {name: np.zeros(0) for name in ("state", "mode", JOINT_SIZE[mesh.dim])}
+    joints = _with_cracks(blocks, number, {"number": np.zeros(0, np.int64)} | none)
+    names = _with_groups(project, elements)
+    joints |= dict(zip(vtkhdf_mesh.CORNERS[mesh.dim], mesh.face_corners(joints["number"]).T.copy(), strict=True))
+    slabs = (to_slabs(comm, ("number",), columns) for columns in (corners, elements, joints))
+    return MeshFrame(int(blocks.clock.step), float(blocks.told_time()), float(blocks.clock.dt), *slabs, names)
+
+
+def frame(project: Project, sound: bool = True) -> MeshFrame:
+    """What is written at this moment; sound: with what elements do to each other and what acts on them; before all
+    elements have a model the mesh alone. Collective."""
+    blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
+    if len(blocks.bare()):
+        return _of_mesh(project)
     with blocks.one_moment():
         corners = _corners(blocks)
         elements = diagnostics.owned_values(blocks, "element", _names(blocks, "element"))
@@ -196,15 +230,7 @@ def frame(project: Project, sound: bool = True) -> MeshFrame:
             blocks, elements["number"], diagnostics.owned_values(blocks, "joint", _names(blocks, "joint"))
         )
         joints = _with_channels(blocks, joints)
-        elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
-        names: dict[str, list[str]] = {}
-        for set_name, groups in project.groups[ELEMENT].sets.items():
-            column = f"group_{set_name}"
-            code = np.full(len(mesh.cells), -1, np.int32)
-            for k, members in enumerate(groups.values()):
-                code[members] = k
-            elements[column] = code[elements["number"]]
-            names[column] = list(groups)
+        names = _with_groups(project, elements)
         joints |= dict(zip(vtkhdf_mesh.CORNERS[mesh.dim], mesh.face_corners(joints["number"]).T.copy(), strict=True))
         of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
         clock = blocks.clock

@@ -444,13 +444,13 @@ function bar(part) {
   };
   if (part.above) end(stops.at(-1), top, 0);
   if (part.below) end(stops[0], bottom, h);
-  root.append(canvas);
   for (const [place, text] of part.ticks) {
     const mark = document.createElement("span");
     mark.textContent = text;
     mark.style.top = `${bottom - place * (bottom - top)}px`;
     root.append(mark);
   }
+  root.append(canvas);  // the first canvas of a window is its picture
   return root;
 }
 

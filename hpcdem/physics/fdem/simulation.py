@@ -686,10 +686,14 @@ class Blocks(State):
         if stale:
             give_back()
 
+    def bare(self) -> np.ndarray:
+        """Elements that have no model yet. CommandError without a mesh."""
+        self.the_mesh()
+        return np.flatnonzero(self.alive & (self.element_row == 0))
+
     def _check_ready(self) -> None:
         """CommandError unless every element has a model."""
-        self.the_mesh()
-        bare = np.flatnonzero(self.alive & (self.element_row == 0))
+        bare = self.bare()
         if len(bare):
             raise CommandError(f"element {bare[0]} has no model ({len(bare)} elements in all)")
         if not self.alive.any():

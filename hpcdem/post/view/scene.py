@@ -492,6 +492,8 @@ def _by_name(
     result.legend = [(names[v], palette[v % len(palette)]) for v in there[:CLASSES]]
     if len(there) > CLASSES:
         result.legend.append((f"and {len(there) - CLASSES} more", NOTHING))
+    elif there and (values < 0).any():
+        result.legend.append(("in no group", NOTHING))
 
 
 def _one_colour(result: Painted, colour: str) -> None:
