@@ -44,8 +44,7 @@ def test_each_word_alone_changes_the_picture(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_mesh_is_seen_before_it_has_a_model(tmp_path: Path, dim: int) -> None:
-    """Its groups, by picture, by frame and for the page that shows the model while commands are typed; as soon as it has
-    models these are shown, and nothing of the model is said by having looked at it."""
+    """Its groups, by picture, by frame and for the page; to look at it says nothing of the model."""
     mesh = ["(0,0) (2,1) cells 4 2", "(0,0,0) (2,1,1) cells 4 2 2"][dim - 2]
     text = (
         f"pcdc model new dim {dim}\npcdc mesh structured {mesh} group 'rock'\n"
