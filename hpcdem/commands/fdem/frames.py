@@ -213,8 +213,11 @@ def _of_mesh(project: Project) -> MeshFrame:
     joints = _with_cracks(blocks, number, {"number": np.zeros(0, np.int64)} | none)
     names = _with_groups(project, elements)
     joints |= dict(zip(vtkhdf_mesh.CORNERS[mesh.dim], mesh.face_corners(joints["number"]).T.copy(), strict=True))
-    slabs = (to_slabs(comm, ("number",), columns) for columns in (corners, elements, joints))
-    return MeshFrame(int(blocks.clock.step), float(blocks.told_time()), float(blocks.clock.dt), *slabs, names)
+    of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
+    clock = blocks.clock
+    return MeshFrame(
+        int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names
+    )  # fmt: skip
 
 
 def frame(project: Project, sound: bool = True) -> MeshFrame:
