@@ -69,12 +69,13 @@ class Curves:
     def state(self) -> dict[str, Any]:
         """What there is to draw."""
         return {
-            "records": [[one.name, one.title, one.label] for one in self.records()], "charts": self.charts(),
-        }  # fmt: skip
+            "records": [[one.name, one.title, one.label] for one in self.records()],
+            "charts": self.charts(),
+        }
 
     def presets(self) -> list[dict[str, Any]]:
-        """Charts of the script, and what a laboratory draws: stress over strain first, the load over how far it has moved
-        last. chart: as `chart` takes it; x and y: as `drawn` does."""
+        """Charts of the script, and what a laboratory draws: stress over strain first, load over shortening last. chart:
+        as `chart` takes it; x and y: as `drawn` does."""
         records = self.records()
 
         def of(word: str) -> list[Record]:

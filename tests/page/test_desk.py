@@ -352,6 +352,7 @@ def test_a_session_at_the_page(bench: Bench, folder: Path):
     page.wait_for_selector("body[data-wrong='2']")
     assert "read 'yuong'" in page.inner_text("#check-result")
     assert page.inner_text("#numbers-of-lines .bad") == "2"
+    page.click("#more-toggle")
     page.fill("#find", "yuong")
     page.fill("#replace", "young")
     page.click("#replace-all")
@@ -394,6 +395,7 @@ def test_comments_and_selected_lines(bench: Bench):
     page.press("#text", "Control+/")
     assert page.input_value("#text") == "a = 20\nb = 3\na + b\n"
     page.evaluate("document.getElementById('text').setSelectionRange(0, 12)")
+    page.click("#more-toggle")
     for _ in range(2):  # unlike the key, a button does one of both
         page.click("#comment-on")
     assert page.input_value("#text") == "# # a = 20\n# # b = 3\na + b\n"
@@ -468,6 +470,7 @@ def test_several_scripts_are_open_saved_renamed_and_closed(bench: Bench, folder:
     (folder / "one.sc").write_text("a = 1\n")
     (folder / "two.sc").write_text("b = 2\n")
     page.click("#tab-editor")
+    page.click("#more-toggle")
     for name in ("one.sc", "two.sc"):
         page.click("#script-new")  # the list is that of now
         bench.until(lambda: name in page.locator("#script option").all_text_contents())  # noqa: B023

@@ -469,7 +469,11 @@ function editorKey(event) {
   else if (control && event.key.toLowerCase() === "s") { event.preventDefault(); guarded(event.shiftKey ? saveAll : save)(); }
   else if (control && event.key === "Enter") { event.preventDefault(); guarded(runPart)(); }
   else if (control && event.key === "/") { event.preventDefault(); comment(); }
-  else if (control && event.key === "f") { event.preventDefault(); $("find").focus(); }
+  else if (control && event.key === "f") {
+    event.preventDefault();
+    $("editor").classList.add("more");
+    $("find").focus();
+  }
 }
 
 function consoleKey(event) {
@@ -547,6 +551,7 @@ export async function begin(complained, ready) {
   on("comment-on", "click", () => comment(true));
   on("comment-out", "click", () => comment(false));
   on("panes", "change", panes);
+  on("more-toggle", "click", () => $("more-toggle").setAttribute("aria-expanded", $("editor").classList.toggle("more")));
   on("replace-all", "click", replaceAll);
   on("find", "keydown", (event) => { if (event.key === "Enter") { event.preventDefault(); findNext(); } });
   on("wrap", "change", () => { for (const one of papers) { one.area.wrap = $("wrap").checked ? "soft" : "off"; lines(one); } });
