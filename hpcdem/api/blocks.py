@@ -410,14 +410,43 @@ class Mesh(Words):
         self._do("mesh intersect", {"layer": layer, "follow": follow})
 
     def glue(
-        self, tolerance: float | None = None, between: tuple[str, str] | None = None, *, set: str | None = None
+        self,
+        tolerance: float | None = None,
+        between: tuple[str, str] | None = None,
+        *,
+        set: str | None = None,
+        where: Where = None,
     ) -> None:
         """Bodies hang together where their faces lie on each other; tolerance [m]; between: only elements of these
-        two groups."""
+        two groups; where: only faces of these elements, with any."""
         if between is None and set is not None:
             raise TypeError("set goes with between")
         pair = None if between is None else {"value": between, "set": set}
-        self._do("mesh glue", {"tolerance": tolerance, "between": pair})
+        self._do("mesh glue", {"tolerance": tolerance, "between": pair}, where, g.ELEMENT)
+
+    def densify(
+        self,
+        maximum_length: float | tuple[float, float],
+        pattern: tuple[int, int] | None = None,
+        *,
+        where: Where = None,
+    ) -> None:
+        """Quads are halved, along x and y or as the pattern says (1 or 0), until their sides are no longer than this
+        [m]; neighbours follow, and quads with a point on a side become triangles."""
+        most = maximum_length if isinstance(maximum_length, tuple) else (maximum_length,)
+        self._do("element densify", {"maximum_length": most, "pattern": pattern}, where, g.ELEMENT)
+
+    def delete(self, *, where: Where = None) -> None:
+        """Elements are gone; after the first model or condition they are taken out, as by `elements.null`."""
+        self._do("element delete", {}, where, g.ELEMENT)
+
+    def scale(self, factors: Point) -> None:
+        """Multiply the coordinates of all points."""
+        self._do("model scale", {"factors": factors})
+
+    def translate(self, way: Point) -> None:
+        """Move all points [m]."""
+        self._do("model translate", {"way": way})
 
     def quality(self) -> None:
         """Angles and sizes, in the log."""
@@ -492,6 +521,18 @@ class Elements(_Modelled):
     def null(self, *, relax: float | None = None, where: Where = None) -> None:
         """Take elements out; relax: time [s] (static runs: steps) over which their forces on the others die down."""
         self._carry_out("c-model", {"relax": relax}, where, "null")
+
+    def hide(self, hidden: bool = True, *, where: Where = None) -> None:
+        """They are hidden from pictures and, without use-hidden, from ranges, or seen again."""
+        self._carry_out("hide", {"hidden": hidden}, where)
+
+    def collision(self, on: bool, *, where: Where = None) -> None:
+        """Contact of these elements with others is looked for, or not."""
+        self._carry_out("collision", {"on": on}, where)
+
+    def water(self, surface: str, density: float, *, where: Where = None) -> None:
+        """Water of a density [kg/m3] stands before their free faces below the line of a layer; 0: no more."""
+        self._carry_out("water", {"surface": surface, "density": density}, where)
 
     def initial_stress(
         self,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.free_field import FreeField
     from hpcdem.physics.fdem.structures import Structure
+    from hpcdem.physics.fdem.water import Water
     from hpcdem.physics.flow.model import Flow
     from hpcdem.physics.heat.model import Heat
     from hpcdem.physics.proppant.model import Proppant
@@ -53,8 +54,16 @@ def _proppant() -> type[Proppant]:
     return Proppant
 
 
-PHYSICS: Mapping[str, Callable[[], type[Structure] | type[FreeField] | type[Flow] | type[Proppant] | type[Heat]]] = {
+def _water() -> type[Water]:
+    from hpcdem.physics.fdem.water import Water
+
+    return Water
+
+
+PHYSICS: Mapping[
+    str, Callable[[], type[Structure] | type[FreeField] | type[Flow] | type[Proppant] | type[Heat] | type[Water]]
+] = {
     "bolts": _bolts, "liners": _liners, "free_field": _free_field, "fluid": _fluid, "proppant": _proppant,
-    "heat": _heat,
+    "heat": _heat, "water": _water,
 }  # fmt: skip
 """How to get each class: its import brings numba and kernels, which takes a second."""

@@ -16,7 +16,11 @@ from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.fdem.user_laws import UserLaw
+from hpcdem.physics.fdem.water import Water
+from hpcdem.pre.mesh import geometry, solids
 
+ARC_STEPS = 360
+"""Arcs of a water line stand for so many sides."""
 Number = float | str
 """A number, or the name of a table of time."""
 
@@ -219,6 +223,33 @@ def stress(
         "incoming_z": incoming_z,
     }  # fmt: skip
     blocks.stress_condition(faces, quiet=quiet, **from_now(project, blocks.time_now(), given))
+
+
+def water(project: Project, surface: str, density: float, where: Range | None = None) -> None:
+    """Water of a density [kg/m3] stands before faces of elements below the lines, in space the planes and polygons, of
+    a layer; 0: no more."""
+    levels = [_level(one, surface) for one in project.layers[surface]]
+    blocks = project.ready()
+    faces = Water.create(blocks, chosen(project, ELEMENT, where), levels, density)
+    if project.log is not None:
+        project.log.info(f"element water: {faces} faces lie below '{surface}'; those that are free are pushed on")
+
+
+def _level(shape: Any, layer: str) -> tuple[tuple[float, ...], ...]:
+    """A water line, see physics/fdem/water.py."""
+    if isinstance(shape, (solids.Polygon, solids.Plane)):
+        at, normal = (vector.tolist() for vector in shape.plane())
+        if not abs(normal[2]) > 1e-6 * float(np.hypot(*normal[:2])):
+            raise CommandError(f"layer '{layer}': a water surface that is upright has no height")
+        corners = () if isinstance(shape, solids.Plane) else tuple((x, y) for x, y, _ in shape.corners)
+        return (tuple(at), tuple(normal), *corners)
+    if not isinstance(shape, geometry.Curve):
+        raise CommandError(f"layer '{layer}': a water surface is made of planes and polygons")
+    points = shape.points if not shape.bulges.any() else geometry.sampled(shape, shape.length() / ARC_STEPS)
+    points = points if points[0, 0] < points[-1, 0] else points[::-1]
+    if len(points) < 2 or shape.closed or not (np.diff(points[:, 0]) > 0.0).all():
+        raise CommandError(f"layer '{layer}': a water line goes from left to right, with one height at each place")
+    return tuple(map(tuple, points.tolist()))
 
 
 def free_field(project: Project, where: Range | None = None) -> None:

@@ -174,6 +174,7 @@ def _state(project: Project) -> dict[str, Any]:
         "solids": {name: solids.state(project.layers[name]) for name in project.layers} if project.dim == 3 else {},
         "groups": {kind: groups.state() for kind, groups in project.groups.items()},
         "null": np.flatnonzero(~project.alive).tolist(),
+        "hidden": np.flatnonzero(project.hidden).tolist(),
         "histories": {name: asdict(history) for name, history in project.histories.items()},
         "charts": {name: asdict(chart) for name, chart in project.charts.items()},
         "frames": project.frames,
@@ -213,6 +214,8 @@ def _take(project: Project, state: dict[str, Any]) -> None:
     alive = np.ones(0 if mesh is None else len(mesh.cells), bool)
     alive[np.array(state["null"], np.int64)] = False
     project.layers, project.mesh, project.alive = layers, mesh, alive
+    project.hidden = np.zeros(len(alive), bool)
+    project.hidden[np.array(state.get("hidden", ()), np.int64)] = True
     project.dim = int(state.get("dim", 2))
     project.groups.update(groups)
     project.histories, project.charts, project.frames = histories, charts, dict(state["frames"])

@@ -31,6 +31,8 @@ def chosen(project: Project, kind: str, where: g.Range | None, null_too: bool = 
         return None
     objects = _Objects(project, kind, null_too)
     mask = objects.all_of(where)
+    if project.hidden.any() and not any(isinstance(term, g.UseHidden) and term.on for term in where):
+        mask &= objects.seen()
     if not mask.any():
         raise CommandError(f"the range chooses no {kind}" + _why(objects, where))
     return objects.on_sides(mask) if kind == g.NODE else objects.numbers[mask]
@@ -61,6 +63,10 @@ def _why(objects: _Objects, where: g.Range) -> str:
         gone = int(_Objects(objects.project, objects.kind, True).all_of(where).sum())
         if gone:
             return f": all that it names ({gone}) was taken out (element c-model null)"
+    if objects.project.hidden.any() and not any(isinstance(term, g.UseHidden) for term in where):
+        gone = int(objects.all_of(where).sum())
+        if gone:
+            return f": all that it names ({gone}) is hidden (element hide); use-hidden on chooses it all the same"
     if len(where) == 1:
         return ""
     empty = [type(term).__name__ for term in where if not objects.mask(term).any()]
@@ -143,6 +149,20 @@ class _Objects:
             mask &= self.mask(term)
         return mask
 
+    def seen(self) -> np.ndarray:
+        """(n,) bool: those of which an element is not hidden."""
+        hidden = self.project.hidden
+        if self.kind in g.SUPPORTS:
+            return np.ones(len(self.numbers), bool)
+        if self.kind == g.ELEMENT:
+            return ~hidden[self.numbers]
+        if self.kind == g.JOINT:
+            return ~hidden[self.sides // 4].all(axis=1)
+        if self.kind == g.FACE:
+            return ~hidden[self.numbers // 4]
+        corners = self.mesh.cells[self.there & ~hidden]
+        return np.isin(self.numbers, corners[corners >= 0])
+
     def on_sides(self, mask: np.ndarray) -> np.ndarray:
         """Numbers of these nodes (sides.py), on the sides that terms of elements and groups name. Where no corner at a
         point is meant by all of them, as between two groups, those count that any of them means."""
@@ -224,7 +244,7 @@ class _Objects:
                 groups = self.groups[g.ELEMENT]
                 a, b = (np.isin(self.sides // 4, groups.members(name, set_name)) for name in (one, other))
                 return (a[:, 0] & b[:, 1]) | (a[:, 1] & b[:, 0])
-            case g.Present():
+            case g.Present() | g.UseHidden():
                 return np.ones(len(self.numbers), bool)
             case g.OnCrack():
                 rows = self.mesh.find_edges(self.edges, self.mesh.cracks)

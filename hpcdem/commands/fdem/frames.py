@@ -189,6 +189,8 @@ def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, n
 def _with_groups(project: Project, elements: dict[str, np.ndarray]) -> dict[str, list[str]]:
     """Give elements a column for each set of groups, and how many corners they have; the names of the groups."""
     mesh = project.whole_mesh()
+    if project.hidden.any():
+        elements["hidden"] = project.hidden[elements["number"]].astype(np.int32)
     elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
     names: dict[str, list[str]] = {}
     for set_name, groups in project.groups[ELEMENT].sets.items():

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from hpcdem.commands.fdem import values
+from hpcdem.commands.fdem import assignments, values
+from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.geometry import shape
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, hexahedra
 from hpcdem.physics.fdem.connectivity import bodies as bodies_of
-from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, NODE
+from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, NODE, Range
 from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
 from hpcdem.pre.mesh import cracks as cracks_of
 from hpcdem.pre.mesh import (
@@ -23,7 +25,9 @@ from hpcdem.pre.mesh import (
     fractures,
     geometry,
     imported,
+    quadtree,
     quality,
+    remade,
     structured,
     structured_space,
 )
@@ -295,10 +299,11 @@ def glue(
     tolerance: float | None = None,
     between: tuple[str, str] | None = None,
     set_name: str = DEFAULT,
+    where: Range | None = None,
 ) -> None:
     """Bodies that were meshed separately hang together where their faces lie on each other: these become joints, as
     inside of a body; where the faces differ, elements are cut. tolerance [m]: points nearer than this are one; between:
-    only faces between the elements of two groups. Collective."""
+    only faces between the elements of two groups; where: only faces of elements of a range, with any. Collective."""
     mesh = project.whole_mesh()
     project.refuse_in_use("bodies are glued")
     sides = None
@@ -306,6 +311,9 @@ def glue(
         one, other = (project.groups[ELEMENT].members(name, set_name) for name in between)
         numbers = np.arange(len(mesh.cells))
         sides = np.isin(numbers, one), np.isin(numbers, other)
+    elif where is not None:
+        some = np.isin(np.arange(len(mesh.cells)), everything(project, ELEMENT, where))
+        sides = some, np.ones(len(some), bool)
     made: glue_of.Glued = made_once(project.comm, lambda: glue_of.glued(mesh, tolerance, sides))
     if not made.faces:
         _say(project, "glue: the mesh is one body already")
@@ -324,6 +332,50 @@ def glue(
             f"glue: {made.cut} elements were cut, which makes {len(made.mesh.cells) - len(mesh.cells)} more, where "
             f"points of others lie on their sides; the least altitude was {before:.3g} m and is {after:.3g} m",
         )
+
+
+def delete(project: Project, where: Range | None = None) -> None:
+    """Elements are gone: before the first model or condition the mesh is without them, numbers of others close up;
+    later they are taken out. Collective."""
+    elements = everything(project, ELEMENT, where)
+    if project.in_use:
+        assignments.null(project, where=where)
+        return
+    made = made_once(project.comm, lambda: remade.without(project.whole_mesh(), elements))
+    lost = len(project.whole_mesh().cells) - len(made.parent)
+    project.refit(made)
+    _say(project, f"element delete: {lost} elements are gone, {len(made.parent)} are left")
+
+
+def densify(project: Project, pattern: tuple[int, int], most: tuple[float, float], where: Range | None = None) -> None:
+    """Quads are halved along x, along y or both (pattern, 0 or 1) until they are no longer than `most` [m]; neighbours
+    follow, so that no side has more than one point on it; quads with such points become triangles. Collective."""
+    project.refuse_in_use("elements are densified")
+    mesh = project.whole_mesh()
+    elements = everything(project, ELEMENT, where)
+    made = made_once(project.comm, lambda: quadtree.densified(mesh, elements, pattern, most))
+    project.refit(made)
+    _say(project, f"element densify: {len(made.parent) - len(mesh.cells)} more elements, {len(made.parent)} in all")
+
+
+def scale(project: Project, factors: tuple[float, ...]) -> None:
+    """Multiply x and y (and z) of all points of the mesh."""
+    if len(factors) != project.dim or not all(factor > 0.0 for factor in factors):
+        raise CommandError(f"scale needs {project.dim} factors above 0, not {factors}")
+    _move(project, np.array(factors), 0.0, "scaled")
+
+
+def translate(project: Project, way: tuple[float, ...]) -> None:
+    """Move all points of the mesh [m]."""
+    _move(project, 1.0, np.array(way), "moved")
+
+
+def _move(project: Project, factor: Any, way: Any, what: str) -> None:
+    mesh = project.whole_mesh()
+    project.refuse_in_use(f"the mesh is {what}")
+    moved = replace(mesh, points=mesh.points * factor + way)
+    check(moved)
+    project.replace_mesh(moved)
 
 
 def tell_quality(project: Project) -> None:

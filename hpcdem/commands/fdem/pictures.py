@@ -13,7 +13,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.values import FIGURES, frames_name
 from hpcdem.core.errors import CommandError
 from hpcdem.io.agreed import on_first
-from hpcdem.physics.fdem.groups import SHOWN, Range
+from hpcdem.physics.fdem.groups import SHOWN, Range, UseHidden
 
 
 def image(
@@ -45,7 +45,10 @@ def image(
     if where is not None and kind not in SHOWN:
         raise CommandError(f"range goes with object, one of {', '.join(SHOWN)}")
     project.ready(use=False)
-    only = None if where is None else {kind: np.asarray(everything(project, SHOWN[kind], where))}
+    only = {} if where is None else {kind: np.asarray(everything(project, SHOWN[kind], where))}
+    if project.hidden.any():
+        for of in ("elements", "joints"):
+            only.setdefault(of, everything(project, SHOWN[of], (UseHidden(False),)))
     file = project.to_read(view) if view else None
     step = project.step
     path = project.to_write(project.folder() / f"{stem}_{step:010d}{suffix if suffix in FIGURES else FIGURES[0]}")
@@ -62,7 +65,7 @@ def image(
             (left, bottom), (right, top) = corners
             more["camera"] = left, right, bottom, top
         more = {word: value for word, value in more.items() if value is not None}
-        draw(moment, path, adjusted(shown, moment, field or None, kind or None, looks, **more), only=only)
+        draw(moment, path, adjusted(shown, moment, field or None, kind or None, looks, **more), only=only or None)
 
     with project.blocks.timers.around("output"):
         on_first(project.comm, picture)

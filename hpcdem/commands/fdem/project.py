@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hpcdem.commands.dem.cycles import Due
     from hpcdem.physics.coupling.model import Coupled
     from hpcdem.physics.fdem.simulation import Blocks
-    from hpcdem.pre.mesh.glue import Glued
+    from hpcdem.pre.mesh.remade import Remade
 
 
 class Project:
@@ -31,7 +31,8 @@ class Project:
     the results; job: what was started, for run.json; keep: numbered checkpoints that are kept, 0: all.
 
     dim: dimensions of space; layers: geometry; mesh: of all bodies, None before the first; groups: by kind of object;
-    alive (ne,) bool: elements that are not null; histories, charts and frames (steps between two by name) that are kept
+    alive (ne,) bool: elements that are not null; hidden (ne,) bool: those that pictures and ranges pass over;
+    histories, charts and frames (steps between two by name) that are kept
     up; cracks_filed: broken joints that are in their file, None: the file is not of this model yet; framed: step of the
     last frame by name;
     run_time: that model solve takes at most [s], 0: no end; began: times from which it counts, by part (clocks.PARTS);
@@ -118,7 +119,7 @@ class Project:
         self.mesh: Mesh | None = None
         self.dim = 2
         self._edges: tuple[np.ndarray, Edges] | None = None
-        self.alive = np.empty(0, bool)
+        self.alive, self.hidden = np.empty((2, 0), bool)
         self.groups = {kind: Groups(kind) for kind in KINDS}
         self.histories: dict[str, History] = {}
         self.cracks_filed: int | None = None
@@ -153,6 +154,7 @@ class Project:
             for name, numbers in of.items():
                 self.groups[ELEMENT].assign(numbers + first, name, set_name)
         self.alive = np.concatenate([self.alive, np.ones(len(mesh.cells), bool)])
+        self.hidden = np.concatenate([self.hidden, np.zeros(len(mesh.cells), bool)])
         self.taken = False
 
     def refuse_in_use(self, what: str) -> None:
@@ -162,17 +164,18 @@ class Project:
                 f"the mesh has models or conditions already: {what} before the first of them is assigned"
             )
 
-    def refit(self, made: Glued) -> None:
-        """The mesh after bodies were glued: groups and histories of what was merged, cut or renumbered go on. Of points
-        that were in several groups of a set the lowest counts."""
+    def refit(self, made: Remade) -> None:
+        """The mesh after bodies were glued, or elements cut or deleted: groups and histories of what was merged, cut or
+        renumbered go on. Of points that were in several groups of a set the lowest counts."""
         before, mesh, number = self.whole_mesh(), made.mesh, made.points
         self.replace_mesh(mesh)
-        self.alive = self.alive[made.parent]
+        self.alive, self.hidden = self.alive[made.parent], self.hidden[made.parent]
         old, parent, n = before.cells.reshape(-1), np.repeat(made.parent, 4), len(mesh.points)
 
         def sides(numbers: np.ndarray) -> np.ndarray:
             """Where these sides (sides.py) are now."""
             corner = numbers - SIDE
+            corner = corner[number[old[corner]] >= 0]
             return SIDE + np.flatnonzero(
                 np.isin(parent * n + mesh.cells.reshape(-1), corner // 4 * n + number[old[corner]])
             )
@@ -181,22 +184,28 @@ class Project:
             lowest = np.full(len(mesh.points), len(number))
             for members in sets.values():
                 members = members[members < SIDE]
+                members = members[number[members] >= 0]
                 np.minimum.at(lowest, number[members], members)
             for name, members in sets.items():
                 side, members = members[members >= SIDE], members[members < SIDE]
+                members = members[number[members] >= 0]
                 sets[name] = np.append(np.unique(number[members[lowest[number[members]] == members]]), sides(side))
         edges = self.edges()
 
         def faces(numbers: np.ndarray, joints: bool) -> np.ndarray:
             """Where these faces, or joints, are now."""
             points, of = made.moved.faces(before.face_points(numbers))
-            both = edges.faces[mesh.find_edges(edges, points)]
+            at = mesh.find_edges(edges, points)
+            good = (at >= 0) & (edges.inner[at] | ~np.bool_(joints))
+            both, of = edges.faces[at[good]], of[good]
             own = made.parent[both // 4] == (numbers // 4)[of][:, None]
-            return np.unique(both[:, 0] if joints else np.where(own[:, 0], both[:, 0], both[:, 1]))
+            if joints:
+                return np.unique(both[:, 0])
+            return np.unique(np.where(own[:, 0], both[:, 0], both[:, 1])[own.any(axis=1)])
 
         moved: dict[str, Callable[[np.ndarray], np.ndarray]] = {
             NODE: lambda numbers: np.append(
-                np.unique(number[numbers[numbers < SIDE]]), sides(numbers[numbers >= SIDE])
+                np.setdiff1d(number[numbers[numbers < SIDE]], [-1]), sides(numbers[numbers >= SIDE])
             ),
             ELEMENT: lambda numbers: np.flatnonzero(np.isin(made.parent, numbers)),
             FACE: lambda numbers: faces(numbers, False),
@@ -205,8 +214,11 @@ class Project:
         for kind in (ELEMENT, FACE, JOINT):
             for sets in self.groups[kind].sets.values():
                 sets.update((name, moved[kind](members)) for name, members in sets.items() if len(members))
+        first = np.full(len(before.cells), -1)  # a piece of an element that was cut keeps its number
+        first[made.parent[::-1]] = np.arange(len(made.parent))[::-1]
+        moved[ELEMENT] = lambda numbers: first[numbers][first[numbers] >= 0]
         for history in self.histories.values():
-            if history.kind in (NODE, FACE, JOINT):  # a piece of an element keeps its number
+            if history.kind in moved:
                 history.numbers = moved[history.kind](np.array(history.numbers, np.int64)).tolist()
 
     def edges(self) -> Edges:

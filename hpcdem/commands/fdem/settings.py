@@ -6,13 +6,13 @@ from typing import Any
 
 from hpcdem.commands import units as of_values
 from hpcdem.commands.fdem import coupling
-from hpcdem.commands.fdem.choices import chosen
+from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem import creep as of_elements
-from hpcdem.physics.fdem.groups import ELEMENT, JOINT, Range
+from hpcdem.physics.fdem.groups import ELEMENT, JOINT, Range, UseHidden
 
 
 def new(project: Project, dim: int = 2) -> None:
@@ -139,6 +139,22 @@ def reset_velocity(project: Project) -> None:
 def reset_displacement(project: Project) -> None:
     """Displacements are counted from here."""
     changes.reset_displacement(project.ready())
+
+
+def hide(project: Project, hidden: bool = True, where: Range | None = None) -> None:
+    """Elements are hidden from pictures and, without use-hidden, from ranges, or seen again."""
+    seen_too = where if where is None else (*where, UseHidden())
+    project.whole_mesh()
+    project.hidden[everything(project, ELEMENT, seen_too, null_too=True)] = hidden
+
+
+def collision(project: Project, on: bool, where: Range | None = None) -> None:
+    """Contact of these elements with others is looked for, or not."""
+    blocks = project.ready()
+    elements = everything(project, ELEMENT, where, null_too=True)
+    blocks.before_change()
+    blocks.touches[elements] = on
+    blocks.changed()
 
 
 def reset_elements(project: Project, where: Range | None = None) -> None:

@@ -112,6 +112,7 @@ _TERMS: dict[str, Callable[[Any], g.Term]] = {
     "between": lambda v: g.Between(v["value"][0], v["value"][1], v.get("set", g.DEFAULT)),
     "crack": lambda v: g.OnCrack(),
     "present": lambda v: g.Present(),
+    "use-hidden": g.UseHidden,
 }
 
 # ---- model ---------------------------------------------------------------------------------------------------------
@@ -192,8 +193,13 @@ def _patch(call: Call) -> None:
 def _mesh_glue(call: Call) -> None:
     groups = call.get("between", {})
     fdem.meshes.glue(
-        call.project, call.get("tolerance"), groups.get("value"), groups.get("set", g.DEFAULT)
+        call.project, call.get("tolerance"), groups.get("value"), groups.get("set", g.DEFAULT), call.where
     )  # fmt: skip
+
+
+def _densify(call: Call) -> None:
+    most = call["maximum-length"]
+    fdem.meshes.densify(call.project, call.get("pattern", (1, 1)), (most[0], most[-1]), call.where)
 
 
 # ---- elements, faces, joints, nodes --------------------------------------------------------------------------------
@@ -548,6 +554,14 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "element create geometry-patch": _patch,
     "element create geometry-boundary": _patch,
     "element create hollow-circle": _patch,
+    "model scale": lambda c: fdem.meshes.scale(c.project, c["factors"]),
+    "model translate": lambda c: fdem.meshes.translate(c.project, c["way"]),
+    "element delete": lambda c: fdem.meshes.delete(c.project, c.where),
+    "element densify": _densify,
+    "element hide": lambda c: fdem.settings.hide(c.project, c.get("hidden", True), c.where),
+    "element collision": lambda c: fdem.settings.collision(c.project, c["on"], c.where),
+    "element water": lambda c: fdem.assignments.water(c.project, **c.given(), where=c.where),
+    "element list summary": lambda c: fdem.summary.listed(c.project, g.ELEMENT, c.where),
     "element group": _group(g.ELEMENT),
     "element c-model": _element_model,
     "element law": lambda c: fdem.assignments.load_law(c.project, c["law"]),

@@ -223,6 +223,8 @@ FREEDOM = Kind("0|1|2", "0 free, 1 held or 2 along a vector (3 is for 3-D)", who
 DIMENSIONS = Kind("2|3", "2 or 3", whole(2, 3))
 SPLIT = Kind("5|6|12", "5, 6 or 12", _one_of(5, 6, 12))
 LAST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True)
+CHOSEN = Kind("0|1", "0 or 1", _one_of(0, 1))
+SECOND_POSITIVE = Kind("[<f>]", "a number above 0", number(0.0, above=True), optional=True)
 STRING = Kind("<s>", "a text in quotes", _string)
 FILE = Kind("<s>", "the name of a file in quotes", _file)
 BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false", "yes", "no"))

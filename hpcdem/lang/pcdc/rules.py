@@ -182,7 +182,13 @@ def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         )
 
 
+def _glue(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    if terms is not None and "between" in arguments:
+        raise ValueError("between and range exclude each other: both say which faces are glued")
+
+
 _RULES = {
+    "mesh glue": _glue,
     "bolt create polyline": _bolt,
     "mesh structured": _structured,
     "field create": _field,

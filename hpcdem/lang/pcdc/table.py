@@ -21,6 +21,7 @@ from hpcdem.core.units import CHOICES as UNITS
 from hpcdem.lang.pcdc.keywords import Keyword
 from hpcdem.lang.pcdc.kinds import (
     BOOL,
+    CHOSEN,
     CORNER,
     COUNT,
     DIMENSIONS,
@@ -38,6 +39,7 @@ from hpcdem.lang.pcdc.kinds import (
     PLACES,
     POINTS,
     POSITIVE,
+    SECOND_POSITIVE,
     SECTION,
     SPLIT,
     STRING,
@@ -550,6 +552,7 @@ RANGE_TERMS = (
     Option("geom{etry}", (STRING,), "lies on the lines, in three dimensions on the surfaces, of the geometry layer; "
            "elements: their centre is inside of it; in the mesh", only=("element", *_FACES)),
     Option("pres{ent}", (), "x, y and geometry (of elements) look at where things are at this moment"),
+    Option("use-hidden", (BOOL,), "elements that are hidden, and what belongs to them, are chosen too", default="off"),
     Option("boundary", (), "lies on a surface of the model", only=("element-face", "node")),
     Option("face-of", (STRING,), "faces, joints or nodes of the elements of the group; joints: both elements are in "
            "it; nodes: where elements may part, on their side", more=(SET,), only=_FACES),
@@ -1031,25 +1034,33 @@ _MESH = (
             ("pcdc mesh equilateral (0,0) (10,5) size 0.25 group 'base'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
             (Option("size", (POSITIVE,), "length of edges", "m", required=True), _GROUP)),
+    Command("mod{el} scale", "Coordinates of all points of the mesh are multiplied, before the first model or "
+            "condition is assigned.", ("pcdc model scale (1,2)",),
+            (_leading("factors", VECTOR, "along the axes, above 0"),),
+            dims=BOTH),
+    Command("mod{el} tran{slate}", "All points of the mesh are moved, before the first model or condition is "
+            "assigned.", ("pcdc model translate (10,0)",), (_leading("way", VECTOR, "where to", "m"),), dims=BOTH),
     Command("mesh imp{ort}", "A mesh of another program, for example .msh or .inp; its physical groups and sets of "
             "elements, nodes and faces become groups.",
             ("pcdc mesh import 'rock.msh'",), (_leading("file", FILE, "name of the file"),),
             (Option("group", (STRING,), "a group that all elements are put into, besides those of the file",
                     more=(SET,)),
              Option("merge", (NOT_NEGATIVE,), "points nearer than this are one", "m", "0"),
-             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1")), dims=BOTH),
+             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1")), dims=BOTH,
+            also=("mod{el} imp{ort} gmsh", "mod{el} imp{ort} abaqus")),
     Command("mesh int{ersect}", "Joints on a layer become cracks: the edges of the mesh that lie on it.",
             ("pcdc mesh intersect layer 'fault'",),
             options=(Option("layer", (STRING,), "its lines are edges of the mesh, its surfaces faces", required=True),
                      Option("follow", (), "they are not: the edges that follow them best are taken, the faces between "
                             "elements on either side")), dims=BOTH),
     Command("mesh glue", "Bodies that were meshed separately hang together where their faces lie on each other: these "
-            "become joints, as inside of a body. Elements are cut where points of others lie on their sides.",
+            "become joints, as inside of a body. Elements are cut where points of others lie on their sides. With a "
+            "range only faces of its elements are glued, to any others.",
             ("pcdc mesh glue", "pcdc mesh glue tolerance 1e-4 between 'lining' 'rock' set 'domain'"),
             options=(Option("tol{erance}", (POSITIVE,), "points nearer than this are one", "m",
                             "a thousandth of the shortest edge"),
                      Option("betw{een}", (STRING, STRING), "only faces between the elements of these two groups",
-                            more=(SET,))), dims=BOTH),
+                            more=(SET,))), ranged="element", dims=BOTH, also=("e{lement} glue",)),
     Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",)),
 )  # fmt: skip
 
@@ -1120,6 +1131,33 @@ _ELEMENT_CREATE = (
 
 _OBJECTS = (
     _group_command("element", "e{lement}"),
+    Command("e{lement} delete", "Elements are gone. Before the first model or condition is assigned the mesh is "
+            "without them, and numbers of others close up; later they are taken out, as by element c-model null.",
+            ("pcdc element delete range x 2 4 y 0 1",), ranged="element", dims=BOTH),
+    Command("e{lement} dens{ify}", "Quads are halved until they are short enough, before the first model or condition "
+            "is assigned. Neighbours follow, so that no side has more than one point on it; quads with such a point "
+            "become triangles.",
+            ("pcdc element densify pattern 1 1 maximum-length 0.5 0.5 range x 2 4 y 0 1",),
+            options=(Option("p{attern}", (CHOSEN, CHOSEN), "1: halved along x, along y; 0: not", "", "1 1"),
+                     Option("m{aximum}-l{ength}", (POSITIVE, SECOND_POSITIVE), "of sides along x and y; one number for "
+                            "both", "m", required=True)), ranged="element"),
+    Command("e{lement} hide", "Elements are hidden from pictures and, where use-hidden is not said, from ranges; off: "
+            "seen again. They go on being computed.",
+            ("pcdc element hide range group 'cover'", "pcdc element hide off"),
+            (_leading("hidden", BOOL, "whether they are", required=False),), ranged="element", dims=BOTH),
+    _list_command("element", "e{lement}"),
+    Command("e{lement} col{lision}", "Whether contact of these elements is looked for; off: others pass through them.",
+            ("pcdc element collision off range group 'cover'",),
+            (_leading("on", BOOL, "whether they touch others"),), ranged="element", dims=BOTH),
+    Command("e{lement} w{ater}", "Water stands before the surface of the model: its pressure, the depth below a water "
+            "line times density and gravity, pushes on all free faces of these elements that lie below the line, on "
+            "parts of faces too, wherever they move. Where the line, which goes from left to right, does not reach "
+            "there is no water. Said again: it takes the place of what was.",
+            ("pcdc element water surface 'lake' density 1000", "pcdc element water surface 'lake' density 0"),
+            options=(Option("s{urface}", (STRING,), "layer of the water line, in three dimensions of planes and "
+                            "polygons", required=True),
+                     Option("d{ensity}", (NOT_NEGATIVE,), "of the water; 0: there is none any more", "kg/m3",
+                            required=True)), ranged="element", dims=BOTH),
     Command("e{lement} c-m{odel}", "The constitutive model of elements, with its properties.",
             ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25",
              "pcdc element c-model null range group 'excav_1' set 'domain'",
@@ -1416,7 +1454,7 @@ _RECORDS = (
             ("pcdc output vtk 'blast' every 1000", "pcdc output vtk 'last'"),
             (_leading("file", FILE, "first part of the names of the files, in the folder of the results"),),
             (Option("ev{ery}", (COUNT,), "steps between two frames", "", "once, now"),
-             Option("off", (), "no more frames of this name")), dims=BOTH),
+             Option("off", (), "no more frames of this name")), dims=BOTH, also=("mod{el} exp{ort} vtk",)),
     Command("output image", "A picture of the model as it is now, `<name>_<step>.png`, of any field that frames have.",
             ("pcdc output image 'stress' field 'stress-yy' limits -2e6 0 colours blue-red",
              "pcdc output image 'roof.pdf' object elements field 'displacement' deformed 100 range group 'roof'",

@@ -178,7 +178,7 @@ class ModelDefinition:
 
     def _make_arrays(self, elements: int) -> None:
         self.partner = np.full(4 * elements, -1, np.int64)
-        self.alive = np.ones(elements, bool)
+        self.alive, self.touches = np.ones((2, elements), bool)
         """Elements that were not taken out."""
         self.element_row = np.zeros(elements, np.int32)
         self.joint_row = sparse_zeros(4 * elements, np.int32)
@@ -1223,6 +1223,10 @@ class ModelDefinition:
         """The table of tractions at a moment, columns `TRACTIONS`."""
         names = TRACTIONS[self.dim]
         return np.array([[self._now(getattr(one, name), time) for name in names] for one in self.loads])
+
+    def gravity_down(self) -> float:
+        """Gravity against the last axis [m/s2]."""
+        return -(self.options.gz if self.dim == 3 else self.options.gy)
 
     def stressed(self, faces: np.ndarray) -> np.ndarray:
         """Those of these faces (k,) on which a stress is prescribed, bool: the total of what acts there."""

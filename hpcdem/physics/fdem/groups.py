@@ -173,6 +173,26 @@ class Present:
     """Other terms of the range look at where things are now, not at where they are in the mesh."""
 
 
-Term = InGroup | InSet | Ids | Span | OnLayer | OnBoundary | OfElements | OfElement | Between | OnCrack | Present
+@dataclass(frozen=True)
+class UseHidden:
+    """Elements that are hidden, and what belongs to them, are chosen too."""
+
+    on: bool = True
+
+
+Term = (
+    InGroup
+    | InSet
+    | Ids
+    | Span
+    | OnLayer
+    | OnBoundary
+    | OfElements
+    | OfElement
+    | Between
+    | OnCrack
+    | Present
+    | UseHidden
+)
 Range = tuple[Term, ...]
 """All terms must hold."""

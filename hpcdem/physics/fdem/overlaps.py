@@ -136,6 +136,8 @@ def _in_the_plane(sim: State, local: Local) -> np.ndarray:
     first, second = detect.find(
         box, around, bodies.element, bodies.number, owned, mesh.cells, sim.partner, sim.closed_faces()
     )
+    keep = sim.touches[bodies.element[first]] & sim.touches[bodies.element[second]]
+    first, second = first[keep], second[keep]
     depth = np.empty((len(first), 3))
     if len(first):
         contact.depths(first, second, bodies.free, bodies.x_place, sim.x, depth)

@@ -295,6 +295,9 @@ class ContactPairs(Bodies):
         first, second = detect.find(
             box, around, self.element, self.number, owned, mesh.cells, sim.partner, closed
         )  # fmt: skip
+        if not sim.touches.all():
+            keep = sim.touches[self.element[first]] & sim.touches[self.element[second]]
+            first, second = first[keep], second[keep]
         code = self.quad[first] + 2 * self.quad[second] + 4 * self.free[first] + 32 * self.free[second]
         bodies = Surfaces(sim, tables.shapes, self.face, self.row)
         shared, overlay = self._shared_faces(sim, self.element[first], self.element[second])

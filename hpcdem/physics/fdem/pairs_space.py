@@ -162,10 +162,14 @@ class ContactSpace:
         if not len(self.face) or not len(self.row):
             return np.empty(0, np.int64), np.empty(0, np.int64)
         owned = [(row >= own.start) & (row < own.stop) for row in (self.face_row, self.row)]
-        return detect.find(
+        first, second = detect.find(
             self.corner, self.face, owned[0], self.place[:, None] + STRIDE * np.arange(4), self.element, owned[1],
             sim.x, skin, Surface.of(sim).clusters, sim.partner, sim.closed_faces(),
         )  # fmt: skip
+        if not sim.touches.all():
+            keep = sim.touches[self.face[first] // 4] & sim.touches[self.element[second]]
+            first, second = first[keep], second[keep]
+        return first, second
 
     def _make_list(self, sim: State) -> None:
         """Pairs that may touch, and their properties."""

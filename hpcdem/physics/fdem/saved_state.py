@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 KIND = checkpoint.BLOCKS
 ARRAYS = {
-    "elements": ("alive", "element_row"),
+    "elements": ("alive", "element_row", "touches"),
     "faces": ("partner", "joint_row", "open", "broken", "face_row", "load_row", "corner_row"),
 }
 """Assignments, known to all ranks; rank 0 writes them."""
@@ -186,6 +186,8 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
             for name in names:
                 if name == "corner_row" and "points" in tables:  # of versions that had conditions by points
                     sim.corner_row[:] = np.append(tables["points"]["point_row"], 0)[mesh.cells.reshape(-1)]
+                    continue
+                if name == "touches" and name not in tables[kind]:  # of versions in which all elements did
                     continue
                 array = getattr(sim, name)
                 array[:] = tables[kind][name].astype(array.dtype)

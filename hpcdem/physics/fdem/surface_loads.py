@@ -11,7 +11,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 
-ORDER = ("discs", "fluid", "proppant", "heat", "bolts", "liners", "free_field")
+ORDER = ("discs", "fluid", "proppant", "heat", "bolts", "liners", "free_field", "water")
 """In which they are added up, whoever came first: sums keep their bits."""
 SHARED_OUT = ("flow_nodes", "proppant_nodes", "fluid_heat")
 """Tables of checkpoints of which each rank has a part, see `SurfaceLoad.saved_rows`."""

@@ -16,41 +16,16 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.pre.mesh import fit, refine
+from hpcdem.pre.mesh.remade import Moved, Remade
 
 
 @dataclass(frozen=True)
-class Glued:
-    """mesh; faces: how many pairs of faces are inner ones now; points (np,): the number in it of each point before;
-    parent (ne,): element before of which each is a piece; cut: how many elements were cut; tolerance [m]."""
+class Glued(Remade):
+    """faces: how many pairs of faces are inner ones now; cut: how many elements were cut; tolerance [m]."""
 
-    mesh: Mesh
     faces: int
-    points: np.ndarray
-    parent: np.ndarray
-    moved: Moved
     tolerance: float
     cut: int = 0
-
-
-@dataclass(frozen=True)
-class Moved:
-    """Where faces are now: by their points before, see `faces`."""
-
-    points: np.ndarray
-    quads: dict[tuple[int, ...], list[tuple[int, ...]]]
-    pieces: dict[tuple[int, ...], list[tuple[int, ...]]]
-
-    def faces(self, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (m, dim) of the pieces of these faces (n, dim), and the row of the face each comes from."""
-        out: list[tuple[int, ...]] = []
-        rows: list[int] = []
-        for k, face in enumerate(np.sort(self.points[before], axis=1).tolist()):
-            for half in self.quads.get(tuple(face), [tuple(face)]):
-                found = self.pieces.get(half, [half])
-                out += found
-                rows += [k] * len(found)
-        dim = before.shape[1]
-        return np.array(out, np.int64).reshape(-1, dim), np.array(rows, np.int64)
 
 
 def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray, np.ndarray] | None = None) -> Glued:
@@ -69,7 +44,7 @@ def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray,
     pairs = _touching(free, spot, tolerance, between)
     if not len(pairs) and free.bodies == 1:
         same = np.arange(len(mesh.points))
-        return Glued(mesh, 0, same, np.arange(len(mesh.cells)), Moved(same, {}, {}), tolerance)
+        return Glued(mesh, same, np.arange(len(mesh.cells)), Moved(same, {}, {}), 0, tolerance)
     if not len(pairs):
         raise CommandError(
             f"no faces of different bodies lie on each other within {tolerance:g} m: there is nothing to glue; a "
@@ -102,7 +77,7 @@ def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray,
         *_cracks(mesh, moved),
         hexes=made.mesh.hexes,
     )
-    return Glued(whole, faces + made.faces, number, made.parent, moved, tolerance, made.cut)
+    return Glued(whole, number, made.parent, moved, faces + made.faces, tolerance, made.cut)
 
 
 def _cracks(mesh: Mesh, moved: Moved) -> tuple[np.ndarray, np.ndarray]:

@@ -76,7 +76,7 @@ def _in_plane(mesh: Mesh, free: fit.Free, pairs: np.ndarray, tolerance: float) -
     for e, sides in by_element.items():
         corners = [p for p in mesh.cells[e].tolist() if p >= 0]
         outline = [p for k, corner in enumerate(corners) for p in (corner, *sides.get(k, []))]
-        made = np.array(_triangles(outline, mesh.points[outline], tolerance, fit.places(mesh.points[corners[:1]])))
+        made = np.array(triangles(outline, mesh.points[outline], tolerance, fit.places(mesh.points[corners[:1]])))
         made = np.column_stack([made, np.full(len(made), -1)])
         cells[0][e] = made[0]
         cells.append(made[1:])
@@ -194,7 +194,7 @@ class _Cut:
         u = self.points[ring[1]] - self.points[ring[0]]
         u = u / np.sqrt(u @ u)
         xy = (self.points[ring] - self.points[ring[0]]) @ np.array([u, _across(normal, u)]).T
-        return _triangles(ring, xy, self.tolerance, fit.places(self.points[ring[:1]]))
+        return triangles(ring, xy, self.tolerance, fit.places(self.points[ring[:1]]))
 
     def made(self) -> Refined:
         """The mesh."""
@@ -305,7 +305,7 @@ def _area(corners: np.ndarray) -> float:
     return 0.5 * float(np.sqrt(normal @ normal))
 
 
-def _triangles(ring: Sequence[int], xy: np.ndarray, tolerance: float, place: str) -> list[Face]:
+def triangles(ring: Sequence[int], xy: np.ndarray, tolerance: float, place: str) -> list[Face]:
     """Triangles of a polygon with corners xy (n, 2), counter-clockwise, convex but for points on its sides, within the
     tolerance [m]: the ear with the best shape goes first."""
     at = [(float(x), float(y)) for x, y in xy]
