@@ -70,7 +70,7 @@ def test_exit_ends(bench):
     ("line", "words"),
     [
         ("pcdc mod", "model"),
-        ("pcdc model s", "save scale step solve solve-check sub-step"),
+        ("pcdc model s", "save step solve solve-check sub-step scale"),
         ("pcdc geom cr p", "polyline polygon point plane"),
         ("pcdc model option dynamic ", "on off true false yes no"),
         ("pcdc element c-model null ", "property relax range"),
