@@ -156,10 +156,7 @@ def plan(options: dict[str, Any], log: Log, scratch: Path | None = None) -> list
         raise UsageError(f"{len(files)} frames do not go into one picture: --step chooses one, or -o FILE.gif a film")
     first = read_moment(files[-1])
     view = view_of(options, first)
-    seen, ranges = common(files, view)
-    view = view.changed(layers=[
-        {**layer.model_dump(), "limits": ranges.get(layer.label, layer.limits)} for layer in view.layers
-    ])  # fmt: skip
+    seen, view = common(files, view)
     if options["save_view"] is not None:
         save_view(options["save_view"], view)
     paper = Paper(options["page"], options["font"], options["dpi"])
@@ -200,11 +197,11 @@ def view_of(options: dict[str, Any], moment: Moment) -> ModelView:
     return view
 
 
-def common(files: Sequence[Path], view: ModelView) -> tuple[View, dict[str, tuple[float, float]]]:
-    """The part of the plane that holds every one of these frames, and ranges of colours for all of them."""
+def common(files: Sequence[Path], view: ModelView) -> tuple[View, ModelView]:
+    """The part of the plane that holds every one of these frames, and the view with ranges for all of them."""
     from hpcdem.io.axes import View
     from hpcdem.post.view.moment import read_moment
-    from hpcdem.post.view.scene import common_spans, seen_of
+    from hpcdem.post.view.scene import seen_of, shared
 
     seen: list[View] = []
 
@@ -214,10 +211,10 @@ def common(files: Sequence[Path], view: ModelView) -> tuple[View, dict[str, tupl
             seen.append(seen_of(moment, view))
             yield moment
 
-    ranges = common_spans(moments(), view)
+    view = shared(view, moments())
     whole = View(min(s.left for s in seen), max(s.right for s in seen), min(s.bottom for s in seen),
                  max(s.top for s in seen))  # fmt: skip
-    return whole, ranges
+    return whole, view
 
 
 def _list(files: Sequence[Path]) -> None:

@@ -173,9 +173,7 @@ def jobs_in_space(files: list[Path], options: dict[str, Any], scratch: Path) -> 
             raise UsageError(f"--{name} is for two dimensions; hpcdem draw DIR --field NAME -o FILE.gif draws three")
     title = style_of(options, options["folder"], PAGE, 1.0).title or ""
     view = default_view(read_moment(files[-1])).changed(title=title)
-    seen, ranges = common(files, view)
-    if "elements" in ranges:
-        view = view.with_layer("elements", limits=ranges["elements"])
+    seen, view = common(files, view)
     paper = Paper(PAGE, options["fontsize"], 2.0 * options["size"] * 2.54 / PAGE)
     return [ViewJob(file, scratch / f"{k:06d}.png", view, paper, seen) for k, file in enumerate(files)]
 

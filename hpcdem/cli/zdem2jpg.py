@@ -49,7 +49,7 @@ def of_field(options: dict[str, Any], files: list[Path]) -> Layer | None:
     from hpcdem.core.errors import UsageError
     from hpcdem.post.view.model import ModelView, view_of
     from hpcdem.post.view.moment import read_moment
-    from hpcdem.post.view.scene import common_spans
+    from hpcdem.post.view.scene import shared
 
     looks = {name: options[name] for name in ("limits", "colours") if options[name] is not None}
     if options["field"] is None:
@@ -59,8 +59,7 @@ def of_field(options: dict[str, Any], files: list[Path]) -> Layer | None:
     if not options["ballplot"]:
         raise UsageError("--field colours particles, which --ballplot=false leaves out")
     view: ModelView = view_of({"layers": [{"object": "particles", "field": options["field"], **looks}]}, "--field")
-    spans = common_spans((read_moment(file) for file in files), view)
-    return view.with_layer("particles", limits=spans["particles"]).layers[0] if spans else view.layers[0]
+    return shared(view, (read_moment(file) for file in files)).layers[0]
 
 
 def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:

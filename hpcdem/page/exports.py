@@ -22,7 +22,7 @@ from hpcdem.post import movie
 from hpcdem.post.view.model import ModelView
 from hpcdem.post.view.moment import DISCS, FACES, POLYGONS, RODS, SOLIDS, Moment, read_moment
 from hpcdem.post.view.paper import Paper, draw
-from hpcdem.post.view.scene import Painted, common_spans, scene, seen_of
+from hpcdem.post.view.scene import Painted, scene, seen_of, shared
 
 FILMS = ("gif", "mp4")
 FORMATS = {
@@ -185,10 +185,7 @@ def film(files: Sequence[FrameFile], view: ModelView, kind: str, wanted: dict[st
 
 
 def _filmed(files: Sequence[FrameFile], view: ModelView, kind: str, fps: float) -> bytes:
-    ranges = common_spans((read_moment(file.path) for file in files), view)
-    view = view.changed(layers=[
-        {**layer.model_dump(), "limits": ranges.get(layer.label, layer.limits)} for layer in view.layers
-    ])  # fmt: skip
+    view = shared(view, (read_moment(file.path) for file in files))
     if view.camera is None and files:
         seen = seen_of(read_moment(files[-1].path), view)
         view = view.changed(camera=(seen.left, seen.right, seen.bottom, seen.top))

@@ -399,6 +399,10 @@ def _legend(shown: Scene) -> list[dict[str, Any]]:
             })  # fmt: skip
         elif layer.legend:
             told.append({"label": layer.layer.label, "classes": layer.legend})
+        if layer.reference is not None:
+            part = layer.reference.length / shown.seen.width
+            told.append({"label": layer.layer.label, "arrow": layer.reference.text, "part": part,
+                         "vectors": layer.layer.vectors})  # fmt: skip
     return told
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.vtkhdf_mesh import MeshState
+from hpcdem.post.saved import save
 
 SIZE = 5.5, 3.9
 """Of the diagram, in inches."""
@@ -55,7 +56,7 @@ def draw(
         axes.set_title(title)
     if len(curves) > 1:
         axes.legend(frameon=False)
-    figure.savefig(path, format=kind, dpi=200)
+    save(figure, str(path), kind, 200.0, path)
 
 
 def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:

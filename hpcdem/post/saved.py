@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import IO, Any
 
 from hpcdem.core.errors import HpcdemError
+from hpcdem.post.lettering import lettered
 
 FORMATS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".svg")
 SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}
@@ -27,7 +29,9 @@ def save(figure: Any, target: str | IO[bytes], kind: str, dpi: float, picture: o
             f"cannot draw {picture}: {width:.0f} x {height:.0f} pixels, at most {LONGEST_SIDE} along a side and "
             f"{MOST_PIXELS / 1e6:.0f} million in all; take a smaller page or fewer dots per inch"
         )
-    with matplotlib.rc_context(SAVED):
+    lettered(figure, note=kind != "svg")  # whose texts are written by who reads it
+    with matplotlib.rc_context(SAVED), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from")  # it was told, once
         figure.savefig(target, format=kind, dpi=dpi, **_saving(kind))
 
 

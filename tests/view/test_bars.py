@@ -17,7 +17,7 @@ from hpcdem.page.viewer import Viewer
 from hpcdem.post.view.model import Layer, ModelView
 from hpcdem.post.view.moment import POLYGONS, Moment, Objects, read_moment
 from hpcdem.post.view.paper import figure_of
-from hpcdem.post.view.scene import STEPS, Scale, common_spans, scene
+from hpcdem.post.view.scene import STEPS, Scale, scene, shared
 from tests.view import frames
 
 SHOWN = {"camera": (0.0, 3.0, 0.0, 3.0)}
@@ -130,9 +130,10 @@ def test_one_value_everywhere_stands_in_the_middle():
 def test_many_frames_share_a_range():
     view = ModelView(layers=(Layer(object="elements", field="stress"),))
     moments = [strip(np.linspace(0.0, top, 1001)) for top in (1.0, 4.0)]
-    assert common_spans(moments, view) == {"elements": (pytest.approx(0.01), pytest.approx(3.96))}
+    assert shared(view, moments).layers[0].limits == (pytest.approx(0.01), pytest.approx(3.96))
     full = view.with_layer("elements", limits="full")
-    assert common_spans(moments, full) == {"elements": (0.0, 4.0)}
+    assert shared(full, moments).layers[0].limits == (0.0, 4.0)
+    assert shared(view, [strip(np.ones(9))] * 2).layers[0].limits is None
 
 
 # ---- the same everywhere ---------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
@@ -14,9 +15,11 @@ from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame
 from hpcdem.page.sources import Sources
 from hpcdem.page.viewer import Viewer
 from hpcdem.post.view.model import Layer, ModelView, read_view
-from hpcdem.post.view.moment import Moment, read_moment
-from hpcdem.post.view.scene import PALE, chosen_rows, default_view, rgb, scene
+from hpcdem.post.view.moment import Moment, of_particles, read_moment
+from hpcdem.post.view.paper import figure_of
+from hpcdem.post.view.scene import PALE, chosen_rows, default_view, rgb, scene, shared
 from tests.view import frames
+from tests.view.test_bars import told
 from tests.view.test_pictures import run
 
 pytestmark = pytest.mark.figures
@@ -136,3 +139,43 @@ def test_what_a_click_tells_has_units_by_size(tmp_path: Path):
     said = {name: text for name, _, _, text in found["values"]}
     assert said["stress_yy"] == "-10 MPa" and said["displacement"] == "948.683 mm (900, 300)"
     assert said["group_rock"] == "roof" and said["number"] == "9"
+
+
+def test_an_arrow_says_how_long_a_value_is(tmp_path: Path):
+    """Of velocities up to 9 m/s in the picture, a twentieth of it, 5 m/s; on the page a part of its width;
+    of many frames the longest of all."""
+    path = frames.write_blocks(tmp_path, grown=0.3)
+    layer = Layer(object="elements", vectors="velocity", colour="#cccccc")
+    view = ModelView(layers=(layer,), camera=(0.0, 3.0, 0.0, 3.0))
+    shown = scene(read_moment(path), view)
+    longest = max(np.hypot(*read_moment(path).of("elements").vectors["velocity"][:9].T))
+    reference = shown.layers[0].reference
+    assert reference is not None and reference.text == "velocity 5 m/s" and longest == pytest.approx(9.0)
+    assert reference.length == pytest.approx(5.0 / 9.0 * 0.05 * 3.0)
+    texts = [text.get_text() for text in figure_of(shown).findobj(Text)]
+    assert "velocity 5 m/s" in texts
+    assert "velocity 5 m/s" not in [t.get_text() for t in figure_of(scene(shown.moment, view.changed(legend=False)))
+                                    .findobj(Text)]  # fmt: skip
+    legend = told(Viewer(Sources([path])), {"view": view.model_dump(), "width": 60, "height": 60})
+    assert legend["arrow"] == "velocity 5 m/s" and legend["part"] == pytest.approx(reference.length / 3.0)
+    both = shared(view, [read_moment(path), read_moment(path)])
+    assert both.layers[0].longest == pytest.approx(10.0)
+    faster = scene(read_moment(path), view.with_layer("elements", longest=100.0)).layers[0]
+    assert faster.reference is not None and faster.reference.text == "velocity 100 m/s"
+    assert faster.arrows is not None and np.hypot(*faster.arrows[1].T).max() == pytest.approx(0.09 * 0.15, rel=1e-6)
+
+
+def test_beds_have_a_legend_by_group(tmp_path: Path):
+    """From the highest to the lowest, with the colours that each has."""
+    frame = frames.discs()
+    particles = frame.tables["particles"].columns
+    particles["group"] = np.where(particles["y"] > 2.5, 0, 1).astype(np.int32)
+    particles["color"] = np.where(particles["y"] > 2.5, 3, np.where(particles["y"] > 1.5, 1, 2)).astype(np.int32)
+    moment = of_particles(frame)
+    shown = scene(moment, default_view(moment))
+    assert shown.layers[0].legend == [("odd", "#ff0000"), ("even", "#00ff00 #ffff00")]
+    texts = [text.get_text() for text in figure_of(shown).findobj(Text)]
+    assert "odd" in texts and "even" in texts
+    particles["color"][:], particles["group"][:] = 3, 1
+    one = of_particles(frame)
+    assert scene(one, default_view(one)).layers[0].legend == []

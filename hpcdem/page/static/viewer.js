@@ -410,13 +410,23 @@ function axes(one, pen, w, h) {
 function legend(root, parts) {
   root.replaceChildren(...parts.map((part) => {
     const box = document.createElement("div");
+    if (part.arrow) {
+      const name = part.vectors.replaceAll("_", " "), arrow = document.createElement("span");
+      arrow.className = "arrow";
+      arrow.style.width = `${part.part * root.parentElement.clientWidth}px`;
+      box.append(part.arrow.replace(name, called("fields", part.vectors).replaceAll("_", " ")), arrow);
+      return box;
+    }
     if (part.classes) {
       for (const [word, colour] of part.classes) {
         const line = document.createElement("span");
-        const swatch = document.createElement("span");
-        swatch.className = "swatch";
-        swatch.style.background = colour;
-        line.append(swatch, called("legend", word), document.createElement("br"));
+        const swatches = colour.split(" ").map((one) => {
+          const swatch = document.createElement("span");
+          swatch.className = "swatch";
+          swatch.style.background = one;
+          return swatch;
+        });
+        line.append(...swatches, called("legend", word), document.createElement("br"));
         box.append(line);
       }
       return box;
@@ -593,7 +603,7 @@ function add() {
 }
 
 const BLANK = { name: "", visible: true, field: "", limits: null, log: false, colours: "viridis", colour: "", opacity: 1,
-  edges: false, size: 1, vectors: "", arrows: 1, filter: "" };
+  edges: false, size: 1, vectors: "", arrows: 1, longest: 0, filter: "" };
 
 function remove() {
   current.view.layers = current.view.layers.filter((one) => label(one) !== chosen);

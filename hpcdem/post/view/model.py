@@ -37,8 +37,8 @@ class Layer(_Table):
 
     name: in the tree and the legend, else that of the object; field: what colours it, "" the object's own colours;
     limits: values of the first and the last colour, "full": the least and the greatest of what is shown, else those
-    that one in a hundred is below or above; colour: one for all; size: factor on
-    radii of particles and widths of lines; vectors: a field drawn as arrows, the longest `arrows` times a twentieth of
+    that one in a hundred is below or above; colour: one for all; size: factor on radii of particles and widths of
+    lines; vectors: a field drawn as arrows, `longest` (SI, 0: the longest that is shown) `arrows` times a twentieth of
     the picture; filter: an expression that chooses objects, see hpcdem.post.view.filter."""
 
     object: Literal[OBJECTS]  # type: ignore[valid-type]
@@ -54,6 +54,7 @@ class Layer(_Table):
     size: Annotated[FiniteFloat, Field(gt=0.0, le=100.0)] = 1.0
     vectors: Annotated[str, Field(max_length=60)] = ""
     arrows: Annotated[FiniteFloat, Field(gt=0.0, le=100.0)] = 1.0
+    longest: Annotated[FiniteFloat, Field(ge=0.0)] = 0.0
     filter: Annotated[str, Field(max_length=LONGEST)] = ""
 
     @property

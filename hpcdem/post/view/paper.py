@@ -21,7 +21,7 @@ from hpcdem.post.saved import FORMATS, SAVED, save
 from hpcdem.post.view import space
 from hpcdem.post.view.model import ModelView
 from hpcdem.post.view.moment import DISCS, POLYGONS, Moment, read_moment
-from hpcdem.post.view.scene import Painted, Scale, Scene, scene
+from hpcdem.post.view.scene import Painted, Reference, Scale, Scene, scene
 
 TALLEST = 1.3
 """Largest height of the model over its width on paper; taller ones are narrower."""
@@ -90,6 +90,9 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
     left, bottom = (left, bottom) if view.axes else (0.15, 0.15)
     classes = [entry for layer in shown.layers for entry in layer.legend] if view.legend else []
     top = k * (_TOP + 0.45 * (-(-len(classes) // 4))) if view.title or classes else 0.5 * k if bars else 0.15
+    references = [layer.reference for layer in shown.layers if layer.reference is not None] if view.legend else []
+    arrow_row = 0.5 * k if references else 0.0
+    top += arrow_row
     right = k * _RIGHT + k * _BAR * len(bars)
     width = paper.page - left - right
     if width < 1.0:
@@ -121,10 +124,18 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
         colour_bar(figure, figure.add_axes((at / page[0], bottom / page[1], 0.3 * k / page[0], height / page[1])),
              layer.scale, paper.font)  # fmt: skip
     if handles:
+        from matplotlib.legend_handler import HandlerTuple
+
         axes.legend(
-            handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False,
-            fontsize=0.9 * paper.font, borderaxespad=0.15, handlelength=1.2, columnspacing=1.0, handletextpad=0.4,
+            [patches for _, patches in handles], [word for word, _ in handles], loc="lower left",
+            bbox_to_anchor=(0.0, 1.0 + arrow_row / height), ncols=4, frameon=False, fontsize=0.9 * paper.font,
+            borderaxespad=0.15, handlelength=max(1.2, *(0.8 * len(patches) for _, patches in handles)),
+            columnspacing=1.0, handletextpad=0.4,
+            handler_map={tuple: HandlerTuple(ndivide=None, pad=0.0)},
         )  # fmt: skip
+    end = left + width
+    for reference in references:
+        end -= _arrow(figure, reference, width / seen.width, (end, bottom + height + 0.25 * k), paper.font, page)
     if view.title:
         figure.text(
             (left + width) / page[0], 1.0 - 0.1 / page[1], shown.title(), fontsize=paper.font, ha="right", va="top",
@@ -185,6 +196,23 @@ def _length(
                 va="bottom")  # fmt: skip
 
 
+def _arrow(
+    figure: Any, reference: Reference, scale: float, at: tuple[float, float], font: float, page: tuple[float, float]
+) -> float:
+    """An arrow of a round value that ends at `at` [cm], what it is before it; scale: cm per metre. Width of both."""
+    from matplotlib.patches import FancyArrowPatch
+
+    length = scale * reference.length
+    ends = ((at[0] - length) / page[0], at[1] / page[1]), (at[0] / page[0], at[1] / page[1])
+    figure.add_artist(FancyArrowPatch(
+        *ends, transform=figure.transFigure, arrowstyle="-|>", mutation_scale=0.6 * font, shrinkA=0.0, shrinkB=0.0,
+        color="#202020", linewidth=0.8,
+    ))  # fmt: skip
+    figure.text((at[0] - length - 0.15) / page[0], at[1] / page[1], reference.text, fontsize=0.9 * font, ha="right",
+                va="center")  # fmt: skip
+    return length + 0.6 + 0.018 * font * len(reference.text)
+
+
 def _draw(axes: Any, layer: Painted, order: int) -> None:
     """Draw a layer over those before it."""
     from matplotlib.collections import LineCollection, PolyCollection
@@ -224,7 +252,7 @@ def _draw(axes: Any, layer: Painted, order: int) -> None:
 def _handles(layer: Painted) -> list[Any]:
     from matplotlib.patches import Patch
 
-    return [Patch(color=shade, label=word) for word, shade in layer.legend]
+    return [(word, tuple(Patch(color=one) for one in shades.split())) for word, shades in layer.legend]
 
 
 def colour_bar(figure: Any, axes: Any, scale: Scale, font: float) -> None:

@@ -39,6 +39,8 @@ THROUGH = 0.35
 """Opacity of elements around rods."""
 MOST_ARROWS = 3000
 """Of a picture: with more objects some are left out, every k-th is shown."""
+LONGEST = 0.2
+"""Length of the arrow that tells how long a value is, over the width of the picture, at most."""
 ARROW = 0.05
 """Length of the longest, over the width of the picture."""
 CATEGORIES = (
@@ -96,14 +98,22 @@ class Scale:
         ]
 
 
+@dataclass(frozen=True)
+class Reference:
+    """An arrow of a round value: what it says, and its length in the picture [m]."""
+
+    text: str
+    length: float
+
+
 @dataclass
 class Painted:
     """A layer ready to be drawn.
 
     rows (m,): which of its objects these are; shape as in `Objects`, of these; of tetrahedra what is seen of them, the
     columns of `space.Skin`; shades (c, 3): colours as fractions, kind (m,): the colour of each; width: of lines
-    [points]; values (m,): of the field, None without; arrows: where (k, dim), and how far (k, dim) [m]; legend: (word,
-    colour) of classes; scale: of the field."""
+    [points]; values (m,): of the field, None without; arrows: where (k, dim), and how far (k, dim) [m]; reference: how
+    long a value is; legend: (word, colour, or several with blanks between them) of classes; scale: of the field."""
 
     layer: Layer
     kind_of_shape: str
@@ -114,6 +124,7 @@ class Painted:
     width: float
     values: np.ndarray | None = None
     arrows: tuple[np.ndarray, np.ndarray] | None = None
+    reference: Reference | None = None
     legend: list[tuple[str, str]] = field(default_factory=list)
     scale: Scale | None = None
 
@@ -411,14 +422,28 @@ def spans(moment: Moment, view: ModelView) -> dict[str, tuple[float, float]]:
     return found
 
 
-def common_spans(moments: Iterable[Moment], view: ModelView) -> dict[str, tuple[float, float]]:
-    """The same of many frames; what is one value everywhere is left out."""
+def shared(view: ModelView, moments: Iterable[Moment]) -> ModelView:
+    """The view for many frames: one range of colours, and one length of arrows for all; of a field that is one value
+    everywhere each frame finds its own."""
     found: dict[str, tuple[float, float]] = {}
+    longest = {layer.label: layer.longest for layer in view.layers}
     for moment in moments:
         for label, (low, high) in spans(moment, view).items():
             before = found.get(label, (low, high))
             found[label] = min(low, before[0]), max(high, before[1])
-    return {label: span for label, span in found.items() if span[0] < span[1]}
+        for layer in view.layers:
+            vectors = moment.objects[layer.object].vectors if layer.object in moment.objects else {}
+            if layer.visible and layer.vectors in vectors and not layer.longest:
+                far = np.asarray(vectors[layer.vectors], float)[chosen_rows(moment, layer)]
+                longest[layer.label] = max(longest[layer.label], _largest(lengths(far)))
+    span = {label: {"limits": ends} for label, ends in found.items() if ends[0] < ends[1]}
+    return view.changed(layers=[
+        layer.model_dump() | {"longest": longest[layer.label]} | span.get(layer.label, {}) for layer in view.layers
+    ])  # fmt: skip
+
+
+def _largest(values: np.ndarray) -> float:
+    return float(np.max(values, initial=0.0, where=np.isfinite(values)))
 
 
 FEW = 0.01
@@ -496,6 +521,33 @@ def _by_name(
         result.legend.append(("in no group", NOTHING))
 
 
+MIXED = 0.02
+"""Part of the discs of a group that a colour of its legend has at least."""
+
+
+def _beds(objects: Objects, rows: np.ndarray, kind: np.ndarray) -> list[tuple[str, str]]:
+    """Groups of discs with the colours that they have, both from the highest to the lowest; none of a single group of
+    one colour."""
+    names, group = objects.names["group"], np.asarray(objects.fields["group"])[rows].astype(np.int64)
+    known = (group >= 0) & (group < len(names))
+    count, height = np.zeros((2, len(names), len(colours.RGB)))
+    np.add.at(count, (group[known], kind[known]), 1.0)
+    np.add.at(height, (group[known], kind[known]), objects.centres()[rows, 1][known])
+    legend = []
+    for k in np.argsort(-height.sum(axis=1) / np.maximum(count.sum(axis=1), 1.0), kind="stable"):
+        order = np.argsort(-height[k] / np.maximum(count[k], 1.0), kind="stable")
+        shown = [c for c in order if count[k, c] > MIXED * count[k].sum()]
+        if shown:
+            legend.append((names[k], " ".join(_hex(colours.RGB[c]) for c in shown)))
+    if len(legend) > CLASSES:
+        return [*legend[:CLASSES], (f"and {len(legend) - CLASSES} more", NOTHING)]
+    return legend if len(legend) > 1 or any(" " in shades for _, shades in legend) else []
+
+
+def _hex(shade: np.ndarray) -> str:
+    return "#" + "".join(f"{round(255.0 * part):02x}" for part in shade)
+
+
 def _one_colour(result: Painted, colour: str) -> None:
     result.shades, result.kind = rgb([colour]), np.zeros(len(result.rows), np.int64)
 
@@ -506,6 +558,8 @@ def _as_usual(result: Painted, objects: Objects) -> None:
     name, rows = result.layer.object, result.rows
     if name in ("particles", "walls") and "color" in objects.fields:
         result.shades, result.kind = colours.RGB, colours.numbers(objects.fields["color"])[rows]
+        if name == "particles" and len(rows) and "group" in objects.fields:
+            result.legend = _beds(objects, rows, result.kind)
     elif name == "clumps":
         result.shades = rgb(CATEGORIES)
         result.kind = np.asarray(objects.fields["clump"])[rows].astype(np.int64) % len(CATEGORIES)
@@ -546,9 +600,20 @@ def _arrows(objects: Objects, result: Painted, seen: View) -> tuple[np.ndarray, 
     some = some[:: max(1, -(-len(some) // MOST_ARROWS))]
     far = np.asarray(objects.vectors[layer.vectors], float)[rows][some]
     length = lengths(far)
-    longest = float(np.max(length, initial=0.0, where=np.isfinite(length)))
+    longest = layer.longest or _largest(length)
     shown = np.isfinite(length) & (length > 1e-3 * longest)
-    return at[some][shown], far[shown] * (layer.arrows * ARROW * seen.width / max(longest, 1e-300))
+    factor = layer.arrows * ARROW * seen.width / max(longest, 1e-300)
+    if longest > 0.0:
+        value = _round(min(longest, LONGEST * seen.width / factor))
+        said = units.printed(units.with_prefix(value, unit_of(layer.vectors, objects.dim)))
+        result.reference = Reference(f"{layer.vectors.replace('_', ' ')} {said}", factor * value)
+    return at[some][shown], far[shown] * factor
+
+
+def _round(value: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above this one."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(part * power for part in (0.5, 1.0, 2.0, 5.0) if part * power <= value * (1.0 + 1e-9))
 
 
 def rgb(words: Sequence[str]) -> np.ndarray:

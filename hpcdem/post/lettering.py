@@ -1,0 +1,88 @@
+"""Letters that the usual font of figures lacks, Chinese above all: another font of this machine that has them, else a
+line in the picture that says which package brings one."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+PREFERRED = (
+    "Noto Sans CJK SC", "Noto Sans SC", "Source Han Sans SC", "Source Han Sans CN", "WenQuanYi Zen Hei",
+    "WenQuanYi Micro Hei", "Microsoft YaHei", "SimHei", "PingFang SC", "Hiragino Sans GB", "Heiti SC", "SimSun",
+    "Noto Sans CJK JP", "Droid Sans Fallback", "Arial Unicode MS",
+)  # fmt: skip
+"""Fonts that are looked at first."""
+WIDE = "\u2e80"
+"""From here on letters are those of Chinese, Japanese and Korean."""
+PACKAGES = "fonts-noto-cjk or fonts-wqy-zenhei (Debian, Ubuntu), google-noto-sans-cjk-fonts (Fedora)"
+_told: set[str] = set()
+
+
+def lettered(figure: Any, note: bool = True) -> str:
+    """Give texts of a figure of matplotlib fonts that have their letters; what is to be told of those that no font has,
+    "" if all are there. It goes to standard error too, once in a process; note: and into the figure."""
+    from matplotlib.font_manager import findfont
+    from matplotlib.text import Text
+
+    lost: set[str] = set()
+    for text in figure.findobj(Text):
+        said = "".join(text.get_text().split())
+        if said.isascii():
+            continue
+        some = frozenset(said) - _letters(findfont(text.get_fontproperties()))
+        if not some:
+            continue
+        found = font_of(some)
+        if found:
+            text.set_fontfamily([*text.get_fontfamily(), found])
+        else:
+            lost |= some
+    if not lost:
+        return ""
+    advice = f": install {PACKAGES}" if max(lost) >= WIDE else ""
+    line = f"no font of this machine has the letters {''.join(sorted(lost)[:8])}{advice}"
+    if advice not in _told:
+        _told.add(advice)
+        sys.stderr.write(f"warning: {line}\n")
+    if note:  # in letters that can be read
+        figure.text(
+            0.004, 0.004, f"no font of this machine has some of these letters{advice}", fontsize=6.0, color="#c81e1e",
+            va="bottom", parse_math=False,
+        )  # fmt: skip
+    return line
+
+
+@cache
+def font_of(letters: frozenset[str]) -> str:
+    """A font that has all of these letters, "" if there is none."""
+    return next((name for name, path in _fonts() if letters <= _letters(path)), "")
+
+
+def _fonts() -> Iterator[tuple[str, str]]:
+    """Names and files of all fonts, those that are likely to have many letters first."""
+    from matplotlib import font_manager
+
+    known = font_manager.fontManager.ttflist
+    place = {name: k for k, name in enumerate(PREFERRED)}
+    for entry in sorted(known, key=lambda entry: (place.get(entry.name, len(place)), str(entry.weight) != "400")):
+        yield entry.name, entry.fname
+    # Matplotlib keeps its list of fonts in a file, and does not know those that were installed since.
+    for path in sorted({*font_manager.findSystemFonts()} - {entry.fname for entry in known}):
+        try:
+            font_manager.fontManager.addfont(path)
+        except Exception:  # a file that is no font, or is damaged
+            continue
+        yield font_manager.fontManager.ttflist[-1].name, path
+
+
+@cache
+def _letters(path: str) -> frozenset[str]:
+    """What a font can write."""
+    from matplotlib.font_manager import get_font
+
+    try:
+        return frozenset(map(chr, get_font(path).get_charmap()))
+    except (OSError, RuntimeError):
+        return frozenset()
