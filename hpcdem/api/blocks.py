@@ -115,9 +115,18 @@ class Geometry(Words):
         """A rectangle along the axes, from corner to corner."""
         self._shape("rectangle", as_layer, first=first, second=second)
 
-    def circle(self, centre: Point, radius: float, as_layer: str) -> None:
-        """A circle."""
-        self._shape("circle", as_layer, centre=centre, radius=radius)
+    def circle(
+        self,
+        centre: Point,
+        radius: float,
+        as_layer: str,
+        *,
+        segment_length: float | None = None,
+        normal: Point | None = None,
+    ) -> None:
+        """A circle, with the length of its sides a polygon; in three dimensions the surface of a disc."""
+        given = {"center": centre, "radius": radius, "segment_length": segment_length, "normal": normal}
+        self._do("geometry create circle", {**given, "as_layer": as_layer})
 
     def arc(self, centre: Point, radius: float, begin: float, end: float, as_layer: str) -> None:
         """A part of a circle from angle to angle."""
@@ -226,9 +235,21 @@ class Geometry(Words):
         given = {"layer": layer, "scale": scale, "rotate": rotate, "about": about, "move": move}
         self._do("geometry transform", given)
 
-    def delete(self, layer: str) -> None:
-        """Forget a layer; meshes that were made from it keep its edges."""
-        self._do("geometry delete", {"layer": layer})
+    def scale(self, factors: Point, layer: Sequence[str] | None = None) -> None:
+        """Multiply the coordinates of layers, of all if none is named."""
+        self._do("geometry scale", {"factors": factors, "layer": layer})
+
+    def translate(self, way: Point, layer: Sequence[str] | None = None) -> None:
+        """Move layers, all if none is named [m]."""
+        self._do("geometry translate", {"way": way, "layer": layer})
+
+    def export(self, layers: Sequence[str], file: File) -> None:
+        """Write layers to a DXF file in the folder of the results."""
+        self._do("geometry export", {"layers": layers, "file": file})
+
+    def delete(self, *layers: str) -> None:
+        """Forget layers; meshes that were made from them keep their edges."""
+        self._do("geometry delete", {"layers": layers})
 
     def _shape(self, kind: str, as_layer: str, **given: Any) -> None:
         self._do(f"geometry create {kind}", {**given, "as_layer": as_layer})

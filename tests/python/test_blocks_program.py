@@ -134,7 +134,12 @@ SAME: list[tuple[str, str]] = [
      "sim.geometry.import_file(Path('a.dxf'), 'l', dxf_layer='k', scale=0.001)"),
     ("pcdc geometry transform 'l' scale 2 rotate 30 about (0,1) move (1,0)",
      "sim.geometry.transform('l', scale=2, rotate=30, about=(0, 1), move=(1, 0))"),
-    ("pcdc geometry delete 'l'", "sim.geometry.delete('l')"),
+    ("pcdc geometry delete 'l' 'm'", "sim.geometry.delete('l', 'm')"),
+    ("pcdc geometry create circle c (0,1) rad 2 s-l 0.5 as-layer 'l'",
+     "sim.geometry.circle((0, 1), 2, 'l', segment_length=0.5)"),
+    ("pcdc geometry scale (2,1) layer 'l' 'm'", "sim.geometry.scale((2, 1), ['l', 'm'])"),
+    ("pcdc geometry translate (2,1) layer 'l'", "sim.geometry.translate((2, 1), ['l'])"),
+    ("pcdc geometry export 'l' 'm' file 'a.dxf'", "sim.geometry.export(['l', 'm'], 'a.dxf')"),
     ("pcdc mesh create from-layer 'o' size 0.5 type quad refine-layer 'h' size 0.05 refine-layer 'i' size 0.1 distance "
      "2 hole 'h' region 'r' region 'q' group 'w' embed 'e' crack 'c' irregular smooth group 'rock' set 'd'",
      "sim.mesh.create('o', 0.5, 'quad', refine_layer=[('h', 0.05), ('i', 0.1, 2)], hole=['h'], region=['r', ('q', 'w')]"
@@ -408,6 +413,8 @@ def carry_out(sim: Simulation, text: str) -> Any:
 
 
 IN_SPACE: list[tuple[str, str]] = [
+    ("pcdc geometry create circle c (0,1,0) rad 2 normal (1,0,0) as-layer 'l'",
+     "sim.geometry.circle((0, 1, 0), 2, 'l', normal=(1, 0, 0))"),
     ("pcdc element create brick p0 (0,0,0) p1 (2,0,0) p2 (1,1,0) p3 (0,0,2) n 4 2 2",
      "sim.mesh.brick((0, 0, 0), (2, 0, 0), (1, 1, 0), (0, 0, 2), n=(4, 2, 2))"),
     ("pcdc model option potential munjiza overlap keep deep-overlap stop",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.io.agreed import on_first
 from hpcdem.pre.mesh import cad, dxf, solids
 from hpcdem.pre.mesh import geometry as shapes
 from hpcdem.pre.mesh.once import made_once
@@ -108,6 +109,26 @@ def transform(
     project.layers.transform(layer, translate=move, rotate=rotate, scale=scale, about=about)
 
 
-def delete(project: Project, layer: str) -> None:
-    """Forget a layer. Meshes that were made from it keep its edges."""
-    project.layers.remove(layer)
+def moved(project: Project, layers: Sequence[str] | None = None, **how: Any) -> None:
+    """Scale (factors along x and y) or translate [m] layers; None: all of them."""
+    every = list(project.layers) if layers is None else list(dict.fromkeys(layers))
+    for layer in every:
+        _ = project.layers[layer]
+    changed = {layer: [shapes.transformed(curve, **how) for curve in project.layers[layer]] for layer in every}
+    project.layers.curves.update(changed)
+
+
+def export(project: Project, layers: Sequence[str], path: str) -> None:
+    """Write layers to a DXF file in the folder of the results, each as a layer of its name, in metres. Collective."""
+    if not path.lower().endswith(".dxf"):
+        raise CommandError(f"'{path}': layers are exported to files *.dxf")
+    wanted = {layer: project.layers[layer] for layer in dict.fromkeys(layers)}
+    project.folder()
+    file = project.to_write(project.result(path))
+    on_first(project.comm, lambda: dxf.write(file, wanted))
+
+
+def delete(project: Project, layers: Sequence[str]) -> None:
+    """Forget layers. Meshes that were made from them keep their edges."""
+    for layer in dict.fromkeys(layers):
+        project.layers.remove(layer)

@@ -16,5 +16,6 @@ NEEDED: Mapping[str, Callable[[str], tuple[optional.Load, ...]]] = {
     },
     "mesh import": optional.of_mesh,
     "geometry import": optional.of_drawing,
+    "geometry export": optional.of_drawing,
 }
 """What loads them, for a file of this name; each raises HpcdemError, with the way to get it, where it is missing."""

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
 
 Terms = tuple[tuple[str, Any], ...]
+DEFAULT_LAYER = "default"
+"""Of shapes that name none."""
 
 
 class Call:
@@ -128,7 +130,7 @@ def _restore(call: Call) -> None:
 
 def _shape(kind: str, *names: str) -> Callable[[Call], None]:
     def carry_out(call: Call) -> None:
-        fdem.geometry.create(call.project, kind, call["as-layer"], *(call[name] for name in names))
+        fdem.geometry.create(call.project, kind, call.get("as-layer", DEFAULT_LAYER), *(call[name] for name in names))
 
     return carry_out
 
@@ -136,12 +138,16 @@ def _shape(kind: str, *names: str) -> Callable[[Call], None]:
 def _fractures(call: Call) -> None:
     if call.project.dim == 3:
         fdem.meshes.disc_network(
-            call.project, call["as-layer"], call["inside"], **trial.disc_words(call.arguments), seed=call["seed"]
+            call.project,
+            call.get("as-layer", DEFAULT_LAYER),
+            call["inside"],
+            **trial.disc_words(call.arguments),
+            seed=call["seed"],
         )
         return
     fdem.meshes.fracture_network(
-        call.project, call["as-layer"], call["inside"], **trial.fracture_words(call.arguments), seed=call["seed"],
-        holes=call.get("hole", []), least=call.get("shortest", 0.0),
+        call.project, call.get("as-layer", DEFAULT_LAYER), call["inside"], **trial.fracture_words(call.arguments),
+        seed=call["seed"], holes=call.get("hole", []), least=call.get("shortest", 0.0),
     )  # fmt: skip
 
 
@@ -521,7 +527,9 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "geometry create polyline": _shape("polyline", "points"),
     "geometry create polygon": _shape("polygon", "points"),
     "geometry create rectangle": _shape("rectangle", "first", "second"),
-    "geometry create circle": _shape("circle", "centre", "radius"),
+    "geometry create circle": lambda c: fdem.geometry.create(
+        c.project, *trial.circle(c.arguments)[:1], c.get("as-layer", DEFAULT_LAYER), *trial.circle(c.arguments)[1:]
+    ),
     "geometry create arc": _shape("arc", "centre", "radius", "begin", "end"),
     "geometry create point": _shape("point", "points"),
     "geometry create fractures": _fractures,
@@ -531,15 +539,20 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "geometry create cone": _shape("cone", "first", "second", "radius", "other"),
     "geometry create disc": _shape("disc", "centre", "normal", "radius"),
     "geometry create plane": _shape("plane", "point", "normal"),
-    "geometry create extrude": lambda c: fdem.geometry.extrude(c.project, c["as-layer"], c["layer"], c["along"]),
+    "geometry create extrude": lambda c: fdem.geometry.extrude(
+        c.project, c.get("as-layer", DEFAULT_LAYER), c["layer"], c["along"]
+    ),
     "geometry create revolve": lambda c: fdem.geometry.revolve(
-        c.project, c["as-layer"], c["layer"], **c.given("as-layer", "layer")
+        c.project, c.get("as-layer", DEFAULT_LAYER), c["layer"], **c.given("as-layer", "layer")
     ),
     "geometry import": lambda c: fdem.geometry.import_file(
-        c.project, c["as-layer"], c["file"], c.get("dxf-layer"), c.get("scale")
+        c.project, c.get("as-layer", DEFAULT_LAYER), c["file"], c.get("dxf-layer"), c.get("scale")
     ),
     "geometry transform": lambda c: fdem.geometry.transform(c.project, **c.given()),
-    "geometry delete": lambda c: fdem.geometry.delete(c.project, c["layer"]),
+    "geometry scale": lambda c: fdem.geometry.moved(c.project, c.get("layer"), scale=c["factors"]),
+    "geometry translate": lambda c: fdem.geometry.moved(c.project, c.get("layer"), translate=c["way"]),
+    "geometry export": lambda c: fdem.geometry.export(c.project, c["layers"], c["file"]),
+    "geometry delete": lambda c: fdem.geometry.delete(c.project, c["layers"]),
     "mesh create": _mesh_create,
     "mesh structured": _mesh_structured,
     "mesh equilateral": lambda c: fdem.meshes.equilateral(c.project, c["first"], c["second"], c["size"], **c.group()),
@@ -653,6 +666,7 @@ PASSED_OVER: dict[str, Callable[[Any, str], Any]] = {
     "model save": lambda project, file: project.to_write(project.path(fdem.checkpoints.named(file))),
     "model restore": lambda project, file: project.to_read(fdem.checkpoints.found(project, file)),
     "geometry import": lambda project, file: project.to_read(file),
+    "geometry export": lambda project, file: project.to_write(project.result(file)),
     "mesh import": lambda project, file: project.to_read(file),
     "history export": lambda project, file: project.to_write(project.result(file)),
     "chart export": lambda project, file: project.to_write(project.result(file)),

@@ -566,7 +566,8 @@ RANGE_TERMS = (
 # ---- commands ------------------------------------------------------------------------------------------------------
 
 _GROUP = Option("group", (STRING,), "the group that the new elements are in", "", "'default'", more=(SET,))
-_LAYER = Option("a{s}-l{ayer}", (STRING,), "name of the layer; a layer may hold several shapes", required=True)
+_LAYER = Option("a{s}-l{ayer}", (STRING,), "name of the layer; a layer may hold several shapes", default="'default'")
+_SOME_LAYERS = Option("l{ayer}", (STRINGS,), "names of layers", "", "all")
 _NAME = Option("name", (STRING,), "name", required=True)
 RECORDED = {
     "node": {
@@ -893,14 +894,22 @@ _GEOMETRY = (
             (_leading("points", VECTORS, "the points; or a list of vectors", "m"),), (_LAYER,), manual=True),
     Command("geom{etry} c{reate} polyg{on}", "A closed line; in three dimensions the flat surface within.",
             ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'block'",),
-            (_leading("points", PLACES, "the corners", "m"),), (_LAYER,), dims=BOTH),
+            (_leading("points", PLACES, "the corners", "m"),), (_LAYER,), dims=BOTH,
+            also=("geom{etry} c{reate} p{olyline}-c{lose}",)),
     Command("geom{etry} c{reate} rec{tangle}", "A rectangle along the axes.",
             ("pcdc geometry create rectangle (0,0) (10,5) as-layer 'box'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
             (_LAYER,)),
-    Command("geom{etry} c{reate} cir{cle}", "A circle.", ("pcdc geometry create circle (0,0) 1 as-layer 'hole'",),
-            (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m")),
-            (_LAYER,)),
+    Command("geom{etry} c{reate} cir{cle}", "A circle; with segment-length a polygon of equal sides. In three "
+            "dimensions the surface of a disc.",
+            ("pcdc geometry create circle (0,0) 1 as-layer 'hole'",
+             "pcdc geometry create circle center (0,0) radius 1 segment-length 0.1 as-layer 'hole'"),
+            (_leading("centre", VECTOR, "centre", "m", False), _leading("radius", POSITIVE, "radius", "m", False)),
+            (Option("c{enter}", (VECTOR,), "centre", "m"), Option("r{adius}", (POSITIVE,), "radius", "m"),
+             Option("s{egment}-l{ength}", (POSITIVE,), "of its sides, about", "m", "a true circle",
+                    dims=PLANE),
+             Option("n{ormal}", (VECTOR,), "of the disc, of any length", "", "(0,0,1)", dims=SPACE), _LAYER),
+            dims=BOTH),
     Command("geom{etry} c{reate} arc", "A part of a circle, counter-clockwise.",
             ("pcdc geometry create arc (0,0) 1 0 90 as-layer 'arch'",),
             (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m"),
@@ -988,8 +997,18 @@ _GEOMETRY = (
              Option("rot{ate}", (FLOAT,), "then, counter-clockwise", "degrees"),
              Option("about", (VECTOR,), "centre of both", "m", "(0,0)"), Option("move", (VECTOR,), "last", "m")),
             needs_option=True),
-    Command("geom{etry} d{elete}", "Forgets a layer.", ("pcdc geometry delete 'hole'",),
-            (_leading("layer", STRING, "name of the layer"),), dims=BOTH),
+    Command("geom{etry} s{cale}", "Multiplies the coordinates of layers, of all without layer. Circles and arcs "
+            "take one factor only.", ("pcdc geometry scale (2,1) layer 'hole' 'slope'",),
+            (_leading("factors", VECTOR, "along x and y, not 0"),), (_SOME_LAYERS,)),
+    Command("geom{etry} t{ranslate}", "Moves layers, all without layer.",
+            ("pcdc geometry translate (10,0) layer 'hole' 'slope'",),
+            (_leading("way", VECTOR, "where to", "m"),), (_SOME_LAYERS,)),
+    Command("geom{etry} exp{ort}", "Writes layers to a DXF file, in metres, each as a layer of its name.",
+            ("pcdc geometry export 'hole' 'slope' file 'plan.dxf'",),
+            (_leading("layers", STRINGS, "names of the layers"),),
+            (Option("f{ile}", (FILE,), "name of the file, in the folder of the results", required=True),)),
+    Command("geom{etry} d{elete}", "Forgets layers.", ("pcdc geometry delete 'hole'", "pcdc geometry delete 'a' 'b'"),
+            (_leading("layers", STRINGS, "names of the layers"),), dims=BOTH),
 )  # fmt: skip
 
 _MESH = (

@@ -189,6 +189,22 @@ def _make_shape(command: str) -> Callable[[Mapping[str, Any]], None]:
     return make
 
 
+def circle(arguments: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Kind and values of the shape of `geometry create circle`, see `geometry.shape`."""
+    centre, radius = arguments.get("centre", arguments.get("center")), arguments.get("radius")
+    if centre is None or radius is None or {"centre", "center"} <= arguments.keys():
+        raise CommandError("a circle needs a centre and a radius, each once")
+    if len(centre) == 3:
+        return "disc", centre, arguments.get("normal", (0.0, 0.0, 1.0)), radius
+    if "segment-length" in arguments:
+        return "segmented-circle", centre, radius, arguments["segment-length"]
+    return "circle", centre, radius
+
+
+def _circle(arguments: Mapping[str, Any]) -> None:
+    geometry.shape(*circle(arguments))
+
+
 def _rectangle(arguments: Mapping[str, Any]) -> None:
     even = (1.0,) * len(arguments["first"])
     values.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", even))
@@ -271,6 +287,10 @@ def _export(arguments: Mapping[str, Any]) -> None:
     values.figure_name(arguments["file"])
 
 
+def _drawing(arguments: Mapping[str, Any]) -> None:
+    values.result_name(arguments["file"])
+
+
 def _frames(arguments: Mapping[str, Any]) -> None:
     values.frames_name(arguments["file"])
 
@@ -325,9 +345,11 @@ def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 _TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
     **{f"geometry create {name}": _make_shape(name) for name in
-       ("polyline", "polygon", "rectangle", "circle", "arc", "point", "box", "sphere", "cylinder", "cone", "disc",
+       ("polyline", "polygon", "rectangle", "arc", "point", "box", "sphere", "cylinder", "cone", "disc",
         "plane")},
+    "geometry create circle": _circle,
     "geometry create fractures": _fractures,
+    "geometry export": _drawing,
     "bolt create polyline": _bolt,
     "mesh structured": _rectangle,
     "element create brick": _brick,

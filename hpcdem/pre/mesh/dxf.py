@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.io.agreed import atomic_path
 from hpcdem.pre.mesh import geometry, optional
 from hpcdem.pre.mesh.geometry import Curve
 
@@ -48,6 +49,26 @@ def metres(document: Any, scale: float | None, notes: list[str]) -> float:
     how = "as scale says" if scale is not None else "scale says otherwise" if name else "taken as metres"
     notes.append(f"{said}: a unit is {taken:g} m, {how}")
     return taken
+
+
+def write(path: Path, layers: Mapping[str, Sequence[Curve]]) -> None:
+    """A drawing in metres of these curves, by layer. CommandError for a name that no layer of a drawing can have."""
+    ezdxf = optional.ezdxf()
+    document = ezdxf.new("R2010", units=6)
+    space = document.modelspace()
+    for name, curves in layers.items():
+        if any(char in '<>/\\":;?*|=`,' for char in name):
+            raise CommandError(f"'{name}' can be no layer of a drawing: it has one of <>/\\\":;?*|=`,")
+        if name not in document.layers:
+            document.layers.add(name)
+        for curve in curves:
+            if not curve.segments:
+                space.add_point(tuple(curve.points[0].tolist()), dxfattribs={"layer": name})
+                continue
+            rows = [(x, y, bulge) for (x, y), bulge in zip(curve.points.tolist(), curve.bulges.tolist())]
+            space.add_lwpolyline(rows, format="xyb", close=curve.closed, dxfattribs={"layer": name})
+    with atomic_path(path) as temporary:
+        document.saveas(temporary)
 
 
 def read_dxf(path: str | Path, only: set[str] | None = None) -> dict[str, list[Curve]]:
