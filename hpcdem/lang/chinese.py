@@ -354,6 +354,23 @@ ZDEM_KEYWORDS = {
 """Meanings of keywords of ZDEM by their English."""
 
 PCDC_KEYWORDS = {
+    "x from ... to ..., or at one number, in the mesh": "x 从 … 到 …,或等于一个数,在网格中",
+    "y from ... to ..., or at one number, in the mesh": "y 从 … 到 …,或等于一个数,在网格中",
+    "z from ... to ..., or at one number, in the mesh": "z 从 … 到 …,或等于一个数,在网格中",
+    "elements with an area, in space faces, from ... to ...": "面积从 … 到 … 的单元,三维中为面",
+    "the term that follows does not hold": "后面的一项不成立",
+    "all its points lie in the circle, in space the sphere, about a centre and of a radius; elements: their centre; in the mesh": "所有点位于圆内(三维为球内);单元按中心;在网格中",
+    "lies along the lines of the layer: within a distance of them and at an angle to them; elements and nodes by the distance; in the mesh": "沿几何层的线:距离和夹角在范围内;单元和节点只看距离;在网格中",
+    "all its points are near the lines, in space the surfaces, of the layer; elements: their centre; in the mesh": "所有点靠近几何层的线(三维为面);单元按中心;在网格中",
+    "a ray from its middle crosses the lines of the layer an odd or an even number of times, as count is, and at least so often: with 1 what is inside; in the mesh": "从中点出的射线与几何层的线相交次数与 count 同为奇数或偶数,且不少于它:1 为内部;在网格中",
+    "faces or nodes of the element, or of those from first to last; without a number of any": "该单元(或编号从…到…的单元)的面或节点;不写编号为任意单元",
+    "the centre": "中心",
+    "the radius": "半径",
+    "distance of its points at most": "各点距离的上限",
+    "angle at most": "夹角的上限",
+    "distance at most": "距离的上限",
+    "of the ray": "射线的方向",
+    "crossings": "相交次数",
     "on: joints that are whole are no contacts besides; nothing else is there, so off is refused": "on:完好的节理不另作接触;只有这一种,off 被拒绝",
     "as model creep": "同 model creep",
     "as the word value": "同 value",
@@ -847,9 +864,6 @@ PCDC_KEYWORDS = {
     "members of the group": "组的成员",
     "members of any group of the set": "此集中任一组的成员",
     "the number, or from first to last; numbers begin at 0, as in the output": "编号,或从首号到末号;编号从 0 开始,与输出相同",
-    "x from ... to ..., in the mesh": "网格中 x 从……到……",
-    "y from ... to ..., in the mesh": "网格中 y 从……到……",
-    "z from ... to ..., in the mesh": "网格中 z 从……到……",
     "lies on the lines, in three dimensions on the surfaces, of the geometry layer; elements: their centre is inside "
     "of it; in the mesh":
     "位于几何图层的线上(三维:面上);单元:中心在图层之内;按网格中的位置",
@@ -858,7 +872,6 @@ PCDC_KEYWORDS = {
     "lies on a surface of the model": "位于模型的表面",
     "faces, joints or nodes of the elements of the group; joints: both elements are in it; nodes: where elements may "
     "part, on their side": "此组单元的面、节理或节点;节理:两侧单元都在组中;节点:在单元可能分开之处,取本侧的节点",
-    "faces or nodes of the element, or of those from first to last": "此单元(或从首号到末号各单元)的面或节点",
     "joints with an element of each of the two groups": "两侧单元分属这两组的节理",
     "joints on a crack of the mesh": "网格裂纹上的节理",
 }  # fmt: skip

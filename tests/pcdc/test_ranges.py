@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from hpcdem.api.arguments import chosen_by
 from hpcdem.commands.fdem import meshes
 from hpcdem.commands.fdem.choices import chosen, points
-from hpcdem.core.errors import CommandError
+from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.groups import Groups
 
@@ -182,3 +183,94 @@ def test_ranges_that_make_no_sense(bench, terms, message):
     bench(BOX)
     with pytest.raises(CommandError, match=message):
         chosen(bench.project, g.ELEMENT, terms)
+
+
+def by_words(bench, kind: str, words: str) -> list[int]:
+    """What a range of a script chooses."""
+    return numbers(bench, kind, *chosen_by(words, kind))
+
+
+def test_one_number_not_and_in_circle(bench):
+    bench(BOX)
+    assert by_words(bench, g.NODE, "x 0") == by_words(bench, g.NODE, "x 0 0") != []
+    every, left = by_words(bench, g.ELEMENT, "x 0 4"), by_words(bench, g.ELEMENT, "x 0 2")
+    assert by_words(bench, g.ELEMENT, "not x 0 2") == sorted(set(every) - set(left))
+    bench("pcdc element group 'left' range x 0 2\n")
+    assert by_words(bench, g.ELEMENT, "y 0 1 not group 'left'") == sorted(
+        set(by_words(bench, g.ELEMENT, "y 0 1")) - set(left)
+    )
+    at = bench.project.whole_mesh().points
+    near = np.flatnonzero(np.hypot(*(at - (1.0, 1.0)).T) <= 1.0 + 1e-9).tolist()
+    for words in ("in-circle (1,1) 1", "in-circle center 1,1 radius 1", "in-c c (1,1) rad 1"):
+        assert by_words(bench, g.NODE, words) == near and len(near) == 5
+    assert by_words(bench, g.NODE, "not in-circle (1,1) 1") == sorted(set(range(len(at))) - set(near))
+    for wrong, why in (
+        ("x 0 2 not", "not stands before"), ("not not x 0 2", "not stands before"), ("in-circle (1,1)", "a radius"),
+        ("in-circle rad 1", "a centre and a radius"),
+    ):  # fmt: skip
+        with pytest.raises(CommandError, match=why):
+            by_words(bench, g.NODE, wrong)
+
+
+def test_nodes_that_a_group_does_not_mean_are_on_the_other_side(bench):
+    bench(BOX + "pcdc element group 'left' range x 0 2\n")
+    sides, others = (chosen(bench.project, g.NODE, chosen_by(words, g.NODE))
+                     for words in ("face-of 'left' x 2", "not face-of 'left' x 2"))  # fmt: skip
+    assert not set(sides.tolist()) & set(others.tolist())
+
+
+def test_area(bench):
+    bench(
+        "pcdc mesh structured (0,0) (2,1) cells 2 1 type quad\npcdc mesh structured (5,0) (9,4) cells 2 2 type quad\n"
+    )
+    assert by_words(bench, g.ELEMENT, "area 0.5 2") == [0, 1]
+    assert by_words(bench, g.ELEMENT, "area 3.9 4.1") == [2, 3, 4, 5]
+    with pytest.raises(CommandError, match="area chooses elements in 2 dimensions"):
+        by_words(bench, g.FACE, "area 0 9")
+
+
+def test_along_near_and_inside_of_a_layer(bench):
+    bench(
+        BOX + "pcdc geometry create polyline (0,1) (4,1) as-layer 'line'\n"
+        "pcdc geometry create polygon (0,0) (3,0) (3,2) (2,2) (2,1) (1,1) (1,2) (0,2) as-layer 'u'\n"
+    )
+    on = by_words(bench, g.JOINT, "geometry 'line'")
+    assert by_words(bench, g.JOINT, "geometry-along 'line'") == on and len(on) == 4
+    # joints half a metre away at most: with all ends within 1 m those across, too, unless the angle forbids it
+    wide = by_words(bench, g.JOINT, "geometry-along 'line' distance-offset 1 angle-offset 0")
+    assert wide == on
+    assert len(by_words(bench, g.JOINT, "geom-a 'line' dis-offset 1 ang-offset 45")) > len(on)
+    assert len(by_words(bench, g.JOINT, "geom-a 'line' dis-offset 1 ang-offset 90")) == len(
+        by_words(bench, g.JOINT, "geom-d 'line' within 1")
+    )
+    at = bench.project.whole_mesh().points
+    assert by_words(bench, g.NODE, "geometry-distance 'line' within 0.5") == np.flatnonzero(at[:, 1] == 1.0).tolist()
+    # a ray from the left arm of the u crosses it three times, one from the opening twice
+    inside = by_words(bench, g.ELEMENT, "geometry 'u'")
+    for way in ("", " ray-direction (1,0.01)", " ray-direction (0.3,-1) count 1"):
+        assert by_words(bench, g.ELEMENT, f"geometry-location 'u'{way}") == inside
+    centres = bench.project.whole_mesh().centroids()
+    opening = np.flatnonzero((np.abs(centres[:, 0] - 1.5) < 0.5) & (centres[:, 1] > 1.0)).tolist()
+    assert by_words(bench, g.ELEMENT, "geometry-location 'u' count 2") == opening
+    three = by_words(bench, g.ELEMENT, "geom-l 'u' ray-dir (1,0) count 3")
+    assert three and set(three) < set(inside)
+    with pytest.raises(CommandError, match="there is no geometry layer 'v'"):
+        by_words(bench, g.NODE, "geometry-distance 'v' within 1")
+    with pytest.raises(CommandError, match="ray-direction"):
+        by_words(bench, g.ELEMENT, "geometry-location 'u' ray-direction (0,0)")
+
+
+def test_terms_of_space(bench):
+    bench(
+        "pcdc model new dim 3\npcdc mesh structured (0,0,0) (2,1,1) cells 2 1 1\n"
+        "pcdc geometry create sphere (0,0,0) 1 as-layer 's'\n"
+    )
+    at = bench.project.whole_mesh().points
+    away = np.abs(np.sqrt((at**2).sum(axis=1)) - 1.0)
+    assert by_words(bench, g.NODE, "geometry-distance 's' within 0.1") == np.flatnonzero(away <= 0.1).tolist() != []
+    inside = np.flatnonzero(np.sqrt((at**2).sum(axis=1)) <= 1.2).tolist()
+    assert by_words(bench, g.NODE, "in-circle (0,0,0) 1.2") == inside != []
+    faces = by_words(bench, g.FACE, "area 0.4 0.6")
+    assert faces and set(faces) < set(by_words(bench, g.FACE, "area 0 9"))
+    with pytest.raises(ScriptError, match="geometry-along' is for two dimensions"):
+        bench("pcdc element group 'a' range geometry-along 's'\n")

@@ -51,7 +51,7 @@ def test_what_is_chosen(text, rows):
         "abs(" * 60 + "x" + ")" * 60 + " > 1", "", "x", "x + 1", "(x > 1) + 1 > 0", "x and y", "True", "x > True",
         "nix > 1", "abs(x, y) > 1", "sin(x) > 0", "abs(x=1) > 0", "group('floor')", "group('roof' + 'x')",
         "group(floor)",
-        "range", "range x 1", "range x __import__('os') 2", "range group", "range geometry 'a'", "range x 0 1 and",
+        "range", "range x", "range x __import__('os') 2", "range group", "range geometry 'a'", "range x 0 1 and",
         "range x a.b 1", "range set 'a b'", "range x 0 1 0 1", "group()",
         "x is y", "x in y", "~x > 0", "x // 2 > 1", "x > 1j", "x > ...", "x > None", "*x > 1", "x\x00 > 1",
     ],
@@ -85,3 +85,21 @@ def test_lines_before_the_comparison_give_names():
     ):  # fmt: skip
         with pytest.raises(HpcdemError, match=said):
             chosen(wrong, 3, fields, lambda *_: np.zeros(3, bool))
+
+
+def test_words_of_a_range_that_came_from_pcdc():
+    x, y = np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0, 5.0])
+    fields = {"x": x, "y": y}
+
+    def found(text):
+        return np.flatnonzero(chosen(text, 4, fields, lambda *_: x > 1.5)).tolist()
+
+    assert found("range x 1") == [1] and found("range x 1 2 y 0") == [1]
+    assert found("range not x 1 2") == [0, 3] and found("range not group 'a' y 0") == [0, 1]
+    assert found("range in-circle (1,0) 1.5") == [0, 1, 2] and found("range not in-circle (1,0) 1.5 and y > 2") == [3]
+    for text, why in (
+        ("range not", "expected a term after not"), ("range geometry-along 'a'", "frames have no layers"),
+        ("range in-circle (1,0)", "expected a centre and a radius"),
+    ):  # fmt: skip
+        with pytest.raises(HpcdemError, match=why):
+            found(text)

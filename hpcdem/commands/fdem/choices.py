@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,8 +75,11 @@ def _why(objects: _Objects, where: g.Range) -> str:
 
 
 _ONLY_JOINTS = (g.Between, g.OnCrack)
-_NOT_ELEMENTS = (g.OnBoundary, g.OfElements, g.OfElement)
-_NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer)
+_NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
+_NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer, g.Along, g.Near, g.Crossed, g.Sized)
+_BY_PLACE = (g.Span, g.OnLayer, g.InCircle, g.Near, g.Crossed, g.Along)
+STRAIGHT = 1e-6
+"""Degrees by which an angle that is 0 may be off: coordinates of meshes are rounded."""
 
 
 class _Objects:
@@ -142,7 +146,7 @@ class _Objects:
     def all_of(self, where: g.Range) -> np.ndarray:
         """(n,) bool: which of them all terms hold for."""
         self.now = any(isinstance(term, g.Present) for term in where)
-        if self.now and not any(isinstance(term, (g.Span, g.OnLayer)) for term in where):
+        if self.now and not any(isinstance(_bare(term), _BY_PLACE) for term in where):
             raise CommandError("present goes with x, y and geometry: it says which positions they look at")
         mask = np.ones(len(self.numbers), bool)
         for term in where:
@@ -238,6 +242,8 @@ class _Objects:
             case g.OfElement(first, last):
                 if self.kind == g.JOINT:
                     raise CommandError("element chooses faces and nodes; joints of elements: face-of, with a group")
+                if self.kind == g.ELEMENT:
+                    return self._ids(first, last)
                 elements = np.flatnonzero(_Objects(self.project, g.ELEMENT, self.null_too)._ids(first, last))
                 return self._of_elements(_Objects(self.project, g.ELEMENT, self.null_too).numbers[elements])
             case g.Between(one, other, set_name):
@@ -246,6 +252,25 @@ class _Objects:
                 return (a[:, 0] & b[:, 1]) | (a[:, 1] & b[:, 0])
             case g.Present() | g.UseHidden():
                 return np.ones(len(self.numbers), bool)
+            case g.Not(of):
+                before = len(self.corners_of_terms)
+                found = ~self.mask(of)
+                # Nodes by what they belong to: the sides of points that are not meant.
+                return self._of_corners(~self.corners_of_terms.pop()) if len(self.corners_of_terms) > before else found
+            case g.Sized(low, high):
+                return self._sized(low, high)
+            case g.InCircle(centre, radius):
+                if len(centre) != self.mesh.dim:
+                    raise CommandError(f"in-circle: a centre of {self.mesh.dim} numbers is needed, got {len(centre)}")
+                away = np.sqrt(((self.places() - np.array(centre)) ** 2).sum(axis=2))
+                return (away <= radius + self._slack()).all(axis=1)
+            case g.Near(layer, within):
+                return (self._away(layer) <= within + self._slack(TOLERANCE)).all(axis=1)
+            case g.Along(layer, distance, angle):
+                return self._along(layer, distance, angle)
+            case g.Crossed(layer, direction, count):
+                crossed = _crossings(self._curves(layer), self.places().mean(axis=1), direction)
+                return (crossed >= count) & ((crossed - count) % 2 == 0)
             case g.OnCrack():
                 rows = self.mesh.find_edges(self.edges, self.mesh.cracks)
                 return np.isin(self.numbers, self.edges.faces[rows[rows >= 0], 0])
@@ -281,9 +306,53 @@ class _Objects:
             raise CommandError("a range in z needs a model in three dimensions")
         if low > high:
             raise CommandError(f"{'xyz'[axis]} {low:g} {high:g}: the first bound is above the second")
-        slack = NEAR * float(np.ptp(self.mesh.points, axis=0).max())
+        slack = self._slack()
         at = self.places()[:, :, axis]
         return ((at >= low - slack) & (at <= high + slack)).all(axis=1)
+
+    def _slack(self, part: float = NEAR) -> float:
+        """Of places [m]."""
+        return part * float(np.ptp(self.mesh.points, axis=0).max())
+
+    def _sized(self, low: float, high: float) -> np.ndarray:
+        """By the area of elements, in space of faces."""
+        wanted = {2: g.ELEMENT, 3: g.FACE}[self.mesh.dim]
+        if self.kind != wanted:
+            raise CommandError(f"area chooses {wanted}s in {self.mesh.dim} dimensions, not {self.kind}s")
+        if wanted == g.ELEMENT:
+            found = self.mesh.areas()[self.numbers]
+        else:
+            a, b, c = np.moveaxis(self.mesh.points[self.ends[:, :3]], 1, 0)
+            found = 0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1))
+        return (found >= low) & (found <= high)
+
+    def _away(self, layer: str) -> np.ndarray:
+        """(n, k) [m]: how far points are from the lines, in space the surfaces, of a layer."""
+        places = self.places()
+        if self.mesh.dim == 3:
+            flat = places.reshape(-1, 3)
+            found = [np.abs(one.distance(flat)) for one in self._solids(layer)]
+        else:
+            flat = places.reshape(-1, 2)
+            found = [geometry.distance(curve, flat) for curve in self._curves(layer)]
+        return np.min(found, axis=0).reshape(places.shape[:2])
+
+    def _along(self, layer: str, distance: float, angle: float) -> np.ndarray:
+        """Near a line of the layer, and, what has a direction, at a small angle to it there."""
+        if self.mesh.dim == 3:
+            raise CommandError("geometry-along is for two dimensions; geometry-distance chooses near a surface")
+        places, found = self.places(), np.zeros(len(self.numbers), bool)
+        slack, least = self._slack(TOLERANCE), math.cos(math.radians(angle + STRAIGHT)) if angle < 90.0 else 0.0
+        way = places[:, -1] - places[:, 0]
+        size = np.hypot(*way.T)
+        for curve in self._curves(layer):
+            ends = curve.points if curve.bulges.any() == 0 else geometry.sampled(curve, curve.length() / SIDES)
+            for a, b in zip(ends, np.roll(ends, -1, axis=0)[: len(ends) - (not curve.closed)]):
+                away = geometry.distance_to_segment(a, b, 0.0, places.reshape(-1, 2)).reshape(places.shape[:2])
+                near = (away <= distance + slack).all(axis=1)
+                along = np.abs(way @ (b - a)) >= least * size * np.hypot(*(b - a))
+                found |= near & along
+        return found
 
     def _layer(self, layer: str) -> np.ndarray:
         if self.mesh.dim == 3:
@@ -358,6 +427,29 @@ class _Objects:
             corners[elements] = self.mesh.cells[elements] >= 0
             return self._of_corners(corners.reshape(-1))
         return np.isin(self.numbers // 4, elements)
+
+
+def _bare(term: g.Term) -> g.Term:
+    return term.term if isinstance(term, g.Not) else term
+
+
+def _crossings(curves: list[geometry.Curve], points: np.ndarray, direction: tuple[float, ...]) -> np.ndarray:
+    """(n,) how often rays from points cross lines, arcs by their sides."""
+    size = math.hypot(*direction)
+    if len(direction) != 2 or size == 0.0:
+        raise CommandError(f"ray-direction is a vector of two numbers that is not zero, got {direction}")
+    along = np.array(direction) / size
+    turned = np.column_stack([along, [-along[1], along[0]]])
+    u, v = (points @ turned).T
+    count = np.zeros(len(points), np.int64)
+    for curve in curves:
+        sides = curve.points if not curve.bulges.any() else geometry.sampled(curve, curve.length() / SIDES)
+        ends = sides @ turned
+        for (au, av), (bu, bv) in zip(ends, np.roll(ends, -1, axis=0)[: len(ends) - (not curve.closed)]):
+            across = (av > v) != (bv > v)
+            if across.any():
+                count[across] += u[across] < au + (v[across] - av) * (bu - au) / (bv - av)
+    return count
 
 
 SIDES = 1440

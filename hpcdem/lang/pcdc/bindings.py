@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 Terms = tuple[tuple[str, Any], ...]
 DEFAULT_LAYER = "default"
 """Of shapes that name none."""
+LAST = 2**53
+"""Beyond all numbers of objects."""
 
 
 class Call:
@@ -97,20 +99,36 @@ def with_parameters(given: dict[str, Any]) -> dict[str, Any]:
 
 def where(terms: Terms | None) -> g.Range | None:
     """RANGE as the commands take it."""
-    return None if terms is None else tuple(_TERMS[name](value) for name, value in terms)
+    if terms is None:
+        return None
+    found: list[g.Term] = []
+    negated = False
+    for name, value in terms:
+        if name == "not":
+            negated = True
+        else:
+            term = _TERMS[name](value)
+            found.append(g.Not(term) if negated else term)
+            negated = False
+    return tuple(found)
 
 
 _TERMS: dict[str, Callable[[Any], g.Term]] = {
     "group": lambda v: g.InGroup(v["value"], v.get("set", g.DEFAULT)),
     "set": g.InSet,
     "id": lambda v: g.Ids(v[0], v[-1]),
-    "x": lambda v: g.Span(0, *v),
-    "y": lambda v: g.Span(1, *v),
-    "z": lambda v: g.Span(2, *v),
+    "x": lambda v: g.Span(0, v[0], v[-1]),
+    "y": lambda v: g.Span(1, v[0], v[-1]),
+    "z": lambda v: g.Span(2, v[0], v[-1]),
+    "area": lambda v: g.Sized(*v),
+    "in-circle": lambda v: g.InCircle(*(v["value"] or (v["center"], v["radius"]))),
+    "geometry-along": lambda v: g.Along(v["value"], v.get("distance-offset", 0.0), v.get("angle-offset", 0.0)),
+    "geometry-distance": lambda v: g.Near(v["value"], v.get("within", 0.0)),
+    "geometry-location": lambda v: g.Crossed(v["value"], v.get("ray-direction", (1.0, 0.0)), v.get("count", 1)),
     "geometry": g.OnLayer,
     "boundary": lambda v: g.OnBoundary(),
     "face-of": lambda v: g.OfElements(v["value"], v.get("set", g.DEFAULT)),
-    "element": lambda v: g.OfElement(v[0], v[-1]),
+    "element": lambda v: g.OfElement(*((v[0], v[-1]) if v else (0, LAST))),
     "between": lambda v: g.Between(v["value"][0], v["value"][1], v.get("set", g.DEFAULT)),
     "crack": lambda v: g.OnCrack(),
     "present": lambda v: g.Present(),

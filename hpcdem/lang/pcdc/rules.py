@@ -13,6 +13,11 @@ from hpcdem.physics.fdem.groups import SHOWN
 
 def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     """ValueError if the words of a line do not go together."""
+    for k, (name, value) in enumerate(terms or ()):
+        if name == "not" and (k + 1 == len(terms or ()) or (terms or ())[k + 1][0] in ("not", "present", "use-hidden")):
+            raise ValueError("not stands before the term of a range that does not hold, such as x, group or geometry")
+        if name == "in-circle" and (len(value["value"]), len(value)) not in ((2, 1), (0, 3)):
+            raise ValueError("in-circle takes a centre and a radius")
     rule = _RULES.get(command.name)
     if rule is not None:
         rule(arguments, terms)

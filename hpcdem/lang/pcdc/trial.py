@@ -71,7 +71,7 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
     same."""
     try:
         for name, value in terms or ():
-            if name in ("id", "element", "x", "y", "z") and known(value):
+            if name in ("id", "element", "x", "y", "z", "area") and known(value) and value:
                 _ascending(name, value)
         if isinstance(arguments.get("law", arguments.get("function")), Pending):
             raise CommandError("the file of a law or function is plain text: it is read before the script runs")

@@ -134,6 +134,58 @@ class OnLayer:
 
 
 @dataclass(frozen=True)
+class Sized:
+    """Elements with an area [m2] from low to high; in space faces."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class InCircle:
+    """All points in a circle, in space a sphere [m], in the mesh. Elements: their centre."""
+
+    centre: tuple[float, ...]
+    radius: float
+
+
+@dataclass(frozen=True)
+class Along:
+    """Within a distance [m] of the lines of a geometry layer, faces and joints at an angle to them of at most so much
+    [degrees], in the mesh. Elements: their centre."""
+
+    layer: str
+    distance: float = 0.0
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
+class Near:
+    """All points within a distance [m] of the lines, in space the surfaces, of a geometry layer, in the mesh. Elements:
+    their centre."""
+
+    layer: str
+    within: float = 0.0
+
+
+@dataclass(frozen=True)
+class Crossed:
+    """A ray from the middle crosses the lines of a geometry layer as often as `count` or by an even number more often:
+    1 is inside."""
+
+    layer: str
+    direction: tuple[float, ...] = (1.0, 0.0)
+    count: int = 1
+
+
+@dataclass(frozen=True)
+class Not:
+    """What a term does not hold for."""
+
+    term: Term
+
+
+@dataclass(frozen=True)
 class OnBoundary:
     """On a surface of the model."""
 
@@ -193,6 +245,12 @@ Term = (
     | OnCrack
     | Present
     | UseHidden
+    | Sized
+    | InCircle
+    | Along
+    | Near
+    | Crossed
+    | Not
 )
 Range = tuple[Term, ...]
 """All terms must hold."""

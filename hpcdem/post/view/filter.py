@@ -32,6 +32,7 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
 GROUP = "group"
 """`group(NAME)`, or `group(NAME, SET)`: whether an object is in a group. Names may stand in quotes."""
 _GIVEN = re.compile(r"\s*[A-Za-z_]\w*\s*=(?!=)")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[^\s(),]+")
 _ARITHMETIC = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 _COMPARISONS = {
@@ -104,15 +105,30 @@ def _without_range(text: str) -> str:
     def name() -> str:
         return repr(taken("a name").strip("'\""))
 
+    negated = False
     while words:
         word = taken("a word").lower()
+        before = len(found)
         if word == "and" and found:
             rest = re.search(r"\band\b(.*)$", text, re.IGNORECASE | re.DOTALL)
             assert rest is not None
             return f"{' and '.join(found)} and ({rest[1].strip()})"
+        if word == "not" and not negated:
+            negated = True
+            continue
         if word in ("x", "y", "z"):
-            low, high = taken("a number"), taken("a number")
+            low = taken("a number")
+            high = words.pop(0) if words and _NUMBER.fullmatch(words[0]) else low
             found.append(f"{low} <= {word} <= {high}")
+        elif word in ("in-circle", "in-c"):
+            numbers = [taken("a centre and a radius") for _ in range(3)]
+            while words and _NUMBER.fullmatch(words[0]):
+                numbers.append(words.pop(0))
+            *centre, radius = numbers
+            if len(numbers) > 4:
+                raise refusal(text, "in-circle takes a centre and a radius")
+            square = " + ".join(f"(({axis}) - ({at})) * (({axis}) - ({at}))" for axis, at in zip("xyz", centre))
+            found.append(f"{square} <= ({radius}) * ({radius})")
         elif word == "id":
             low = taken("a number")
             high = words.pop(0) if words and words[0].isdigit() else low
@@ -126,7 +142,18 @@ def _without_range(text: str) -> str:
         elif word == "set":
             found.append(f"group_{taken('a name').strip(chr(39))} >= 0")
         else:
-            raise refusal(text, f"'{word[:30]}' is no word of a range that a frame can answer: x, y, z, id, group, set")
+            advice = ""
+            if word.startswith("geom"):
+                advice = "; frames have no layers: element group 'name' range geometry-... first, and then group 'name'"
+            raise refusal(
+                text,
+                f"'{word[:30]}' is no word of a range that a frame can answer: x, y, z, in-circle, not, id, group, set"
+                + advice,
+            )
+        if negated and len(found) > before:
+            found[-1], negated = f"not ({found[-1]})", False
+    if negated:
+        raise refusal(text, "expected a term after not")
     if not found:
         raise refusal(text, "expected x, y, z, id, group or set after range")
     return " and ".join(found)
