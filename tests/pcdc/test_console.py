@@ -76,7 +76,7 @@ def test_exit_ends(bench):
         ("pcdc element c-model null ", "property relax range"),
         ("pcdc element-face c-model contact-m-c property p-n 1 p", "penalty-normal penalty-shear"),
         ("pcdc mesh create from-layer 'a' refine-layer 'b' ", "size distance"),
-        ("pcdc node group 'a' range g", "group geometry"),
+        ("pcdc node group 'a' range g", "group geometry geometry-along geometry-distance geometry-location"),
         (
             "pcdc history create 'h' ",
             "node element joint bolt-node bolt-element flow-node flow-channel well liner-node liner-element model",
