@@ -134,6 +134,8 @@ class Session:
                 speed.remember_run(summary.particle_steps, summary.wall, self.comm.size * self.threads, law)
         if self.figure and sim.log is not None:
             draw_last_state(sim, sim.log)
+            if sim.folder_made and not sim.coupled:
+                sim.log.results(Path(sim.outdir))
         self._note(sim, "done")
         sim.release()
 
@@ -154,6 +156,7 @@ class Session:
         self.projects.clear()
         self.interpreter = None
         self.stop.uninstall()
+        self.log.close()
         if self.reproduction is not None and failure is None:
             self.reproduction.close()
         run_folder.release_all()
@@ -170,6 +173,8 @@ class Session:
             from hpcdem.commands.fdem import summary
 
             summary.close(project, self.figure and not stopped)
+            if project.log is not None and project.folder_made and self.figure and not stopped:
+                project.log.results(project.outdir)
         if project.folder_made:
             state = "done" if failure is None else "stopped" if stopped else "failed"
             run_folder.leave(project.outdir, self.comm, state, project.step)

@@ -51,6 +51,7 @@ def start(words: list[str]) -> NoReturn:
         if comm.size > 1:
             raise UsageError(f"hpcdem console is for one rank, these are {comm.size}; a script runs on many")
         log = Log(comm.rank)
+        log.folds = False
         for warning in warnings:
             log.warn(warning)
         session = Session(comm, log, StopRequests(), threads, Path(), options["outdir"], figure=False)

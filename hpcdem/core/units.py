@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from hpcdem.core.errors import CommandError
@@ -233,6 +233,13 @@ def power_of_ten(value: float) -> str:
     return ("" if factor == "1" else f"{factor}·") + f"10{str(int(power)).translate(_RAISED)}"
 
 
+def in_one_unit(values: Iterable[float], unit: str, system: str = "") -> tuple[float, str]:
+    """`scale` of the largest of some values; system: units that the model declared, whose values stay as they are."""
+    if system not in ("", SI.name):
+        return 1.0, label(system, unit)
+    return scale(max((abs(value) for value in values), default=0.0), unit)
+
+
 def with_prefix(value: float, unit: str, digits: int = 4, system: str = "") -> str:
     """A value as people write it: ``2.5 MPa``, ``12 mm``, ``3.17 years``.
 
@@ -247,5 +254,10 @@ def with_prefix(value: float, unit: str, digits: int = 4, system: str = "") -> s
     system : str
         Units that the model declared (`SYSTEMS`), "" none. In units other than SI values are written as they are.
     """
-    size, name = scale(value, unit, digits) if system in ("", SI.name) else (1.0, label(system, unit))
+    size, name = scale(value, unit, digits) if system in ("", SI.name) else in_one_unit((), unit, system)
     return f"{value / size + 0.0:.{digits}g} {name}".rstrip()
+
+
+def counted(count: int, word: str) -> str:
+    """``1 step``, ``20 steps``."""
+    return f"{count} {word}{'s' * (count != 1)}"

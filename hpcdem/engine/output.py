@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.core.units import label
+from hpcdem.core.units import label, with_prefix
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.behind import under_way as _under_way
 from hpcdem.io.columns import append_rows
@@ -269,16 +269,15 @@ def tell_energy(sim: Simulation) -> None:
     seen, of_physics = sim.energy.look(sim), physics_energies(sim)
     if sim.log is None:
         return
-    rows = [
-        (words, f"{getattr(seen, name):.6g}")
+    values = {
+        words: float(getattr(seen, name))
         for name, words in ENERGY_WORDS.items()
         if name not in ("work_blocks", "loss_laws") or getattr(seen, name)
-    ]
-    rows += [(name, f"{value:.6g}") for name, value in of_physics.items()]
-    joule = label(sim.settings.units, "J")
-    sim.log.table("energy budget", ("energy", joule), rows)
+    } | of_physics
+    sim.log.account("energy budget", "energy", "J", values, sim.settings.units)
+    closing = with_prefix(seen.closing, "J", system=sim.settings.units)
     sim.log.info(
-        f"energy: closing error {seen.closing:.4g} {joule}, {seen.relative:.2g} of the largest flow "
+        f"energy: closing error {closing}, {seen.relative:.2g} of the largest flow "
         "(docs/physics.md says which terms close to rounding and which with the time step)"
     )
 
@@ -320,6 +319,7 @@ def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus
         dt_critical=seen.critical_dt if math.isfinite(seen.critical_dt) else 0.0,
         kinetic=seen.kinetic, unbalanced_ratio=seen.unbalanced, particles=seen.particles, contacts=seen.contacts,
         bonds=sim.bonds_left(), broken_tension=tension, broken_shear=shear, walls=walls,
+        units=sim.settings.units,
     )  # fmt: skip
 
 

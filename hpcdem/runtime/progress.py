@@ -10,19 +10,25 @@ import errno
 import json
 import math
 import os
+import re
+import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
 from hpcdem.core.timers import Summary, Timers
+from hpcdem.core.units import counted, in_one_unit, with_prefix
 from hpcdem.io.run_record import PROGRESS
 from hpcdem.runtime.notebook import NotebookBar, in_notebook
 
 QUIET_SECONDS = 10.0
 """A log file gets at most one progress line in this time, unless the script sets the interval itself."""
+FOLDED_AFTER = 3
+"""So many warnings that differ in numbers alone are written one by one."""
+_NUMBERS = re.compile(r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 NOTE_SECONDS = 1.0
 """Time between two notes in the folder of the results, and before the first one."""
 
@@ -33,7 +39,7 @@ class StepStatus:
 
     unbalanced_ratio: largest unbalanced force of a particle over the mean contact force. broken_tension and
     broken_shear count bonds since the start of the script. walls: (id, fx, fy), the force of the particles on each
-    wall.
+    wall. units: those that the model declared (core.units.SYSTEMS), "" none.
     """
 
     step: int
@@ -48,6 +54,7 @@ class StepStatus:
     broken_tension: int = 0
     broken_shear: int = 0
     walls: Sequence[tuple[int, float, float]] = field(default_factory=tuple)
+    units: str = ""
 
 
 def duration(seconds: float) -> str:
@@ -63,11 +70,11 @@ def duration(seconds: float) -> str:
 
 
 def rate(number: float) -> str:
-    """A number per second with three digits: ``812``, ``20.4k``, ``48.2M``."""
-    for scale, letter in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if number >= 0.9995 * scale:
-            return f"{number / scale:.3g}{letter}"
-    return f"{number:.3g}"
+    """A number per second with three digits: ``812``, ``20400``, ``48.2 million``."""
+    if number >= 1e5:
+        size, word = (1e9, "billion") if number >= 0.9995e9 else (1e6, "million")
+        return f"{number / size:.3g} {word}"
+    return f"{float(f'{number:.3g}'):.10g}"
 
 
 @dataclass
@@ -124,6 +131,9 @@ class Log:
         self._notebook = self._speaks and stream is None and in_notebook()
         self._bar: Bar | NotebookBar | None = None
         self._warned: set[str] = set()
+        self._warnings: dict[str, int] = {}
+        self.folds = True
+        """Whether warnings that come again and again are counted; not where somebody types commands."""
         self._script_steps = 0
         self._script_done = self._script_first = 0
         self._script_began = now()
@@ -145,8 +155,26 @@ class Log:
             self._print(text)
 
     def warn(self, text: str) -> None:
-        """A line that starts with ``warning:``."""
-        self.info(f"warning: {text}")
+        """A line that starts with ``warning:``. Of those that differ in numbers alone the first three are written, then
+        the tenth, the hundredth ... with their count; `close` tells how many there were."""
+        kind = _NUMBERS.sub("#", text)
+        count = self._warnings[kind] = self._warnings.get(kind, 0) + 1
+        if not self.folds or count <= FOLDED_AFTER:
+            self.info(f"warning: {text}")
+        elif math.log10(count).is_integer():
+            self.info(f"warning, {count} times so far: {text}")
+
+    def close(self) -> None:
+        """Tell how often warnings came that were not all written."""
+        for kind, count in self._warnings.items():
+            if self.folds and count > FOLDED_AFTER:
+                self.info(f"warning: {count} in all like this one: {kind[:100]}{'...' * (len(kind) > 100)}")
+        self._warnings.clear()
+
+    def results(self, folder: Path) -> None:
+        """Where results are, and how they are looked at: the last line of a run."""
+        where = shlex.quote(str(folder))
+        self.info(f"results: {folder}; `hpcdem view {where}` shows them, `hpcdem measure {where}` measures them")
 
     def warn_once(self, key: str, text: str) -> None:
         """A warning, the first time that `key` comes by."""
@@ -269,19 +297,26 @@ class Log:
         ]
         if total:
             parts.append(f"script {percent(script_done, total)}")
-        parts.append(f"{rate(speed)} steps/s, {rate(speed * status.particles)} particle-steps/s")
-        parts.append(f"left {duration(left)}")
-        if total:
-            parts[-1] += f", script {duration(self._script_left(script_done))}"
+        parts.append(f"{rate(speed)} steps/s")
+        if done < command.steps:
+            parts.append(f"left {duration(left)}")
+            if total:
+                parts[-1] += f", script {duration(self._script_left(script_done))}"
         known = 0.0 < status.dt_critical < math.inf
-        critical = f" ({status.dt / status.dt_critical:.2f} of critical)" if known else ""
-        parts.append(f"t {status.time:.6g} s, dt {status.dt:.4g} s{critical}")
-        parts.append(f"kinetic {status.kinetic:.4g} J, unbalanced/contact {status.unbalanced_ratio:.3g}")
+        critical = f" ({status.dt / status.dt_critical:.2f} of the critical one)" if known else ""
+
+        def said(value: float, unit: str, digits: int = 4) -> str:
+            return with_prefix(value, unit, digits, status.units)
+
+        parts.append(f"time {said(status.time, 's', 6)}, time step {said(status.dt, 's')}{critical}")
+        parts.append(
+            f"kinetic energy {said(status.kinetic, 'J')}, unbalanced force {status.unbalanced_ratio:.3g} of the mean "
+            "contact force"
+        )
         parts.append(f"{status.particles} particles, {status.contacts} contacts, {bonds(status)}")
         if status.walls:
-            parts.append(
-                "walls " + " ".join(f"{i}:({fx + 0.0:.4g},{fy + 0.0:.4g})" for i, fx, fy in status.walls) + " N"
-            )
+            forces = (f"{i} ({said(fx, 'N')}, {said(fy, 'N')})" for i, fx, fy in status.walls)
+            parts.append(f"forces on walls: {', '.join(forces)}")
         return " | ".join(parts)
 
     def _script_left(self, done: int) -> float:
@@ -325,6 +360,11 @@ class Log:
             f"{rate(of_blocks.particle_steps / whole.wall)} element-steps/s"
         )
         self._print(line + (f" | imbalance of {whole.ranks} ranks {whole.imbalance:.2f}" if whole.ranks > 1 else ""))
+
+    def account(self, title: str, quantity: str, unit: str, values: Mapping[str, float], system: str = "") -> None:
+        """A table of values in one unit, with the prefix of the largest; system: units that the model declared."""
+        size, name = in_one_unit(values.values(), unit, system)
+        self.table(title, (quantity, name), [(words, f"{value / size:.6g}") for words, value in values.items()])
 
     def table(self, title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """A table, drawn on a terminal, aligned text in a file; the first column to the left, the others to the
@@ -387,7 +427,7 @@ def closing_line(summary: Summary, body: str = "particle") -> str:
     """Totals: wall time, steps, rates, imbalance."""
     wall = max(summary.wall, 1e-9)
     parts = [
-        f"{summary.steps} steps in {duration(summary.wall)}",
+        f"{counted(summary.steps, 'step')} in {duration(summary.wall)}",
         f"{rate(summary.steps / wall)} steps/s",
         f"{rate(summary.particle_steps / wall)} {body}-steps/s",
     ]

@@ -57,7 +57,8 @@ def test_equilibrium_at_once(bench):
     assert bench.blocks.told("solve_elastic")[-1][1] == {"cycles": 1, "solver": "auto", "steps": 7}
     assert bench.blocks.clock.step == 6 and not bench.blocks.told("advance")
     assert [row[0] for row in bench.project.histories["t"].rows] == [5]
-    assert "line 5: solve elastic: ratio 1e-11 after 3 iterations, 42 unknowns, direct, " in bench.blocks.log.lines[-2]
+    told = "line 5: solve elastic: unbalanced force ratio 1e-11 after 3 iterations; 42 unknowns, solver direct, "
+    assert told in bench.blocks.log.lines[-2]
 
 
 @pytest.mark.parametrize(
@@ -235,7 +236,7 @@ def test_the_log_says_what_is_done(bench):
     bench(BOX + "pcdc model solve cycles 20\n")
     assert "line 2: solve cycles 20" in bench.blocks.log.lines
     assert bench.blocks.log.lines[-1].startswith(
-        "step 20 | t 0.2 s, dt 0.01 s | ratio 0.05 | joints: 2 yielded, 1 broken"
+        "step 20 | time 200 ms, time step 10 ms | unbalanced force ratio 0.05 | joints: 2 yielded, 1 broken"
     )
 
 

@@ -278,7 +278,9 @@ def test_a_run_from_script_to_figure(launch, tmp_path):
     done = launch(1, "a.py", cwd=tmp_path, timeout=300)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("hpcdem ") and "steps/s" in done.stdout
-    figure = done.stdout.splitlines()[-1].removeprefix("figure: ")
+    *_, figure, results = done.stdout.splitlines()
+    figure = figure.removeprefix("figure: ")
+    assert results.startswith("results: data; `hpcdem view data` shows them")
     assert (tmp_path / figure).stat().st_size > 1000
 
 

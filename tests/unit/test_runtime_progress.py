@@ -6,6 +6,7 @@ import io
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -67,7 +68,15 @@ def test_durations(seconds, text):
 
 
 @pytest.mark.parametrize(
-    ("number", "text"), [(0.25, "0.25"), (812, "812"), (999.9, "1k"), (20431, "20.4k"), (48.2e6, "48.2M")]
+    ("number", "text"),
+    [
+        (0.25, "0.25"),
+        (812, "812"),
+        (999.9, "1000"),
+        (20431, "20400"),
+        (48.2e6, "48.2 million"),
+        (2.5e9, "2.5 billion"),
+    ],
 )
 def test_rates(number, text):
     assert rate(number) == text
@@ -82,12 +91,12 @@ def test_a_line_says_where_the_run_is(log, out, clock):
     assert head == "line 12: CYC, 1000 steps"
     for part in (
         "step 500 | CYC 50.0% | script 25.0%",
-        "25 steps/s, 25k particle-steps/s",
+        "25 steps/s",
         "left 20 s, script 1:00",
-        "t 25 s, dt 0.05 s (0.50 of critical)",
-        "kinetic 1.5e+06 J, unbalanced/contact 0.01",
+        "time 25 s, time step 50 ms (0.50 of the critical one)",
+        "kinetic energy 1.5 MJ, unbalanced force 0.01 of the mean contact force",
         "1000 particles, 2500 contacts, 1200 bonds (3 broken in tension, 4 in shear)",
-        "walls 0:(1,-2.5e+09) 1:(0,0) N",
+        "forces on walls: 0 (1 N, -2.5 GN), 1 (0 N, 0 N)",
     ):
         assert part in line
 
@@ -99,7 +108,7 @@ def test_the_rate_is_that_of_the_last_window(log, out, clock):
     clock.t += 10.0
     log.step(status(11000))
     first, second = (line for line in out.getvalue().splitlines() if line.startswith("step"))
-    assert "1k steps/s" in first and "100 steps/s" in second
+    assert "1000 steps/s" in first and "100 steps/s" in second
 
 
 def test_a_log_file_gets_a_line_each_ten_seconds(log, out, clock):
@@ -281,3 +290,50 @@ def test_a_full_disk_under_the_log_changes_no_exit_code(tmp_path, stream):
             ["bash", "-c", f'"$0" -m hpcdem a.sc {stream}', sys.executable], cwd=tmp_path, check=False
         )
         assert done.returncode == code
+
+
+# -- warnings that come again, the end -------------------------------------------------------------------------------
+
+
+def test_warnings_that_differ_in_numbers_alone_are_counted(log, out):
+    for step in range(1, 151):
+        log.warn(f"step {step}: 2 pairs overlap by {0.1 * step:.3g} m")
+    log.warn("another one")
+    log.close()
+    lines = out.getvalue().splitlines()
+    assert lines[:3] == [f"warning: step {k}: 2 pairs overlap by {0.1 * k:.3g} m" for k in (1, 2, 3)]
+    assert lines[3:] == [
+        "warning, 10 times so far: step 10: 2 pairs overlap by 1 m",
+        "warning, 100 times so far: step 100: 2 pairs overlap by 10 m",
+        "warning: another one",
+        "warning: 150 in all like this one: step #: # pairs overlap by # m",
+    ]
+
+
+def test_where_commands_are_typed_each_warning_is_said(log, out):
+    log.folds = False
+    for _ in range(6):
+        log.warn("once more")
+    log.close()
+    assert out.getvalue() == 6 * "warning: once more\n"
+
+
+def test_the_end_says_what_can_be_done_next(log, out):
+    log.results(Path("out of the way"))
+    said = out.getvalue()
+    assert said.startswith("results: out of the way; `hpcdem view 'out of the way'` shows them")
+
+
+def test_an_account_is_in_one_unit_with_a_prefix(log, out):
+    log.account("energy budget", "energy", "J/m", {"motion": 2.5e6, "lost": -1e3})
+    log.account("energy budget", "energy", "J", {"motion": 2.5e6}, "mm-mpa-s")
+    first, second = out.getvalue().split("energy budget\n")[1:]
+    assert [line.split() for line in first.splitlines()] == [["energy", "MJ/m"], ["motion", "2.5"], ["lost", "-0.001"]]
+    assert [line.split() for line in second.splitlines()] == [["energy", "mJ"], ["motion", "2.5e+06"]]
+
+
+def test_a_model_with_declared_units_keeps_them(log, out, clock):
+    log.command_started("CYC", 0, 10, step=0)
+    clock.t += 20.0
+    log.step(status(10, units="mm-mpa-s", walls=((0, 1.0, -2.5e9),)))
+    assert "kinetic energy 1.5e+06 mJ" in out.getvalue() and "0 (1 N, -2.5e+09 N)" in out.getvalue()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from hpcdem.commands.dem.properties import chosen, prop
 from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import GID, MATERIAL, RADIUS, X, Y
 from hpcdem.core.selection import Selection
+from hpcdem.core.units import with_prefix
 from hpcdem.physics.dem.kernels import contacts, laws, mass
 from hpcdem.physics.dem.simulation import Simulation
 
@@ -167,10 +169,11 @@ def warn_of_two_stiffnesses(sim: Simulation) -> None:
     if not number or sim.log is None:
         return
     _, a, b, bond_ks, contact_ks, by_modulus, by_hertz = worst[0]
+    said = partial(with_prefix, unit="N/m", system=sim.settings.units)
     text = (
-        f"{number} bonds have one shear stiffness open and another touching: particles {a} and {b} "
-        f"{bond_ks:.4g} N/m ({'G A/L of the bond' if by_modulus else 'ks at the moment of bonding'}) and "
-        f"{contact_ks:.4g} N/m (ks of the contact{', which goes to 0 with the overlap' if by_hertz else ''}). "
+        f"{number} bonds have another shear stiffness open than touching, that of particles {a} and {b} most: "
+        f"{said(bond_ks)} ({'G A/L of the bond' if by_modulus else 'ks at the moment of bonding'}) and "
+        f"{said(contact_ks)} (ks of the contact{', which goes to 0 with the overlap' if by_hertz else ''}). "
         "Pairs that open and close under shear make energy from nothing; the word `conserving` in the line of the "
         "bonds prevents it (docs/physics.md, Bonds)"
     )

@@ -14,6 +14,7 @@ from hpcdem.commands.dem.bonds import warn_of_two_stiffnesses
 from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.outputs import OUTPUTS
+from hpcdem.core.units import with_prefix
 from hpcdem.engine import output
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
@@ -295,20 +296,22 @@ def _watch_the_time_step(sim: Simulation) -> None:
 def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
     """dt beside the estimate of the critical step and the true one where it comes near; once, a warning if it is beyond
     one. Collective."""
-    dt = sim.clock.dt
+    dt, said = sim.clock.dt, partial(with_prefix, unit="s")
     near = dt > NEAR * critical or (math.isinf(critical) and sim.bonds_left() > 0)
     highest = diagnostics.highest_frequency(sim) if near else 0.0
     sim.step_limit = 0.0 if 0.5 * dt * highest > 1.0 else critical  # 0: the worst is said
     if sim.log is None:
         return
     if highest > 0.0:
-        estimate = f"{dt / critical:.2f} of the estimate 0.8 min sqrt(m / sum k) = {critical:.4g} s, "
         text = (
-            f"{when}time step {dt:g} s: {estimate if math.isfinite(critical) else ''}{0.5 * dt * highest:.2f} of "
-            f"2 / omega = {2.0 / highest:.4g} s, the limit of the contacts and bonds there are"
+            f"{when}the time step {said(dt)} is {0.5 * dt * highest:.2f} of the stability limit of the present "
+            f"contacts and bonds ({said(2.0 / highest)})"
         )
+        if math.isfinite(critical):
+            text += f", {dt / critical:.2f} of the critical one as estimated from masses and stiffnesses "
+            text += f"({said(critical)})"
         if 0.5 * dt * highest > 1.0:
-            sim.log.warn_once("unstable time step", f"{text}; beyond it the undamped step is unstable")
+            sim.log.warn_once("unstable time step", f"{text}; beyond the limit the undamped step is unstable")
         elif dt > critical and not sim.log.has_warned("critical time step"):
             sim.log.warn_once(
                 "critical time step",
@@ -319,8 +322,9 @@ def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
     elif dt > critical:
         sim.log.warn_once(
             "critical time step",
-            f"{when}the time step {dt:g} s is {dt / critical:.2f} times the estimate 0.8 min sqrt(m / sum k) = "
-            f"{critical:.4g} s; results may be noisy, and a run that blows up should be repeated with a smaller one",
+            f"{when}the time step {said(dt)} is {dt / critical:.2f} times the critical one as estimated from masses "
+            f"and stiffnesses ({said(critical)}); results may be noisy, and a run that blows up should be repeated "
+            "with a smaller one",
         )
 
 

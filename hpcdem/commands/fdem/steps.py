@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clocks
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from hpcdem.commands.fdem import checkpoints, coupling, cracks, frames, historie
 from hpcdem.commands.fdem import clocks as clocks_of
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
+from hpcdem.core.units import counted, with_prefix
 from hpcdem.io.behind import under_way
 from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium, overlaps
 from hpcdem.physics.fdem.convergence import RATIO, Watch
@@ -168,8 +170,9 @@ def solve_elastic(
     if project.log is not None:
         parts = f" in {found.increments} increments" if found.increments > 1 else ""
         project.log.info(
-            f"{_where(project)}solve elastic: ratio {found.ratio:.3g} after {found.iterations} iterations{parts}, "
-            f"{found.unknowns} unknowns, {found.solver}, {duration(clocks.monotonic() - began)}"
+            f"{_where(project)}solve elastic: unbalanced force ratio {found.ratio:.3g} after {found.iterations} "
+            f"iterations{parts}; {found.unknowns} unknowns, solver {found.solver}, "
+            f"{duration(clocks.monotonic() - began)}"
         )
     _write_due(project)
     histories.flush(project)
@@ -217,8 +220,10 @@ def solve_hydraulic(
     project.solved = {"reason": "steady" if steady else "time", "ratio": math.nan, "steps": project.step - first}
     if project.log is not None:
         project.log.info(
-            f"{_where(project)}solve hydraulic: {count.steps} implicit steps, {count.cut} cut, {count.iterations} "
-            f"iterations, {count.unknowns} unknowns, {count.solver}, {duration(clocks.monotonic() - began)}"
+            f"{_where(project)}solve hydraulic: {counted(count.steps, 'implicit step')}"
+            f"{f' ({count.cut} repeated with half the time step)' * bool(count.cut)}, "
+            f"{counted(count.iterations, 'iteration')}; {count.unknowns} unknowns, solver {count.solver}, "
+            f"{duration(clocks.monotonic() - began)}"
         )
     histories.flush(project)
     cracks.flush(project)  # joints that broke became free faces at the end
@@ -262,10 +267,11 @@ def solve_thermal(
         project.progress, project.stepping = None, ""
     project.solved = {"reason": "steady" if steady else "time", "ratio": math.nan, "steps": project.step - first}
     if project.log is not None:
-        name = "" if run.solver is None else f", {run.solver.name}"
+        name = "" if run.solver is None else f", solver {run.solver.name}"
         project.log.info(
-            f"{_where(project)}solve thermal: {run.steps} implicit steps, {run.factors} factors, {run.unknowns} "
-            f"unknowns{name}, {duration(clocks.monotonic() - began)}"
+            f"{_where(project)}solve thermal: {counted(run.steps, 'implicit step')}, "
+            f"{counted(run.factors, 'factorization')}; {run.unknowns} unknowns{name}, "
+            f"{duration(clocks.monotonic() - began)}"
         )
     histories.flush(project)
     frames.settle(project)
@@ -347,7 +353,9 @@ def _flow_on(project: Project, run: Coupled, flow: Flow, end: float) -> None:
             _write_due(project)
             if project.log is not None and clocks.monotonic() - told > QUIET_SECONDS:
                 told = clocks.monotonic()
-                project.log.info(f"flow time {flow.time:.6g} s of {end:.6g} s, time step {flow.implicit_dt:.3g} s")
+                said = partial(with_prefix, unit="s")
+                now, whole = said(flow.time, digits=6), said(end, digits=6)
+                project.log.info(f"flow time {now} of {whole}, time step {said(flow.implicit_dt)}")
             if flow.time < last:
                 _answer_requests(project)
 
@@ -678,12 +686,13 @@ class _Report:
         joints = f" | joints: {yielded} yielded, {broken} broken" if intact + yielded + broken else ""
         if deep := diagnostics.deep_overlaps(blocks):
             joints += f" | {deep} overlaps beyond {overlaps.DEEP:g} of an altitude"
-        time = f" | t {clock.time:.6g} s, dt {clock.dt:.4g} s" if self.project.dynamic else ""
+        said = partial(with_prefix, unit="s")
+        time = f" | time {said(clock.time, digits=6)}, time step {said(clock.dt)}" if self.project.dynamic else ""
         if blocks.creep.on:
-            time += f" | creep time {blocks.creep.time:.6g} s"
+            time += f" | creep time {said(blocks.creep.time, digits=6)}"
         if not blocks.options.mechanical:
             return f"step {clock.step}{time}{joints}"
-        return f"step {clock.step}{time} | ratio {diagnostics.unbalanced_ratio(blocks):.3g}{joints}"
+        return f"step {clock.step}{time} | unbalanced force ratio {diagnostics.unbalanced_ratio(blocks):.3g}{joints}"
 
     def finish(self, blocks: Blocks) -> None:
         """Collective: how it ended."""
@@ -692,4 +701,4 @@ class _Report:
         state, steps = self._state(blocks), blocks.clock.step - self.began_step
         spent = clocks.monotonic() - self.began
         speed = steps * int(self.project.alive.sum()) / max(spent, 1e-9)
-        self.project.log.info(f"{state} | {steps} steps in {duration(spent)}, {rate(speed)} element-steps/s")
+        self.project.log.info(f"{state} | {counted(steps, 'step')} in {duration(spent)}, {rate(speed)} element-steps/s")

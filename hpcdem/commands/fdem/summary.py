@@ -11,6 +11,7 @@ from hpcdem.commands.fdem import frames, histories
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
+from hpcdem.core.units import with_prefix
 from hpcdem.engine import output
 from hpcdem.io.agreed import on_first
 from hpcdem.physics import supports
@@ -88,41 +89,44 @@ def close(project: Project, figure: bool = True) -> None:
     histories.flush(project)
     blocks, log = project.blocks, project.log
     both = project.coupled
-    if log is None or not (blocks.timers.steps or (both is not None and both.particles.timers.steps)):
+    stepped = blocks.timers.steps or (both is not None and both.particles.timers.steps)
+    if log is None or not (stepped or project.solved):
         return
     joule = "J" if blocks.dim == 3 else "J/m"
     if blocks.budget is not None:
         energies = diagnostics.energies(blocks)
-        rows = [
-            (text, f"{energies[name]:.6g}")
+        told = {
+            text: energies[name]
             for name, text in ENERGY_WORDS.items()
             if name not in ("work_discs", "work_bolts", "work_liners", "work_heat", "plastic_lost", "creep_lost")
             or energies[name]
-        ]
-        log.table("energy budget", ("energy", joule), rows)
+        }
+        log.account("energy budget", "energy", joule, told, project.units)
         log.info(f"energy: closing error {energies['relative']:.2g} of the largest flow")
         for support in supports.ALL:
             there = support.there(blocks)
             if there is not None:
                 found = there.energies()
-                rows = [(SUPPORT_WORDS[name], f"{found[name]:.6g}") for name in SUPPORT_WORDS if name in found]
-                log.table(f"energy of {support.name}", ("energy", joule), rows)
+                told = {SUPPORT_WORDS[name]: found[name] for name in SUPPORT_WORDS if name in found}
+                log.account(f"energy of {support.name}", "energy", joule, told, project.units)
     flow, volume = Flow.there(blocks), "m2" if blocks.dim == 2 else "m3"
     if flow is not None:
         found = flow.account()
-        log.table("fluid", ("volume", volume), [(FLUID_WORDS[k], f"{found[k]:.6g}") for k in FLUID_WORDS])
+        log.account("fluid", "volume", volume, {FLUID_WORDS[k]: found[k] for k in FLUID_WORDS}, project.units)
     proppant = Proppant.there(blocks)
     if proppant is not None:
         found = proppant.account()
-        log.table("proppant", ("volume", volume), [(PROPPANT_WORDS[k], f"{found[k]:.6g}") for k in PROPPANT_WORDS])
+        log.account("proppant", "volume", volume, {PROPPANT_WORDS[k]: found[k] for k in PROPPANT_WORDS}, project.units)
     heat = Heat.there(blocks)
     if heat is not None:
         found = heat.account()
-        log.table("heat", ("heat", joule), [(HEAT_WORDS[k], f"{found[k]:.6g}") for k in HEAT_WORDS])
+        log.account("heat", "heat", joule, {HEAT_WORDS[k]: found[k] for k in HEAT_WORDS}, project.units)
     _tell_both(project)
     if figure:
         path = last_figure(project)
         log.info(f"figure: {path}")
+    if not stepped:
+        return
     if both is None:
         log.stages(blocks.timers, project.comm, "element")
     else:
@@ -140,12 +144,12 @@ def _tell_both(project: Project) -> None:
         log.warn(f"no table of the energy between discs and faces: {error}")
         return
     found["stored"] -= found["stored_before"]
-    rows = [(text, f"{found[name]:.6g}") for name, text in ACROSS_WORDS.items()]
-    log.table(output.ACROSS, ("energy", "J/m"), rows)
+    log.account(
+        output.ACROSS, "energy", "J/m", {text: found[name] for name, text in ACROSS_WORDS.items()}, project.units
+    )
     if "closing" in found:
-        log.info(
-            f"energy of both: closing error {found['closing']:.4g} J/m, {found['relative']:.2g} of the largest flow"
-        )
+        closing = with_prefix(found["closing"], "J/m", system=project.units)
+        log.info(f"energy of both: closing error {closing}, {found['relative']:.2g} of the largest flow")
 
 
 def last_figure(project: Project) -> Path:

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hpcdem.core.rebuild import RebuildState
+from hpcdem.core.units import with_prefix
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.definition import ModelDefinition, Relaxation
 from hpcdem.physics.fdem.histories import Histories
@@ -230,9 +232,10 @@ class State(ModelDefinition, Model):
         limit = critical / o.safety
         scaled = f"by mass scaling, which adds {added:.3g} times the mass"
         how = "given" if o.dt else scaled if o.mass_scaling else "estimated"
+        said = partial(with_prefix, unit="s")
+        allowed = f"; the safety factor {o.safety:g} allows {said(critical)}" if dt != critical else ""
         self.log.info(
-            f"time step {dt:.4g} s ({how}), {dt / limit:.2f} of the stability limit {limit:.4g} s; safety factor "
-            f"{o.safety:g}: {critical:.4g} s"
+            f"time step {said(dt)} ({how}): {dt / limit:.2f} of the stability limit of {said(limit)}{allowed}"
         )
         if dt > critical * (1.0 + 1e-9):
             self.log.warn_once(

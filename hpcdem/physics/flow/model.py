@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 
 from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.core.units import counted, with_prefix
 from hpcdem.halo.copies import Copies, moved
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import said
@@ -633,9 +634,9 @@ class Flow(SurfaceLoad):
             told.append(f"{total} with water have a prescribed stress, which is all that acts there")
         if dry:
             told.append(
-                f"{dry} free faces between flow nodes are dry, as nothing says that water stands before them: node "
-                "boundary hydraulic-constant-flow-boundary pressure or flow-surface, or well create, whose range holds "
-                "their nodes"
+                f"{dry} free faces between flow nodes are dry: no condition says that water stands before them (node "
+                "boundary hydraulic-constant-flow-boundary pressure, flow-surface, or well create, with a range that "
+                "holds their nodes)"
             )
         text = "; ".join(told)
         if blocks.log is not None and text != self._told_wet:
@@ -1007,10 +1008,10 @@ class Flow(SurfaceLoad):
         known, before = self._told
         if log is None or (abs(self.dt - known) <= 0.1 * known and abs(limit - before) <= 0.1 * before):
             return
-        self._told = self.dt, limit
+        self._told, said = (self.dt, limit), partial(with_prefix, unit="s")
         log.info(
-            f"flow: {self.sub_steps} sub-steps of {self.dt:.4g} s per cycle; stability limit {2.0 * limit:.4g} s, half "
-            f"of it {limit:.4g} s"
+            f"flow: {counted(self.sub_steps, 'sub-step')} of {said(self.dt)} in each cycle; the stability limit is "
+            f"{said(2.0 * limit)}, half of it {said(limit)}"
         )
         if self.dt > limit * (1.0 + 1e-9):
             log.warn_once(

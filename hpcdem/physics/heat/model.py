@@ -12,11 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.core.units import counted, with_prefix
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, by_temperature, hexahedra, said, user_laws
 from hpcdem.physics.fdem.kernels.elements import FORCE
@@ -788,8 +790,11 @@ class Heat(SurfaceLoad):
         log = self.blocks.log
         if log is None or not math.isfinite(self.dt) or abs(self.dt - self._told) <= 0.1 * self._told:
             return
-        self._told = self.dt
-        log.info(f"heat: {self.sub_steps} sub-steps of {self.dt:.4g} s per cycle; stability limit {self._limit:.4g} s")
+        self._told, said = self.dt, partial(with_prefix, unit="s")
+        log.info(
+            f"heat: {counted(self.sub_steps, 'sub-step')} of {said(self.dt)} in each cycle; the stability limit is "
+            f"{said(self._limit)}"
+        )
         if self.dt > self._limit:
             log.warn_once(
                 "heat step",

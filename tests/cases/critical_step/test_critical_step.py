@@ -175,7 +175,7 @@ def test_the_limit_of_contacts_that_form_is_watched(tmp_path):
         sim.settings.dt = factor * 2.0 / math.sqrt(K / body(sim)[0])
         sim.log = Log(stream=io.StringIO())
         cycles.cycle(sim, 0)
-        assert "2 / omega" not in sim.log._stream.getvalue()
+        assert "stability limit" not in sim.log._stream.getvalue()
         cycles.cycle(sim, 4 * cycles.WATCH)
         said = sim.log._stream.getvalue()
         assert ("warning: step " in said and "the undamped step is unstable" in said) == says
@@ -211,6 +211,12 @@ def test_what_the_log_says(tmp_path):
         sim.log = Log(stream=io.StringIO())
         cycles.cycle(sim, 1)
         said[factor] = sim.log._stream.getvalue()
-    assert "2 / omega" not in said[0.25]
-    assert "0.70 of 2 / omega" in said[0.7] and "unstable" not in said[0.7]
-    assert "warning: time step" in said[1.1] and "1.10 of 2 / omega" in said[1.1] and "unstable" in said[1.1]
+    assert "stability limit" not in said[0.25]
+    assert (
+        "0.70 of the stability limit of the present contacts and bonds (" in said[0.7] and "unstable" not in said[0.7]
+    )
+    assert (
+        "warning: the time step" in said[1.1]
+        and "is 1.10 of the stability limit" in said[1.1]
+        and "unstable" in said[1.1]
+    )
