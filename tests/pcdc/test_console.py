@@ -71,7 +71,7 @@ def test_exit_ends(bench):
     [
         ("pcdc mod", "model"),
         ("pcdc model s", "save step solve solve-check sub-step scale"),
-        ("pcdc geom cr p", "polyline polygon point plane"),
+        ("pcdc geom cr p", "polyline polygon polyline-close point plane"),
         ("pcdc model option dynamic ", "on off true false yes no"),
         ("pcdc element c-model null ", "property relax range"),
         ("pcdc element-face c-model contact-m-c property p-n 1 p", "penalty-normal penalty-shear"),

@@ -176,7 +176,7 @@ def velocity(
     _known(project, vx, vy, ax, ay, vz, az)
     blocks, given = project.ready(), {"vx": vx, "vy": vy, "ax": ax, "ay": ay, "vz": vz, "az": az}
     nodes = chosen(project, NODE, where)
-    blocks.velocity_condition(nodes, **from_now(project, blocks.time_now(), given))
+    blocks.velocity_condition(nodes, *from_now(project, blocks.time_now(), given).values())
 
 
 def force(
@@ -189,7 +189,7 @@ def force(
     """Force on each node [N per m of thickness, in space N]."""
     _known(project, fx, fy, fz)
     blocks, nodes = project.ready(), chosen(project, NODE, where)
-    blocks.force_condition(nodes, **from_now(project, blocks.time_now(), {"fx": fx, "fy": fy, "fz": fz}))
+    blocks.force_condition(nodes, *from_now(project, blocks.time_now(), {"fx": fx, "fy": fy, "fz": fz}).values())
 
 
 def move(project: Project, kind: int, direction: tuple[float, ...] = (0.0, 0.0), where: Range | None = None) -> None:

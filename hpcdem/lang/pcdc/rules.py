@@ -4,6 +4,7 @@ that are expressions (`Pending`), and once more when these are known."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from hpcdem.lang.pcdc.kinds import Pending
@@ -106,6 +107,12 @@ def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | 
         raise ValueError("value and safety exclude each other: a time step that is given is taken as it is")
 
 
+def _parts(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None, words: str) -> None:
+    for part, given in arguments.items():
+        if len(given) == 1:
+            raise ValueError(f"{part} needs at least one of {words}")
+
+
 def _option(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if arguments.get("collision") == () and "ecda" not in arguments:
         raise ValueError("collision is on or off")
@@ -199,6 +206,8 @@ _RULES = {
     "field create": _field,
     "flow-node initial": _fluid,
     "model option": _option,
+    "model cycle-option": partial(_parts, words="time-step, cycle-number"),
+    "model reset": partial(_parts, words="start-time, current-time, time-step"),
     "model time-step": _time_step,
     "model creep": _creep,
     "model rayleigh": _rayleigh,
