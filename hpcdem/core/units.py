@@ -219,6 +219,12 @@ def on_bar(low: float, high: float, unit: str) -> tuple[float, str]:
     return size, "°C" if name == "K" and low < COLDEST else printed(name)
 
 
+def stamped(title: str, step: int, time: float) -> str:
+    """A title with {step}, and {time} [s]; "{time} s" has the prefix that suits it, as 250 µs or 3.2 years."""
+    title = title.replace("{step}", str(step)).replace("{time} s", with_prefix(time, "s", 6))
+    return title.replace("{time}", f"{time:.6g}")
+
+
 def printed(unit: str) -> str:
     """A unit as it is printed: m², kg/m³."""
     return re.sub(r"(?<=[A-Za-z])\d+", lambda found: found[0].translate(_RAISED), unit)

@@ -218,6 +218,7 @@ class Viewer:
             image.save(content, "JPEG", quality=85)
         header = {
             "step": shown.moment.step, "time": shown.moment.time, "title": shown.title(), "legend": _legend(shown),
+            "when": units.with_prefix(shown.moment.time, "s", 6),
             "shown": {layer.layer.label: len(layer.rows) for layer in shown.layers},
             "seconds": time.perf_counter() - began, "number": wanted.get("number"),
             "kind": "image/png" if wanted.get("fine") else "image/jpeg",

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.units import stamped
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
@@ -234,7 +235,7 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
         label = f"({'abcdefgh'[number]})" if len(panels) > 1 else ""
         axes.set_title(label, loc="left", fontsize=looks.font, pad=3.0)
     if looks.title is not None:
-        text = looks.title.replace("{step}", str(state.step)).replace("{time}", f"{state.time:.6g}")
+        text = stamped(looks.title, state.step, state.time)
         figure.text(0.99, 0.995, text, fontsize=looks.font, ha="right", va="top", parse_math=False)
     return figure
 

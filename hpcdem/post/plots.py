@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.units import stamped
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, Ticks, View, particle_extent, view
 from hpcdem.io.frame import Frame, Table
@@ -121,7 +122,7 @@ def draw_frame(
             draw(frame, ax, style.look)
     _draw_axes(ax, seen, style)
     if style.title is not None:
-        text = style.title.replace("{step}", str(frame.step)).replace("{time}", f"{frame.time:.6g}")
+        text = stamped(style.title, frame.step, frame.time)
         ax.text(0.01, 0.97, text, transform=ax.transAxes, fontsize=style.font, ha="left", va="top", parse_math=False)
 
 

@@ -155,6 +155,6 @@ def test_files_of_a_body(page: Tab, folder: Path, tmp_path: Path):
 
 def test_frames_follow_each_other(page: Tab):
     before = page.pixels()
-    assert page.text("#moment") == "step 10, 0.01 s"
+    assert page.text("#moment") == "step 10, 10 ms"
     assert not same(before, page.after(lambda: page.tab.keyboard.press(",")))
     assert page.text("#moment") == "step 0, 0 s"

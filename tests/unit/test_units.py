@@ -244,3 +244,8 @@ def test_several_values_share_the_unit_of_the_largest():
     for unit in ("Pa", "N/m", "m", "m/s", "m2", "m3", "s", "kg", "m3/s", "J/m2", "W/(m K)"):
         steps = units.ladder(unit)
         assert (1.0, unit) in steps and [size for size, _ in steps] == sorted(size for size, _ in steps)
+
+
+def test_titles_are_stamped_with_step_and_time():
+    assert units.stamped("step {step}, {time} s", 7, 2.5e-4) == "step 7, 250 µs"
+    assert units.stamped("{time} s", 7, 1e8) == "3.16881 years" and units.stamped("t={time}", 7, 1e8) == "t=1e+08"

@@ -273,7 +273,7 @@ def test_nothing_else_is_needed_for_it(rock: Moment, tmp_path: Path, monkeypatch
         monkeypatch.setitem(sys.modules, name, None)
     for kind in ("png", "jpg", "pdf", "svg"):
         draw(rock, tmp_path / f"a.{kind}", default_view(rock), SMALL)
-    assert "step 5, 0.005 s" in (tmp_path / "a.svg").read_text()
+    assert "step 5, 5 ms" in (tmp_path / "a.svg").read_text()
 
 
 def test_films(tmp_path: Path):

@@ -736,7 +736,7 @@ function controls() {
 
 function moment() {
   const { header } = current.shown;
-  $("moment").textContent = say("moment", { step: header.step, time: short(header.time) });
+  $("moment").textContent = say("moment", { step: header.step, time: header.when });
   charts.moment(header.step);
 }
 

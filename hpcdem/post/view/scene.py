@@ -142,7 +142,7 @@ class Scene:
 
     def title(self) -> str:
         """Over the picture."""
-        return self.view.title.replace("{step}", str(self.moment.step)).replace("{time}", f"{self.moment.time:.6g}")
+        return units.stamped(self.view.title, self.moment.step, self.moment.time)
 
 
 STILL = 1e-9
