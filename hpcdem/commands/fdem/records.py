@@ -28,6 +28,7 @@ LAW_STATE = "law_state"
 """A state variable of laws of the user, see user_laws.py; a history has its name as quantity."""
 UNITS = {
     NODE: {
+        "displacement": "m", "velocity": "m/s",
         "position_x": "m", "position_y": "m", "position_z": "m", "displacement_x": "m", "displacement_y": "m",
         "displacement_z": "m", "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s", "reaction_x": "N/m",
         "reaction_y": "N/m", "reaction_z": "N/m", "temperature": "K",

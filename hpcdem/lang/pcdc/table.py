@@ -591,6 +591,7 @@ _SOME_LAYERS = Option("l{ayer}", (STRINGS,), "names of layers", "", "all")
 _NAME = Option("name", (STRING,), "name", required=True)
 RECORDED = {
     "node": {
+        "displacement": "m", "velocity": "m/s",
         "position-x": "m", "position-y": "m", "position-z": "m", "displacement-x": "m", "displacement-y": "m",
         "displacement-z": "m", "velocity-x": "m/s", "velocity-y": "m/s", "velocity-z": "m/s", "reaction-x": "N/m",
         "reaction-y": "N/m", "reaction-z": "N/m", "temperature": "K",

@@ -51,6 +51,9 @@ def _vector(name: str, on: str, unit: str, doc: str) -> dict[str, Quantity]:
     }
 
 
+LENGTHS = {"displacement": "m", "velocity": "m/s"}
+"""Vectors of nodes whose lengths are quantities too."""
+
 QUANTITIES: dict[str, Quantity] = {
     **{
         f"stress_{c}": Quantity(
@@ -99,6 +102,7 @@ QUANTITIES: dict[str, Quantity] = {
     **_vector("position", "node", "m", "position"),
     **_vector("displacement", "node", "m", "displacement"),
     **_vector("velocity", "node", "m/s", "velocity"),
+    **{name: Quantity("node", unit, f"length of the {name}", False, BOTH) for name, unit in LENGTHS.items()},
     **_vector("reaction", "node", "N/m", "force by which conditions act on the node"),
     **_vector("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included"),
     "temperature": Quantity("node", "K", "temperature; NaN without a thermal model", dims=BOTH),
@@ -363,7 +367,11 @@ def _node_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = Non
     for name in names:
         kind, _, axis = name.rpartition("_")
         c = "xyz".find(axis)
-        if name.startswith(("reaction", "unbalanced")):
+        if name in LENGTHS:
+            parts = [f"{name}_{axis}" for axis in "xyz"[: sim.dim]]
+            found = _node_columns(sim, parts, at)
+            columns[name] = np.sqrt(sum(found[part] ** 2 for part in parts))
+        elif name.startswith(("reaction", "unbalanced")):
             columns[name] = _whole_point(sim, name, points)
         elif name == "temperature":
             columns[name] = corner_temperatures(sim)[row - own.start, k]
