@@ -158,6 +158,7 @@ _LADDERS: dict[str, tuple[tuple[float, str], ...]] = {
     "kg": ((1e-6, "mg"), (1e-3, "g"), (1.0, "kg"), (1e3, "t"), (1e6, "kt"), (1e9, "Mt")),
     "m3/s": ((1e-6, "mL/s"), (1e-3, "L/s"), (1.0, "m3/s")),
     "m2/s": ((1e-6, "mm2/s"), (1.0, "m2/s")),
+    "%": ((0.01, "%"),),
 }  # fmt: skip
 """Units that are written with prefixes. Of a compound ("N/m", "Pa s") the first factor has the prefix."""
 _PLAIN = ("kg/m3", "kg/m2", "m/s2", "s/m")
@@ -213,7 +214,7 @@ def on_bar(low: float, high: float, unit: str) -> tuple[float, str]:
     largest = max(abs(low), abs(high))
     size, name = scale(largest, unit)
     part = largest / size
-    if math.isfinite(part) and part > 0.0 and not 1e-3 <= part < 1e5:
+    if 1e-290 < part < 1e290 and not 1e-3 <= part < 1e5:
         power = 3 * math.floor(math.log10(part) / 3.0)
         size, name = size * 10.0**power, f"10{str(power).translate(_RAISED)} {name}".rstrip()
     return size, "°C" if name == "K" and low < COLDEST else printed(name)

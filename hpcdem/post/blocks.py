@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hpcdem.core import units
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.core.units import stamped
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
@@ -151,7 +151,7 @@ class Contours:
 
     values: Callable[[MeshState], np.ndarray]
     range: Callable[[MeshState], tuple[float, float]]
-    units: Sequence[tuple[float, str]]
+    unit: str
     title: str
     colours: str
     of_corners: bool = False
@@ -229,13 +229,11 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
                 ((x + width + 0.25 * k) / page[0], y / page[1], 0.28 * k / page[0], height / page[1])
             )
             _bar(figure, colours, filled, looks.font)
-            axes.set_title(
-                f"{shown.title} ({unit_of(shown, span)[1]})", loc="right", fontsize=0.9 * looks.font, pad=3.0
-            )
+            axes.set_title(titled(shown, span), loc="right", fontsize=0.9 * looks.font, pad=3.0)
         label = f"({'abcdefgh'[number]})" if len(panels) > 1 else ""
         axes.set_title(label, loc="left", fontsize=looks.font, pad=3.0)
     if looks.title is not None:
-        text = stamped(looks.title, state.step, state.time)
+        text = units.stamped(looks.title, state.step, state.time)
         figure.text(0.99, 0.995, text, fontsize=looks.font, ha="right", va="top", parse_math=False)
     return figure
 
@@ -354,9 +352,9 @@ def lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
 
 
 CONTOURS = {
-    STRESS: Contours(compression, stress_range, fluid.PRESSURES, "compressive stress", "YlOrBr"),
-    PLASTIC: Contours(plastic_shear, plastic_range, ((0.01, "%"),), "plastic shear strain", "YlGn"),
-    TEMPERATURE: Contours(temperature, temperature_range, ((1.0, "K"),), "temperature", "RdYlBu_r", of_corners=True),
+    STRESS: Contours(compression, stress_range, "Pa", "compressive stress", "YlOrBr"),
+    PLASTIC: Contours(plastic_shear, plastic_range, "%", "plastic shear strain", "YlGn"),
+    TEMPERATURE: Contours(temperature, temperature_range, "K", "temperature", "RdYlBu_r", of_corners=True),
 }
 COLOURED: dict[str, Contours | fluid.Shown] = {**CONTOURS, **fluid.PICTURES}
 """Panels with a bar of colours."""
@@ -391,10 +389,14 @@ def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, fl
     return filled
 
 
-def unit_of(shown: Contours | fluid.Shown, span: Sequence[float]) -> tuple[float, str]:
+def unit_of(shown: Contours | fluid.Shown, span: tuple[float, float]) -> tuple[float, str]:
     """The unit in which values of this range are read best, in SI, and its name."""
-    largest = max(abs(value) for value in span)
-    return next(((size, name) for size, name in shown.units if largest >= size), shown.units[-1])
+    return units.on_bar(*span, shown.unit)
+
+
+def titled(shown: Contours | fluid.Shown, span: tuple[float, float]) -> str:
+    """What stands over a bar."""
+    return f"{shown.title} ({unit_of(shown, span)[1] or '-'})"
 
 
 def nice_levels(low: float, high: float) -> np.ndarray:

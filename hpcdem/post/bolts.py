@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.units import with_prefix
 from hpcdem.io.vtkhdf_mesh import MeshState
 
 BAR, TENSION, COMPRESSION = "#202020", "#2f7fb5", "#d0562a"
@@ -48,7 +49,7 @@ def draw(axes: Any, state: MeshState) -> list[Any]:
             axes.add_collection(
                 PolyCollection(corners[rows], facecolors=shade, edgecolors="none", alpha=0.75, zorder=4), autolim=False
             )
-            handles.append(Patch(color=shade, label=f"{word} up to {np.abs(force[rows]).max() / 1e3:.3g} kN"))
+            handles.append(Patch(color=shade, label=f"{word} up to {with_prefix(np.abs(force[rows]).max(), 'N', 3)}"))
     axes.add_collection(LineCollection(corners[:, :2], colors=BAR, linewidths=0.9, zorder=5), autolim=False)
     broken = state.supports["bolts"]["elements"]["bolt_state"].astype(np.int64) & BROKEN > 0
     if broken.any():

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from hpcdem.core import units
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.vtkhdf_mesh import MeshState
 from hpcdem.post.saved import save
@@ -43,20 +47,38 @@ def draw(
         axes = figure.add_subplot()
     else:
         figure, axes = _beside(model, beside)
+    every = np.array([point for *_, points in curves for point in points]).reshape(-1, 2)
+    (x_size, x_label), (y_size, y_label) = (_axis(*both) for both in zip((x_label, y_label), every.T, strict=True))
     for label, style, points in curves:
-        x, y = [p[0] for p in points], [p[1] for p in points]
+        x, y = [p[0] / x_size for p in points], [p[1] / y_size for p in points]
         if style == "points":
             axes.plot(x, y, "o", markersize=4, markerfacecolor="none", label=label)
         else:
             axes.plot(x, y, linewidth=1.2, label=label)
     axes.set(xlabel=x_label, ylabel=y_label)
-    axes.ticklabel_format(style="sci", scilimits=(-3, 4), useMathText=True)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.get_major_formatter().set_scientific(False)
+        axis.get_major_formatter().set_useOffset(False)
     axes.tick_params(direction="in", top=True, right=True)
     if title:
         axes.set_title(title)
     if len(curves) > 1:
         axes.legend(frameon=False)
     save(figure, str(path), kind, 200.0, path)
+
+
+def _axis(label: str, values: np.ndarray) -> tuple[float, str]:
+    """Size of the unit in which values are drawn along an axis, and the label with it: a unit of SI at its end, as
+    "stress [Pa]", gets the prefix that suits, values without one a power of ten where they are very large or small."""
+    found = re.fullmatch(r"(.*?)\s*([\[(])([^\])]+)[\])]\s*", label, re.DOTALL)
+    unit = found[3] if found and len(units.ladder(found[3])) > 1 else ""
+    known = values[np.isfinite(values)]
+    size, name = units.on_bar(float(known.min(initial=0.0)), float(known.max(initial=0.0)), unit)
+    if found and unit:
+        return size, f"{found[1]} {found[2]}{name}{']' if found[2] == '[' else ')'}"
+    if found and name:  # in a unit of the script
+        return size, f"{found[1]} {found[2]}{name} {found[3]}{']' if found[2] == '[' else ')'}"
+    return size, f"{label} ({name})" if name else label
 
 
 def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
@@ -97,8 +119,7 @@ def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
             figure.colorbar(filled, cax=bar, orientation="horizontal", ticks=ticks)
         bar.tick_params(labelsize=0.8 * FONT, width=0.5, length=2.0, labelbottom=False, labeltop=True, bottom=False,
                         top=True, pad=1.0)  # fmt: skip
-        unit = blocks.unit_of(shown, shown.range(model))[1]
-        bar.text(-0.05, 0.5, f"{shown.title} ({unit})", fontsize=0.9 * FONT, ha="right", va="center",
+        bar.text(-0.05, 0.5, blocks.titled(shown, shown.range(model)), fontsize=0.9 * FONT, ha="right", va="center",
                  transform=bar.transAxes)  # fmt: skip
     else:
         modes = blocks.panel(left, model, seen, 2.54 * width)

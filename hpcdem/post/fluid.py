@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,20 +12,17 @@ from hpcdem.io.vtkhdf_mesh import MeshState
 DRY = "#b9b4aa"
 WET = 0.5
 """Channels that are less saturated are drawn as dry."""
-PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
-LENGTHS = ((1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "µm"))
-SPEEDS = ((1.0, "m/s"), (1e-3, "mm/s"), (1e-6, "µm/s"), (1e-9, "nm/s"))
 LEAST = 0.3
 """Width of the narrowest channel, over that of the widest."""
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture of channels. column: of the frame; units: from the largest value to size and name of the unit; dry:
-    also dry channels have a value; colours: of matplotlib, as they stand out from pale rock."""
+    """A picture of channels. column: of the frame; unit: of SI; dry: also dry channels have a value; colours: of
+    matplotlib, as they stand out from pale rock."""
 
     column: str
-    units: Sequence[tuple[float, str]]
+    unit: str
     title: str
     dry: bool
     colours: str
@@ -49,11 +45,11 @@ class Shown:
 
 
 PICTURES = {
-    "pressure": Shown("fluid_pressure", PRESSURES, "fluid pressure", False, "YlGnBu"),
-    "saturation": Shown("saturation", ((1.0, "-"),), "saturation", True, "Blues"),
-    "aperture": Shown("aperture", LENGTHS, "aperture", True, "YlOrRd"),
-    "velocity": Shown("fluid_velocity", SPEEDS, "fluid velocity", False, "PuRd"),
-    "concentration": Shown("proppant_concentration", ((1.0, "-"),), "proppant concentration", False, "YlOrBr"),
+    "pressure": Shown("fluid_pressure", "Pa", "fluid pressure", False, "YlGnBu"),
+    "saturation": Shown("saturation", "", "saturation", True, "Blues"),
+    "aperture": Shown("aperture", "m", "aperture", True, "YlOrRd"),
+    "velocity": Shown("fluid_velocity", "m/s", "fluid velocity", False, "PuRd"),
+    "concentration": Shown("proppant_concentration", "", "proppant concentration", False, "YlOrBr"),
 }
 """By the word for each."""
 

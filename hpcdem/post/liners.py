@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.units import with_prefix
 from hpcdem.io.vtkhdf_mesh import MeshState
 
 BEAM, FORCE, MOMENT = "#202020", "#7a5195", "#1f7a4d"
@@ -63,8 +64,8 @@ def draw(axes: Any, state: MeshState) -> list[Any]:
     handles: list[Any] = []
     if force.any():
         most = float(force.reshape(-1)[np.abs(force).argmax()])
-        handles.append(Patch(color=FORCE, alpha=0.35, label=f"N up to {most / 1e6:.3g} MN/m"))
+        handles.append(Patch(color=FORCE, alpha=0.35, label=f"N up to {with_prefix(most, 'N/m', 3)}"))
     if moment.any():
         handles.append(Line2D([], [], color=MOMENT, linewidth=1.1,
-                              label=f"M up to {np.abs(moment).max() / 1e3:.3g} kN m/m"))  # fmt: skip
+                              label=f"M up to {with_prefix(np.abs(moment).max(), 'N m/m', 3)}"))  # fmt: skip
     return handles or [Line2D([], [], color=BEAM, linewidth=1.8, label="liner without force")]

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.units import scale
 from hpcdem.lang.parameters import Value
 from hpcdem.post import plots
-from hpcdem.post.measure.figures import LINES, key, label, length_unit, page, scaled
+from hpcdem.post.measure.figures import LINES, key, label, length_unit, page
 from hpcdem.sweep.tables import STATISTICS, Band, Column, Report, statistics
 
 DRAWN = {
@@ -168,7 +169,7 @@ def _unit(column: str, largest: float) -> tuple[float, str]:
     if unit == "m2":
         return (1e6, f"{name} (km²)") if largest > 1e6 else (1.0, f"{name} (m²)")
     if unit in ("N", "Pa", "J", "N/m"):
-        size, shown = scaled(largest, unit)
+        size, shown = scale(largest, unit)
         return size, f"{name} ({shown})"
     return 1.0, f"{name} ({unit})"
 

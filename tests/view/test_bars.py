@@ -3,6 +3,7 @@ single value does not stretch; the same in figures and on the page."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from hpcdem.core import units
 from hpcdem.io.axes import View, bar_ticks
 from hpcdem.page.sources import Sources
 from hpcdem.page.viewer import Viewer
+from hpcdem.post import charts
 from hpcdem.post.view.model import Layer, ModelView
 from hpcdem.post.view.moment import POLYGONS, Moment, Objects, read_moment
 from hpcdem.post.view.paper import figure_of
@@ -179,3 +181,36 @@ def test_ends_of_the_bar_are_pointed_where_values_lie_beyond():
             type(one).__name__ == "PathPatch" for one in figure.axes[1].get_children()
         )
     assert pictures[None] > pictures["full"]
+
+
+@pytest.mark.parametrize(
+    ("label", "values", "size", "said"),
+    [
+        ("stress [Pa]", (0.0, 3e7), 1e6, "stress [MPa]"), ("load (N/m)", (-2e5, 1e3), 1e3, "load (kN/m)"),
+        ("time [s]", (0.0, 5e-4), 1e-6, "time [µs]"), ("strain", (0.0, 2e-6), 1e-6, "strain (10⁻⁶)"),
+        ("strain (%)", (0.0, 0.4), 1.0, "strain (%)"), ("axial stress (MPa)", (0.0, 45.0), 1.0, "axial stress (MPa)"),
+        ("pressure (bar)", (0.0, 3e8), 1e6, "pressure (10⁶ bar)"), ("", (0.0, 1.0), 1.0, ""),
+    ],
+)  # fmt: skip
+def test_axes_of_charts_have_units_by_size_and_no_offset(label: str, values: Any, size: float, said: str):
+    assert charts._axis(label, np.array(values)) == (pytest.approx(size), said)
+
+
+def test_a_chart_is_drawn_without_powers_beside_its_axes(tmp_path: Path):
+    charts.draw(tmp_path / "a.svg", "svg", "", "strain (%)", "stress [Pa]", [("a", "line", [(0.0, 0.0), (1.0, 4e8)])])
+    text = (tmp_path / "a.svg").read_text()
+    assert "stress [MPa]" in text and ">400<" in text and "1e" not in "".join(re.findall(r">([^<>]+)</text>", text))
+
+
+@pytest.mark.parametrize("log", [False, True])
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [(-1e308, 1e308), (0.0, 5e-324), (5e-324, 1e308), (1e308, 1.7e308), (1.0, 1.0 + 2.3e-16), (1e-300, 2e-300)],
+)
+def test_bars_of_any_numbers_that_can_be(low: float, high: float, log: bool):
+    if log and low <= 0.0:
+        return
+    for unit in ("Pa", "m", "K", "", "W/(m K)"):
+        bar = scale(low, high, unit, log)
+        ticks = bar.ticks()
+        assert len(ticks) >= 2 and all(0.0 <= place <= 1.0 for place, _ in ticks) and bar.title

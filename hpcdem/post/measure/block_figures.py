@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.units import scale
 from hpcdem.io.vtkhdf_mesh import MeshState
 from hpcdem.post import blocks, plots
 from hpcdem.post.measure import bodies, emission
 from hpcdem.post.measure.blocks import Emission, Part, orientation
 from hpcdem.post.measure.emission import Events
-from hpcdem.post.measure.figures import BOTTOM, GAP, INK, LEFT, LINES, RIGHT, TOP, key, label, length_unit, page, scaled
+from hpcdem.post.measure.figures import BOTTOM, GAP, INK, LEFT, LINES, RIGHT, TOP, key, label, length_unit, page
 
 MODE_COLOURS = blocks.TENSION, blocks.MIXED, blocks.SHEAR
 GREY, PALE = "#808080", "#e4e1d8"
@@ -30,11 +31,11 @@ FRAGMENT_COLOURS = (
 
 
 def times(values: np.ndarray, timed: bool) -> tuple[np.ndarray, str]:
-    """Places on the axis of time and its name: s, ms or us; steps where time stands still."""
+    """Places on the axis of time and its name, µs to years; steps where time stands still."""
     if not timed:
         return values / 1000.0, "thousand steps"
     largest = float(np.abs(values).max(initial=0.0))
-    size, unit = next((s, u) for s, u in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")) if largest >= s or s == 1e-6)
+    size, unit = scale(largest, "s")
     return values / size, f"time ({unit})"
 
 
@@ -326,7 +327,7 @@ def regions(parts: Sequence[Part]) -> Any:
         for region in one.regions or ():
             series.setdefault((region.set_name, region.name), []).append((time, region))
     largest = max(float(np.abs(r.stress).max()) for many in series.values() for _, r in many)
-    size, unit = scaled(largest, "Pa")
+    size, unit = scale(largest, "Pa")
     for k, ((_, name), many) in enumerate(series.items()):
         axes[0].plot([t for t, _ in many], [r.stress[:3].mean() / size for _, r in many], _marks(len(many)), ms=2.5,
                      lw=1.2, color=LINES[k % len(LINES)], label=name)  # fmt: skip
@@ -384,14 +385,13 @@ def fluid(parts: Sequence[Part], state: MeshState) -> Any:
     shown = pictures.PICTURES["pressure"]
     span = shown.range(state)
     drawn = blocks.coloured(sheet.maps[0], state, "pressure", span, sheet.scale)
-    _fluid_bar(sheet.figure, drawn, sheet.bar(), f"{shown.title} ({blocks.unit_of(shown, span)[1]})")
+    _fluid_bar(sheet.figure, drawn, sheet.bar(), blocks.titled(shown, span))
     _letters([*sheet.panels, sheet.maps[0]])
     return sheet.figure
 
 
 def _fluid_curves(panels: Sequence[Any], parts: Sequence[Part], power: int) -> None:
     """power: of the metre in what is wet."""
-    from hpcdem.post import fluid as pictures
 
     a, b = panels
     at, axis = when(parts)
@@ -403,10 +403,10 @@ def _fluid_curves(panels: Sequence[Any], parts: Sequence[Part], power: int) -> N
     a.plot(at, [f.open_size / size for f in some], "--", lw=1.0, color=INK, label="of it open")
     label(a, None, what)
     key(a, loc="upper left")
-    pressure, kind = _in_unit([f.pressure for f in some], pictures.PRESSURES)
+    pressure, kind = _in_unit([f.pressure for f in some], "Pa")
     b.plot(at, pressure, _marks(len(at)), ms=2.5, lw=1.2, color=INK)
     label(b, axis, f"largest pressure ({kind})")
-    aperture, kind = _in_unit([f.aperture for f in some], pictures.LENGTHS)
+    aperture, kind = _in_unit([f.aperture for f in some], "m")
     other = b.twinx()
     other.plot(at, aperture, _marks(len(at)), ms=2.5, lw=1.2, color=LINES[1])
     other.set_ylabel(f"largest aperture ({kind})", fontsize=plots.FONT, color=LINES[1])
@@ -488,10 +488,9 @@ def _in_its_plane(corners: np.ndarray) -> tuple[np.ndarray | None, tuple[str, st
     return np.stack([(corners - middle) @ strike, (corners - middle) @ up], axis=2), ("along strike", "up dip")
 
 
-def _in_unit(values: Sequence[float], units: Sequence[tuple[float, str]]) -> tuple[list[float], str]:
-    """Values in the unit in which they are read best, and its name."""
-    most = max(map(abs, values))
-    size, name = next(((size, name) for size, name in units if most >= size), units[-1])
+def _in_unit(values: Sequence[float], unit: str) -> tuple[list[float], str]:
+    """Values in the multiple of a unit in which they are read best, and its name."""
+    size, name = scale(max(map(abs, values)), unit)
     return [value / size for value in values], name
 
 
@@ -550,7 +549,7 @@ def _load(axes: Any, found: Emission, factor: float) -> None:
     values = curve.values
     known = values[np.isfinite(values)]
     sign = -1.0 if len(known) and known[np.argmax(np.abs(known))] < 0.0 else 1.0
-    size, unit = scaled(float(np.abs(known).max(initial=0.0)), curve.unit)
+    size, unit = scale(float(np.abs(known).max(initial=0.0)), curve.unit)
     axes.plot((curve.time if found.timed else curve.step) * factor, sign * values / size, lw=1.0, color=INK)
     label(axes, None, f"{'−' if sign < 0 else ''}{curve.name} ({unit})")
     bottom, top = axes.get_ylim()

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.units import scale
 from hpcdem.io import colours
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, View, view
@@ -58,15 +59,6 @@ def save(figure: Any, path: Path, dpi: float = 300.0) -> Path:
     with atomic_path(path) as temporary:
         save_figure(figure, temporary, "jpg" if kind == "jpeg" else kind, dpi, path)
     return path
-
-
-def scaled(largest: float, unit: str, least: str = "") -> tuple[float, str]:
-    """Size and name of the multiple of a unit in which the largest value has at most three digits before the point.
-    least: the smallest prefix."""
-    prefixes = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12, "P": 1e15, "E": 1e18}
-    names = list(prefixes)[list(prefixes).index(least) :]
-    name = next((n for n in names if largest < 1e3 * prefixes[n]), names[-1])
-    return prefixes[name], name + unit
 
 
 def length_unit(extent: float) -> tuple[float, str]:
@@ -273,7 +265,7 @@ def wallforce(curves: dict[int, Curve], pusher: Curve | None, name: str) -> Any:
     figure, axes = page([4.6, 4.6, 4.6])
     forces = max((float(np.nanmax(np.abs(c.force), initial=0.0)) for c in curves.values()), default=0.0)
     work = max((float(np.nanmax(np.abs(c.work), initial=0.0)) for c in curves.values()), default=0.0)
-    (newton, force_unit), (joule, work_unit) = scaled(forces, "N", "M"), scaled(work, "J", "M")
+    (newton, force_unit), (joule, work_unit) = scale(max(forces, 1e6), "N"), scale(max(work, 1e6), "J")
     ways = {} if pusher is None else dict(zip(pusher.step.tolist(), pusher.way.tolist()))
     size, unit = length_unit(max(ways.values(), default=1.0))
     for k, (wall, curve) in enumerate(sorted(curves.items())):

@@ -264,6 +264,9 @@ def colour_bar(figure: Any, axes: Any, scale: Scale, font: float) -> None:
     colours = ScalarMappable(Normalize(0.0, 1.0), COLOURS[scale.colours])
     bar = figure.colorbar(colours, cax=axes, extend=beyond[scale.below, scale.above], extendfrac=0.04)
     ticks = scale.ticks()
+    high = axes.get_position().height * figure.get_figheight() * 72.0 / font
+    while len(ticks) > high / 1.15 and len(ticks) > 5:  # they would stand in each other
+        ticks = ticks[::2]
     bar.set_ticks([place for place, _ in ticks], labels=[text for _, text in ticks], minor=False)
     bar.minorticks_off()
     bar.ax.tick_params(labelsize=0.85 * font, width=0.5, length=2.5)

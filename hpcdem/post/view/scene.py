@@ -91,6 +91,8 @@ class Scale:
         """Where numbers stand along the bar, from 0 to 1, and which."""
         size = self.unit[0]
         low, high = self.low / size, self.high / size
+        if not 1e-290 < high - low < 1e290:  # no round step is a number any more
+            return [(0.0, units.power_of_ten(low)), (1.0, units.power_of_ten(high))]
         place = math.log10 if self.log else float
         return [
             (min(max((place(v) - place(low)) / (place(high) - place(low)), 0.0), 1.0), text)
@@ -597,6 +599,9 @@ def _arrows(objects: Objects, result: Painted, seen: View) -> tuple[np.ndarray, 
         at = objects.centres()[rows]
         inside = (at[:, 0] >= seen.left) & (at[:, 0] <= seen.right) & (at[:, 1] >= seen.bottom) & (at[:, 1] <= seen.top)
         some = np.flatnonzero(inside)
+    # One for each square with half of the longest arrow as side: where there are more nobody sees one.
+    place = np.floor(at[some] / (0.5 * ARROW * seen.width))
+    some = some[np.sort(np.unique(place, axis=0, return_index=True)[1])]
     some = some[:: max(1, -(-len(some) // MOST_ARROWS))]
     far = np.asarray(objects.vectors[layer.vectors], float)[rows][some]
     length = lengths(far)
