@@ -603,17 +603,19 @@ class Faces(_Modelled):
         yy: Number | None = None,
         zz: Number | None = None,
         normal: Number | None = None,
+        dip: Number | None = None,
         quiet: bool | None = None,
         incoming_x: Number | None = None,
         incoming_y: Number | None = None,
         incoming_z: Number | None = None,
         where: Where = None,
     ) -> None:
-        """Traction on surfaces [Pa], tension positive; normal turns with the surface. Numbers or names of tables of
-        time. quiet: waves leave through them in dynamic runs; incoming_x, _y, _z: velocity [m/s] of a plane wave
+        """Traction on surfaces [Pa], tension positive; normal turns with the surface, dip is shear along it,
+        counter-clockwise about the body. Numbers or names of tables of time. quiet: waves leave through them in dynamic runs; incoming_x, _y, _z: velocity [m/s] of a plane wave
         that comes in through them. Without a range: the whole surface of the model."""
         given = {
-            "stress_xx": xx, "stress_yy": yy, "stress_zz": zz, "stress_normal": normal, "quiet": quiet,
+            "stress_xx": xx, "stress_yy": yy, "stress_zz": zz, "stress_normal": normal, "dip": dip,
+            "quiet": quiet,
             "incoming_x": incoming_x, "incoming_y": incoming_y, "incoming_z": incoming_z,
         }  # fmt: skip
         self._carry_out("boundary", given, where, "mechanical-stress-boundary-condition")

@@ -33,8 +33,8 @@ def motion(rock) -> list[bytes]:
 
 def test_a_relative_table_begins_when_a_condition_takes_it(tmp_path):
     """As an absolute one that is moved by the time that has passed."""
-    one = Rock(tmp_path / "a", BLOCK + RAMP + "pcdc model gravity 0,-9.8\npcdc model time-step 1e-5\npcdc model step 30\n"
-               "pcdc e-f apply m-s-b-c s-n table 'ramp' range x 3\npcdc model step 40\n")  # fmt: skip
+    one = Rock(tmp_path / "a", BLOCK + RAMP + "pcdc model gravity 0,-9.8\npcdc model time-step 1e-5\n"
+               "pcdc model step 30\npcdc e-f apply m-s-b-c s-n table 'ramp' range x 3\npcdc model step 40\n")  # fmt: skip
     now = 30 * 1e-5
     begun = one.blocks.tables[f"ramp from {_after(30)!r}"]
     other = Rock(
@@ -173,8 +173,8 @@ def test_clocks_are_set_and_told(tmp_path):
 
 def test_conditions_are_taken_back_one_by_one(tmp_path):
     rock = Rock(
-        tmp_path, BLOCK + "pcdc node apply mech-f-b-c f-x 5e3 range y 0\npcdc node apply mech-m-b-c type 2 (1,0) range y 2\n"
-        "pcdc node apply mech-f-b-c f-y 2e3 range y 2\n")  # fmt: skip
+        tmp_path, BLOCK + "pcdc node apply mech-f-b-c f-x 5e3 range y 0\n"
+        "pcdc node apply mech-m-b-c type 2 (1,0) range y 2\npcdc node apply mech-f-b-c f-y 2e3 range y 2\n")  # fmt: skip
 
     def prescribed() -> set[str]:
         rows = [rock.blocks.conditions[row] for row in np.unique(rock.blocks.corner_row)]
@@ -214,7 +214,7 @@ def test_what_has_no_effect_is_said_once(tmp_path):
                 "    pcdc view 'stress' target element name 'stress-yy'\npcdc model render-interval 5\n")  # fmt: skip
     told = [line for line in rock.blocks.log.lines if "no effect" in line]
     assert [line.split(" has no")[0] for line in dict.fromkeys(told)] == [
-        "warning: model collision-detect", "warning: device switch-to", "warning: view", "warning: model render-interval",
+        f"warning: {name}" for name in ("model collision-detect", "device switch-to", "view", "model render-interval")
     ]  # fmt: skip
 
 
@@ -244,3 +244,41 @@ def test_plane_stress_by_other_moduli(tmp_path):
         found.append(-float(np.mean(rock["sag"])))
     assert found == pytest.approx([1e6 * (1 - nu**2) / young, 1e6 / young], rel=1e-5)
     assert found == pytest.approx([4.6875e-4, 5e-4], rel=1e-5)
+
+
+def test_shear_along_faces_turns_a_body_counter_clockwise(tmp_path):
+    """Of a unit square, on all sides and on one."""
+    tau = 3e4
+    body = "pcdc mesh structured (0,0) (1,1) cells 1 1 type quad\npcdc e c-m mech-iso-e prop den 2400 y 3e9 p-r 0.2\n"
+    turned = f"pcdc e-f apply m-s-b-c dip {tau}\npcdc model time-step 1e-7\npcdc model step 1\n"
+    rock = Rock(tmp_path / "a", body + turned)
+    vx, vy = (rock.blocks.v.reshape(-1)[k:8:2] for k in (0, 1))
+    x, y = (rock.blocks.x.reshape(-1)[k:8:2] - 0.5 for k in (0, 1))
+    # each corner has half of both its sides: tau / 2 along each, mass rho / 4
+    assert x * vy - y * vx == pytest.approx([0.5 * tau * 1e-7 / (2400 / 4)] * 4, rel=1e-4)
+    # above it goes to the left
+    one, other = (
+        Rock(tmp_path / word, body + f"pcdc n apply mech-vel-b-c v-x 0 v-y 0 range y 0\npcdc model step 5\n"
+             f"pcdc {line}\npcdc model step 20\n")
+        for word, line in (("b", f"e-f apply m-s-b-c dip {tau} range y 1"),
+                           ("c", f"n apply mech-f-b-c f-x {-tau / 2} range y 1"))
+    )  # fmt: skip
+    assert one.blocks.v == pytest.approx(other.blocks.v, rel=1e-5, abs=1e-9)
+    with pytest.raises(HpcdemError, match="'dip' is for two dimensions"):
+        Rock(tmp_path / "d", "pcdc model new dim 3\npcdc e-f apply m-s-b-c dip 1\n")
+
+
+def test_surfaces_lose_energy_by_damp_b_of_their_elements(tmp_path):
+    """Two blocks that meet: what comes back is less, as with damping-b of a contact model."""
+    found = []
+    for words, model in (("", ""), ("d-b 4", ""), ("", "pcdc e-f c-m c-m-c prop p-n 3e10 p-s 3e10 d-b 4 f 0\n")):
+        rock = Rock(
+            tmp_path / str(len(found)),
+            "pcdc mesh structured (0,0) (1,1) cells 1 1 type quad group 'a'\n"
+            "pcdc mesh structured (0,1.0001) (1,2.0001) cells 1 1 type quad group 'b'\n"
+            f"pcdc e c-m mech-iso-e prop den 2400 y 3e9 p-r 0.2 pen 3e10 {words}\n{model}"
+            "pcdc n apply mech-vel-b-c v-x 0 v-y 0 range face-of 'a'\npcdc n init vel-y -0.5 range face-of 'b'\n"
+            "pcdc model solve time 4e-3\nback = float(pcdc.values('node', 'velocity-y', y=(1.5, 3)).mean())\n",
+        )  # fmt: skip
+        found.append(rock["back"])
+    assert found[0] > found[1] == pytest.approx(found[2], rel=1e-6)

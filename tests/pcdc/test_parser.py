@@ -206,7 +206,7 @@ REFUSED = [
     ("element-face boundary m-s-b-c", "needs at least one of stress-xx, stress-yy, stress-zz, stress-n"),
     ("node group 'a' range", "the line ends where a term: group, set, id"),
     ("node group 'a' range colour 3", "read 'colour' after 'node group range', expected one of group, set, id, x, y"),
-    ("node group 'a' range x 1", "the line ends where a number for 'x' is expected"),
+    ("node group 'a' range x", "the line ends where a number for 'x' is expected"),
     ("node group 'a' range id 1.5", "read '1.5', expected a whole number, not negative for 'id'"),
     ("mesh create from-layer 'a' size 1 region 'b' hole 'c' size 2", "'size' is given twice"),
     ("node group 'a' range z 1 2", "'z' is for three dimensions; model new dim 3 makes a model of three"),

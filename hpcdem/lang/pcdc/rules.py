@@ -3,7 +3,7 @@ that are expressions (`Pending`), and once more when these are known."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -199,7 +199,7 @@ def _glue(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None)
         raise ValueError("between and range exclude each other: both say which faces are glued")
 
 
-_RULES = {
+_RULES: dict[str, Callable[[Mapping[str, Any], Sequence[tuple[str, Any]] | None], None]] = {
     "mesh glue": _glue,
     "bolt create polyline": _bolt,
     "mesh structured": _structured,

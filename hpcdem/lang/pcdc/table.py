@@ -244,7 +244,7 @@ def declared(
 
 _ELASTIC = declared(
     properties.MECH_ISO_ELASTIC, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "d{amp}-f{actor}",
-    "fri{ction}", "pen{alty}",
+    "fri{ction}", "pen{alty}", "d{amp}-b",
 )  # fmt: skip
 _DENSITY, _YOUNG, _POISSON, _SHEAR, _BULK, _DAMP = _ELASTIC[:6]
 _PAIRS = (("young", "poisson-ratio"), ("shear", "bulk"))
@@ -265,7 +265,7 @@ MOHR_COULOMB = Model(
     "Elastic up to the strength of Mohr and Coulomb, or in tension, then plastic, for large rotations.",
     declared(
         properties.MECH_MOHR_COULOMB, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "fri{ction}",
-        "coh{esion}", "ten{sile}", "di{lation}", "d{amp}-f{actor}",
+        "coh{esion}", "ten{sile}", "di{lation}", "d{amp}-f{actor}", "pen{alty}", "d{amp}-b",
     ),
     one_of=_PAIRS, of=properties.MECH_MOHR_COULOMB, dims=BOTH,
 )  # fmt: skip
@@ -349,6 +349,7 @@ STRESS = Model(
      Option("s{tress}-z{z}", (TABLED,), "stress zz", "Pa", dims=SPACE, also=("z{z}",)),
      Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
             "pressure", "Pa", also=("n{ormal}",)),
+     Option("d{ip}", (TABLED,), "shear stress along the surface, counter-clockwise about the body", "Pa", dims=PLANE),
      Option("q{uiet}", (BOOL,), "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress "
             "given beside it enters as a wave of half its size"),
      Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s"),
@@ -358,7 +359,8 @@ STRESS = Model(
 )  # fmt: skip
 ABSORB = Model(
     "mech{anical}-abs{orb}-b{oundary}-c{ondition}", "", "Surfaces through which waves leave, as m-s-b-c quiet on.",
-    (Option("n{ormal}", (TABLED,), "stress along the normal, which enters as a wave of half its size", "Pa"),),
+    (Option("n{ormal}", (TABLED,), "stress along the normal, which enters as a wave of half its size", "Pa"),
+     Option("d{ip}", (TABLED,), "the same along the surface, counter-clockwise about the body", "Pa", dims=PLANE)),
     dims=BOTH,
 )  # fmt: skip
 FLOW_CONDITION = Model(

@@ -58,7 +58,8 @@ RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
 
 @dataclass(frozen=True)
 class Traction:
-    """Stress on faces [Pa]: components, and along the normal. quiet: waves leave through the face; incoming_x, _y, _z:
+    """Stress on faces [Pa]: components, along the normal, and in the plane along the face (dip), counter-clockwise about
+    the body. quiet: waves leave through the face; incoming_x, _y, _z:
     the velocity of one that comes in through it [m/s]."""
 
     xx: Number = 0.0
@@ -72,6 +73,7 @@ class Traction:
     xz: Number = 0.0
     yz: Number = 0.0
     incoming_z: Number = 0.0
+    dip: Number = 0.0
 
 
 COMPONENTS = {2: ("xx", "yy", "xy", "zz"), 3: ("xx", "yy", "xy", "zz", "xz", "yz")}
@@ -79,7 +81,7 @@ ACROSS = 3
 """Place of zz there."""
 """Of stress, in the order of all tables, by dimensions of space."""
 TRACTIONS = {
-    2: ("xx", "yy", "xy", "normal", "incoming_x", "incoming_y"),
+    2: ("xx", "yy", "xy", "normal", "incoming_x", "incoming_y", "dip"),
     3: ("xx", "yy", "xy", "normal", "zz", "xz", "yz", "incoming_x", "incoming_y", "incoming_z"),
 }  # fmt: skip
 """Columns of the table of tractions."""
@@ -968,9 +970,10 @@ class ModelDefinition:
         xz: Number | None = None,
         yz: Number | None = None,
         incoming_z: Number | None = None,
+        dip: Number | None = None,
     ) -> None:
         """Traction t = sigma n [Pa] on the current face, n its current outward normal, plus `normal` n (negative:
-        pressure).
+        pressure), plus, in the plane, `dip` along the face, counter-clockwise about the body.
 
         quiet: besides, dashpots of the impedances rho c_p along n and rho c_s across take up what arrives (Lysmer and
         Kuhlemeyer 1969): plane waves along n leave without reflection, a stress that is given enters as a wave of half
@@ -978,7 +981,9 @@ class ModelDefinition:
         incoming_x, incoming_y, incoming_z [m/s]: velocity of a plane wave along n that comes in through quiet faces:
         their dashpots see the velocity less twice this."""
         self._only_in_space("stress zz, xz and yz, and incoming z, on faces", zz, xz, yz, incoming_z)
-        given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal, "zz": zz, "xz": xz, "yz": yz}
+        if dip is not None and self.dim == 3:
+            raise CommandError("dip is for two dimensions: in three say the components of the stress")
+        given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal, "zz": zz, "xz": xz, "yz": yz, "dip": dip}
         changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
         waves = {"incoming_x": incoming_x, "incoming_y": incoming_y, "incoming_z": incoming_z}
         changes |= {name: self._value(name, value) for name, value in waves.items() if value is not None}
@@ -1230,7 +1235,7 @@ class ModelDefinition:
 
     def stressed(self, faces: np.ndarray) -> np.ndarray:
         """Those of these faces (k,) on which a stress is prescribed, bool: the total of what acts there."""
-        names = ("normal", *COMPONENTS[self.dim])
+        names = ("normal", "dip", *COMPONENTS[self.dim])
         rows = [any(getattr(one, name) != 0.0 for name in names) for one in self.loads]
         return np.array(rows)[self.load_row[faces]]
 

@@ -102,7 +102,7 @@ class Kinds(NamedTuple):
         joint = kind(sim.joint_rows, "friction", "penalty_overlay") + 1
         joint[0] = 0
         joint = joint[sim.joint_row]
-        body = kind(sim.element_rows, "friction", "penalty")[sim.element_row]
+        body = kind(sim.element_rows, "friction", "penalty", "damp_b")[sim.element_row]
         faces = np.flatnonzero(sim.face_exists())
         one = faces[:1]
         alike = (sim.face_row[faces] == sim.face_row[one]).all() and bool(
@@ -140,7 +140,8 @@ class Surfaces:
             np.tan(np.radians(of.column("friction"))) for of in (sim.element_rows, sim.joint_rows, sim.face_rows)
         )
         self.tan_phi = np.where(model > 0, tan_f[model], np.where(joint > 0, tan_j[joint], tan_e[element]))
-        self.most, self.exponent = of_model("damping_t", np.inf), of_model("damping_b", 1.0)
+        self.most = of_model("damping_t", np.inf)
+        self.exponent = of_model("damping_b", np.maximum(of_elements("damp_b"), 1.0))
         self.ratio = of_model("damping_ratio", 0.0)
         self.slope, self.nodes, self.least = shapes.slope, shapes.nodes, shapes.least
         self.slender, self.double_area, self.edge = shapes.slender[rows], shapes.double_area[rows], shapes.edge[rows]

@@ -272,18 +272,21 @@ _ELASTIC = (
              "joints, or 10 E", 0.0),
 )  # fmt: skip
 
+_DAMP_B = Property("damp_b", "1", "exponent of the overlap of its surfaces while they part, where they have no contact "
+                   "model; above 1 contacts lose energy", 1.0, low=1.0)  # fmt: skip
+
 MECH_ISO_ELASTIC = Model(
     "mech_iso_elastic",
     ELEMENT,
     "isotropic, elastic, large rotations",
-    (*_WARM_SOLID, *_ELASTIC, *_warming(*_WARM_SOLID)),
+    (*_WARM_SOLID, *_ELASTIC, *_warming(*_WARM_SOLID), _DAMP_B),
     _elastic,
 )
 
 _WARM_STRENGTH = (
-    Property("cohesion", "Pa", "cohesion", softens=True, warms=True),
+    Property("cohesion", "Pa", "cohesion", 0.0, softens=True, warms=True),
     Property(
-        "tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts", softens=True, warms=True
+        "tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts", 0.0, softens=True, warms=True
     ),
 )
 MECH_MOHR_COULOMB = Model(
@@ -298,6 +301,8 @@ MECH_MOHR_COULOMB = Model(
         *(Property(softening_table(name), "", f"table of {name} over plastic strain", 0.0, internal=True)
           for name in SOFTENS),
         *_warming(*_WARM_SOLID, *_WARM_STRENGTH),
+        _ELASTIC[1],
+        _DAMP_B,
     ),
     _strength,
 )  # fmt: skip

@@ -22,9 +22,10 @@ UNBOUND, FIXED, ALONG = 0, 1, 2
 # force, the constraint and its unit vector.
 DOES_X, AT_X, DOES_Y, AT_Y, FORCE_X, FORCE_Y, CONSTRAINT, WAY_X, WAY_Y = range(9)
 CONDITION = 9
-# Columns of the table of tractions at the present moment (rows, 6): stresses [Pa], velocity of the incoming wave [m/s].
-XX, YY, XY, NORMAL, INCOMING_X, INCOMING_Y = range(6)
-TRACTION = 6
+# Columns of the table of tractions at the present moment (rows, 7): stresses [Pa], velocity of the incoming wave [m/s],
+# shear stress along the face, counter-clockwise about the body [Pa].
+XX, YY, XY, NORMAL, INCOMING_X, INCOMING_Y, DIP = range(7)
+TRACTION = 7
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -32,14 +33,14 @@ def tractions(edges, corner_a, corner_b, row, table, x, applied):
     """Add half of L sigma n of each loaded face to its two corners.
 
     edges, corner_a, corner_b (m,): where the edge begins in x, and its corners in `applied` (both flat); row (m,) of
-    the table (rows, 6): xx, yy, xy, normal [Pa], ...
+    the table (rows, 7): xx, yy, xy, normal [Pa], ...
     """
     x, applied = x.reshape(x.size), applied.reshape(applied.size)
     for m in range(len(edges)):
         p, a, b, q = edges[m], corner_a[m], corner_b[m], row[m]
         nx, ny = x[p + 3] - x[p + 1], x[p] - x[p + 2]
-        fx = 0.5 * (table[q, XX] * nx + table[q, XY] * ny + table[q, NORMAL] * nx)
-        fy = 0.5 * (table[q, XY] * nx + table[q, YY] * ny + table[q, NORMAL] * ny)
+        fx = 0.5 * (table[q, XX] * nx + table[q, XY] * ny + table[q, NORMAL] * nx - table[q, DIP] * ny)
+        fy = 0.5 * (table[q, XY] * nx + table[q, YY] * ny + table[q, NORMAL] * ny + table[q, DIP] * nx)
         applied[a] += fx
         applied[a + 1] += fy
         applied[b] += fx
