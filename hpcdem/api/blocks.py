@@ -611,8 +611,9 @@ class Faces(_Modelled):
         where: Where = None,
     ) -> None:
         """Traction on surfaces [Pa], tension positive; normal turns with the surface, dip is shear along it,
-        counter-clockwise about the body. Numbers or names of tables of time. quiet: waves leave through them in dynamic runs; incoming_x, _y, _z: velocity [m/s] of a plane wave
-        that comes in through them. Without a range: the whole surface of the model."""
+        counter-clockwise about the body. Numbers or names of tables of time. quiet: waves leave through them in dynamic
+        runs; incoming_x, _y, _z: velocity [m/s] of a plane wave that comes in through them. Without a range: the whole
+        surface of the model."""
         given = {
             "stress_xx": xx, "stress_yy": yy, "stress_zz": zz, "stress_normal": normal, "dip": dip,
             "quiet": quiet,
