@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from hpcdem.api.arguments import Where, arguments, chosen_by, model_arguments
-from hpcdem.api.program import HELP, carried_out, place
+from hpcdem.api.program import HELP, carried_out, place, spelt
 from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.bindings import Call, carry_out
@@ -53,13 +53,14 @@ def commands(cls: Kind) -> Kind:
 
 def _told(method: Callable[..., Any]) -> Callable[..., Any]:
     name = method.__name__
+    names = [parameter for parameter in inspect.signature(method).parameters if parameter != "self"]
 
     @functools.wraps(method)
     def call(self: Any, *values: Any, **options: Any) -> Any:
-        word = self._word
+        word, options = self._word, spelt(options, names)
         full = (f"{word}[...]" if name == "__getitem__" else f"{word}.{name}") if word else name
         advice = f"see help(sim.{word})" if word else HELP
-        return carried_out(place(), full, lambda: method(self, *values, **options), advice)
+        return carried_out(place(), full, lambda: method(self, *values, **options), advice, names)
 
     return call
 

@@ -7,18 +7,37 @@ import html
 import io
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
 import numpy as np
 
+from hpcdem.api.program import spelt
 from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.nearest import hint
 
 if TYPE_CHECKING:
     from hpcdem.io.frames import FrameFile
     from hpcdem.post.view.moment import Moment
 
+NARROWEST = 100
+"""Pixels along a picture, at least."""
 MAIN = ("particles", "elements")
 """Kinds of objects of which a frame is asked for if none is named."""
+
+
+class Looks(TypedDict, total=False):
+    """How the objects of a picture look: words of a layer of a view (docs/view.md)."""
+
+    limits: tuple[float, float]
+    log: bool
+    colours: str
+    opacity: float
+    edges: bool
+    size: float
+    vectors: str
+    arrows: float
+    filter: str
+    colour: str
 
 
 class Frame:
@@ -60,9 +79,28 @@ class Frame:
         """`table` as an xarray.Dataset along the numbers of the objects; units are attributes of the variables."""
         return _with_units(self.pandas(object), self._moment.dim, {"step": self.step, "time": self.time})
 
-    def picture(self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Any) -> bytes:
-        """A PNG of so many pixels' width; field: what colours the objects that have it, or those of the kind `object`;
-        looks: as `limits=(low, high)`, `colours="blue-red"`, `log=True` of a layer of a view (docs/view.md)."""
+    def picture(
+        self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Unpack[Looks]
+    ) -> bytes:
+        """A picture of the frame.
+
+        Parameters
+        ----------
+        field, object : what colours the objects that have it, or those of this kind.
+        width : of the picture [pixels].
+        looks : of the objects: limits=(low, high), colours="blue-red", log=True ... (docs/view.md).
+
+        Returns
+        -------
+        bytes : of a PNG.
+        """
+        if isinstance(width, bool) or not isinstance(width, int) or width < NARROWEST:
+            raise UsageError(f"width: expected a whole number of pixels from {NARROWEST} on, got {width!r}")
+        given = spelt(dict(looks), Looks.__annotations__)
+        for name in given:
+            if name not in Looks.__annotations__:
+                near = hint(name, Looks.__annotations__)
+                raise UsageError(f"there is no look '{name}'{near}; there is {', '.join(Looks.__annotations__)}")
         import matplotlib
 
         from hpcdem.io.axes import CM
@@ -71,7 +109,7 @@ class Frame:
 
         view = scene.default_view(self._moment)
         if field is not None:
-            view = scene.with_field(view, self._moment, field, object, **looks)
+            view = scene.with_field(view, self._moment, field, object, **given)
         page = paper.Paper(dpi=width / (paper.USUAL.page * CM))
         content = io.BytesIO()
         with matplotlib.rc_context(saved.SAVED):
@@ -79,7 +117,9 @@ class Frame:
             saved.save(figure, content, "png", page.dpi, f"a picture {width} pixels wide")
         return content.getvalue()
 
-    def show(self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Any) -> Any:
+    def show(
+        self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Unpack[Looks]
+    ) -> Any:
         """`picture` as an image of IPython, for a notebook."""
         return _needed("IPython.display").Image(self.picture(field, object, width, **looks))
 

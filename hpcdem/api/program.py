@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
 from hpcdem import session
-from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, ScriptError
+from hpcdem.core.errors import (
+    CommandError,
+    EquilibriumError,
+    HpcdemError,
+    ScriptError,
+    WrongTypeError,
+    WrongValueError,
+)
+from hpcdem.core.nearest import hint
 
 PACKAGE = str(Path(__file__).resolve().parent.parent)
 HELP = "see help(hpcdem.Simulation)"
+_BOTH = (("color", "colour"), ("colors", "colours"), ("center", "centre"))
+TWINS = {one: other for pair in _BOTH for one, other in (pair, pair[::-1])}
+"""Words that are spelt in two ways."""
+_UNKNOWN = re.compile(r"got an unexpected keyword argument '(\w+)'")
+_OWN_NAME = re.compile(r"^\w+(\.\w+)*\(\) ")
 
 
 def place() -> tuple[str, int]:
@@ -22,24 +36,45 @@ def place() -> tuple[str, int]:
     return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("python", 0)
 
 
-def carried_out(at: tuple[str, int], name: str, make: Callable[[], Any], advice: str = HELP) -> Any:
-    """What `make` returns. Errors of a command leave with file and line of the program; values of a wrong kind too."""
+def spelt(options: dict[str, Any], names: Collection[str]) -> dict[str, Any]:
+    """Arguments by the names that a method has: color is colour, and center is centre."""
+    twins = {name: TWINS[name] for name in options if name not in names and TWINS.get(name) in names}
+    if any(twin in options for twin in twins.values()):
+        return options  # both: the method says that one is too many
+    return {twins.get(name, name): value for name, value in options.items()}
+
+
+def carried_out(
+    at: tuple[str, int], name: str, make: Callable[[], Any], advice: str = HELP, names: Collection[str] = ()
+) -> Any:
+    """What `make` returns. Errors of a command leave with file and line of the program; values of a wrong kind too.
+    names: arguments of the method, of which the nearest is named where one is mistyped."""
     session.refuse_after_stop()
     try:
         return make()
+    except ScriptError:
+        raise
     except CommandError as error:
-        raise ScriptError(*at, f"{name}: {error}") from error
+        raise WrongValueError(*at, f"{name}: {error}") from error
     except EquilibriumError as error:
         raise EquilibriumError(f"{at[0]}:{at[1]}: {name}: {error}") from error
     except (TypeError, ValueError) as error:
         if raised_by_the_user(error):
             raise
-        raise ScriptError(*at, f"{name}: {error}; {advice}") from error
+        kind = WrongTypeError if isinstance(error, TypeError) else WrongValueError
+        raise kind(*at, f"{name}: {_wrong(str(error), names)}; {advice}") from error
     except HpcdemError as error:
         if type(error) is not HpcdemError:
             raise
         # A file that could not be written: the line is not wrong, the exit code is that of a run that failed.
         raise HpcdemError(f"{at[0]}:{at[1]}: {name}: {error}") from error
+
+
+def _wrong(said: str, names: Collection[str]) -> str:
+    """What Python says of a call, shorter, and with the argument that was meant."""
+    if (found := _UNKNOWN.search(said)) and names:
+        return f"there is no argument '{found[1]}'{hint(found[1], names)}; there is {', '.join(names)}"
+    return _OWN_NAME.sub("", said)
 
 
 def raised_by_the_user(error: BaseException) -> bool:

@@ -5,20 +5,27 @@ from __future__ import annotations
 import functools
 import inspect
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Sequence, ValuesView
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, TypeVar, Unpack
 
 import numpy as np
 
 from hpcdem import session
 from hpcdem.api.blocks import BlockCommands
 from hpcdem.api.frames import Frame, shown
-from hpcdem.api.program import carried_out
+from hpcdem.api.program import carried_out, spelt
 from hpcdem.api.program import place as _place
 from hpcdem.commands import dem, fdem
-from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageError
+from hpcdem.core.errors import (
+    CommandError,
+    HpcdemError,
+    ScriptError,
+    UnknownNameError,
+    UsageError,
+    WrongValueError,
+)
 from hpcdem.core.fields import FIELDS, FIX_BITS
 from hpcdem.core.material import Material
 from hpcdem.core.nearest import hint
@@ -38,9 +45,12 @@ if TYPE_CHECKING:
 SETTABLE = ("x", "y", "vx", "vy", "spin", "radius", "angle", "fix", "color", "group")
 """Fields that a program may write."""
 MATERIAL_FIELDS = MATERIAL.names or ()
+MATERIAL_WORDS = tuple(Material.__annotations__)
 Point = tuple[float, float]
 Where = str | Selection | None
 Method = TypeVar("Method", bound=Callable[..., Any])
+Given = ParamSpec("Given")
+Returned = TypeVar("Returned")
 
 
 OF_BOTH = {"start", "save", "restore", "resume", "finish", "cycle", "imple", "energy"}
@@ -58,14 +68,20 @@ def _command(method: Method, edits: bool = True) -> Method:
     particles."""
 
     signature = inspect.signature(method)
+    names = [name for name, one in signature.parameters.items() if name != "self" and one.kind is not one.VAR_KEYWORD]
+    names += MATERIAL_WORDS if "properties" in signature.parameters else ()
 
     @functools.wraps(method)
     def call(self: Simulation, *values: Any, **options: Any) -> Any:
-        place = _place()
+        place, options = _place(), spelt(options, names)
         if self._engine is not None:
             self._engine.line = place[1]
 
         def carry_out() -> Any:
+            if "properties" in signature.parameters:
+                for name in options:
+                    if name not in names:
+                        raise TypeError(f"got an unexpected keyword argument '{name}'")
             if method.__name__ not in OF_BOTH:
                 _ = self.engine
             value = method(self, *values, **options)
@@ -76,7 +92,7 @@ def _command(method: Method, edits: bool = True) -> Method:
             return value
 
         def done() -> Any:
-            value = carried_out(place, method.__name__, carry_out)
+            value = carried_out(place, method.__name__, carry_out, names=names)
             if self._engine is not None:
                 self._engine.edited |= edits
             return value
@@ -421,7 +437,7 @@ class Simulation(BlockCommands):
         vtk: int | None = None,
         stepbar: int | None = None,
         energy: int | None = None,
-        **others: Any,
+        **others: int,
     ) -> None:
         """SET: choose settings of the model. What is left out stays as it is.
 
@@ -496,7 +512,7 @@ class Simulation(BlockCommands):
         from hpcdem.physics.dem.simulation import Watcher
 
         if int(steps) != steps or steps < 1:
-            raise ScriptError(*_place(), f"every: expected a number of steps of 1 or more, got {steps}")
+            raise WrongValueError(*_place(), f"every: expected a number of steps of 1 or more, got {steps}")
         running = self._session.interpreter
 
         def call() -> object:
@@ -668,9 +684,9 @@ class Simulation(BlockCommands):
             self._ready()
             values = engine.body[:, ("mass", "inertia").index(name)].view()
         else:
-            fields = (*FIELDS, *p.extra)
+            fields = tuple(self._ipython_key_completions_())
             near = hint(name, fields)
-            raise ScriptError(*_place(), f"there is no field '{name}'{near}; fields are {', '.join(fields)}")
+            raise UnknownNameError(*_place(), f"there is no field '{name}'{near}; fields are {', '.join(fields)}")
         values.flags.writeable = False
         return values
 
@@ -685,7 +701,8 @@ class Simulation(BlockCommands):
         """
         settable = (*SETTABLE, *self.engine.particles.extra)
         if name not in settable:
-            raise ScriptError(*_place(), f"field '{name}' cannot be set; these can: {', '.join(settable)}")
+            near = hint(name, settable) if name not in self._ipython_key_completions_() else ""
+            raise UnknownNameError(*_place(), f"field '{name}' cannot be set{near}; these can: {', '.join(settable)}")
         self._asked(("set field", name, values), lambda: self._set_field(name, values))
         self.engine.edited = True
 
@@ -699,15 +716,15 @@ class Simulation(BlockCommands):
             number = {group: engine.group_number(str(group)) for group in names}
             values = np.array([number[group] for group in np.atleast_1d(values.astype(str))])
         elif name == "radius" and engine.comm.any(bool((values <= 0.0).any())):
-            raise ScriptError(*_place(), "radius must be positive")
+            raise WrongValueError(*_place(), "radius must be positive")
         if engine.comm.any(values.dtype.kind == "f" and not bool(np.isfinite(values).all())):
-            raise ScriptError(*_place(), f"field '{name}' must be finite")
+            raise WrongValueError(*_place(), f"field '{name}' must be finite")
         p = engine.particles
         before = p[name].copy()
         try:
             p[name][:] = values
         except ValueError as error:
-            raise ScriptError(*_place(), f"field '{name}' has {len(p)} values on this rank: {error}") from error
+            raise WrongValueError(*_place(), f"field '{name}' has {len(p)} values on this rank: {error}") from error
         if engine.clumps and name in ("x", "y", "radius", "angle"):
             changed = bool((p[name] != before)[p.clump >= 0].any())
             if engine.comm.any(changed):
@@ -768,9 +785,21 @@ class Simulation(BlockCommands):
         return self._folder if first is None else first.outdir
 
     @property
-    def walls(self) -> dict[int, Wall]:
-        """The walls by id, those of BOX with ids 100 to 103 (bottom, right, top, left)."""
+    def particles(self) -> Particles:
+        """Methods of discs."""
+        return Particles(self)
 
+    @property
+    def walls(self) -> Walls:
+        """The walls by id, those of BOX with ids 100 to 103 (bottom, right, top, left), and their methods."""
+        return Walls(self)
+
+    @property
+    def bonds(self) -> Bonds:
+        """Methods of bonds; ``sim.bonds()`` is the table of all of them."""
+        return Bonds(self)
+
+    def _walls(self) -> dict[int, Wall]:
         def rows() -> dict[int, tuple[Any, ...]]:
             w = self.engine.walls
             return {
@@ -837,7 +866,7 @@ class Simulation(BlockCommands):
         force fs [N], fx fy on id1, contact point x y, overlap [m]."""
         return self._table("contacts")
 
-    def bonds(self) -> dict[str, np.ndarray]:
+    def _bonds(self) -> dict[str, np.ndarray]:
         """Bonds of the whole model, as `contacts`, with kind, ebmod, gbmod, tstrength, sstrength."""
         return self._table("bonds")
 
@@ -1046,6 +1075,117 @@ class Simulation(BlockCommands):
         if found is None:
             raise CommandError(f"there is no file {self.directory / file}")
         return found
+
+
+class Shared(Generic[Given, Returned]):
+    """A method of the simulation under the name that it has in a group; the work is done there."""
+
+    def __init__(self, method: Callable[Concatenate[Simulation, Given], Returned]) -> None:
+        self.method = method
+
+    def __get__(self, group: Group | None, owner: type) -> Callable[Given, Returned]:
+        """The method, bound to the simulation of the group."""
+        method: Any = self.method
+        return method if group is None else method.__get__(group._sim)  # type: ignore[no-any-return]
+
+
+class Group:
+    """Methods of a simulation that belong together."""
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim = sim
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__.lower()} of {self._sim!r}>"
+
+
+class Particles(Group):
+    """Discs, by the names that the methods of blocks have; `sim.ball` is `sim.particles.ball`."""
+
+    ball = Shared(Simulation.ball)
+    generate = Shared(Simulation.gen)
+    grid = Shared(Simulation.gen_grid)
+    row = Shared(Simulation.gline)
+    load = Shared(Simulation.load)
+    export = Shared(Simulation.export)
+    delete = Shared(Simulation.delete)
+    properties = Shared(Simulation.prop)
+    fix = Shared(Simulation.fix)
+    free = Shared(Simulation.free)
+    clump = Shared(Simulation.clump)
+    join = Shared(Simulation.join)
+    clumps = Shared(Simulation.clumps)
+    contacts = Shared(Simulation.contacts)
+    gather = Shared(Simulation.gather)
+    extents = Shared(Simulation.extents)
+    history = Shared(Simulation.hist)
+
+    @property
+    def count(self) -> int:
+        """How many there are on all ranks."""
+        return self._sim.count
+
+    def __len__(self) -> int:
+        return len(self._sim)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._sim[name]
+
+    def __setitem__(self, name: str, values: Any) -> None:
+        self._sim[name] = values
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return self._sim._ipython_key_completions_()
+
+
+class Bonds(Group):
+    """Bonds between discs; called, `sim.bonds()`, it gives the table of them."""
+
+    create = Shared(Simulation.bond)
+    cut = Shared(Simulation.break_bonds)
+    table = Shared(Simulation._bonds)
+    __call__ = Shared(Simulation._bonds)
+
+    @property
+    def left(self) -> int:
+        """How many hold."""
+        return self._sim.bonds_left
+
+    @property
+    def broken(self) -> tuple[int, int]:
+        """How many broke so far, in tension and in shear."""
+        return self._sim.bonds_broken
+
+
+class Walls(Group, Mapping[int, Wall]):
+    """The walls as they are now, by id; those of BOX have the ids 100 to 103 (bottom, right, top, left)."""
+
+    create = Shared(Simulation.wall)
+    box = Shared(Simulation.box)
+    force = Shared(Simulation.wall_force)
+    forces = Shared(Simulation.wall_forces)
+    contacts = Shared(Simulation.wall_contacts)
+    drive = Shared(Simulation.imple)
+
+    def __getitem__(self, id: int) -> Wall:
+        return self._sim._walls()[id]
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._sim._walls())
+
+    def __len__(self) -> int:
+        return len(self._sim._walls())
+
+    def items(self) -> ItemsView[int, Wall]:
+        """Ids and walls, looked at once."""
+        return self._sim._walls().items()
+
+    def values(self) -> ValuesView[Wall]:
+        """The walls, looked at once."""
+        return self._sim._walls().values()
+
+    def __repr__(self) -> str:
+        return repr(self._sim._walls())
 
 
 class Coupling:

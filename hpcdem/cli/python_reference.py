@@ -9,6 +9,7 @@ import sys
 from typing import Any
 
 from hpcdem.api import Call, Coupling, Frame, Frames, Simulation, blocks, couple, frames
+from hpcdem.api.simulation import Bonds, Particles, Shared, Walls
 from hpcdem.sweep import Sweep
 
 _TOP = """\
@@ -33,7 +34,7 @@ OF_BLOCKS = {
 
 def page() -> str:
     """The whole page, in Markdown."""
-    parts = [_TOP, _class("hpcdem.Simulation", Simulation, "sim")]
+    parts = [_TOP, _class("hpcdem.Simulation", Simulation, "sim"), *map(_group, (Particles, Walls, Bonds))]
     parts += [_class(f"sim.{name}", of, f"sim.{name}") for name, of in OF_BLOCKS.items()]
     parts += [f"## hpcdem.couple\n\n{_function('hpcdem.couple', couple, method=False)}"]
     parts += [f"## hpcdem.frames\n\n{_function('hpcdem.frames', frames, method=False)}"]
@@ -56,6 +57,20 @@ def _class(title: str, of: type, name: str) -> str:
     if rows:
         lines += ["Values:", "", *rows, ""]
     return "\n".join(lines)
+
+
+def _group(of: type) -> str:
+    """A group: which method of the simulation each of its own is."""
+    name = f"sim.{of.__name__.lower()}"
+    rows = []
+    for member in sorted(member for member in vars(of) if not member.startswith("_")):
+        value = inspect.getattr_static(of, member)
+        if isinstance(value, Shared):
+            own = value.method.__name__
+            rows.append(f"- `{name}.{member}`: " + (f"as `sim.{own}`" if own[0] != "_" else _text(value.method)))
+        elif isinstance(value, property):
+            rows.append(f"- `{name}.{member}`: {_text(value.fget)}")
+    return "\n".join([f"## {name}", "", _text(of), "", *rows, ""])
 
 
 def _function(name: str, of: Any, method: bool = True) -> str:

@@ -41,6 +41,20 @@ class ScriptError(HpcdemError):
         self.file, self.line, self.message = file, line, message
 
 
+class WrongValueError(ScriptError, ValueError):
+    """A line of a Python program gives a value that makes no sense; it can be caught as a ValueError too."""
+
+
+class WrongTypeError(ScriptError, TypeError):
+    """A line of a Python program gives a value of a wrong kind, or an argument that there is not: a TypeError too."""
+
+
+class UnknownNameError(ScriptError, KeyError):
+    """A line of a Python program asks for a field that there is not: a KeyError too."""
+
+    __str__ = Exception.__str__  # that of KeyError puts the sentence in quotes
+
+
 class CommandError(HpcdemError):
     """A command was given values that make no sense; the script language adds file and line."""
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from hpcdem.core.errors import UsageError
+from hpcdem.core.nearest import hint
 from hpcdem.lang import parameters
 from hpcdem.sweep import array, design, driver
 from hpcdem.sweep import plan as plans
@@ -15,6 +16,32 @@ from hpcdem.sweep.design import Sampling
 if TYPE_CHECKING:
     from hpcdem.sweep.plan import Member, Plan
     from hpcdem.sweep.tables import Report
+
+
+class Options(TypedDict, total=False):
+    """Of a report: the options of `hpcdem measure`, lengths in m."""
+
+    walls: tuple[int, ...]
+    groups: tuple[str, ...]
+    colors: tuple[int, ...]
+    first: int
+    last: int
+    xmove: float
+    ymove: float
+    width: float
+    strain: float
+    length: float
+    skin: float
+    increment: bool
+    ids: tuple[int, ...]
+    points: tuple[tuple[float, float], ...]
+    number: int
+    history: str
+    bins: int
+    completeness: float
+    released: bool
+    joule: float
+    box: tuple[float, ...]
 
 
 class Sweep:
@@ -102,9 +129,23 @@ class Sweep:
         path = array.write(self.plan, options, at_once)
         return "" if path is None else array.submit(path)
 
-    def report(self, what: Sequence[str] = (), formats: Sequence[str] = ("png",), **options: Any) -> Report:
-        """Measure all members that are done (options: those of `hpcdem measure`, as `--strain`: strain=0.3), and write
-        tables and figures into `report` of the folder. Returns the tables."""
+    def report(self, what: Sequence[str] = (), formats: Sequence[str] = ("png",), **options: Unpack[Options]) -> Report:
+        """Measure all members that are done, and write tables and figures into `report` of the folder.
+
+        Parameters
+        ----------
+        what : kinds of measurements; all that the folders allow if empty.
+        formats : of the figures.
+        options : those of `hpcdem measure`, as `--strain`: strain=0.3.
+
+        Returns
+        -------
+        Report : the tables.
+        """
+        for name in options:
+            if name not in Options.__annotations__:
+                near = hint(name, Options.__annotations__)
+                raise UsageError(f"report has no option '{name}'{near}; there is {', '.join(Options.__annotations__)}")
         from hpcdem.halo.comm import SerialComm
         from hpcdem.post.measure.scene import Request
         from hpcdem.sweep import report
