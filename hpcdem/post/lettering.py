@@ -20,10 +20,12 @@ PACKAGES = "fonts-noto-cjk or fonts-wqy-zenhei (Debian, Ubuntu), google-noto-san
 _told: set[str] = set()
 
 
-def lettered(figure: Any, note: bool = True) -> str:
-    """Give texts of a figure of matplotlib fonts that have their letters; what is to be told of those that no font has,
-    "" if all are there. It goes to standard error too, once in a process; note: and into the figure."""
+def lettered(figure: Any, kind: str = "png") -> str:
+    """Give texts of a figure of matplotlib, that becomes a file of this kind, fonts that have their letters; what is to
+    be told of those that no font has, "" if all are there. It goes to standard error too, once in a process, and into
+    the figure, but for SVG, whose texts are written by who reads it."""
     from matplotlib.font_manager import findfont
+    from matplotlib.patheffects import Normal
     from matplotlib.text import Text
 
     lost: set[str] = set()
@@ -36,7 +38,10 @@ def lettered(figure: Any, note: bool = True) -> str:
             continue
         found = font_of(some)
         if found:
-            text.set_fontfamily([*text.get_fontfamily(), found])
+            name, path = found
+            text.set_fontfamily([*text.get_fontfamily(), name])
+            if kind in ("pdf", "eps") and _cubic(path):
+                text.set_path_effects([Normal()])  # matplotlib draws such texts as lines
         else:
             lost |= some
     if not lost:
@@ -46,7 +51,7 @@ def lettered(figure: Any, note: bool = True) -> str:
     if advice not in _told:
         _told.add(advice)
         sys.stderr.write(f"warning: {line}\n")
-    if note:  # in letters that can be read
+    if kind != "svg":  # in letters that can be read
         figure.text(
             0.004, 0.004, f"no font of this machine has some of these letters{advice}", fontsize=6.0, color="#c81e1e",
             va="bottom", parse_math=False,
@@ -55,9 +60,21 @@ def lettered(figure: Any, note: bool = True) -> str:
 
 
 @cache
-def font_of(letters: frozenset[str]) -> str:
-    """A font that has all of these letters, "" if there is none."""
-    return next((name for name, path in _fonts() if letters <= _letters(path)), "")
+def font_of(letters: frozenset[str]) -> tuple[str, str] | None:
+    """Name and file of a font that has all of these letters, None if there is none."""
+    return next(((name, path) for name, path in _fonts() if letters <= _letters(path)), None)
+
+
+@cache
+def _cubic(path: str) -> bool:
+    """Whether the letters of a font are not those of TrueType: files of matplotlib that hold such fonts are read by
+    nobody."""
+    with open(path, "rb") as file:
+        head = file.read(16)
+        if head[:4] == b"ttcf":  # several in one file
+            file.seek(int.from_bytes(head[12:16], "big"))
+            head = file.read(4)
+    return head[:4] == b"OTTO"
 
 
 def _fonts() -> Iterator[tuple[str, str]]:

@@ -29,7 +29,7 @@ def save(figure: Any, target: str | IO[bytes], kind: str, dpi: float, picture: o
             f"cannot draw {picture}: {width:.0f} x {height:.0f} pixels, at most {LONGEST_SIDE} along a side and "
             f"{MOST_PIXELS / 1e6:.0f} million in all; take a smaller page or fewer dots per inch"
         )
-    lettered(figure, note=kind != "svg")  # whose texts are written by who reads it
+    lettered(figure, kind)
     with matplotlib.rc_context(SAVED), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from")  # it was told, once
         figure.savefig(target, format=kind, dpi=dpi, **_saving(kind))

@@ -58,6 +58,26 @@ def no_fonts(monkeypatch: pytest.MonkeyPatch):
     lettering.font_of.cache_clear()
 
 
+def test_letters_of_a_font_of_curves_are_lines_in_a_pdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Noto's are such; PDF of matplotlib would hold them in a way in which they stay white."""
+    path = font(tmp_path / "a.ttf", LETTER)
+    monkeypatch.setattr(lettering, "font_of", lambda letters: (NAME, str(path)))
+    font_manager.fontManager.addfont(path)
+    for cubic in (False, True):
+        monkeypatch.setattr(lettering, "_cubic", lambda path: cubic)  # noqa: B023
+        figure = Figure()
+        text = figure.text(0.5, 0.5, LETTER)
+        saved.save(figure, str(tmp_path / f"{cubic}.pdf"), "pdf", 100.0)
+        assert (b"/FontFile2" in (tmp_path / f"{cubic}.pdf").read_bytes()) == (not cubic)
+        assert bool(text.get_path_effects()) == cubic
+    monkeypatch.undo()
+    (tmp_path / "c.otf").write_bytes(b"OTTO" + bytes(12))
+    (tmp_path / "c.ttc").write_bytes(
+        b"ttcf" + bytes(4) + (1).to_bytes(4, "big") + (20).to_bytes(4, "big") + bytes(4) + b"OTTO"
+    )
+    assert [lettering._cubic(str(one)) for one in (path, tmp_path / "c.otf", tmp_path / "c.ttc")] == [False, True, True]
+
+
 def titled(folder: Path, kind: str = "png", title: str = LETTER) -> Path:
     moment = read_moment(frames.write_blocks(folder))
     view = ModelView(layers=(Layer(object="elements"),), title=title)

@@ -35,6 +35,8 @@ LARGEST = 8192
 MOST = 2**24
 """Pixels of them in all: a gigabyte while they are painted."""
 _LEFT, _RIGHT, _BOTTOM, _TOP, _BAR = 1.35, 0.35, 1.05, 0.75, 1.9  # cm around the model, and for each bar of colours
+SWATCH = 0.8
+"""Width of one of several colours of a class, over the size of letters."""
 _CORNER = 2.0
 """Side of the square with the axes of space [cm]."""
 
@@ -124,14 +126,11 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
         colour_bar(figure, figure.add_axes((at / page[0], bottom / page[1], 0.3 * k / page[0], height / page[1])),
              layer.scale, paper.font)  # fmt: skip
     if handles:
-        from matplotlib.legend_handler import HandlerTuple
-
         axes.legend(
             [patches for _, patches in handles], [word for word, _ in handles], loc="lower left",
             bbox_to_anchor=(0.0, 1.0 + arrow_row / height), ncols=4, frameon=False, fontsize=0.9 * paper.font,
-            borderaxespad=0.15, handlelength=max(1.2, *(0.8 * len(patches) for _, patches in handles)),
-            columnspacing=1.0, handletextpad=0.4,
-            handler_map={tuple: HandlerTuple(ndivide=None, pad=0.0)},
+            borderaxespad=0.15, handlelength=max(1.2, *(SWATCH * len(patches) for _, patches in handles)),
+            columnspacing=1.0, handletextpad=0.4, handler_map={tuple: _swatches()},
         )  # fmt: skip
     end = left + width
     for reference in references:
@@ -253,6 +252,19 @@ def _handles(layer: Painted) -> list[Any]:
     from matplotlib.patches import Patch
 
     return [(word, tuple(Patch(color=one) for one in shades.split())) for word, shades in layer.legend]
+
+
+def _swatches() -> Any:
+    """What draws the colours of a class side by side before its word, as wide as they need."""
+    from matplotlib.legend_handler import HandlerTuple
+
+    class Swatches(HandlerTuple):
+        def create_artists(self, legend: Any, patches: Any, x: float, y: float, width: float, height: float,
+                           font: float, place: Any) -> Any:  # fmt: skip
+            own = font * max(1.2, SWATCH * len(patches))
+            return super().create_artists(legend, patches, x - (width - own), y, own, height, font, place)
+
+    return Swatches(ndivide=None, pad=0.0)
 
 
 def colour_bar(figure: Any, axes: Any, scale: Scale, font: float) -> None:
