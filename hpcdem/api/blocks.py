@@ -126,7 +126,7 @@ class Geometry(Words):
         normal: Point | None = None,
     ) -> None:
         """A circle, with the length of its sides a polygon; in three dimensions the surface of a disc."""
-        given = {"center": centre, "radius": radius, "segment_length": segment_length, "normal": normal}
+        given = {"centre": centre, "radius": radius, "segment_length": segment_length, "normal": normal}
         self._do("geometry create circle", {**given, "as_layer": as_layer})
 
     def arc(self, centre: Point, radius: float, begin: float, end: float, as_layer: str) -> None:
@@ -609,6 +609,7 @@ class Faces(_Modelled):
         incoming_x: Number | None = None,
         incoming_y: Number | None = None,
         incoming_z: Number | None = None,
+        dip: Number | None = None,
         where: Where = None,
     ) -> None:
         """Traction on surfaces [Pa], tension positive; normal turns with the surface, dip is shear along it,
@@ -683,6 +684,10 @@ class Nodes(Objects):
             "acceleration_z": az,
         }  # fmt: skip
         self._carry_out("boundary", given, where, "mechanical-velocity-boundary-condition")
+
+    def damp(self, local: float, *, where: Where = None) -> None:
+        """Local damping, from 0 to 1, in the place of that of the model (0, in static runs 0.8)."""
+        self._carry_out("mechanical-damp", {"local": local}, where)
 
     def function(self, function: str) -> FunctionName:
         """Read, check and compile a function of place and time in a Python file, "file.py:function"
@@ -802,6 +807,21 @@ class Bolts(Objects):
             "group": _group(group, set),
         }  # fmt: skip
         self._do("bolt create polyline", given)
+
+    def between(
+        self,
+        first: Point,
+        second: Point,
+        mesh_size: float | None = None,
+        *,
+        group: str | None = None,
+        set: str | None = None,
+        where: Where = None,
+    ) -> None:
+        """Install a bolt from a point to another [m] in the parts of the way that lie in the rock; where: only in these
+        elements."""
+        given = {"first": first, "second": second, "mesh_size": mesh_size, "group": _group(group, set)}
+        self._do("bolt-element create", given, where, g.ELEMENT)
 
     def model(self, name: str, *, where: Where = None, **properties: float) -> None:
         """The properties of elements of bolts: docs/pcdc_reference.md lists them; those of one bolt."""

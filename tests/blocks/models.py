@@ -11,6 +11,7 @@ from hpcdem.physics.fdem import changes, creep, diagnostics, sides, user_functio
 from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
+from hpcdem.physics.fdem.water import Water
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
 from tests.parallel.model import Found, Model
 
@@ -276,6 +277,27 @@ def shaking(sim: Blocks) -> None:
     diagnostics.account_energy(sim)
 
 
+def weir(sim: Blocks) -> None:
+    """Water before a jointed block that breaks off a wall, nodes with damping of their own, loads along faces, and
+    elements that touch nothing."""
+    mesh = joined(shaken(rectangle(24, 10, 2.4, 1.0, kind="mixed"), 0.15), rectangle(6, 2, 0.6, 0.2, x0=1.0, y0=1.001))
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e8, "damp_factor": 0.02})
+    centre = mesh.centroids()
+    edges = mesh.edges()
+    inner = edges.faces[edges.inner][:, 0]
+    sim.joint_model(inner[centre[inner // 4, 0] < 1.0], COHESIVE, {**WEAK, "tensile_strength": 2e4, "cohesion": 4e4})
+    sim.gravity(0.0, -9.81)
+    Water.create(sim, None, [((-1.0, 0.87), (0.4, 0.8)), ((2.0, 0.6), (3.0, 0.63))], 1e3)
+    x, y = mesh.points.T
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
+    sim.damp_nodes(np.flatnonzero((x > 1.2) & (y < 0.9)), 0.3)
+    sim.touches[np.flatnonzero(centre[:, 1] > 1.0)[::2]] = False
+    ends, outer = mesh.points[edges.points[~edges.inner]], edges.faces[~edges.inner][:, 0]
+    sim.stress_condition(outer[(ends[:, :, 0] > 2.4 - 1e-9).all(axis=1)], dip=3e4)
+    changes.set_velocity(sim, np.flatnonzero(x < 0.8), vx=-8.0, vy=0.5)
+
+
 def shake_more(sim: Blocks) -> None:
     """What happens to it."""
     if sim.clock.step == 300:
@@ -406,6 +428,11 @@ def much_creeps(found: Found) -> None:
     assert found["energy_creep_lost"] > 0.0 and found["energy_relative"] < 0.01
 
 
+def the_weir_gives_way(found: Found) -> None:
+    assert found["counts"][2] > 10
+    assert np.abs(found["displacement_x"]).max() > 1e-2
+
+
 def the_ground_shakes(found: Found) -> None:
     assert np.hypot(found["velocity_x"], found["velocity_y"]).max() > 0.1
     assert found["counts"][1] + found["counts"][2] > 5  # joints behind their peak
@@ -424,5 +451,6 @@ MODELS = {
     "backfill": Model(backfill, result, the_fill_carries, fill_up, steps=1100),
     "creeping": Model(creeping, result, much_creeps, creep_more, steps=1400),
     "parting": Model(parting, parted, sides_part, part_more, steps=600, middle=300),
+    "weir": Model(weir, result, the_weir_gives_way, steps=700, middle=401),
     "shaking": Model(shaking, result, the_ground_shakes, shake_more, steps=700, middle=401),
 }

@@ -155,6 +155,20 @@ SAME: list[tuple[str, str]] = [
     ("pcdc mesh intersect layer 'l' follow", "sim.mesh.intersect('l', follow=True)"),
     ("pcdc mesh glue tolerance 1e-3 between 'a' 'b' set 'd'", "sim.mesh.glue(1e-3, ('a', 'b'), set='d')"),
     ("pcdc mesh quality", "sim.mesh.quality()"),
+    ("pcdc node mechanical-damp local 0.5 range x 0 1", "sim.nodes.damp(0.5, where='x 0 1')"),
+    ("pcdc element-face boundary m-s-b-c dip 1e5 range x 0 1", "sim.faces.stress(dip=1e5, where='x 0 1')"),
+    ("pcdc bolt-element create (0,1) (0,2) m-s 0.1 group 'a' set 's' range x 0 1",
+     "sim.bolts.between((0, 1), (0, 2), 0.1, group='a', set='s', where='x 0 1')"),
+    *((f"pcdc element c-model {model}", f"sim.elements.model('{name}', {given})") for model, name, given in (
+        ("hydr-p-m f-den 1000 f-bulk 2e9 visc 1e-6 a-i 1e-4 a-min 1e-5 a-max 1e-3", "hydr-p-m",
+         "fluid_density=1000, fluid_bulk=2e9, viscosity=1e-6, aperature_initial=1e-4, aperature_minumum=1e-5, "
+         "aperature_maximum=1e-3"),
+        ("hydr-p-p-m f-den 1000 f-bulk 2e9 visc 1e-6 a-i 1e-4 a-min 1e-5 a-max 1e-3 p-den 2600 p-s 1e-4 "
+         "p-c-l 0.6", "hydr-p-p-m",
+         "fluid_density=1000, fluid_bulk=2e9, viscosity=1e-6, aperature_initial=1e-4, aperature_minumum=1e-5, "
+         "aperature_maximum=1e-3, proppant_density=2600, proppant_size=1e-4, "
+         "proppant_concentration_limit=0.6"),
+        ("t-f con 0.6 cap 4200", "t-f", "conductivity=0.6, capacity=4200"))),
     ("pcdc element glue range x 0 1", "sim.mesh.glue(where='x 0 1')"),
     ("pcdc element densify pattern 1 0 max-length 0.5 0.2 range x 0 1",
      "sim.mesh.densify((0.5, 0.2), (1, 0), where='x 0 1')"),

@@ -13,6 +13,7 @@ from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, TEMPERATURE, Over, Value
+from hpcdem.physics.fdem.water import Water
 from hpcdem.physics.heat.model import Heat
 from tests.parallel.model import Found, Model
 from tests.space.support import ROCK, box, hexes
@@ -132,6 +133,8 @@ def blocks_of_hexes(sim: Blocks) -> None:
     sim.stress_condition(faces["right"], normal="beat")
     sim.rayleigh(0.02, 60.0)
     sim.gravity(0.5, 0.0, -9.81)
+    sim.damp_nodes(np.flatnonzero(mesh.points[:, 0] > 2.0), 0.1)
+    Water.create(sim, None, [((0.0, 0.0, 0.12), (0.05, 0.0, 1.0))], 1e3)
     changes.set_velocity(sim, np.arange(len(mesh.points) - len(flier.points), len(mesh.points)), 30.0, 1.0, -3.0)
 
 

@@ -13,7 +13,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField
 from hpcdem.physics.fdem import changes, node_conditions, sides, user_functions, user_laws
 from hpcdem.physics.fdem.free_field import FreeField
-from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
+from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, Around, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.fdem.user_laws import UserLaw
 from hpcdem.physics.fdem.water import Water
@@ -51,6 +51,11 @@ def element_model(project: Project, name: str, properties: Mapping[str, Value], 
     changes.element_model(blocks, elements, name, properties)
     if elements is not None:
         project.alive[elements] = True
+
+
+def around(project: Project, where: Range | None) -> Range | None:
+    """Joints of which a side is one of these elements; None: all."""
+    return None if where is None else (Around(tuple(everything(project, ELEMENT, where).tolist())),)
 
 
 def load_law(project: Project, law: str) -> None:
@@ -190,6 +195,14 @@ def force(
     _known(project, fx, fy, fz)
     blocks, nodes = project.ready(), chosen(project, NODE, where)
     blocks.force_condition(nodes, *from_now(project, blocks.time_now(), {"fx": fx, "fy": fy, "fz": fz}).values())
+
+
+def damp(project: Project, alpha: float, where: Range | None = None) -> None:
+    """Local damping of nodes, from 0 to 1, in the place of that of the model."""
+    blocks = project.ready()
+    if alpha > 0.0 and blocks.budget is not None:
+        raise CommandError("the energy budget knows no local damping of nodes: model option energy off")
+    blocks.damp_nodes(chosen(project, NODE, where), alpha)
 
 
 def move(project: Project, kind: int, direction: tuple[float, ...] = (0.0, 0.0), where: Range | None = None) -> None:

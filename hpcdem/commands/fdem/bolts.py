@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from hpcdem.commands.fdem import supports
+from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.bolts import kernels
+from hpcdem.physics.bolts import kernels, layout
 from hpcdem.physics.bolts.model import Bolts
-from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE, DEFAULT, Range
+from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE, DEFAULT, ELEMENT, Range
 
+SIZE = 0.2
+"""Length of elements of a bolt between two points, if none is said [m]."""
 Number = float | str
 """A number, or the name of a table of time."""
 
@@ -38,6 +44,34 @@ def create(
     if group is not None:
         project.groups[BOLT_NODE].assign(nodes, group, set_name)
         project.groups[BOLT_ELEMENT].assign(elements, group, set_name)
+
+
+def between(
+    project: Project,
+    first: Sequence[float],
+    second: Sequence[float],
+    size: float = SIZE,
+    group: str | None = None,
+    set_name: str = DEFAULT,
+    where: Range | None = None,
+) -> None:
+    """Install a bolt from a point to another [m] in elements no longer than size, one in each part of the way that lies
+    in the rock, or in these elements of it. CommandError if none does."""
+    blocks = project.ready()
+    alive = np.zeros(len(blocks.alive), bool)
+    alive[everything(project, ELEMENT, where)] = True
+    line = layout.checked([first, second], blocks.dim)
+    cells = blocks.the_mesh().cells
+    corners = diagnostics.corner_values(blocks, "position").reshape(-1, 4, blocks.dim)
+    pieces = layout.inside(line[0], line[1], corners, cells, alive)
+    if not len(pieces):
+        raise CommandError("no part of the bolt lies in the rock")
+    for ends in pieces:
+        create(project, ends.tolist(), length=size, group=group, set_name=set_name)
+    left = float(layout.lengths(pieces[:, 1] - pieces[:, 0]).sum())
+    whole = float(layout.lengths((line[1] - line[0])[None])[0])
+    if project.log is not None and left < whole * (1.0 - 1e-9):
+        project.log.info(f"bolt: {whole - left:g} of {whole:g} m lie outside of the rock and are cut off")
 
 
 def velocity(

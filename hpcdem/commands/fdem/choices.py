@@ -74,7 +74,7 @@ def _why(objects: _Objects, where: g.Range) -> str:
     return "; each of its terms alone chooses some" if not empty else ""
 
 
-_ONLY_JOINTS = (g.Between, g.OnCrack)
+_ONLY_JOINTS = (g.Between, g.OnCrack, g.Around)
 _NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
 _NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer, g.Along, g.Near, g.Crossed, g.Sized)
 _BY_PLACE = (g.Span, g.OnLayer, g.InCircle, g.Near, g.Crossed, g.Along)
@@ -250,6 +250,8 @@ class _Objects:
                 groups = self.groups[g.ELEMENT]
                 a, b = (np.isin(self.sides // 4, groups.members(name, set_name)) for name in (one, other))
                 return (a[:, 0] & b[:, 1]) | (a[:, 1] & b[:, 0])
+            case g.Around(elements):
+                return np.isin(self.sides // 4, elements).any(axis=1)
             case g.Present() | g.UseHidden():
                 return np.ones(len(self.numbers), bool)
             case g.Not(of):

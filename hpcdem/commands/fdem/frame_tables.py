@@ -161,7 +161,8 @@ def _face_conditions(blocks: Blocks) -> Columns | None:
     table = blocks.local.loads_now(placed, time)[placed.of]
     for name, values in zip(TRACTIONS[blocks.dim], table.T, strict=True):
         word = name if name.startswith("incoming") else "normal_stress" if name == "normal" else f"stress_{name}"
-        columns[word] = values.copy()
+        if name != "dip" or values.any():
+            columns["shear_stress" if name == "dip" else word] = values.copy()
     columns["quiet"] = blocks.quiet_faces()[numbers].astype(np.int8)
     if flow is not None:
         columns["water_pressure"] = np.full(len(numbers), np.nan)

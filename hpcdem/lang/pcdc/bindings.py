@@ -243,6 +243,8 @@ def _element_model(call: Call) -> None:
         fdem.assignments.user_model(call.project, call["law"], call.properties(), call.where)
     elif trial.MODELS[call["model"]] is ISO_HEAT.of:
         fdem.heat.model(call.project, call.properties(), call.where)
+    elif call["model"] in _FLUIDS:
+        _FLUIDS[call["model"]](call, fdem.assignments.around(call.project, call.where))
     else:
         name = trial.MODELS[call["model"]].name
         fdem.assignments.element_model(call.project, name, call.properties(), call.where)
@@ -252,15 +254,17 @@ def _face_model(call: Call) -> None:
     fdem.assignments.face_model(call.project, trial.MODELS[call["model"]].name, call.properties(), call.where)
 
 
+_FLUIDS: dict[str, Callable[[Call, g.Range | None], None]] = {
+    POROUS.keyword.name: lambda c, where: fdem.flow.model(c.project, c.properties(), where),
+    PROPPANT.keyword.name: lambda c, where: fdem.flow.with_proppant(c.project, c.properties(), where),
+    FLUID_HEAT.keyword.name: lambda c, where: fdem.heat.fluid_model(c.project, c.properties(), where),
+}
+"""Models of what is in joints."""
+
+
 def _joint_model(call: Call) -> None:
-    if trial.MODELS[call["model"]] is POROUS.of:
-        fdem.flow.model(call.project, call.properties(), call.where)
-        return
-    if trial.MODELS[call["model"]] is PROPPANT.of:
-        fdem.flow.with_proppant(call.project, call.properties(), call.where)
-        return
-    if trial.MODELS[call["model"]] is FLUID_HEAT.of:
-        fdem.heat.fluid_model(call.project, call.properties(), call.where)
+    if call["model"] in _FLUIDS:
+        _FLUIDS[call["model"]](call, call.where)
         return
     properties = {name: value for name, value in call.properties().items() if name != "np"}
     fdem.assignments.joint_model(call.project, trial.MODELS[call["model"]].name, properties, call.where)
@@ -393,6 +397,11 @@ def _stage(call: Call) -> None:
 def _bolt(call: Call) -> None:
     words = {name: call.get(name) for name in ("segments", "length", "grout")}
     fdem.bolts.create(call.project, call["points"], **words, plate=call.get("plate", False), **call.group())
+
+
+def _bar(call: Call) -> None:
+    size = {"size": call["mesh-size"]} if "mesh-size" in call.arguments else {}
+    fdem.bolts.between(call.project, call["first"], call["second"], **size, **call.group(), where=call.where)
 
 
 def _bolt_node_condition(call: Call) -> None:
@@ -613,6 +622,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "face-joint reset state": lambda c: fdem.settings.reset_joints(c.project, c.where),
     "node group": _group(g.NODE),
     "node boundary": _node_condition,
+    "node mechanical-damp": lambda c: fdem.assignments.damp(c.project, c["local"], c.where),
     "node function": lambda c: fdem.assignments.load_function(c.project, c["function"]),
     "node boundary remove": _free_nodes,
     "node initial": _initial_nodes,
@@ -622,6 +632,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "well create": lambda c: fdem.flow.well(c.project, c["name"], c.where),
     "well stage": _stage,
     "bolt create polyline": _bolt,
+    "bolt-element create": _bar,
     "bolt c-model": lambda c: fdem.supports.assign(c.project, g.BOLT_ELEMENT, c.properties(), c.where),
     "bolt delete": lambda c: fdem.supports.delete(c.project, g.BOLT_ELEMENT, c.where),
     "bolt-element group": _group(g.BOLT_ELEMENT),

@@ -163,7 +163,7 @@ def page() -> str:
 def state(row: Row, dim: int) -> tuple[str, str]:
     """The state of a path in so many dimensions as lines with it are read, and what it is an alias of or why it is
     refused."""
-    found = {_state(row, line, dim) for line in row.lines(dim)}
+    found = dict.fromkeys(_state(row, line, dim) for line in row.lines(dim))
     return max(found, key=lambda one: list(STATES).index(one[0]))
 
 

@@ -77,7 +77,7 @@ class Option:
 
     notation and also: see `Keyword`; values: their kinds, in order; more: keywords that may follow right after the
     values and belong to this one; only: where a term of RANGE makes sense (objects), () for everywhere; dims:
-    dimensions of space in which it is there.
+    dimensions of space in which it is there; refused: why it is, and what to write instead.
     """
 
     notation: str
@@ -91,6 +91,7 @@ class Option:
     also: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
     dims: tuple[int, ...] = BOTH
+    refused: str = ""
 
     @cached_property
     def keyword(self) -> Keyword:
@@ -420,7 +421,10 @@ CONTACT = Model(
     "c{ontact}-m{ohr}-c{oulomb}", "8",
     "Contact of surfaces: potential of the overlap, Coulomb friction. Of two surfaces the smaller value counts.",
     declared(properties.CONTACT_MOHR_COULOMB, "f{riction}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}", "d{amping}-t",
-             "d{amping}-b", "d{amping}-r{atio}"),
+             "d{amping}-b", "d{amping}-r{atio}", also={"penalty-normal": ("n{ormal}-s{tiffness}",),
+                                                       "penalty-shear": ("s{hear}-s{tiffness}",)})
+    + (Option("c{ohesion}", (NOT_NEGATIVE,), "surfaces that touch have none", "Pa", "0", refused="surfaces that touch "
+              "have friction and no cohesion; joints have it until they break: face-joint c-model c-i-c-i cohesion"),),
     of=properties.CONTACT_MOHR_COULOMB, dims=BOTH,
 )  # fmt: skip
 COHESIVE = Model(
@@ -508,10 +512,12 @@ BOLT = Model(
 BOLT_VELOCITY = Model(
     "b{olt}-n{ode}-c{onstrain}", "20", "Velocity or acceleration of nodes of bolts. Components that are not given stay "
     "free: along the bar by its forces, across it with the rock.", VELOCITY.options, any_of=True, dims=BOTH,
+    also=("s{upport}-n{ode}-c{onstrain}",),
 )  # fmt: skip
 BOLT_FORCE = Model(
     "b{olt}-n{ode}-f{orce}-b{oundary}-c{ondition}", "21", "Force on each node of one bolt; across the bar the rock "
-    "takes it.", FORCE.options, any_of=True, dims=BOTH, also=("b{olt}-n{ode}-f{orce}-b{oundary}-c{onditio}",),
+    "takes it.", FORCE.options, any_of=True, dims=BOTH,
+    also=("b{olt}-n{ode}-f{orce}-b{oundary}-c{onditio}", "s{upport}-n{ode}-f{orce}-b{oundary}-c{onditio}"),
 )  # fmt: skip
 
 # ---- liners, beyond the manual -------------------------------------------------------------------------------------
@@ -661,12 +667,13 @@ def _removed(*conditions: Model) -> tuple[Option, ...]:
     return tuple(Option(one.notation, (), "only this condition", also=one.also, dims=one.dims) for one in conditions)
 
 
-def _group_command(kind: str, notation: str) -> Command:
+def _group_command(kind: str, notation: str, also: str = "") -> Command:
     return Command(
         f"{notation} g{{roup}}", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the "
         "one it was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
         (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
         dims=BOTH if kind in ("element", "element-face", "face-joint", "node", "bolt-element", "bolt-node") else PLANE,
+        also=(f"{also} g{{roup}}",) if also else (),
     )  # fmt: skip
 
 
@@ -680,7 +687,8 @@ def _list_command(kind: str, notation: str) -> Command:
 def _properties(model: Model) -> tuple[Option, ...]:
     """Those of a model, none of them compulsory, for commands that change some."""
     return tuple(
-        Option(o.notation, o.values, o.doc, o.unit, also=o.also, dims=tuple(d for d in o.dims if d in model.dims))
+        Option(o.notation, o.values, o.doc, o.unit, also=o.also, dims=tuple(d for d in o.dims if d in model.dims),
+               refused=o.refused)
         for o in model.options if o.name != "np"
     )  # fmt: skip
 
@@ -1013,7 +1021,7 @@ _GEOMETRY = (
             (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all"),
              Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "as STEP and DXF files say, else 1")),
             dims=BOTH),
-    Command("geom{etry} trans{form}", "Moves, turns or scales a layer.",
+    Command("geom{etry} transf{orm}", "Moves, turns or scales a layer.",
             ("pcdc geometry transform 'hole' rotate 30 about (0,0) move (1,0)",),
             (_leading("layer", STRING, "name of the layer"),),
             (Option("scale", (POSITIVE,), "done first"),
@@ -1200,7 +1208,8 @@ _OBJECTS = (
                             "polygons", required=True),
                      Option("d{ensity}", (NOT_NEGATIVE,), "of the water; 0: there is none any more", "kg/m3",
                             required=True)), ranged="element", dims=BOTH),
-    Command("e{lement} c-m{odel}", "The constitutive model of elements, with its properties.",
+    Command("e{lement} c-m{odel}", "The constitutive model of elements, with its properties. Models of fluid "
+            "are those of the joints around the elements.",
             ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25",
              "pcdc element c-model null range group 'excav_1' set 'domain'",
              "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
@@ -1210,7 +1219,8 @@ _OBJECTS = (
              "pcdc element c-model therm-iso-h property conductivity 2.7 capacity 900 expansion-coeficient 1e-5",
              "pcdc element c-model user 'clay.py:clay' property density 2000 young 1e9 poisson-ratio 0.3 parameter "
              "'limit' 2e5"),
-            models=(ISO_ELASTIC, NULL, MOHR_COULOMB, USER, BURGERS, ISO_HEAT), ranged="element", manual=True,
+            models=(ISO_ELASTIC, NULL, MOHR_COULOMB, USER, BURGERS, ISO_HEAT, POROUS, PROPPANT, FLUID_HEAT),
+            ranged="element", manual=True,
             dims=BOTH),
     Command("e{lement} law", "Reads, checks and compiles a law of a Python file without giving it to elements: for a "
             "script that begins with model restore. A checkpoint does not name files that are executed.",
@@ -1284,6 +1294,12 @@ _OBJECTS = (
              "pcdc node boundary therm-f-b-c temperature 20 range group 'well'"),
             models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE),
             ranged="node", dims=BOTH, also=("n{ode} bou{ndary} a{pply}", "n{ode} a{pply}")),
+    Command("n{ode} mech{anical}-d{amp}", "Local damping of nodes: what drives one is less by this part of its size "
+            "against its motion, in dynamic runs (without it there is none) and in static ones (0.8). The stable time "
+            "step is shorter by the root of 1 + damping.",
+            ("pcdc node mechanical-damp local 0.3 range y 0 2",),
+            options=(Option("l{ocal}", (limited(0.0, 1.0, True),), "part, from 0 to 1", "1", required=True),),
+            ranged="node", dims=BOTH),
     Command("n{ode} func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
             ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
@@ -1363,19 +1379,28 @@ _OBJECTS = (
             ("pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 tensile-yield-force 250e3 "
              "shear-stiffness-rock-bolt 1e9 grout-thickness 0.0125 cohesion-rock-grout 1.5e6 cohesion-grout-bolt 2e6 "
              "spacing 1.5 pretension-force 50e3 range group 'roof'",),
-            models=(BOLT,), ranged="bolt-element", dims=BOTH, also=("b{olt}-e{lement} c-m{odel}",)),
-    _group_command("bolt-element", "b{olt}-e{lement}"),
-    _group_command("bolt-node", "b{olt}-n{ode}"),
+            models=(BOLT,), ranged="bolt-element", dims=BOTH,
+            also=("b{olt}-e{lement} c-m{odel}", "s{upport}-e{lement} c-m{odel}")),
+    Command("b{olt}-e{lement} c{reate}", "Installs a rock bolt from a point to another, as bolt create polyline, in "
+            "the parts of the way that lie in the rock: each is a bolt. With a range only in these elements.",
+            ("pcdc bolt-element create (0,2) (0,5) mesh-size 0.25",),
+            (_leading("first", VECTOR, "head", "m"), _leading("second", VECTOR, "end", "m")),
+            (Option("m{esh}-s{ize}", (POSITIVE,), "length of its elements, at most", "m", "0.2"),
+             Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
+                    more=(SET,))), ranged="element", dims=BOTH, also=("s{upport}-e{lement} c{reate}",)),
+    _group_command("bolt-element", "b{olt}-e{lement}", "s{upport}-e{lement}"),
+    _group_command("bolt-node", "b{olt}-n{ode}", "s{upport}-n{ode}"),
     Command("b{olt}-n{ode} bou{ndary}", "What is prescribed at nodes of bolts.",
             ("pcdc bolt-node boundary b-n-c velocity-y -1e-3 range id 0",
              "pcdc bolt-node boundary b-n-f-b-c force-y -50e3 range group 'heads'"),
             models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH,
-            also=("b{olt}-n{ode} bou{ndary} a{pply}", "b{olt}-n{ode} a{pply}")),
+            also=("b{olt}-n{ode} bou{ndary} a{pply}", "b{olt}-n{ode} a{pply}",
+                  "s{upport}-n{ode} bou{ndary}", "s{upport}-n{ode} bou{ndary} a{pply}")),
     Command("b{olt}-n{ode} bou{ndary} r{emove}", "Takes it back.",
             ("pcdc bolt-node boundary remove range group 'heads'",
              "pcdc bolt-node boundary remove b-n-f-b-c range group 'heads'"),
             options=_removed(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH,
-            also=("b{olt}-n{ode} r{emove}",)),
+            also=("b{olt}-n{ode} r{emove}", "s{upport}-n{ode} bou{ndary} r{emove}")),
     Command("bolt del{ete}", "Takes elements of bolts out at once, with their part of the grout. Their numbers go with "
             "them, those of the others stay; without RANGE all of them.",
             ("pcdc bolt delete range group 'roof'",), ranged="bolt-element", dims=BOTH),

@@ -302,6 +302,11 @@ def _bolt(arguments: Mapping[str, Any]) -> None:
         layout.parts(span, arguments.get("segments"), arguments.get("length"))
 
 
+def _bar(arguments: Mapping[str, Any]) -> None:
+    line = layout.checked([arguments["first"], arguments["second"]], len(arguments["first"]))
+    layout.parts(float(layout.lengths(line[1:] - line[:-1])[0]), None, arguments.get("mesh-size"))
+
+
 def _fractures(arguments: Mapping[str, Any]) -> None:
     if "radius" in arguments:
         values.disc_set(**disc_words(arguments)).check("fractures")
@@ -351,6 +356,7 @@ _TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
     "geometry create fractures": _fractures,
     "geometry export": _drawing,
     "bolt create polyline": _bolt,
+    "bolt-element create": _bar,
     "mesh structured": _rectangle,
     "element create brick": _brick,
     **{f"element create {name}": _pieces for name in

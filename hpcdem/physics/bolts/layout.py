@@ -75,6 +75,19 @@ def split(
     return np.concatenate(nodes)
 
 
+def inside(a: np.ndarray, b: np.ndarray, corners: np.ndarray, cells: np.ndarray, alive: np.ndarray) -> np.ndarray:
+    """(k, 2, d) ends of the parts of the way from a to b that lie in elements, of which some are there; see `hosts`."""
+    there = np.where(alive[:, None], cells, -1)
+    t = np.unique(np.concatenate([[0.0], (_crossings if len(a) == 2 else _crossed_faces)(a, b, corners, there), [1.0]]))
+    t = np.append(t[:-1][np.diff(t) > INSIDE], 1.0)
+    middle = a + (0.5 * (t[:-1] + t[1:]))[:, None] * (b - a)
+    held = np.concatenate([[False], hosts(middle, corners, cells, alive)[0] >= 0, [False]])
+    begin, end = t[np.flatnonzero(~held[:-1] & held[1:])], t[np.flatnonzero(held[:-1] & ~held[1:])]
+    out = a + np.column_stack([begin, end])[:, :, None] * (b - a)
+    out[end == 1.0, 1] = b
+    return out
+
+
 def _crossings(a: np.ndarray, b: np.ndarray, corners: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Parts (k,) of the way from a to b, ascending, at which it crosses edges of elements."""
     low, high = np.minimum(a, b), np.maximum(a, b)

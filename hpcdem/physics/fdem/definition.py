@@ -957,6 +957,23 @@ class ModelDefinition:
         wanted = getattr(one, f"force_{axis}"), getattr(one, f"side_{axis}")
         return sum((getattr(of, f"force_{axis}"), getattr(of, f"side_{axis}")) == wanted for of in rows)
 
+    def damp_nodes(self, nodes: Numbers, alpha: float) -> None:
+        """Local damping of nodes: what drives one is less by this part of its size against its motion. It takes the
+        place of that of the model, 0.8 in static mode and 0 in dynamic runs."""
+        if not 0.0 <= alpha <= 1.0:
+            raise CommandError(f"local damping lies from 0 to 1, got {alpha:g}")
+        self._condition(nodes, {"damp": float(alpha)})
+        self.changed()
+
+    def safety(self) -> float:
+        """Part of the stability limit that is taken: local damping makes a force against the motion 1 + alpha times as
+        large."""
+        return self.options.safety / math.sqrt(1.0 + self.most_damped())
+
+    def most_damped(self) -> float:
+        """The largest local damping that a node has of its own."""
+        return max(0.0, *(self.conditions[row].damp for row in np.unique(self.corner_row).tolist()))
+
     def stress_condition(
         self,
         faces: Numbers,
@@ -1199,7 +1216,7 @@ class ModelDefinition:
     # ---- tables of the kernels -----------------------------------------------------------------------------------
 
     def conditions_at(self, time: float, middle: float, dt: float) -> np.ndarray:
-        """The table of what node conditions come to (rows, 9), in space (rows, 13), at a moment: forces at `time`,
+        """The table of what node conditions come to (rows, 10), in space (rows, 14), at a moment: forces at `time`,
         velocities in the middle of the step; accelerations as change of velocity over dt."""
         plane = self.dim == 2
         out = np.zeros((len(self.acting()), moving.CONDITION if plane else space.CONDITION))
@@ -1217,7 +1234,7 @@ class ModelDefinition:
                 elif kind == moving.ACCELERATION:
                     out[row, at[k]] = self._now(value, time) * dt
                 out[row, force + k] = self._now(getattr(one, f"force_{axis}"), time) * getattr(one, f"part_{axis}")
-            out[row, constraint] = one.constraint
+            out[row, constraint], out[row, moving.DAMP if plane else space.DAMP] = one.constraint, one.damp
             out[row, way : way + len(one.way)] = one.way
         return out
 

@@ -698,6 +698,8 @@ def account_energy(sim: Blocks, on: bool = True) -> None:
             f"no energy budget can be kept: what the law {laws[0].title} of {user_laws.some(sim)} stores and loses is "
             "not known"
         )
+    if on and sim.most_damped():
+        raise CommandError("no energy budget can be kept: it knows no local damping of nodes (node mechanical-damp)")
     sim.open_model()
     sim.cold.pop("work", None)
     sim.budget = Budget() if on else None

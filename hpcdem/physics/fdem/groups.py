@@ -232,8 +232,16 @@ class UseHidden:
     on: bool = True
 
 
+@dataclass(frozen=True)
+class Around:
+    """Joints of which one of these elements is a side."""
+
+    elements: tuple[int, ...]
+
+
 Term = (
     InGroup
+    | Around
     | InSet
     | Ids
     | Span

@@ -185,7 +185,7 @@ class Hexes:
         o = self.sim.options
         return hexes.time_step(
             self.omega2, self.h[: self.count, hexes.H_ETA], self.modulus, self.place, self.at_corners(springs),
-            self.at_corners(dashpots), o.mass_damping, o.stiffness_damping, o.safety, target, mass,
+            self.at_corners(dashpots), o.mass_damping, o.stiffness_damping, self.sim.safety(), target, mass,
         )  # fmt: skip
 
     def static_masses(self, h: np.ndarray, springs: np.ndarray, alpha: float, mass: np.ndarray) -> None:

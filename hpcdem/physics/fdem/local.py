@@ -714,14 +714,14 @@ class Local:
         if not o.dynamic:
             return math.inf
         least = self._stable_time_step(target, self.true_mass.copy() if mass is None else mass)
-        return o.safety * float(sim.comm.min_into(np.array([least]))[0])
+        return sim.safety() * float(sim.comm.min_into(np.array([least]))[0])
 
     def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
         """Of this rank's elements, see `limits.time_step`."""
         o = self.sim.options
         return limits.time_step(
             self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, self.sim.owned.start,
-            *self.springs(), o.mass_damping, o.stiffness_damping, o.safety, target, mass,
+            *self.springs(), o.mass_damping, o.stiffness_damping, self.sim.safety(), target, mass,
         )  # fmt: skip
 
     def row_sums(self) -> np.ndarray:
@@ -1100,7 +1100,7 @@ class Local:
         )  # fmt: skip
 
     def loads_now(self, placed: Placed, time: float) -> np.ndarray:
-        """The table of tractions (rows, 6), with a row of its own for each face whose traction is a function."""
+        """The table of tractions (rows, 7), with a row of its own for each face whose traction is a function."""
         return placed.filled(self.sim.loads_at(time), lambda one, field: (TRACTIONS[2].index(field), time, 1.0))
 
     def conditions_now(self, placed: Placed, time: float, middle: float, dt: float) -> np.ndarray:

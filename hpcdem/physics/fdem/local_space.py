@@ -253,7 +253,7 @@ class LocalSpace(LawsSpace):
         springs = self.springs()
         rows, c = self._tetrahedra()
         found = space.time_step(
-            c, rows, self.sim.n_left, *springs, o.mass_damping, o.stiffness_damping, o.safety, target, mass
+            c, rows, self.sim.n_left, *springs, o.mass_damping, o.stiffness_damping, self.sim.safety(), target, mass
         )
         return found if self.hexes is None else min(found, self.hexes.time_step(*springs, target, mass))
 
@@ -379,7 +379,7 @@ class LocalSpace(LawsSpace):
         return placed.filled(self.sim.loads_at(time), lambda one, field: (TRACTIONS[3].index(field), time, 1.0))
 
     def conditions_now(self, placed: Placed, time: float, middle: float, dt: float) -> np.ndarray:
-        """The table of node conditions (rows, 13)."""
+        """The table of node conditions (rows, 14)."""
 
         def how(one: NodeCondition, field: str) -> tuple[int, float, float]:
             kind, _, axis = field.partition("_")

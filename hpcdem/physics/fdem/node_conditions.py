@@ -33,7 +33,8 @@ class NodeCondition:
     constraint (moving.UNBOUND, ..., in space space.ACROSS too) and its unit vector. older: bits of the components of
     motion (1, 2, 4) and force (8, 16, 32) that were said anew of other corners of the node: they count once these are
     nodes of their own. side_x, _y, _z: of the force, 0: shared by all corners at the point, else by those there with
-    the same number. part_x, _y, _z: factors of the force."""
+    the same number. part_x, _y, _z: factors of the force. damp: local damping, negative: that of
+    the model."""
 
     does_x: int = moving.FREE
     at_x: Number = 0.0
@@ -53,6 +54,7 @@ class NodeCondition:
     part_x: float = 1.0
     part_y: float = 1.0
     part_z: float = 1.0
+    damp: float = -1.0
 
     def motion(self, axis: str) -> str:
         """Of a component that is prescribed, in words."""
@@ -250,7 +252,7 @@ def together(rows: Sequence[NodeCondition], dim: int) -> NodeCondition:
             found = replace(found, **values[0] if values else {})
     for one in rows:
         kind, way = bound(kind, way, one.constraint, one.way, dim)  # type: ignore[assignment]
-    return replace(found, constraint=kind, way=way)
+    return replace(found, constraint=kind, way=way, damp=max(one.damp for one in rows))
 
 
 def _latest(said: list[NodeCondition], bit: int) -> list[NodeCondition]:

@@ -18,12 +18,12 @@ FREE, VELOCITY, ACCELERATION = 0, 1, 2
 UNBOUND, FIXED, ALONG = 0, 1, 2
 """Move constraints of a node."""
 
-# Columns of the table of conditions at the present moment (rows, 9): what x and y do and at which value, the nodal
-# force, the constraint and its unit vector.
-DOES_X, AT_X, DOES_Y, AT_Y, FORCE_X, FORCE_Y, CONSTRAINT, WAY_X, WAY_Y = range(9)
-CONDITION = 9
+# Columns of the table of conditions at the present moment (rows, 10): what x and y do and at which value, the nodal
+# force, the constraint and its unit vector, local damping (negative: that of the model).
+DOES_X, AT_X, DOES_Y, AT_Y, FORCE_X, FORCE_Y, CONSTRAINT, WAY_X, WAY_Y, DAMP = range(10)
+CONDITION = 10
 # Columns of the table of tractions at the present moment (rows, 7): stresses [Pa], velocity of the incoming wave [m/s],
-# shear stress along the face, counter-clockwise about the body [Pa].
+# stress along the face, counter-clockwise [Pa].
 XX, YY, XY, NORMAL, INCOMING_X, INCOMING_Y, DIP = range(7)
 TRACTION = 7
 
@@ -99,9 +99,9 @@ def _move(
         ey += share[i] * table[q, FORCE_Y]
         fx += ex
         fy += ey
-        k = kick[i]
+        k, drag = kick[i], alpha if table[q, DAMP] < 0.0 else table[q, DAMP]
         vx, vy = v[place[begin[i]]], v[place[begin[i]] + 1]
-        wx, wy = vx + k * laws.damped(fx, vx, alpha), vy + k * laws.damped(fy, vy, alpha)
+        wx, wy = vx + k * laws.damped(fx, vx, drag), vy + k * laws.damped(fy, vy, drag)
         if q > 0:
             if table[q, DOES_X] != FREE:
                 wx = table[q, AT_X] if table[q, DOES_X] == VELOCITY else vx + table[q, AT_X]
@@ -111,10 +111,10 @@ def _move(
                 wx = wy = 0.0
             elif table[q, CONSTRAINT] == ALONG:
                 along = wx * table[q, WAY_X] + wy * table[q, WAY_Y]
-                if alpha > 0.0 and table[q, DOES_X] == FREE and table[q, DOES_Y] == FREE:
+                if drag > 0.0 and table[q, DOES_X] == FREE and table[q, DOES_Y] == FREE:
                     # Damping sees the force along the line alone: that across it is carried, and would rub.
                     along = vx * table[q, WAY_X] + vy * table[q, WAY_Y]
-                    along += k * laws.damped(fx * table[q, WAY_X] + fy * table[q, WAY_Y], along, alpha)
+                    along += k * laws.damped(fx * table[q, WAY_X] + fy * table[q, WAY_Y], along, drag)
                 wx, wy = along * table[q, WAY_X], along * table[q, WAY_Y]
             # What the conditions had to add so that the node does this.
             outside[i, 0] = outside[i, 1] = 0.0
@@ -142,9 +142,9 @@ def move(threads, *args):
 
     begin (n + 1,), corner (m,): where the forces of the corners of node i begin in `force` and `applied` (flat), in
     the order of elements; place, again (m,): the same in v, and where v has the corner a second time, or -1; kick (n,):
-    dt / m; condition (n,): row of the table (rows, 9), 0: none; share (n,): part of the force of its point that falls
-    on the node; alpha: local damping. Fills outside (n, 2): what the conditions had to add [N/m], and felt (n, 4): all
-    forces without that, and those of them that are applied from outside.
+    dt / m; condition (n,): row of the table (rows, 10), 0: none; share (n,): part of the force of its point that falls
+    on the node; alpha: local damping of nodes that have none of their own. Fills outside (n, 2): what the conditions
+    had to add [N/m], and felt (n, 4): all forces without that, and those of them that are applied from outside.
     """
     for t in range(threads):
         _move(t, threads, *args)

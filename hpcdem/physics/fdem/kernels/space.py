@@ -20,10 +20,10 @@ from hpcdem.physics.fdem.kernels.tets import ETA, INVERSE, LAMBDA, ROW, STRIDE, 
 
 UNBOUND, FIXED, ALONG, ACROSS = 0, 1, 2, 3
 """Move constraints of a node: along a vector only, in the plane across it only."""
-# Columns of the table of conditions at the present moment (rows, 13): what x, y and z do, at which value, the nodal
-# force, the constraint and its unit vector.
-DOES, AT, FORCE, CONSTRAINT, WAY = 0, 3, 6, 9, 10
-CONDITION = 13
+# Columns of the table of conditions at the present moment (rows, 14): what x, y and z do, at which value, the nodal
+# force, the constraint and its unit vector, local damping (negative: that of the model).
+DOES, AT, FORCE, CONSTRAINT, WAY, DAMP = 0, 3, 6, 9, 10, 13
+CONDITION = 14
 # Columns of the table of tractions at the present moment (rows, 7) [Pa].
 XX, YY, XY, NORMAL, ZZ, XZ, YZ, INCOMING = range(8)  # and two more of the last
 TRACTION = 7
@@ -224,14 +224,15 @@ def _move(
         fx, fy, fz = fx + ex, fy + ey, fz + ez
         at = U(corner[begin[i]])
         vx, vy, vz = v[at], v[at + U(1)], v[at + U(2)]
-        wx = vx + k * laws.damped(fx, vx, alpha)
-        wy = vy + k * laws.damped(fy, vy, alpha)
-        wz = vz + k * laws.damped(fz, vz, alpha)
+        drag = alpha if table[q, DAMP] < 0.0 else table[q, DAMP]
+        wx = vx + k * laws.damped(fx, vx, drag)
+        wy = vy + k * laws.damped(fy, vy, drag)
+        wz = vz + k * laws.damped(fz, vz, drag)
         if q > 0:
             f[0], f[1], f[2] = fx, fy, fz
             before[0], before[1], before[2] = vx, vy, vz
             w[0], w[1], w[2] = wx, wy, wz
-            _obey(k, alpha, table[q], f, before, w, drawn, outside[i])
+            _obey(k, drag, table[q], f, before, w, drawn, outside[i])
             wx, wy, wz = w[0], w[1], w[2]
         felt[i, 0], felt[i, 1], felt[i, 2], felt[i, 3], felt[i, 4], felt[i, 5] = fx, fy, fz, ex, ey, ez
         for m in range(begin[i], begin[i + 1]):
@@ -320,7 +321,7 @@ def kick_threaded(threads, first, kick, force, v, alpha):
 @njit(cache=True, nogil=True, error_model="numpy")
 def move(threads, *args):
     """New velocities of the nodes from the forces of their corners, see `nodes.move`; corner (m,): where they begin in
-    `force`, `applied` and v (flat); pull_begin, pull_corner: the same of those that can have a force; table (rows, 13);
+    `force`, `applied` and v (flat); pull_begin, pull_corner: the same of those that can have a force; table (rows, 14);
     outside (n, 3) [N], felt (n, 6)."""
     for t in range(threads):
         _move(t, threads, *args)
