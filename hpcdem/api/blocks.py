@@ -609,7 +609,6 @@ class Faces(_Modelled):
         incoming_x: Number | None = None,
         incoming_y: Number | None = None,
         incoming_z: Number | None = None,
-        dip: Number | None = None,
         where: Where = None,
     ) -> None:
         """Traction on surfaces [Pa], tension positive; normal turns with the surface, dip is shear along it,
