@@ -74,8 +74,9 @@ class Curves:
         }
 
     def presets(self) -> list[dict[str, Any]]:
-        """Charts of the script, and what a laboratory draws: stress over strain first, load over shortening last. chart:
-        as `chart` takes it; x and y: as `drawn` does."""
+        """Charts of the script, and what a laboratory draws: stress over strain first, load over shortening last.
+
+        chart: as `chart` takes it; x and y: as `drawn` does."""
         records = self.records()
 
         def of(word: str) -> list[Record]:
