@@ -92,8 +92,8 @@ class Curves:
                     {"kind": "stress_strain", "x": _quoted(strain), "y": [_quoted(one) for one in along[:MOST]]}
                 )
         for name in self.charts():
-            x, y = (title.lower() for title in self._head(self.folder / name)[1:3])
-            kind = "stress_strain" if "strain" in x and "stress" in y else "of_script"
+            along, up = (title.lower() for title in self._head(self.folder / name)[1:3])
+            kind = "stress_strain" if "strain" in along and "stress" in up else "of_script"
             found.append({"kind": kind, "chart": name})
         found.sort(key=lambda one: one["kind"] != "stress_strain")
         for axis in "xyz":
@@ -106,7 +106,7 @@ class Curves:
                 x = self._positive(ways, "{0} - {1}", "shortening")
                 y = [self._positive(loads, "({0} - {1}) / 2", "load")]
             else:
-                x, y = _quoted(ways[0]), [_quoted(one) for one in loads[:MOST]]
+                x, y = _quoted(ways[0]), [*map(_quoted, loads[:MOST])]
             found.append({"kind": "load_way", "x": x, "y": y})
         return found
 
