@@ -92,8 +92,8 @@ class Curves:
                     {"kind": "stress_strain", "x": _quoted(strain), "y": [_quoted(one) for one in along[:MOST]]}
                 )
         for name in self.charts():
-            along, up = (title.lower() for title in self._head(self.folder / name)[1:3])
-            kind = "stress_strain" if "strain" in along and "stress" in up else "of_script"
+            _, across, up = (title.lower() for title in self._head(self.folder / name))
+            kind = "stress_strain" if "strain" in across and "stress" in up else "of_script"
             found.append({"kind": kind, "chart": name})
         found.sort(key=lambda one: one["kind"] != "stress_strain")
         for axis in "xyz":

@@ -31,9 +31,13 @@ function complain(error) {
   told(text, true);
 }
 
-function told(text, bad = false) {
-  $("message").textContent = text;
-  $("message").classList.toggle("bad", bad);
+/** A message at the foot, whole: what is longer than a line lies over what is above, until it is clicked. A hint is one
+ * line. */
+function told(text, bad = false, hint = false) {
+  const box = $("message");
+  box.textContent = box.title = text;
+  box.className = bad ? "bad" : hint ? "hint" : "";
+  box.classList.toggle("long", box.offsetHeight > 30);
 }
 
 async function unpacked(response) {
@@ -965,7 +969,7 @@ async function begin() {
   if (camera) windows[0].camera = { x: (camera[0] + camera[1]) / 2, y: (camera[2] + camera[3]) / 2, width: camera[1] - camera[0] };
   choose(windows[0]);
   speak();
-  if (about.box) told(say("keys_space"));
+  if (about.box) told(say("keys_space"), false, true);
   connect();
   new ResizeObserver(() => { for (const one of windows) one.redraw(); }).observe($("windows"));
 }
@@ -1084,6 +1088,7 @@ function connectFirst() {
   });
   on("menu", "click", () => menu(!document.body.classList.contains("menu")));
   on("stage", "pointerdown", () => { menu(false); if (narrow.matches) fold(true); });
+  on("message", "click", () => told(""));
   charts.begin(complain);
   on("language", "click", () => { words.choose(words.current() === "en" ? "zh" : "en"); speak(); });
   on("theme", "click", () => {
@@ -1098,6 +1103,6 @@ words.begin();
 theme = words.kept("hpcdem.theme") ?? "auto";
 speak();
 connectFirst();
-told(say("keys"));
+told(say("keys"), false, true);
 look();
 desk.begin(complain, carried);
