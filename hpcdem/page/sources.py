@@ -48,10 +48,9 @@ class Sources:
         self.moments: OrderedDict[tuple[str, int, int], Moment] = OrderedDict()
         self.lock = threading.Lock()
         self._curves: Curves | None = None
-        self.empty = empty = empty or bool(kernels.builder())  # a run that has just been started makes its folder then
         self.look()
         for path in self.paths:
-            if empty or not path.is_dir() or run_folder.running(path) is not None:
+            if empty or not path.is_dir() or run_folder.running(path) is not None or self._to_be_made(path):
                 continue
             if not any(s.folder == path for s in self.found):
                 raise HpcdemError(
@@ -59,6 +58,12 @@ class Sources:
                     "or open a console beside the page: hpcdem view --run"
                 )
         self._see_one()
+
+    @staticmethod
+    def _to_be_made(path: Path) -> bool:
+        """Whether a run that has just been started may make this folder: kernels are compiled before."""
+        nothing = not any(path.iterdir()) if path.is_dir() else not (path.exists() or path.suffix)
+        return nothing and bool(kernels.builder())
 
     def _see_one(self) -> None:
         """HpcdemError if there are frames, and none of their first ones can be shown."""
@@ -77,7 +82,7 @@ class Sources:
         found: list[Source] = []
         for path in self.paths:
             if not path.is_dir():
-                if self.empty and not path.exists():
+                if not path.exists() and (self.empty or self._to_be_made(path)):
                     continue
                 if not path.is_file():
                     raise HpcdemError(f"cannot read {path}: there is no such file")

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hpcdem.core.errors import HpcdemError
 from hpcdem.core.looks import COLOURS
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.lang import chinese
@@ -420,7 +421,14 @@ def test_an_empty_stage_says_why(browser: Any, tmp_path: Path, monkeypatch: pyte
     sources = Sources([data], empty=True)
     monkeypatch.setattr(kept, "store", lambda: (place, True))
     assert sources.waiting() == {"kind": "compiling", "who": f"process {os.getpid()} of here", "folder": str(data)}
+    late = Sources([tmp_path / "comes later"])  # the page may be opened before the run makes its folder
+    assert late.waiting()["kind"] == "compiling" and not late.found
+    for name in ("typed_wrong.vtkhdf", "store"):  # no folder, and one with something else in it
+        with pytest.raises(HpcdemError):
+            Sources([tmp_path / name])
     building.write_text("process 999999999 of here")  # was killed
+    with pytest.raises(HpcdemError, match="no such file"):
+        Sources([tmp_path / "comes later"])
     assert sources.waiting()["kind"] == "empty" and kernels.builder() == ""
     data.mkdir()
     monkeypatch.setattr(run_folder, "running", lambda folder: {"pid": 1})

@@ -43,7 +43,8 @@ function range(columns) {
   let low = Infinity, high = -Infinity;
   for (const column of columns) for (const v of column) if (v !== null) { if (v < low) low = v; if (v > high) high = v; }
   if (!(low <= high)) return [0, 1];
-  if (low === high) { const air = Math.abs(low) || 1; return [low - air / 2, high + air / 2]; }
+  const air = Math.max(Math.abs(low), Math.abs(high)) || 1;
+  if (high - low < 1e-9 * air) return [low - air / 2, high + air / 2];  // a line, but for rounding
   return [low, high];
 }
 

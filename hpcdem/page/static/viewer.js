@@ -137,7 +137,10 @@ class Window {
       document.body.dataset.pictures = ++drawn;
       document.body.dataset.fine = fine;
       if (this.failed) { told(""); this.failed = false; }
-    } catch (error) { this.failed = true; complain(error); }
+    } catch (error) {
+      if (error.status === 503) { this.wish ??= { fine }; await new Promise((done) => { setTimeout(done, LOOK); }); }  // busy
+      else { this.failed = true; complain(error); }
+    }
     this.busy = false;
     if (this.wish) this.fetch();
     else if (!fine && !this.failed) this.rest = setTimeout(() => this.redraw(true), REST);
