@@ -48,9 +48,10 @@ class Sources:
         self.moments: OrderedDict[tuple[str, int, int], Moment] = OrderedDict()
         self.lock = threading.Lock()
         self._curves: Curves | None = None
+        self.coming = {path for path in self.paths if self._to_be_made(path)}
         self.look()
         for path in self.paths:
-            if empty or not path.is_dir() or run_folder.running(path) is not None or self._to_be_made(path):
+            if empty or not path.is_dir() or run_folder.running(path) is not None or path in self.coming:
                 continue
             if not any(s.folder == path for s in self.found):
                 raise HpcdemError(
@@ -82,7 +83,7 @@ class Sources:
         found: list[Source] = []
         for path in self.paths:
             if not path.is_dir():
-                if not path.exists() and (self.empty or self._to_be_made(path)):
+                if not path.exists() and (self.empty or path in self.coming):
                     continue
                 if not path.is_file():
                     raise HpcdemError(f"cannot read {path}: there is no such file")

@@ -497,7 +497,7 @@ def test_several_scripts_are_open_saved_renamed_and_closed(bench: Bench, folder:
             (folder / "two.sc").read_text() == "b = 2\n# more" and (folder / "one.sc").read_text() == "a = 1\n# more"
         )
     )
-    assert "●" not in "".join(tabs.all_text_contents()) and page.is_disabled("#script-save-all")
+    bench.until(lambda: "●" not in "".join(tabs.all_text_contents()) and page.is_disabled("#script-save-all"))
     page.once("dialog", lambda dialog: dialog.accept("uno.sc"))
     page.click("#script-rename")
     bench.until(lambda: (folder / "uno.sc").exists() and not (folder / "one.sc").exists())
