@@ -34,7 +34,8 @@ def motion(rock) -> list[bytes]:
 def test_a_relative_table_begins_when_a_condition_takes_it(tmp_path):
     """As an absolute one that is moved by the time that has passed."""
     one = Rock(tmp_path / "a", BLOCK + RAMP + "pcdc model gravity 0,-9.8\npcdc model time-step 1e-5\n"
-               "pcdc model step 30\npcdc e-f apply m-s-b-c s-n table 'ramp' range x 3\npcdc model step 40\n")  # fmt: skip
+               "pcdc model step 30\npcdc e-f apply m-s-b-c s-n table 'ramp' range x 3\n"
+               "pcdc model step 40\n")  # fmt: skip
     now = 30 * 1e-5
     begun = one.blocks.tables[f"ramp from {_after(30)!r}"]
     other = Rock(
@@ -174,7 +175,8 @@ def test_clocks_are_set_and_told(tmp_path):
 def test_conditions_are_taken_back_one_by_one(tmp_path):
     rock = Rock(
         tmp_path, BLOCK + "pcdc node apply mech-f-b-c f-x 5e3 range y 0\n"
-        "pcdc node apply mech-m-b-c type 2 (1,0) range y 2\npcdc node apply mech-f-b-c f-y 2e3 range y 2\n")  # fmt: skip
+        "pcdc node apply mech-m-b-c type 2 (1,0) range y 2\n"
+        "pcdc node apply mech-f-b-c f-y 2e3 range y 2\n")  # fmt: skip
 
     def prescribed() -> set[str]:
         rows = [rock.blocks.conditions[row] for row in np.unique(rock.blocks.corner_row)]
@@ -240,7 +242,8 @@ def test_plane_stress_by_other_moduli(tmp_path):
             "pcdc node boundary apply mech-vel-b-c v-y 0 range y 0\n"
             "pcdc node boundary apply mech-vel-b-c v-x 0 range x 0\n"
             "pcdc element-face boundary apply m-s-b-c s-n -1e6 range y 1\npcdc model option dynamic off\n"
-            "pcdc model solve cycle 20000 ratio 1e-8\nsag = pcdc.values('node', 'displacement-y', y=(1, 1))\n")  # fmt: skip
+            "pcdc model solve cycle 20000 ratio 1e-8\n"
+            "sag = pcdc.values('node', 'displacement-y', y=(1, 1))\n")  # fmt: skip
         found.append(-float(np.mean(rock["sag"])))
     assert found == pytest.approx([1e6 * (1 - nu**2) / young, 1e6 / young], rel=1e-5)
     assert found == pytest.approx([4.6875e-4, 5e-4], rel=1e-5)

@@ -228,8 +228,7 @@ def stress(
     dip: Number | None = None,
 ) -> None:
     """Traction of faces [Pa], dip: along them; quiet: waves leave through them; incoming_x, _y, _z: velocity [m/s] of
-    one that comes in.
-    Without a range: all faces on the surface of the model."""
+    one that comes in. Without a range: all faces on the surface of the model."""
     _known(project, xx, yy, zz, normal, incoming_x, incoming_y, incoming_z, dip)
     faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
     blocks = project.ready()

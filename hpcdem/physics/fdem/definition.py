@@ -59,9 +59,8 @@ RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
 @dataclass(frozen=True)
 class Traction:
     """Stress on faces [Pa]: components, along the normal, and in the plane along the face (dip), counter-clockwise
-    about
-    the body. quiet: waves leave through the face; incoming_x, _y, _z:
-    the velocity of one that comes in through it [m/s]."""
+    about the body. quiet: waves leave through the face; incoming_x, _y, _z: the velocity of one that comes in through
+    it [m/s]."""
 
     xx: Number = 0.0
     yy: Number = 0.0
