@@ -1233,7 +1233,7 @@ class ModelDefinition:
                 elif kind == moving.ACCELERATION:
                     out[row, at[k]] = self._now(value, time) * dt
                 out[row, force + k] = self._now(getattr(one, f"force_{axis}"), time) * getattr(one, f"part_{axis}")
-            out[row, constraint], out[row, moving.DAMP if plane else space.DAMP] = one.constraint, one.damp
+            out[row, constraint], out[row, moving.DAMP if plane else space.NODE_DAMP] = one.constraint, one.damp
             out[row, way : way + len(one.way)] = one.way
         return out
 

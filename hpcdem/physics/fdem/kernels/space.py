@@ -22,7 +22,7 @@ UNBOUND, FIXED, ALONG, ACROSS = 0, 1, 2, 3
 """Move constraints of a node: along a vector only, in the plane across it only."""
 # Columns of the table of conditions at the present moment (rows, 14): what x, y and z do, at which value, the nodal
 # force, the constraint and its unit vector, local damping (negative: that of the model).
-DOES, AT, FORCE, CONSTRAINT, WAY, DAMP = 0, 3, 6, 9, 10, 13
+DOES, AT, FORCE, CONSTRAINT, WAY, NODE_DAMP = 0, 3, 6, 9, 10, 13
 CONDITION = 14
 # Columns of the table of tractions at the present moment (rows, 7) [Pa].
 XX, YY, XY, NORMAL, ZZ, XZ, YZ, INCOMING = range(8)  # and two more of the last
@@ -224,7 +224,7 @@ def _move(
         fx, fy, fz = fx + ex, fy + ey, fz + ez
         at = U(corner[begin[i]])
         vx, vy, vz = v[at], v[at + U(1)], v[at + U(2)]
-        drag = alpha if table[q, DAMP] < 0.0 else table[q, DAMP]
+        drag = alpha if table[q, NODE_DAMP] < 0.0 else table[q, NODE_DAMP]
         wx = vx + k * laws.damped(fx, vx, drag)
         wy = vy + k * laws.damped(fy, vy, drag)
         wz = vz + k * laws.damped(fz, vz, drag)
