@@ -77,7 +77,7 @@ class Frame:
 
     def xarray(self, object: str | None = None) -> Any:
         """`table` as an xarray.Dataset along the numbers of the objects; units are attributes of the variables."""
-        return _with_units(self.pandas(object), self._moment.dim, {"step": self.step, "time": self.time})
+        return _with_units(self.pandas(object), self._moment, {"step": self.step, "time": self.time})
 
     def picture(
         self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Unpack[Looks]
@@ -177,7 +177,7 @@ class Frames(Sequence[Frame]):
         there yet, or no more."""
         data = self.pandas(object)
         times = data.pop("time").groupby("step").first()
-        found = _with_units(data, self[0]._moment.dim, {})
+        found = _with_units(data, self[0]._moment, {})
         return found.assign_coords(time=("step", times.to_numpy()))
 
     def _each(self) -> Iterator[Frame]:
@@ -221,14 +221,12 @@ def shown(title: str, picture: bytes | None) -> str:
     return f"<div>{html.escape(title)}{tag}</div>"
 
 
-def _with_units(data: Any, dim: int, about: dict[str, Any]) -> Any:
-    from hpcdem.post.view.moment import unit_of
-
+def _with_units(data: Any, moment: Moment, about: dict[str, Any]) -> Any:
     _needed("xarray")
     found = data.to_xarray()
     for name in found.data_vars:
         stem = name.removesuffix("_x").removesuffix("_y").removesuffix("_z")
-        unit = "m" if name in ("x", "y", "z") else unit_of(stem, dim)
+        unit = moment.unit_of("x" if name in ("x", "y", "z") else stem)
         if unit:
             found[name].attrs["units"] = unit
     return found.assign_attrs(about)

@@ -218,7 +218,7 @@ def common(files: Sequence[Path], view: ModelView) -> tuple[View, ModelView]:
 
 
 def _list(files: Sequence[Path]) -> None:
-    from hpcdem.post.view.moment import read_moment, unit_of
+    from hpcdem.post.view.moment import read_moment
 
     moment = read_moment(files[-1])
     click.echo(f"{files[-1]}: step {moment.step}, time {moment.time:.6g} s")
@@ -226,4 +226,4 @@ def _list(files: Sequence[Path]) -> None:
         click.echo(f"{name} ({objects.count})")
         for field in objects.known():
             kind = "length of the vector" if field in objects.vectors else ", ".join(objects.names.get(field, ()))
-            click.echo(f"  {field:<24} {unit_of(field, moment.dim):<6} {kind}".rstrip())
+            click.echo(f"  {field:<24} {moment.unit_of(field):<6} {kind}".rstrip())

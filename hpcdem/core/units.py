@@ -102,6 +102,11 @@ def label(name: str, unit: str) -> str:
     return SYSTEMS[name].label(unit) if name else unit
 
 
+def declared(name: str) -> str:
+    """The units that a model declared, "" for those of SI, which frames have unless they say otherwise."""
+    return "" if name == SI.name else name
+
+
 def kind_of(name: str, unit: str) -> Kind | None:
     """The kind of a property, None if nothing is declared of it."""
     unit, name = _ALSO.get(unit, unit), name.replace("-", "_")

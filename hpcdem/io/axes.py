@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from hpcdem.core.units import power_of_ten
+from hpcdem.core.units import label, power_of_ten
 from hpcdem.io.frame import Frame
 
 UNITS = ((1e3, 1e3, "km"), (1.0, 1.0, "m"), (0.05, 0.01, "cm"), (1e-3, 1e-3, "mm"), (0.0, 1e-6, "µm"))
@@ -36,12 +36,13 @@ class Ticks:
 
 @dataclass(frozen=True)
 class View:
-    """The rectangle shown [m], and the unit of its axes."""
+    """The rectangle shown [m], and the unit of its axes; system: units that the model declared, "" SI."""
 
     left: float
     right: float
     bottom: float
     top: float
+    system: str = field(default="", kw_only=True)
 
     @property
     def width(self) -> float:
@@ -53,7 +54,9 @@ class View:
 
     @property
     def unit(self) -> tuple[float, str]:
-        """Length in metres and name of the axes' unit."""
+        """Length in metres and name of the axes' unit; in declared units that one."""
+        if self.system:
+            return 1.0, label(self.system, "m")
         longer = max(self.width, self.height)
         return next((size, name) for least, size, name in UNITS if longer >= least)
 

@@ -77,7 +77,8 @@ class Frame:
     """All that is written at one output time.
 
     tables: "particles", "contacts", "bonds", "wall_contacts"; walls: columns of the wall table (BOX walls first,
-    ids fields.BOX_IDS, in this order); settings: left, right, bottom, height, gx, gy, disk, frac, lsm. SI units
+    ids fields.BOX_IDS, in this order); settings: left, right, bottom, height, gx, gy, disk, frac, lsm, and units where
+    the model declared others than SI. SI units
     throughout.
     """
 

@@ -43,7 +43,7 @@ class MeshFrame:
     corners: number (element * 4 + k), x, y and further columns; elements: number, corners (how many) and further
     columns; joints: number, their `CORNERS` and further columns. group_names: by name of an integer
     column of the elements what its values stand for. supports: by name ("bolts", "liners") columns of their "nodes"
-    and "elements", equal on all ranks. tables: of `TABLES`, by name.
+    and "elements", equal on all ranks. tables: of `TABLES`, by name. units: that the model declared, "" SI.
     """
 
     step: int
@@ -55,6 +55,7 @@ class MeshFrame:
     group_names: Mapping[str, list[str]]
     supports: Supports = field(default_factory=dict)
     tables: Mapping[str, Table] = field(default_factory=dict)
+    units: str = ""
 
 
 @dataclass
@@ -64,7 +65,7 @@ class MeshState:
     points (n, 2), in space (n, 3): corners [m]; cells (ne, 4): rows of points, -1 in the fourth column of triangles;
     joints (nj, 2), in space (nj, 3): rows of points of their corners; of_points, of_elements, of_joints: columns by
     name, vectors as points;
-    group_names and supports as in `MeshFrame`; tables: columns of `TABLES`, vectors as points.
+    group_names, supports and units as in `MeshFrame`; tables: columns of `TABLES`, vectors as points.
     """
 
     step: int
@@ -79,6 +80,7 @@ class MeshState:
     group_names: Mapping[str, list[str]]
     supports: Supports = field(default_factory=dict)
     tables: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    units: str = ""
 
 
 def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
@@ -99,7 +101,7 @@ def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
         _cells(elements["corners"]), ends, _flat({k: v for k, v in corners.items() if k not in ("x", "y", "z")}),
         {k: v for k, v in elements.items() if k != "corners"},
         {k: v for k, v in joints.items() if k not in of_joints}, frame.group_names, frame.supports,
-        dict(zip(frame.tables, map(_flat, others), strict=True)),
+        dict(zip(frame.tables, map(_flat, others), strict=True)), frame.units,
     )  # fmt: skip
 
 
@@ -169,7 +171,7 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool =
             of_points, of_elements, of_joints = tables
             return MeshState(
                 int(about["step"]), float(about["time"]), float(about["dt"]), points, _cells(sizes), ends, of_points,
-                of_elements, of_joints, names, supports, others,
+                of_elements, of_joints, names, supports, others, bytes(about.get("units", b"")).decode(),
             )  # fmt: skip
         except NotImplementedError:
             raise HpcdemError(f"{os.fspath(path)} is a frame in three dimensions: this is for two") from None
@@ -225,7 +227,8 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later
         out.group("VTKHDF/FieldData")
         out.whole("VTKHDF/FieldData/TimeValue", np.array([frame.time]))
         out.whole("VTKHDF/FieldData/step", np.array([frame.step], np.int64))
-        out.group("hpcdem", {"format": 1, "step": frame.step, "time": float(frame.time), "dt": float(frame.dt)})
+        about = {"format": 1, "step": frame.step, "time": float(frame.time), "dt": float(frame.dt)}
+        out.group("hpcdem", about | ({"units": np.bytes_(frame.units)} if frame.units else {}))
         for word, tables in frame.supports.items():
             out.group(word)
             for kind, of in tables.items():

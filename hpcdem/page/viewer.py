@@ -32,7 +32,7 @@ from hpcdem.page.maker import packed
 from hpcdem.page.server import Answer, BusyError, Call, PageServer, as_json
 from hpcdem.page.sources import Sources
 from hpcdem.post.view.model import Layer, ModelView, read_view, view_of, written
-from hpcdem.post.view.moment import BALLS, RODS, SPOTS, Moment, read_moment, unit_of
+from hpcdem.post.view.moment import BALLS, RODS, SPOTS, Moment, read_moment
 from hpcdem.post.view.scene import (
     Painted,
     Scene,
@@ -162,7 +162,9 @@ class Viewer:
         return {
             "step": moment.step, "time": moment.time, "view": view.model_dump(), "whole": [left, right, bottom, top],
             "objects": {name: objects.count for name, objects in moment.objects.items()},
-            "lengths": AXES, "order": list(OBJECTS), "displaced": moment.displacement is not None,
+            "lengths": [(0.0, 1.0, units.label(moment.units, "m"))] if moment.units else AXES,
+            "unit": units.label(moment.units, "m"), "order": list(OBJECTS),
+            "displaced": moment.displacement is not None,
             "colours": {name: _stops(name) for name in COLOURS}, "box": _box(moment), "eyes": EYES,
             "files": exports.kinds(), "chinese": _in_chinese(moment),
             "most": {"pixels": MOST_PIXELS, "side": LONGEST_SIDE},
@@ -194,7 +196,7 @@ class Viewer:
         waiting = objects.waiting()
         return {
             "fields": [
-                [name, unit_of(name, moment.dim)]
+                [name, moment.unit_of(name)]
                 for name in (*objects.fields, *objects.of_vectors())
                 if name in waiting or objects.filled(name)
             ],
@@ -251,7 +253,7 @@ class Viewer:
                 told = f"({', '.join(f'{part:.6g}' for part in value)})"
             else:
                 told = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
-            unit = unit_of(name, shown.moment.dim)
+            unit = shown.moment.unit_of(name)
             values.append([name, told, unit, _said(told if names else value, unit)])
         told_of = {"point": None if picture.near is None else self._hit(shown, picture, int(column), int(row))}
         number = objects.value(objects.number, which) if objects.number in objects.fields else which

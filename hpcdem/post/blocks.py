@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -195,7 +195,7 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
     """A matplotlib Figure with the panels, beside each other for tall models, else below each other."""
     from matplotlib.figure import Figure
 
-    seen = view(state) if seen is None else seen
+    seen = replace(view(state) if seen is None else seen, system=state.units)
     panels = looks.panels or panels_of(state)
     ratio = seen.height / seen.width
     beside = len(panels) > 1 and ratio > 0.7
@@ -229,7 +229,7 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
                 ((x + width + 0.25 * k) / page[0], y / page[1], 0.28 * k / page[0], height / page[1])
             )
             _bar(figure, colours, filled, looks.font)
-            axes.set_title(titled(shown, span), loc="right", fontsize=0.9 * looks.font, pad=3.0)
+            axes.set_title(titled(shown, span, state), loc="right", fontsize=0.9 * looks.font, pad=3.0)
         label = f"({'abcdefgh'[number]})" if len(panels) > 1 else ""
         axes.set_title(label, loc="left", fontsize=looks.font, pad=3.0)
     if looks.title is not None:
@@ -366,7 +366,7 @@ def coloured(axes: Any, state: MeshState, panel: str, span: tuple[float, float],
     if isinstance(shown, Contours):
         return contours(axes, state, shown, span)
     rock(axes, state, "face")
-    return fluid.draw(axes, state, shown, span, unit_of(shown, span)[0], 1.6 * line_width(state, scale))
+    return fluid.draw(axes, state, shown, span, unit_of(shown, span, state)[0], 1.6 * line_width(state, scale))
 
 
 def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, float]) -> Any:
@@ -375,7 +375,7 @@ def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, fl
 
     if not len(state.cells):
         return None
-    unit, _ = unit_of(shown, span)
+    unit, _ = unit_of(shown, span, state)
     levels = nice_levels(span[0] / unit, span[1] / unit)
     points, triangles, values = (cornered if shown.of_corners else smoothed)(state, shown.values(state))
     mesh = Triangulation(points[:, 0], points[:, 1], triangles)
@@ -389,14 +389,14 @@ def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, fl
     return filled
 
 
-def unit_of(shown: Contours | fluid.Shown, span: tuple[float, float]) -> tuple[float, str]:
-    """The unit in which values of this range are read best, in SI, and its name."""
-    return units.on_bar(*span, shown.unit)
+def unit_of(shown: Contours | fluid.Shown, span: tuple[float, float], state: MeshState) -> tuple[float, str]:
+    """The unit in which values of this range are read best, in that of the model, and its name."""
+    return units.on_bar(*span, units.label(state.units, shown.unit))
 
 
-def titled(shown: Contours | fluid.Shown, span: tuple[float, float]) -> str:
+def titled(shown: Contours | fluid.Shown, span: tuple[float, float], state: MeshState) -> str:
     """What stands over a bar."""
-    return f"{shown.title} ({unit_of(shown, span)[1] or '-'})"
+    return f"{shown.title} ({unit_of(shown, span, state)[1] or '-'})"
 
 
 def nice_levels(low: float, high: float) -> np.ndarray:

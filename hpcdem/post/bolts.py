@@ -49,7 +49,9 @@ def draw(axes: Any, state: MeshState) -> list[Any]:
             axes.add_collection(
                 PolyCollection(corners[rows], facecolors=shade, edgecolors="none", alpha=0.75, zorder=4), autolim=False
             )
-            handles.append(Patch(color=shade, label=f"{word} up to {with_prefix(np.abs(force[rows]).max(), 'N', 3)}"))
+            handles.append(
+                Patch(color=shade, label=f"{word} up to {with_prefix(np.abs(force[rows]).max(), 'N', 3, state.units)}")
+            )
     axes.add_collection(LineCollection(corners[:, :2], colors=BAR, linewidths=0.9, zorder=5), autolim=False)
     broken = state.supports["bolts"]["elements"]["bolt_state"].astype(np.int64) & BROKEN > 0
     if broken.any():

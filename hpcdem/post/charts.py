@@ -119,7 +119,8 @@ def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
             figure.colorbar(filled, cax=bar, orientation="horizontal", ticks=ticks)
         bar.tick_params(labelsize=0.8 * FONT, width=0.5, length=2.0, labelbottom=False, labeltop=True, bottom=False,
                         top=True, pad=1.0)  # fmt: skip
-        bar.text(-0.05, 0.5, blocks.titled(shown, shown.range(model)), fontsize=0.9 * FONT, ha="right", va="center",
+        title = blocks.titled(shown, shown.range(model), model)
+        bar.text(-0.05, 0.5, title, fontsize=0.9 * FONT, ha="right", va="center",
                  transform=bar.transAxes)  # fmt: skip
     else:
         modes = blocks.panel(left, model, seen, 2.54 * width)

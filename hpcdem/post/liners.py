@@ -64,8 +64,8 @@ def draw(axes: Any, state: MeshState) -> list[Any]:
     handles: list[Any] = []
     if force.any():
         most = float(force.reshape(-1)[np.abs(force).argmax()])
-        handles.append(Patch(color=FORCE, alpha=0.35, label=f"N up to {with_prefix(most, 'N/m', 3)}"))
+        handles.append(Patch(color=FORCE, alpha=0.35, label=f"N up to {with_prefix(most, 'N/m', 3, state.units)}"))
     if moment.any():
-        handles.append(Line2D([], [], color=MOMENT, linewidth=1.1,
-                              label=f"M up to {with_prefix(np.abs(moment).max(), 'N m/m', 3)}"))  # fmt: skip
+        said = with_prefix(float(np.abs(moment).max()), "N m/m", 3, state.units)
+        handles.append(Line2D([], [], color=MOMENT, linewidth=1.1, label=f"M up to {said}"))
     return handles or [Line2D([], [], color=BEAM, linewidth=1.8, label="liner without force")]

@@ -91,7 +91,7 @@ def seen_of(frame: Frame, style: Style) -> View:
             f"nothing to show: x from {sides['left']:g} to {sides['right']:g} m, "
             f"y from {sides['bottom']:g} to {sides['top']:g} m"
         )
-    return View(**sides)
+    return View(*(sides[side] for side in SIDES))
 
 
 def moved(frame: Frame, x: float, y: float) -> Frame:
@@ -115,7 +115,7 @@ def draw_frame(
     """
     from hpcdem.post.layers import LAYERS
 
-    seen = view(frame) if seen is None else seen
+    seen = replace(view(frame) if seen is None else seen, system=str(frame.settings.get("units", "")))
     ax.set(xlim=(seen.left, seen.right), ylim=(seen.bottom, seen.top), aspect="equal")
     for word, draw in LAYERS.items():
         if word in what:
@@ -146,7 +146,7 @@ def frame_figure(
     """A matplotlib Figure of the frame, as wide as a page; as high as it must be, or narrower if too high."""
     from matplotlib.figure import Figure
 
-    seen = seen_of(frame, style) if seen is None else seen
+    seen = replace(seen_of(frame, style) if seen is None else seen, system=str(frame.settings.get("units", "")))
     if style.move != (0.0, 0.0):
         frame = moved(frame, *style.move)
     growth = style.font / FONT

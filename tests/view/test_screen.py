@@ -10,7 +10,7 @@ from hpcdem.post.view import reference
 from hpcdem.post.view.model import Layer, ModelView
 from hpcdem.post.view.moment import DISCS, LINES, POLYGONS, Moment, Objects
 from hpcdem.post.view.scene import scene
-from hpcdem.post.view.screen import Picture, paint
+from hpcdem.post.view.screen import DARK_GROUND, Picture, paint
 
 WIDTH, HEIGHT = 120, 80
 SEEN = View(0.0, 12.0, 0.0, 8.0)  # ten pixels per metre, y upwards
@@ -98,6 +98,6 @@ def test_outlines_size_arrows_and_ground():
     disc = np.array([[5.0, 4.0]]), np.array([2.0])
     assert not np.array_equal(picture(DISCS, disc).colours, picture(DISCS, disc, edges=True).colours)
     assert (picture(DISCS, disc, size=0.5).row == 0).sum() < (picture(DISCS, disc).row == 0).sum()
-    assert (picture(DISCS, disc, dark=True).colours[0, 0] == (18, 24, 26)).all()
+    assert (picture(DISCS, disc, dark=True).colours[0, 0] == DARK_GROUND).all()
     fine = picture(DISCS, disc, fine=2)
     assert fine.row.shape == (HEIGHT, WIDTH) and len(np.unique(fine.colours.reshape(-1, 3), axis=0)) > 2

@@ -236,7 +236,7 @@ def test_each_option_alone_changes_the_picture(tmp_path: Path):
 
 
 def test_colours_without_a_field_one_colour_and_logarithms(rock: Moment, tmp_path: Path):
-    usual = default_view(rock)
+    usual = default_view(rock).with_layer("elements", field="")
     views = [usual, usual.with_layer("elements", colour="#00ff00"), with_field(usual, rock, "displacement"),
              with_field(usual, rock, "displacement", log=True), with_field(usual, rock, "group_rock")]  # fmt: skip
     found = [pixels(rock, view, tmp_path / f"{k}.png") for k, view in enumerate(views)]

@@ -15,6 +15,7 @@ from hpcdem.commands.fdem import frame_tables
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.values import frames_name
 from hpcdem.core.errors import CommandError
+from hpcdem.core.units import declared
 from hpcdem.io import vtkhdf_mesh
 from hpcdem.io.behind import Deliveries, under_way
 from hpcdem.io.frame import Table
@@ -218,7 +219,8 @@ def _of_mesh(project: Project) -> MeshFrame:
     of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
     clock = blocks.clock
     return MeshFrame(
-        int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names
+        int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
+        units=declared(project.units),
     )  # fmt: skip
 
 
@@ -243,4 +245,5 @@ def frame(project: Project, sound: bool = True) -> MeshFrame:
         return MeshFrame(
             int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
             {found.name: found.columns() for found in there}, frame_tables.tables(blocks) if sound else {},
+            declared(project.units),
         )  # fmt: skip

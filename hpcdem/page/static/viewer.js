@@ -313,7 +313,7 @@ function listen(one) {
   });
   canvas.addEventListener("pointermove", (event) => {
     const { x, y } = one.at(event);
-    $("place").textContent = about.box ? `→ ${short(x)}  ↑ ${short(y)} m` : `x ${short(x)}  y ${short(y)} m`;
+    $("place").textContent = about.box ? `→ ${short(x)}  ↑ ${short(y)} ${about.unit}` : `x ${short(x)}  y ${short(y)} ${about.unit}`;
     if (!drag) return;
     const k = one.camera.width / canvas.clientWidth;
     if (event.clientX === drag.x && event.clientY === drag.y) return;
@@ -650,7 +650,7 @@ async function query(one, at) {
     if (!found.object) { told(say("nothing")); return; }
     told("");
     $("answer-title").textContent = say("number", { object: found.label === found.object ? say(found.object) : found.label, number: found.number });
-    const rows = [...["x", "y", ...(turn ? ["z"] : [])].map((axis) => [axis, `${short(found[axis])} m`]),
+    const rows = [...["x", "y", ...(turn ? ["z"] : [])].map((axis) => [axis, `${short(found[axis])} ${about.unit}`]),
       ...found.values.filter(([name]) => !["x", "y", ...(turn ? ["z"] : [])].includes(name)).map(([name, , , text]) => [name, text])];
     $("values").replaceChildren(...rows.map(([name, text]) => {
       const row = document.createElement("tr");
@@ -681,10 +681,10 @@ async function measure(one, at) {
   if (first) return;
   const [[x0, y0], [x1, y1]] = one.points;
   const [a, b] = one.places;
-  const flat = { d: short(Math.hypot(x1 - x0, y1 - y0)), x: short(x1 - x0), y: short(y1 - y0) };
+  const flat = { unit: about.unit, d: short(Math.hypot(x1 - x0, y1 - y0)), x: short(x1 - x0), y: short(y1 - y0) };
   if (a && b) {
     const by = b.map((v, k) => v - a[k]);
-    told(say("distance_space", { d: short(Math.hypot(...by)), x: short(by[0]), y: short(by[1]), z: short(by[2]) }));
+    told(say("distance_space", { unit: about.unit, d: short(Math.hypot(...by)), x: short(by[0]), y: short(by[1]), z: short(by[2]) }));
   } else told(say(about.box ? "distance_flat" : "distance", flat));
 }
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from hpcdem.core.fields import ANGLE, FIELDS, FIX, GID, MATERIAL, RADIUS
 from hpcdem.core.material import PROPERTIES
+from hpcdem.core.units import declared
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.numerics.exact_sum import BINS_SHAPE, exact_sum, rounded_sums
@@ -496,4 +497,6 @@ def frame(sim: Simulation) -> Frame:
         "left": box[0], "right": box[1], "bottom": box[2], "height": box[3] - box[2],
         "gx": s.gx, "gy": s.gy, "disk": s.disk, "frac": s.frac, "lsm": s.lsm,
     }  # fmt: skip
+    if units := declared(s.units):
+        settings["units"] = units
     return Frame(sim.clock.step, sim.clock.time, sim.clock.dt, settings, walls, tables, list(sim.groups))

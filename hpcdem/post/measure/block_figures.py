@@ -385,7 +385,7 @@ def fluid(parts: Sequence[Part], state: MeshState) -> Any:
     shown = pictures.PICTURES["pressure"]
     span = shown.range(state)
     drawn = blocks.coloured(sheet.maps[0], state, "pressure", span, sheet.scale)
-    _fluid_bar(sheet.figure, drawn, sheet.bar(), blocks.titled(shown, span))
+    _fluid_bar(sheet.figure, drawn, sheet.bar(), blocks.titled(shown, span, state))
     _letters([*sheet.panels, sheet.maps[0]])
     return sheet.figure
 
@@ -453,7 +453,7 @@ def _fluid_in_space(parts: Sequence[Part], state: MeshState) -> Any:
     left = box.x0 + max(0.0, 0.5 * (box.width - (width + bar) / w))
     seen.set_position((left, box.y0, width / w, height / h))
     pressure, span = shown.values(state)[rows], shown.range(state)
-    size, unit = blocks.unit_of(shown, span)
+    size, unit = blocks.unit_of(shown, span, state)
     wet = np.isfinite(pressure)
     seen.add_collection(PolyCollection(flat[~wet], facecolors=pictures.DRY, edgecolors="face", linewidths=0.2))
     drawn = PolyCollection(flat[wet], array=pressure[wet] / size, cmap=shown.colours, linewidths=0.5, edgecolors="face")

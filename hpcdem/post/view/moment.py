@@ -13,6 +13,7 @@ import numpy as np
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.fields import PER_METRE
+from hpcdem.core.units import label
 from hpcdem.io.frame import Columns, Frame, Table, part
 from hpcdem.io.frames import read_frame
 from hpcdem.io.vtkhdf_mesh import CONTACTS, CORNERS, FACE_CONDITIONS, MeshState, is_mesh_frame, read_mesh_frame
@@ -186,13 +187,18 @@ def there(values: np.ndarray) -> bool:
 @dataclass
 class Moment:
     """A frame. displacement: (k, dim) [m] of the points of the elements, None where the frame has none; dim: dimensions
-    of space."""
+    of space; units: that the model declared, "" SI."""
 
     step: int
     time: float
     objects: dict[str, Objects]
     displacement: Callable[[], np.ndarray] | None = None
     dim: int = 2
+    units: str = ""
+
+    def unit_of(self, name: str) -> str:
+        """The unit of a field, as the model calls it."""
+        return label(self.units, unit_of(name, self.dim))
 
     def of(self, name: str) -> Objects:
         """The objects of a kind. HpcdemError that names what there is."""
@@ -302,7 +308,7 @@ def of_particles(frame: Frame) -> Moment:
         pulls = {"force": pair(table, "fx", "fy")} if "fx" in table else {}
         columns = Columns({column: partial(part, table, column) for column in table}, KEPT)
         objects[name] = Objects(LINES, frame.tables[name].total, lines, columns, Columns(pulls, KEPT), number="")
-    return Moment(frame.step, frame.time, objects)
+    return Moment(frame.step, frame.time, objects, units=str(frame.settings.get("units", "")))
 
 
 def _clumps(
@@ -407,7 +413,7 @@ def of_blocks(state: MeshState) -> Moment:
     for name, table in state.tables.items():
         objects[name] = _further(state, name, table)
     displacement = (lambda: state.of_points["displacement"]) if "displacement" in state.of_points else None
-    return Moment(state.step, state.time, objects, displacement, dim)
+    return Moment(state.step, state.time, objects, displacement, dim, state.units)
 
 
 def _of_stress(given: Mapping[str, np.ndarray], dim: int) -> dict[str, _Reader]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from hpcdem.io.axes import View, bar_ticks
 from hpcdem.post import blocks
 from hpcdem.post.view.filter import chosen, refusal
 from hpcdem.post.view.model import Layer, ModelView
-from hpcdem.post.view.moment import BALLS, DISCS, LINES, RODS, SOLIDS, SPOTS, Moment, Objects, lengths, unit_of
+from hpcdem.post.view.moment import BALLS, DISCS, LINES, RODS, SOLIDS, SPOTS, Moment, Objects, lengths
 
 STEPS = 256
 """Colours of a field."""
@@ -279,7 +279,7 @@ def scene(
 ) -> Scene:
     """Put a view of a frame together. only: numbers of the objects that may be shown, by kind. HpcdemError for what the
     frame does not have."""
-    seen = seen_of(moment, view) if seen is None else seen
+    seen = replace(seen_of(moment, view) if seen is None else seen, system=moment.units)
     shifted = shift_of(moment, view.deformed)
     plane = plane_of(moment, view)
     layers = [
@@ -370,7 +370,7 @@ def painted(
         WIDTH.get(layer.object, 1.0) * layer.size,
     )
     if layer.field:
-        _by_field(result, objects, moment.dim)
+        _by_field(result, objects, moment)
     elif layer.colour:
         _one_colour(result, layer.colour)
     else:
@@ -402,7 +402,7 @@ def painted(
         else:
             result.shape = points, _of(whole[1], rows)
     if layer.vectors:
-        result.arrows = _arrows(objects, result, seen)
+        result.arrows = _arrows(moment, objects, result, seen)
     return result
 
 
@@ -474,7 +474,7 @@ def _span(values: np.ndarray, layer: Layer) -> tuple[float, float]:
     return (low, high) if low < high else (least, greatest)
 
 
-def _by_field(result: Painted, objects: Objects, dim: int) -> None:
+def _by_field(result: Painted, objects: Objects, moment: Moment) -> None:
     layer = result.layer
     values = _of(np.asarray(objects.values(layer.field, layer.object)), result.rows)
     names = objects.names.get(layer.field)
@@ -491,7 +491,7 @@ def _by_field(result: Painted, objects: Objects, dim: int) -> None:
         low, high = (low / 2.0, 2.0 * low) if layer.log else (low - 0.05 * abs(low), low + 0.05 * abs(low))
     slack = 1e-9 * (high - low)
     result.scale = Scale(
-        layer.field.replace("_", " "), unit_of(layer.field, dim), low, high, layer.log, layer.colours,
+        layer.field.replace("_", " "), moment.unit_of(layer.field), low, high, layer.log, layer.colours,
         bool((values < low - slack).any()), bool((values > high + slack).any()),
     )  # fmt: skip
     result.values = values
@@ -583,7 +583,7 @@ def _as_usual(result: Painted, objects: Objects) -> None:
         _one_colour(result, INK.get(name, "#202020"))
 
 
-def _arrows(objects: Objects, result: Painted, seen: View) -> tuple[np.ndarray, np.ndarray]:
+def _arrows(moment: Moment, objects: Objects, result: Painted, seen: View) -> tuple[np.ndarray, np.ndarray]:
     """From the middle of the objects; in space from that of their faces that are seen."""
     layer, rows = result.layer, result.rows
     if layer.vectors not in objects.vectors:
@@ -610,7 +610,7 @@ def _arrows(objects: Objects, result: Painted, seen: View) -> tuple[np.ndarray, 
     factor = layer.arrows * ARROW * seen.width / max(longest, 1e-300)
     if longest > 0.0:
         value = _round(min(longest, LONGEST * seen.width / factor))
-        said = units.printed(units.with_prefix(value, unit_of(layer.vectors, objects.dim)))
+        said = units.printed(units.with_prefix(value, moment.unit_of(layer.vectors)))
         result.reference = Reference(f"{layer.vectors.replace('_', ' ')} {said}", factor * value)
     return at[some][shown], far[shown] * factor
 
