@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 
+from hpcdem.lang.pcdc import check
 from tests.conftest import ROOT
 from tests.pcdc.test_time import Rock
 
@@ -38,7 +39,7 @@ pcdc node boundary mech-vel-b-c velocity-y table 'pull' range y 0.08 0.08
 pcdc model time-step value 1e-7
 pcdc model solve time 1.2e-4
 """,
-    "A slope of which a part is taken out": """\
+    "A slope of which a part is taken out, with water": """\
 pcdc geometry create polygon (4,2) (8,2) (8,4) (4,4) as-layer 'cut'
 pcdc mesh structured (0,0) (8,4) cells 16 8 type tri
 pcdc element c-model mech-m-c property density 2000 young 5e7 poisson-ratio 0.3 friction 25 cohesion 2e4 tensile 5e3
@@ -52,6 +53,8 @@ pcdc model option dynamic off
 pcdc model solve cycles 400 ratio 1e-4
 pcdc node reset displacement
 pcdc element c-model null range group 'cut'
+pcdc geometry create polyline (4,3) (8,3) as-layer 'lake'
+pcdc element water surface 'lake' density 1000
 pcdc model solve cycles 300
 """,
     "A dam with seepage": f"""\
@@ -99,7 +102,8 @@ pcdc mesh structured (0,0) (6,1) cells 24 4 type quad
 pcdc element c-model mech-iso-elastic property density 2500 young 20e9 poisson-ratio 0.25
 pcdc node boundary mech-m-b-c type 2 (1,0)
 pcdc model step 10
-pcdc table create 'blast' values ([pcdc.time],0) ([1e-4 + pcdc.time],-2e6) ([3e-4 + pcdc.time],0) ([1 + pcdc.time],0)
+t = pcdc.time
+pcdc table create 'blast' values ([t],0) ([1e-4 + t],-2e6) ([3e-4 + t],0) ([1 + t],0)
 pcdc element-face boundary m-s-b-c stress-normal table 'blast' range x 0 0
 pcdc element-face boundary m-s-b-c quiet on range x 6 6
 pcdc model solve time 2e-3
@@ -107,11 +111,44 @@ pcdc model solve time 2e-3
     "An imported mesh": """\
 pcdc mesh import 'large.msh'
 pcdc element c-model mech-iso-elastic property density 2500 young 2e9 poisson-ratio 0.25
-pcdc element c-model mech-iso-elastic property density 4000 young 8e9 poisson-ratio 0.25 range group 'ore' set 'physical'
+pcdc element c-model mech-iso-elastic property density 4000 young 8e9 poisson-ratio 0.25 range group 'ore' \\
+     set 'physical'
 pcdc model gravity (0,-9.8)
 pcdc node boundary mech-vel-b-c velocity-x 0 velocity-y 0 range y 0 0
 pcdc model option dynamic off
 pcdc model solve cycles 200 ratio 1e-6
+""",
+    "A tunnel in stages, with bolts and a support": """\
+pcdc mesh structured (0,0) (8,8) cells 16 16 type quad
+pcdc element c-model mech-iso-elastic property density 2500 young 3e9 poisson-ratio 0.25
+pcdc element group 'top heading' set 'stages' range x 3 5 y 4 5
+pcdc element group 'bench' set 'stages' range x 3 5 y 3 4
+pcdc element initial stress-xx -3e6 stress-yy -5e6
+pcdc node boundary mech-vel-b-c velocity-x 0 range x 0 0
+pcdc node boundary mech-vel-b-c velocity-x 0 range x 8 8
+pcdc node boundary mech-vel-b-c velocity-y 0 range y 0 0
+pcdc element-face boundary m-s-b-c stress-normal -5e6 range y 8 8
+pcdc model option dynamic off
+pcdc element c-model null range group 'top heading' set 'stages'
+pcdc model solve cycles 150 ratio 1e-5
+for x in (3.25, 4, 4.75):
+    pcdc bolt create polyline ([x],5) ([x],7.2) length 0.5 group 'roof'
+pcdc bolt create polyline (2.6,2.7) (5.4,2.7) length 0.5 group 'floor'
+pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 tensile-yield-force 2e5 \\
+     shear-stiffness-rock-bolt 1e9 grout-thickness 0.02 cohesion-rock-grout 1e6 cohesion-grout-bolt 2e6 spacing 1
+pcdc element c-model null range group 'bench' set 'stages'
+pcdc model solve cycles 250 ratio 1e-5
+""",
+    "A block that splits between two plates": """\
+pcdc geometry create circle center (0,0) radius 0.03 segment-length 0.006 as-layer 'disc'
+pcdc element create geometry layer 'disc' mesh-size 0.008
+pcdc element c-model mech-iso-elastic property density 2500 young 20e9 poisson-ratio 0.2 damp-factor 0.2
+pcdc face-joint c-model c-i-c-i property friction 35 cohesion 8e6 tensile-strength 2e6 gf1 4 gf2 40 penalty-normal \\
+     2e11 penalty-shear 2e11 penalty-overlay 2e11
+pcdc node boundary mech-vel-b-c velocity-x 0 velocity-y 0 range y -0.03 -0.0285
+pcdc node boundary mech-vel-b-c velocity-x 0 velocity-y -0.4 range y 0.0285 0.03
+pcdc model time-step value 1e-7
+pcdc model solve time 4e-5
 """,
     "An excavation in three dimensions": """\
 pcdc model new dim 3
@@ -147,10 +184,13 @@ def mesh_file(scale: float, move: float) -> str:
 def found(rock: Rock) -> dict[str, bytes]:
     """Bits of what moved, of the fluid and of the heat."""
     blocks = rock.blocks
-    out = {"x": blocks.x.tobytes(), "v": blocks.v.tobytes(), "clock": repr((blocks.clock.step, blocks.clock.time)).encode()}
+    clock = repr((blocks.clock.step, blocks.clock.time)).encode()
+    out = {"x": blocks.x.tobytes(), "v": blocks.v.tobytes(), "clock": clock}
     for load in blocks.surface_loads:
         if load.name == "fluid":
             out |= {"fluid": load.state.tobytes(), "time of fluid": repr(load.time).encode()}
+        if load.name == "bolts":
+            out |= {f"bolts {name}": column.tobytes() for name, column in load.nodes.items()}
         if load.name == "heat":
             out |= {"heat": rock.blocks.cold["temperature"].tobytes(), "time of heat": repr(load.time).encode()}
     return out
@@ -169,6 +209,21 @@ def test_a_script_has_the_bits_of_its_twin(tmp_path, name):
     assert found(theirs) == found(ours)
     moved = np.abs(theirs.blocks.v).max() if theirs.blocks.options.mechanical else 1.0
     assert moved > 0.0 and theirs.project.step > 0
+
+
+def test_a_look_at_the_scripts_finds_their_names():
+    """hpcdem --check: layers, tables and groups that words of PCDC make are known, those that none makes are named."""
+    for name, text in SCRIPTS.items():
+        assert "warning" not in check.summary(text, "a.sc"), name
+    for text, what in (
+        ("pcdc n g 'a' range geometry-distance 'bed' within 1\n", "line 1: no line makes the geometry layer 'bed'"),
+        ("pcdc f-j g 'a' range not geom-a 'bed'\n", "line 1: no line makes the geometry layer 'bed'"),
+        ("pcdc table 'a' data 0 1\npcdc n apply mech-f-b-c f-x table 'b'\n", "line 2: no line makes the table 'b'"),
+        ("pcdc element create geometry layer 'out' m-s 1\n", "line 1: no line makes the geometry layer 'out'"),
+        ("pcdc element create brick p0 0,0 p1 1,0 p2 0,1 n 1 1 group 'a'\npcdc e hide on range group 'b'\n",
+         "line 2: no line makes the group 'b' of elements"),
+    ):  # fmt: skip
+        assert what in check.summary(text, "a.sc")
 
 
 def test_the_block_sags_by_what_theory_says(tmp_path):

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
+from collections.abc import Iterator
+from typing import Any
 
 from hpcdem.commands.fdem.packages import EXTRA, NEEDED
 from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.pcdc import source
+from hpcdem.lang.pcdc.bindings import DEFAULT_LAYER
 from hpcdem.lang.pcdc.kinds import Pending, TableName
 from hpcdem.lang.pcdc.source import Source
 from hpcdem.lang.pcdc.statement import Statement
@@ -79,22 +82,21 @@ def _loose_names(script: Source) -> list[str]:
     used: list[tuple[int, str, str]] = []
     for statement in script.statements:
         name, given = statement.command.name, statement.arguments
-        if name in ("model restore", "mesh import"):
+        if name == "model restore" or name.split()[1:2] == ["import"] and name != "geometry import":
             return []
-        if name == "mesh structured" or name == "mesh equilateral":
+        if name in ("mesh structured", "mesh equilateral", "element create brick"):
             made["geometry layer"] |= {"left", "right", "bottom", "top"}
-        kind = {"table create": "table", "field create": "field"}.get(name, "geometry layer")
-        if "as-layer" in given or kind != "geometry layer":
+        kind = {"table create": "table", "table": "table", "field create": "field"}.get(name, "geometry layer")
+        if name.startswith("geometry ") and "as-layer" not in given:
+            made[kind].add(DEFAULT_LAYER)
+        if "as-layer" in given or (kind != "geometry layer" and (name != "table" or "data" in given)):
             new = given.get("as-layer", given.get("name"))
             if isinstance(new, Pending):
                 return []
             made[kind].add(new)
-        for word in ("from-layer", "layer", "inside"):
-            if isinstance(given.get(word), str):
-                used.append((statement.line, "geometry layer", given[word]))
-        for term, value in statement.range or ():
-            if term == "geometry" and isinstance(value, str):
-                used.append((statement.line, "geometry layer", value))
+        layers = [given.get(word) for word in ("from-layer", "layer", "inside", "surface", "layers")]
+        layers += [value for term, value in statement.range or () if term.startswith("geometry")]
+        used += [(statement.line, "geometry layer", layer) for layer in _names(layers)]
         for value in (*given.values(), *given.get("properties", {}).values()):
             match value:
                 case TableName(of) | Over(of, _) if isinstance(of, str):
@@ -103,6 +105,17 @@ def _loose_names(script: Source) -> list[str]:
                     used.append((statement.line, "field", of))
     found = [(line, f"{kind} '{name}'") for line, kind, name in used if name not in made[kind]]
     return [f"line {line}: no line makes the {what}" for line, what in sorted(found + _loose_groups(script))]
+
+
+def _names(value: Any) -> Iterator[str]:
+    """Texts in what follows a keyword, not those of words behind it."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, list):
+        for one in value:
+            yield from _names(one)
+    elif isinstance(value, dict):
+        yield from _names(value.get("value"))
 
 
 _GROUPED = {"element": "element", "node": "node", "element-face": "face", "face-joint": "joint"}
@@ -116,7 +129,9 @@ def _loose_groups(script: Source) -> list[tuple[int, str]]:
     unknown: set[str] = set()
     for statement in script.statements:
         words, given = statement.command.name.split(), statement.arguments
-        if words[0] == "mesh" and words[1] in ("create", "structured", "equilateral"):
+        if words[0] == "mesh" and words[1] in ("create", "structured", "equilateral") or words[1:2] == ["create"]:
+            if words[0] not in ("mesh", "element"):
+                continue
             if "region" in given or "bodies" in given:
                 unknown.add("element")
             kind, group = "element", given.get("group", {"value": "default"})
