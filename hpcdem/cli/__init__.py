@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 
 from hpcdem.cli.common import HELP, messages_only, read_command_line, run_program
-from hpcdem.cli.programs import BY_NAME
+from hpcdem.cli.programs import BY_NAME, FIRST
 from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
-from hpcdem.core.errors import EXIT_OK
+from hpcdem.core import chinese
+from hpcdem.core.errors import EXIT_OK, EXIT_USAGE
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import launch, shutdown
 from hpcdem.session import OF_BLOCKS, OF_PARTICLES, Session, greet, prepare
@@ -52,6 +53,15 @@ def warmup(**options: object) -> None:
 def main() -> NoReturn:
     """The programs hpcdem and zdem."""
     words, cores_before = sys.argv[1:], launch.cores()
+    if not words:
+        with launch.one_voice():
+            if chinese.wanted(encoding=getattr(sys.stdout, "encoding", None)):
+                from hpcdem.cli.chinese import FIRST as IN_CHINESE
+
+                click.echo(IN_CHINESE, err=True)
+            else:
+                click.echo(FIRST, err=True)
+        sys.exit(EXIT_USAGE)
     program = BY_NAME.get(words[0]) if words else None
     if program is not None and program.looks:
         start(program.name, words[1:])

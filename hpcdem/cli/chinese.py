@@ -398,6 +398,18 @@ HEADS = {
     "[required]": "[必需]",
 }  # fmt: skip
 
+FIRST = """\
+hpcdem:岩石与砂土的离散元程序。用法:hpcdem SCRIPT,或 hpcdem COMMAND ...
+
+  hpcdem examples             列出示例;hpcdem examples push.py 把一个示例复制到当前目录
+  hpcdem --check SCRIPT       只读脚本,说明它会做什么,不运行
+  hpcdem SCRIPT               运行;结果写入脚本旁的 data(Ctrl-C 存盘并停止,--resume 继续)
+  hpcdem view data            在浏览器中看结果,运行中也可以
+  hpcdem view --run SCRIPT    同上,并带编辑器与命令行
+  hpcdem doctor               检查这台机器有什么问题,以及怎样解决
+
+hpcdem --help 给出全部说明。"""
+"""不带参数的 `hpcdem` 所显示的内容。"""
 PARTLY = "(部分说明目前只有英文。)"
 
 

@@ -122,6 +122,8 @@ def frames_of(options: dict[str, Any], log: Log) -> list[Path]:
     found: list[Path] = []
     for path in options["paths"]:
         if not path.is_dir():
+            if not path.exists():
+                raise HpcdemError(f"there is no folder or file {path}")
             for name in ("step", "name"):
                 if options[name] is not None:
                     raise UsageError(f"--{name} chooses frames of a folder; {path} is a file")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 
-from hpcdem.core.nearest import nearest
+from hpcdem.core.nearest import hint, nearest
 
 
 class Program(NamedTuple):
@@ -49,9 +50,25 @@ GROUPS: dict[str, tuple[Program, ...]] = {
 BY_NAME = {program.name: program for group in GROUPS.values() for program in group}
 
 
+FIRST = """\
+hpcdem: discrete elements for rock and sand. Usage: hpcdem SCRIPT, or hpcdem COMMAND ...
+
+  hpcdem examples             list the examples; hpcdem examples push.py copies one to this folder
+  hpcdem --check SCRIPT       read a script, say what it would do, run nothing
+  hpcdem SCRIPT               run it; results go to data beside it (Ctrl-C saves and stops, --resume goes on)
+  hpcdem view data            see the results in the browser, also while the run goes on
+  hpcdem view --run SCRIPT    the same with an editor and a console
+  hpcdem doctor               what is wrong with this machine, and what to type against it
+
+hpcdem --help tells everything."""
+"""What `hpcdem` without a word says: a page that fits on a screen."""
+
+
 def suggestion(word: str) -> str:
-    """What to add to a message that `word` is no script and no command; empty if it looks like a file."""
+    """What to add to a message that `word` is no script, and no command if it looks like one."""
     if "." in word or "/" in word:
-        return ""
+        path = Path(word)
+        there = [one.name for one in path.parent.glob("*") if one.suffix in (".py", ".sc")]
+        return hint(path.name, there) or "; hpcdem examples lists those that come along"
     near = nearest(word, BY_NAME)
     return f" and no such command; did you mean hpcdem {near}?" if near else " and no such command; see hpcdem --help"

@@ -303,6 +303,8 @@ def read_script(comm: SerialComm, path: Path) -> bytes:
             source = path.read_bytes()
         except FileNotFoundError:
             error = f"{path}: no such script{suggestion(str(path))}"
+        except IsADirectoryError:
+            error = f"{path} is a folder: hpcdem view {path} shows results, hpcdem resume {path} goes on with their run"
         except OSError as problem:
             error = f"{path}: cannot read the script: {problem.strerror}"
     source, error = comm.bcast((source, error))

@@ -12,7 +12,9 @@ import math
 import os
 import re
 import shlex
+import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -75,6 +77,19 @@ def rate(number: float) -> str:
         size, word = (1e9, "billion") if number >= 0.9995e9 else (1e6, "million")
         return f"{number / size:.3g} {word}"
     return f"{float(f'{number:.3g}'):.10g}"
+
+
+def folded(text: str, width: int) -> str:
+    """Lines that are too long for a terminal, broken between words; tables and paths stay as they are."""
+    lines = []
+    for line in text.split("\n"):
+        if len(line) < width or not line.strip():
+            lines.append(line)
+        else:
+            lines += textwrap.wrap(
+                line, max(width - 1, 20), subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+            )
+    return "\n".join(lines)
 
 
 @dataclass
@@ -188,6 +203,8 @@ class Log:
 
     def _print(self, text: str) -> None:
         self._text = text
+        if self._terminal:
+            text = folded(text, shutil.get_terminal_size().columns)
         if self._bar is not None:
             self._bar.print(text)
         else:

@@ -139,7 +139,7 @@ def test_every_command_of_the_table_starts():
         ("viw", "no such script and no such command; did you mean hpcdem view?"),
         ("mesure", "did you mean hpcdem measure?"),
         ("xyzzyxyzzy", "see hpcdem --help"),
-        ("viw.py", "viw.py: no such script\n"),
+        ("viw.py", "viw.py: no such script; hpcdem examples lists those that come along\n"),
     ],
 )
 def test_a_mistyped_command_is_met_with_the_nearest(word, said):

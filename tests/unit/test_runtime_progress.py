@@ -12,7 +12,7 @@ import pytest
 
 from hpcdem.core.timers import Timers
 from hpcdem.halo.comm import SerialComm
-from hpcdem.runtime.progress import Log, StepStatus, duration, rate
+from hpcdem.runtime.progress import Log, StepStatus, duration, folded, rate
 
 
 class Clock:
@@ -337,3 +337,12 @@ def test_a_model_with_declared_units_keeps_them(log, out, clock):
     clock.t += 20.0
     log.step(status(10, units="mm-mpa-s", walls=((0, 1.0, -2.5e9),)))
     assert "kinetic energy 1.5e+06 mJ" in out.getvalue() and "0 (1 N, -2.5e+09 N)" in out.getvalue()
+
+
+def test_lines_are_broken_between_words_on_a_terminal_alone(log, out, monkeypatch):
+    text = "step 500 | " + "some words " * 12 + "/a/path/" + 60 * "x"
+    log.info(text)
+    assert out.getvalue() == f"{text}\n"
+    lines = folded(f"{text}\nshort\n\n  table  kept", 50).split("\n")
+    assert all(len(line) < 50 for line in lines if "xxx" not in line) and lines[-3:] == ["short", "", "  table  kept"]
+    assert " ".join(" ".join(lines[:-3]).split()) == " ".join(text.split())

@@ -76,7 +76,7 @@ def test_cracks_of_a_mesh_are_seen_with_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("field 'stres'", "this frame has no field stres; it has elements: "),
+        ("field 'stres'", "this frame has no field stres; did you mean 'stress_zz'? It has elements: "),
         ("object bolts", "this frame has no bolts; it has elements, joints"),
         ("field 'stress-yy' object joints", "joints have no field stress_yy in this frame"),
         ("object elements filter 'nix > 1'", "filter 'nix > 1': there is no field nix"),

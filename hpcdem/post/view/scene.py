@@ -12,6 +12,7 @@ import numpy as np
 from hpcdem.core import units
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.looks import COLOURS, HIDDEN, OBJECTS, eye_of, section_of
+from hpcdem.core.nearest import hint
 from hpcdem.io import colours
 from hpcdem.io.axes import View, bar_ticks
 from hpcdem.post import blocks
@@ -215,7 +216,8 @@ def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None
             raise HpcdemError(f"the view shows no {on}")
         raise objects.lack(name, on)
     known = "; ".join(f"{kind}: {', '.join(objects.known())}" for kind, objects in moment.objects.items())
-    raise HpcdemError(f"this frame has no field {name}; it has {known or 'nothing'}")
+    near = hint(name, [word for objects in moment.objects.values() for word in objects.known()])
+    raise HpcdemError(f"this frame has no field {name}{near}{' It' if near else '; it'} has {known or 'nothing'}")
 
 
 def adjusted(
