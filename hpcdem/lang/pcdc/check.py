@@ -82,7 +82,7 @@ def _loose_names(script: Source) -> list[str]:
     used: list[tuple[int, str, str]] = []
     for statement in script.statements:
         name, given = statement.command.name, statement.arguments
-        if name == "model restore" or name.split()[1:2] == ["import"] and name != "geometry import":
+        if name == "model restore" or (name.split()[1:2] == ["import"] and name != "geometry import"):
             return []
         if name in ("mesh structured", "mesh equilateral", "element create brick"):
             made["geometry layer"] |= {"left", "right", "bottom", "top"}
@@ -129,7 +129,7 @@ def _loose_groups(script: Source) -> list[tuple[int, str]]:
     unknown: set[str] = set()
     for statement in script.statements:
         words, given = statement.command.name.split(), statement.arguments
-        if words[0] == "mesh" and words[1] in ("create", "structured", "equilateral") or words[1:2] == ["create"]:
+        if (words[0] == "mesh" and words[1] in ("create", "structured", "equilateral")) or words[1:2] == ["create"]:
             if words[0] not in ("mesh", "element"):
                 continue
             if "region" in given or "bodies" in given:
