@@ -65,7 +65,7 @@ def unit_of(name: str, dim: int = 2) -> str:
         unit = unit_of(name)
         return PER_METRE.get(unit, unit)
     words = name.split("_")
-    while words and words[-1] in PARTS:
+    while len(words) > 1 and words[-1] in PARTS:
         words.pop()
     stem = "_".join(words)
     ends = ((unit, word) for unit, known in UNITS.items() for word in known)
