@@ -272,7 +272,7 @@ def _told(x: tuple[str, str], curves: list[tuple], whole: bool) -> dict[str, Any
 
     def part(title: str, unit: str, columns: list[np.ndarray]) -> dict[str, Any]:
         largest = max((float(np.abs(c[np.isfinite(c)]).max(initial=0.0)) for c in columns), default=0.0)
-        size, shown = units.scale(largest, unit) if unit else (1.0, "")
+        size, shown = units.scale(largest, unit) if unit not in ("", "%") else (1.0, unit)
         return {"title": title, "unit": unit, "size": size, "shown": shown}
 
     by_unit: dict[str, list[np.ndarray]] = {}

@@ -45,7 +45,7 @@ def test_any_history_over_any_other_where_both_have_steps(tmp_path: Path):
 def test_what_is_computed_has_a_title_and_a_unit(tmp_path: Path):
     pressed(tmp_path)
     told = Curves(tmp_path).drawn("strain [%] = 100 * ('way bottom' - 'way top') / 0.1", ["'force below' / 0.05"])
-    assert (told["x"]["title"], told["x"]["unit"]) == ("strain", "%")
+    assert (told["x"]["title"], told["x"]["unit"], told["x"]["size"]) == ("strain", "%", 1.0)
     np.testing.assert_allclose(told["curves"][0]["x"], 100 * 3e-6 * np.arange(0, 50, 10) / 0.1)
     np.testing.assert_allclose(told["curves"][0]["y"], 5e4 * np.arange(0, 50, 10) / 0.05)
 
@@ -109,7 +109,7 @@ def test_a_chart_of_the_script(tmp_path: Path):
     curves = Curves(tmp_path)
     assert curves.charts() == ["ucs.csv"]
     told = curves.chart("ucs.csv")
-    assert (told["x"]["title"], told["x"]["shown"]) == ("axial strain", "%")
+    assert (told["x"]["title"], told["x"]["shown"], told["x"]["size"]) == ("axial strain", "%", 1.0)
     assert (told["curves"][0]["title"], told["curves"][0]["unit"]) == ("axial stress", "MPa")
     rows = list(csv.reader(io.StringIO(as_csv(told))))
     assert rows == [

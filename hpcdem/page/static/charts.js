@@ -224,6 +224,7 @@ function draw() {
   box.replaceChildren(figure(told, { width: Math.max(300, box.clientWidth), height: Math.max(220, box.clientHeight), font: 13, dark, step }));
   if (document.activeElement !== $("chart-x-text")) $("chart-x-text").value = wish.x ?? told.x.title;
   if (document.activeElement !== $("chart-y-text")) $("chart-y-text").value = (wish.y ?? told.curves.map((curve) => curve.title)).join("\n");
+  $("chart-y-text").rows = Math.min(6, Math.max(1, $("chart-y-text").value.split("\n").length));
   $("chart-x-text").disabled = $("chart-y-text").disabled = wish.chart !== undefined;
 }
 
