@@ -373,7 +373,7 @@ def _box(moment: Moment) -> list[list[float]] | None:
 
 def _in_chinese(moment: Moment) -> dict[str, dict[str, str]]:
     """What fields, colours and classes are called in Chinese."""
-    names = {name for objects in moment.objects.values() for name in (*objects.fields, *objects.vectors)}
+    names = {name for objects in moment.objects.values() for name in (*objects.fields, *objects.of_vectors())}
     return {
         "fields": {name: chinese.field_name(name) for name in sorted(names)}, "colours": chinese.COLOURS,
         "legend": chinese.LEGEND,

@@ -179,3 +179,13 @@ def test_beds_have_a_legend_by_group(tmp_path: Path):
     particles["color"][:], particles["group"][:] = 3, 1
     one = of_particles(frame)
     assert scene(one, default_view(one)).layers[0].legend == []
+
+
+def test_vectors_of_bolts_are_means_of_their_ends(tmp_path: Path):
+    frame = frames.blocks()
+    nodes = frame.supports["bolts"]["nodes"]
+    nodes |= {"displacement_x": np.array([0.0, 2.0, 4.0]), "displacement_y": np.array([1.0, 1.0, 3.0])}
+    bolts = moment_of(frame, tmp_path).of("bolts")
+    assert bolts.values("displacement_x", "").tolist() == [1.0, 3.0]
+    assert bolts.values("displacement", "").tolist() == pytest.approx([2.0**0.5, 13.0**0.5])
+    assert not moment_of(frame, tmp_path).of("liners").has("displacement")

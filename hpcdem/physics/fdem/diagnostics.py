@@ -45,9 +45,10 @@ def unit_of(sim: Blocks, name: str) -> str:
     return PER_METRE.get(unit, unit) if sim.dim == 3 else unit
 
 
-def _vector(name: str, on: str, unit: str, doc: str) -> dict[str, Quantity]:
+def _vector(name: str, on: str, unit: str, doc: str, framed: bool = True) -> dict[str, Quantity]:
     return {
-        f"{name}_{axis}": Quantity(on, unit, f"{doc} in {axis}", dims=(3,) if axis == "z" else BOTH) for axis in "xyz"
+        f"{name}_{axis}": Quantity(on, unit, f"{doc} in {axis}", framed, (3,) if axis == "z" else BOTH)
+        for axis in "xyz"
     }
 
 
@@ -103,8 +104,8 @@ QUANTITIES: dict[str, Quantity] = {
     **_vector("displacement", "node", "m", "displacement"),
     **_vector("velocity", "node", "m/s", "velocity"),
     **{name: Quantity("node", unit, f"length of the {name}", False, BOTH) for name, unit in LENGTHS.items()},
-    **_vector("reaction", "node", "N/m", "force by which conditions act on the node"),
-    **_vector("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included"),
+    **_vector("reaction", "node", "N/m", "force by which conditions act on the node", False),
+    **_vector("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included", False),
     "temperature": Quantity("node", "K", "temperature; NaN without a thermal model", dims=BOTH),
     "state": Quantity("joint", "1", "0 free, 1 intact, 2 behind its peak, 3 broken", dims=BOTH),
     "mode": Quantity("joint", "1", "how it broke, from 1 (opened) to 2 (slid); 0 if it is not broken", dims=BOTH),

@@ -324,7 +324,7 @@ def _clumps(
         return part(p, name, slice(None))[some[rows]]
 
     fields: dict[str, _Reader] = {name: partial(column, name) for name in p} | {"members": members}
-    vectors = {"velocity": ("vx", "vy")} if "vx" in p else {}
+    vectors = {name: both for name, both in {"velocity": ("vx", "vy"), "force": ("fx", "fy")}.items() if both[0] in p}
     pairs = {
         name: partial(lambda both, rows: np.stack([column(one, rows) for one in both], axis=1), both)
         for name, both in vectors.items()
@@ -512,4 +512,10 @@ def _supports(name: str, tables: Mapping[str, Mapping[str, np.ndarray]]) -> Obje
     last = elements.get("last_node", first + 1)
     ends = np.stack([at[first[rows]], at[last[rows]]], axis=1)
     kind = RODS if ends.shape[2] == 3 else LINES
-    return Objects(kind, len(rows), lambda: (ends,), {k: v[rows] for k, v in elements.items()})
+    vectors = {}
+    for stem in VECTORS:
+        parts = [nodes[f"{stem}_{axis}"] for axis in "xyz"[: at.shape[1]] if f"{stem}_{axis}" in nodes]
+        if parts:  # means of both ends
+            values = np.column_stack(parts)
+            vectors[stem] = 0.5 * (values[first[rows]] + values[last[rows]])
+    return Objects(kind, len(rows), lambda: (ends,), {k: v[rows] for k, v in elements.items()}, vectors)
