@@ -462,6 +462,14 @@ class Mesh(Words):
         """Elements are gone; after the first model or condition they are taken out, as by `elements.null`."""
         self._do("element delete", {}, where, g.ELEMENT)
 
+    def add_nodes(self, points: Sequence[Point]) -> None:
+        """More nodes [m], for elements that are added next; their numbers follow those of the mesh."""
+        self._do("model add node", {"points": points})
+
+    def add_element(self, *corners: int) -> None:
+        """One more element, by the numbers of its nodes."""
+        self._do("model add element", {"corners": corners})
+
     def scale(self, factors: Point) -> None:
         """Multiply the coordinates of all points."""
         self._do("model scale", {"factors": factors})

@@ -174,6 +174,8 @@ SAME: list[tuple[str, str]] = [
      "sim.mesh.densify((0.5, 0.2), (1, 0), where='x 0 1')"),
     ("pcdc element densify max-length 0.5", "sim.mesh.densify(0.5)"),
     ("pcdc element delete range x 0 1", "sim.mesh.delete(where='x 0 1')"),
+    ("pcdc model add node (0,0) (1,2)", "sim.mesh.add_nodes([(0, 0), (1, 2)])"),
+    ("pcdc model add element 0 1 2", "sim.mesh.add_element(0, 1, 2)"),
     ("pcdc model scale (1,2)", "sim.mesh.scale((1, 2))"),
     ("pcdc model translate (1,2)", "sim.mesh.translate((1, 2))"),
     ("pcdc element hide range x 0 1", "sim.elements.hide(where='x 0 1')"),

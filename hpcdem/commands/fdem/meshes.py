@@ -14,9 +14,11 @@ from hpcdem.commands.fdem.geometry import shape
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, hexahedra
+from hpcdem.physics.fdem.connectivity import areas
 from hpcdem.physics.fdem.connectivity import bodies as bodies_of
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, NODE, Range
 from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
+from hpcdem.physics.fdem.tetrahedra import volumes
 from hpcdem.pre.mesh import cracks as cracks_of
 from hpcdem.pre.mesh import (
     fill,
@@ -356,6 +358,30 @@ def densify(project: Project, pattern: tuple[int, int], most: tuple[float, float
     made = made_once(project.comm, lambda: quadtree.densified(mesh, elements, pattern, most))
     project.refit(made)
     _say(project, f"element densify: {len(made.parent) - len(mesh.cells)} more elements, {len(made.parent)} in all")
+
+
+def add_nodes(project: Project, points: Sequence[tuple[float, ...]]) -> None:
+    """More nodes [m], for elements that are added next; their numbers follow those of the mesh."""
+    project.refuse_in_use("nodes are added")
+    if any(len(at) != project.dim for at in points):
+        raise CommandError(f"a node needs {project.dim} coordinates")
+    project.added[0].extend(points)
+
+
+def add_element(project: Project, corners: Sequence[int]) -> None:
+    """One more element by the numbers of its nodes, in any sense of turning: a triangle or quad, in space a
+    tetrahedron."""
+    project.refuse_in_use("elements are added")
+    known = np.empty((0, project.dim)) if project.mesh is None else project.mesh.points
+    points = np.concatenate([known, np.array(project.added[0], np.float64).reshape(-1, project.dim)])
+    lost = [number for number in corners if number >= len(points)]
+    if lost:
+        raise CommandError(f"there is no node {lost[0]}; there are {len(points)}, numbered from 0")
+    if len(corners) not in ((3, 4) if project.dim == 2 else (4,)):
+        raise CommandError(f"an element has {'3 or 4' if project.dim == 2 else '4'} nodes, not {len(corners)}")
+    cells = np.array([[*corners, -1][:4]])
+    turned = (areas(points, cells) if project.dim == 2 else volumes(points, cells))[0] < 0.0
+    project.added[1].append(tuple(corners[:1]) + tuple(reversed(corners[1:])) if turned else tuple(corners))
 
 
 def scale(project: Project, factors: tuple[float, ...]) -> None:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hpcdem.commands.fdem.records import Chart, History
-from hpcdem.core.errors import CommandError
+from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.connectivity import Edges
-from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, KINDS, NODE, Groups
-from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, KINDS, NODE, Groups
+from hpcdem.physics.fdem.mesh import Mesh, check
 from hpcdem.physics.fdem.sides import SIDE
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.runtime import launch, run_folder
@@ -30,7 +31,8 @@ class Project:
     """blocks: the simulation (its comm, log and stop are used); directory: where file names begin; outdir: folder of
     the results; job: what was started, for run.json; keep: numbered checkpoints that are kept, 0: all.
 
-    dim: dimensions of space; layers: geometry; mesh: of all bodies, None before the first; groups: by kind of object;
+    dim: dimensions of space; layers: geometry; mesh: of all bodies, None before the first; added: nodes
+    [m] and elements that are not in it yet; groups: by kind of object;
     alive (ne,) bool: elements that are not null; hidden (ne,) bool: those that pictures and ranges pass over;
     histories, charts and frames (steps between two by name) that are kept
     up; cracks_filed: broken joints that are in their file, None: the file is not of this model yet; framed: step of the
@@ -117,6 +119,7 @@ class Project:
     def _forget(self) -> None:
         self.layers = Layers()
         self.mesh: Mesh | None = None
+        self.added: tuple[list[tuple[float, ...]], list[tuple[int, ...]]] = [], []
         self.dim = 2
         self._edges: tuple[np.ndarray, Edges] | None = None
         self.alive, self.hidden = np.empty((2, 0), bool)
@@ -144,6 +147,7 @@ class Project:
     def add_mesh(self, mesh: Mesh) -> None:
         """One more body. CommandError if models or conditions were assigned to the mesh already."""
         self.refuse_in_use("all bodies are meshed")
+        self.take_added()
         if mesh.dim != self.dim:
             raise CommandError(
                 f"the mesh has {mesh.dim} dimensions, the model {self.dim}: model new dim {mesh.dim} makes one for it"
@@ -228,8 +232,31 @@ class Project:
             self._edges = mesh.cells, mesh.edges()
         return self._edges[1]
 
+    def take_added(self) -> None:
+        """Nodes and elements that were added one by one become part of the mesh. CommandError, with what is wrong."""
+        points, cells = self.added
+        if not points and not cells:
+            return
+        known = self.mesh
+        at = np.array(points, np.float64).reshape(-1, self.dim)
+        new = np.array([[*cell, -1] if len(cell) == 3 else cell for cell in cells], np.int64).reshape(-1, 4)
+        if known is not None:
+            at, new = np.concatenate([known.points, at]), np.concatenate([known.cells, new])
+        self.added = [], []
+        try:
+            mesh = Mesh.of(at, new) if known is None else replace(known, points=at, cells=new)
+            check(mesh, "model add")
+        except HpcdemError as error:
+            raise CommandError(str(error)) from None
+        count = len(cells)
+        self.mesh, self.taken = mesh, False
+        self.alive = np.concatenate([self.alive, np.ones(count, bool)])
+        self.hidden = np.concatenate([self.hidden, np.zeros(count, bool)])
+        self.groups[ELEMENT].assign(range(len(new) - count, len(new)), DEFAULT)
+
     def whole_mesh(self) -> Mesh:
         """The mesh. CommandError if there is none."""
+        self.take_added()
         if self.mesh is None:
             raise CommandError("there is no mesh yet: mesh create, mesh structured or mesh import comes first")
         return self.mesh

@@ -594,6 +594,8 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "element create geometry-patch": _patch,
     "element create geometry-boundary": _patch,
     "element create hollow-circle": _patch,
+    "model add node": lambda c: fdem.meshes.add_nodes(c.project, c["points"]),
+    "model add element": lambda c: fdem.meshes.add_element(c.project, c["corners"]),
     "model scale": lambda c: fdem.meshes.scale(c.project, c["factors"]),
     "model translate": lambda c: fdem.meshes.translate(c.project, c["way"]),
     "element delete": lambda c: fdem.meshes.delete(c.project, c.where),

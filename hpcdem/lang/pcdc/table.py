@@ -1084,6 +1084,12 @@ _MESH = (
             ("pcdc mesh equilateral (0,0) (10,5) size 0.25 group 'base'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
             (Option("size", (POSITIVE,), "length of edges", "m", required=True), _GROUP)),
+    Command("mod{el} add node", "More nodes, for elements that are added next, before the first model or condition is "
+            "assigned. Their numbers follow those of the mesh.", ("pcdc model add node (0,0) (1,0) (0,1)",),
+            (_leading("points", PLACES, "the nodes", "m"),), dims=BOTH),
+    Command("mod{el} add element", "One more element, by the numbers of its nodes.", ("pcdc model add element 0 1 2",),
+            (Option("corners", (ZERO_OR_MORE, ZERO_OR_MORE, ZERO_OR_MORE, LAST_ID), "three or four, in three "
+                    "dimensions four", required=True),), dims=BOTH),
     Command("mod{el} scale", "Coordinates of all points of the mesh are multiplied, before the first model or "
             "condition is assigned.", ("pcdc model scale (1,2)",),
             (_leading("factors", VECTOR, "along the axes, above 0"),),
@@ -1184,6 +1190,8 @@ _OBJECTS = (
     Command("e{lement} delete", "Elements are gone. Before the first model or condition is assigned the mesh is "
             "without them, and numbers of others close up; later they are taken out, as by element c-model null.",
             ("pcdc element delete range x 2 4 y 0 1",), ranged="element", dims=BOTH),
+    Command("e{lement} from", "Elements of another program.", ("pcdc element from",), dims=BOTH,
+            refused="a mesh of another program is read by mesh import 'file' (model import gmsh or abaqus)"),
     Command("e{lement} dens{ify}", "Quads are halved until they are short enough, before the first model or condition "
             "is assigned. Neighbours follow, so that no side has more than one point on it; quads with such a point "
             "become triangles.",

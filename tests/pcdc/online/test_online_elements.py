@@ -284,3 +284,36 @@ def test_summaries(desk):
     told = "\n".join(desk.log.lines)
     assert "31 elements: 31 mech-iso-elastic, 31 in group 'default', 16 in group 'low' of set 'g'" in told
     assert "124 element-faces: " in told and "50 face-joints: 50 without model" in told
+
+
+def test_nodes_and_elements_one_by_one(desk):
+    desk("pcdc element create brick p0 (0,0) p1 (2,0) p2 (0,1) n 2 1 triangle off\n"
+         "pcdc model add node (3,0) (3,1)\npcdc model add element 2 6 7 5\npcdc model add node (2.5,2)\n"
+         "pcdc model add element 8 7 5\n")  # fmt: skip
+    mesh = desk.project.whole_mesh()
+    check(mesh)
+    assert mesh.cells[2:].tolist() == [[2, 6, 7, 5], [8, 5, 7, -1]] and mesh.areas().tolist() == [1.0, 1.0, 1.0, 0.5]
+    assert mesh.edges().inner.sum() == 3
+    desk(PATCH.format(3).replace("stress-xx 3e6 range x 3 3", "stress-xx 3e6 range x 3 3 y 0 1"))
+    assert len(desk.pcdc.values("element", "stress-xx")) == 4
+
+
+def test_a_tetrahedron_by_itself(desk):
+    desk("pcdc model new dim 3\npcdc model add node (0,0,0) (1,0,0) (0,1,0) (0,0,1)\npcdc model add element 0 2 1 3\n")
+    assert desk.project.whole_mesh().areas() == pytest.approx([1.0 / 6.0])
+
+
+ADDED = [
+    ("model add node (5,5)\npcdc element group 'a'", "point 45 at \\(5, 5\\) belongs to no element"),
+    ("model add element 0 1 99", "there is no node 99"),
+    ("model add element 0 1 2", "flat"),
+    ("model add element 0 1 10 9", "more than two elements|is there again|same side"),
+    ("model add element 0 1", "the line ends where"),
+    ("element from", "is refused: a mesh of another program"),
+]
+
+
+@pytest.mark.parametrize(("line", "message"), ADDED)
+def test_what_cannot_be_added(desk, line, message):
+    with pytest.raises(HpcdemError, match=message):
+        desk(QUADS + f"pcdc {line}\npcdc element group 'all'\n")
