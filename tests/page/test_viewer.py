@@ -28,6 +28,7 @@ from hpcdem.runtime import kept, kernels, run_folder
 from tests.conftest import PATIENCE, Launcher, until
 from tests.page.viewing import Tab, Viewing
 from tests.view import frames
+from tests.view.test_default import moment_of, unmoved
 
 STEPS = (0, 10, 20, 30)
 BOX = "li[data-layer=elements] input"
@@ -585,3 +586,35 @@ def test_fields_that_take_long_are_told_once_they_were_chosen(tmp_path: Path):
         assert isinstance(told()["stress_xx"], float)
     finally:
         viewing.close()
+
+
+def test_a_run_that_has_begun_shows_what_happens_as_soon_as_something_does(browser: Any, tmp_path: Path):
+    """The page was opened on a mesh with its groups; a view that somebody has changed stays as it is."""
+    moment_of(unmoved(frames.blocks()), tmp_path, 0)
+    viewing = Viewing(tmp_path)
+    try:
+        tabs = [Tab(browser, viewing.url, locale="en-GB", color_scheme="light") for _ in range(2)]
+        for tab in tabs:
+            assert "base" in tab.text(".legend") and "displacement" not in tab.text(".legend")
+        tabs[1].tab.click("li[data-layer=elements]")
+        tabs[1].after(lambda: tabs[1].tab.uncheck("#edges"))
+        moment_of(frames.blocks(), tmp_path, 10)
+        for tab in tabs:
+            tab.until(lambda: tab.text("#moment").startswith("step 10"))  # noqa: B023
+        tabs[0].until(lambda: "displacement (mm)" in tabs[0].text(".legend"))
+        assert "base" in tabs[1].text(".legend")
+        for tab in tabs:
+            tab.context.close()
+    finally:
+        viewing.close()
+
+
+def test_the_range_of_colours_is_said_in_the_unit_of_the_bar(page: Tab):
+    page.tab.click("li[data-layer=elements]")
+    page.after(lambda: page.tab.select_option("#field", "stress_yy"))
+    page.until(lambda: page.text("#range-unit") == "MPa")
+    assert page.tab.locator("#low").get_attribute("placeholder") == "-10"
+    page.after(lambda: enter(page, "#low", "-5"))
+    assert page.text(".legend .bar").split() == ["-1", "-2", "-3", "-4", "-5"][::-1]
+    page.after(lambda: page.tab.check("#full"))
+    assert page.text(".legend .bar").split() == ["-10", "-8", "-6", "-4", "-2"]
