@@ -102,7 +102,8 @@ def test_one_value_does_not_take_all_colours():
     bar = bar_of(values)
     assert (bar.low, bar.high, bar.below, bar.above) == (-991e3, -11e3, True, True)
     assert bar.title == "stress (kPa)"
-    assert bar_of(values, log=True, limits=(1e3, 1e6)).below
+    assert not bar_of(values, log=True, limits=(1e3, 1e6)).below  # they are grey
+    assert bar_of(-values, log=True, limits=(1e4, 1e6)).below
     full = bar_of(values, limits="full")
     assert (full.low, full.high, full.below, full.above) == (-1e12, 0.0, False, False)
     given = bar_of(values, limits=(-2e6, -5e5))

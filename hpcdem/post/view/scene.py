@@ -494,7 +494,7 @@ def _by_field(result: Painted, objects: Objects, moment: Moment) -> None:
     slack = 1e-9 * (high - low)
     result.scale = Scale(
         layer.field.replace("_", " "), moment.unit_of(layer.field), low, high, layer.log, layer.colours,
-        bool((values < low - slack).any()), bool((values > high + slack).any()),
+        bool(((values < low - slack) & ((values > 0.0) | (not layer.log))).any()), bool((values > high + slack).any()),
     )  # fmt: skip
     result.values = values
     with np.errstate(invalid="ignore", divide="ignore"):
