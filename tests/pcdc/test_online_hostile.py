@@ -1,5 +1,5 @@
-"""Hostile input for every path of PCDC's online help: one message of one line with what was read, or it is accepted; and
-on a model that has nothing, or that is of another kind, commands refuse in words."""
+"""Hostile input for every path of PCDC's online help: one message of one line with what was read, or it is accepted;
+on a model that has nothing commands refuse in words."""
 
 from __future__ import annotations
 

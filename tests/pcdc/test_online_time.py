@@ -135,6 +135,24 @@ def test_run_time_and_whatever_comes_first(tmp_path):
     assert "run-time 0.001 s from 0 s on has passed: no step is done" in rock.blocks.log.lines[-1]
     rock("pcdc model solve run-time 1.2e-3\npcdc model run-time 0\npcdc model solve cycle 3\n")
     assert rock.blocks.clock.step == 123
+    rock("pcdc model run-time 1\npcdc model dynamic off\npcdc model solve cycle 2\n")
+    assert rock.blocks.clock.step == 125 and any("ends no static run" in line for line in rock.blocks.log.lines)
+    for words, why in (("run-time 1", "run-time: in static runs"), ("elastic run-time 1", "run-time goes with a run by")):
+        with pytest.raises(HpcdemError, match=why):
+            rock(f"pcdc model solve {words}\n")
+
+
+def test_run_time_by_the_clock_of_another_part(tmp_path):
+    rock = Rock(
+        tmp_path, "pcdc mesh structured (0,0) (2,2) cells 2 2\npcdc e c-m mech-iso-e prop den 2400 y 3e9 p-r 0.2\n"
+        "pcdc e c-m therm-iso-h prop con 3 cap 800\npcdc model mech off\npcdc model step 5\npcdc model run-time 100\n"
+        "pcdc model reset thermal current-time 40 start-time 0\n")  # fmt: skip
+    heat = next(one for one in rock.blocks.surface_loads if one.name == "heat")
+    dt = rock.blocks.clock.dt
+    rock("pcdc model solve\n")
+    assert rock.project.solved["reason"] == "time" and abs(heat.time - 100.0) <= max(0.5 * dt, heat.dt)
+    with pytest.raises(HpcdemError, match="thermal has a time step of its own"):
+        rock("pcdc model reset thermal time-step 2 current-time 0\npcdc model solve\n")
 
 
 def test_clocks_are_set_and_told(tmp_path):

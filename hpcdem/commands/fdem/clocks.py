@@ -98,6 +98,21 @@ def _physics(project: Project, part: str) -> Any:
     return found
 
 
+def time(project: Project, part: str) -> float:
+    """What the clock of a part shows [s], of blocks in static runs that of creep. CommandError if it goes by itself."""
+    blocks = project.blocks
+    if part == MECHANICAL:
+        return float(blocks.clock.time if project.dynamic else blocks.creep.time)
+    own = blocks.options.heat_dt if part == THERMAL else blocks.options.flow_dt
+    if own > 0.0:
+        word = part.replace("_", "-")
+        raise CommandError(
+            f"run-time counts with the blocks, and {word} has a time step of its own ({own:g} s): model reset {word} "
+            "time-step 0 lets it go with them"
+        )
+    return float(_physics(project, part).time)
+
+
 def query(project: Project, *parts: str) -> None:
     """Say in the log what time these parts have come to, and their time step. Collective."""
     for part in parts:

@@ -87,6 +87,12 @@ def solve(
     EquilibriumError, or, with on_failure CONTINUE, with a warning. project.solved says how it ended.
     """
     bare = (ratio, cycles, time) == (None, None, None)
+    if run_time is not None and not _time_passes(project):
+        raise CommandError("run-time: in static runs without creep no time passes; cycles or ratio end them")
+    if project.run_time and not _time_passes(project) and project.log is not None:
+        project.log.warn_once(
+            "run-time", f"model run-time {project.run_time:g} s ends no static run: no time passes there without creep"
+        )
     if (run := run_time or project.run_time) and _time_passes(project):
         left = _left(project, run)
         if left <= 0.0 and project.progress is None:
@@ -135,18 +141,15 @@ def _time_passes(project: Project) -> bool:
 
 
 def _left(project: Project, run: float) -> float:
-    """Time [s] until the end of a run-time."""
-    if clocks_of.MECHANICAL not in project.began:
-        return run
-    now = project.blocks.clock.time if project.dynamic else project.blocks.creep.time
-    return project.began[clocks_of.MECHANICAL] + run - now
+    """Time [s] until the end of a run-time, of the parts that were given a start the one that comes first."""
+    return min((begin + run - clocks_of.time(project, part) for part, begin in project.began.items()), default=run)
 
 
 def _tell_no_time(project: Project, run: float) -> None:
     project.solved = {"reason": "time", "ratio": math.nan, "steps": 0}
     if project.log is not None:
-        begin = project.began[clocks_of.MECHANICAL]
-        project.log.warn(f"{_where(project)}run-time {run:g} s from {begin:g} s on has passed: no step is done")
+        begins = " and ".join(f"{begin:g} s" for begin in project.began.values())
+        project.log.warn(f"{_where(project)}run-time {run:g} s from {begins} on has passed: no step is done")
 
 
 def solve_elastic(

@@ -119,6 +119,8 @@ def _option(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | Non
 
 
 def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    if {"elastic", "run-time"} <= arguments.keys():
+        raise ValueError("run-time goes with a run by steps")
     if {"elastic", "time", "cycles"} <= arguments.keys():
         raise ValueError("elastic takes time or cycles: a creep step is found at once")
     watched = [word for word in ("window", "limit", "on-failure") if word in arguments]
