@@ -15,11 +15,11 @@ from tests.pcdc.test_online_acts import contexts
 from tests.pcdc.test_time import Rock
 
 NONSENSE = (
-    "", "nonsense", "-1", "1e400", "9" * 400, "nan", "inf", "1e-320", "''", "'", "(1,", "(1,2", "1,", ",", ",,", "1,,2", "(",
-    "()",
-    "(1,2,3,4)", "(a,b)", "[", "[]", "[1/0", "[__import__('os')]", "table", "table 't'", "table t", "'../../etc/passwd'",
-    "'a\x00b'", "\u202e", "\uff08\uff11\uff09", "'" + "x" * 5000 + "'", "on", "range", "range not", "range x", "range x 2 1",
-    "range not not x 1", "range in-circle", "range geometry-along 3", "range geometry-location 'a' count -1", "...", "\\",
+    "", "nonsense", "-1", "1e400", "9" * 400, "nan", "inf", "1e-320", "''", "'", "(1,", "(1,2", "1,", ",", ",,",
+    "1,,2", "(", "()", "(1,2,3,4)", "(a,b)", "[", "[]", "[1/0", "[__import__('os')]", "table", "table 't'", "table t",
+    "'../../etc/passwd'", "'a\x00b'", "\u202e", "\uff08\uff11\uff09", "'" + "x" * 5000 + "'", "on", "range",
+    "range not", "range x", "range x 2 1", "range not not x 1", "range in-circle", "range geometry-along 3",
+    "range geometry-location 'a' count -1", "...", "\\",
     "#", "; rm -rf /", "0x10", "--", "1e", "+", "'a','b',", "0 1, 2",
 )  # fmt: skip
 LINES = sorted({(line, dim) for row in online.rows() for dim in row.dims for line in row.lines(dim)})

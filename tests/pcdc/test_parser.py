@@ -224,7 +224,7 @@ REFUSED = [
     ("mesh create from-layer 'a' size 1 type hex", "expected one of tri, quad for 'type'"),
     ("table create 't' values", "the line ends where vectors (x,y) for 'values' is expected"),
     ("table create 't' values 3 4", "read '3', expected vectors (x,y) for 'values'"),
-    ("history create 'h' node value stress-xx id 1", "a history of node can follow position-x"),
+    ("history create 'h' node value stress-xx id 1", "a history of node can follow displacement, velocity, position-x"),
     ("history create 'h' node value reaction-y", "needs one of id, nearest and range"),
     ("history create 'h' node value reaction-y id 1 nearest (0,0)", "one of id, nearest and range, not id and nearest"),
     ("history create 'h' node value reaction-y range boundary", "needs sum, mean, minimum or maximum"),
@@ -258,7 +258,8 @@ REFUSED_IN_SPACE = [
     ("model gravity (0,-9.81)", "read '(0,-9.81)', expected a vector (x,y,z) for 'gravity'"),
     ("mesh structured (0,0,0) (1,1,1) cells 2 2", "the line ends where a whole number above 0 for 'cells' is expected"),
     ("mesh structured (0,0,0) (1,1,1) cells 2 2 2 type tri", "type tri: in three dimensions it is tet or hex"),
-    ("geometry create circle (0,0) 1 as-layer 'c'", "'geometry create circle' is for two dimensions in this version"),
+    ("geometry create rectangle (0,0) (1,1) as-layer 'c'",
+     "'geometry create rectangle' is for two dimensions in this version"),
     ("liner create range x 0 1", "'liner create' is for two dimensions"),
 ]  # fmt: skip
 
