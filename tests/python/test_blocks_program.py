@@ -604,7 +604,7 @@ WRONG = {
     "number for a flag": ("sim.mesh.intersect('l', follow=1)", "follow: expected True or False, got 1"),
     "cells as one number": ("sim.mesh.structured((0, 0), (1, 1), 4)", "cells: expected a list of values, got 4"),
     "three cells": ("sim.mesh.structured((0, 0), (1, 1), (4, 4, 4))", "cells: expected 2 values"),
-    "point in space": ("sim.geometry.circle((0, 0, 0), 1, 'l')", r"center: expected a vector \(x,y\), got \(0, 0, 0\)"),
+    "point in space": ("sim.geometry.circle((0, 0, 0), 1, 'l')", r"centre: expected a vector \(x,y\), got \(0, 0, 0\)"),
     "text for a list": ("sim.mesh.create('o', 1.0, hole='abc')", "hole: expected a list of values, got 'abc'"),
     "too much to refine": ("sim.mesh.create('o', 1.0, refine_layer=[('h', 1, 2, 3)])", "expected size, distance besi"),
     "size left out": ("sim.mesh.create('o', 1.0, refine_layer=['h'])", "mesh.create: refine_layer needs size"),
