@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.core.looks import COLOURS
+from hpcdem.core.looks import COLOURS, OBJECTS
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.lang import chinese
 from hpcdem.page import exports
@@ -331,6 +331,34 @@ def test_the_window_that_is_chosen_is_seen(page: Tab):
             for n in (0, 1)
         ]
         assert [colour != "none" for colour in colours] == [chosen == 0, chosen == 1]
+
+
+def test_the_whole_model_stays_whole_when_the_window_changes(page: Tab):
+    """Fitted, it is fitted again; what was zoomed to stays."""
+
+    def width() -> float:
+        left, right, *_ = page_box(page)
+        return right - left
+
+    before = width()
+    page.after(lambda: page.tab.set_viewport_size({"width": 1280, "height": 420}))
+    page.until(lambda: width() > 1.5 * before)
+    page.after(lambda: page.tab.set_viewport_size({"width": 1280, "height": 720}))
+    page.until(lambda: abs(width() / before - 1.0) < 0.02)
+    page.tab.locator("#windows canvas").first.focus()
+    page.after(lambda: page.tab.keyboard.press("+"))
+    page.after(lambda: page.tab.set_viewport_size({"width": 1280, "height": 420}))
+    assert abs(width() / (0.8 * before) - 1.0) < 0.02
+
+
+def test_the_words_of_the_page_stand_in_both_languages(page: Tab):
+    words = page.tab.evaluate("import('./words.js').then((module) => module.WORDS)")
+    assert set(words["en"]) - set(words["zh"]) == set()
+    assert set(words["zh"]) - set(words["en"]) <= set(OBJECTS), "what objects are called in English is their name"
+    for name in set(words["en"]) & set(words["zh"]):
+        assert sorted(re.findall(r"\{\w+\}", words["en"][name])) == sorted(re.findall(r"\{\w+\}", words["zh"][name])), (
+            name
+        )
 
 
 def test_films_are_offered_where_they_can_be_made(page: Tab, viewing: Viewing, monkeypatch: pytest.MonkeyPatch):

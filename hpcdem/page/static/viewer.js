@@ -208,6 +208,13 @@ class Window {
       [left, right, bottom, top] = [Math.min(...x) - air, Math.max(...x) + air, Math.min(...y) - air, Math.max(...y) + air];
     }
     this.camera = { x: (left + right) / 2, y: (bottom + top) / 2, width: Math.max(right - left, (top - bottom) * w / h) };
+    this.fitted = { ...this.camera };
+  }
+
+  /** The window has another size: the whole model stays the whole model. */
+  resized() {
+    if (["x", "y", "width"].every((name) => this.camera[name] === this.fitted?.[name])) this.fit();
+    this.redraw();
   }
 }
 
@@ -718,11 +725,12 @@ function split() {
   const like = current ?? windows[0];
   while (windows.length < count) {
     windows.push(new Window(like.view, like.camera, like.source, like.frame));
+    windows.at(-1).fitted = like.fitted;
     $("windows").append(windows.at(-1).root);
   }
   $("windows").dataset.split = kind;
   choose(current ?? windows[0]);
-  for (const one of windows) one.redraw();
+  for (const one of windows) one.resized();
 }
 
 // ---- time ------------------------------------------------------------------------------------------------------------
@@ -974,7 +982,7 @@ async function begin() {
   speak();
   if (about.box) told(say("keys_space"), false, true);
   connect();
-  new ResizeObserver(() => { for (const one of windows) one.redraw(); }).observe($("windows"));
+  new ResizeObserver(() => { for (const one of windows) one.resized(); }).observe($("windows"));
 }
 
 async function switched() {
