@@ -11,6 +11,8 @@ from matplotlib.text import Text
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
+from hpcdem.io.frames import frame_name
+from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame
 from hpcdem.page.sources import Sources
 from hpcdem.page.viewer import Viewer
@@ -189,3 +191,24 @@ def test_vectors_of_bolts_are_means_of_their_ends(tmp_path: Path):
     assert bolts.values("displacement_x", "").tolist() == [1.0, 3.0]
     assert bolts.values("displacement", "").tolist() == pytest.approx([2.0**0.5, 13.0**0.5])
     assert not moment_of(frame, tmp_path).of("liners").has("displacement")
+
+
+def test_discs_have_moved_since_the_command_began(tmp_path: Path):
+    """The last `_ini` frame before counts, whatever comes after; a disc that was not there yet has no displacement."""
+    for step, ini, shift in ((0, True, 0.0), (10, False, 0.5), (10, True, 1.0), (20, False, 3.0), (20, True, 9.0)):
+        frame = frames.discs(step, 25 if ini else 36)
+        columns = frame.tables["particles"].columns
+        columns["x"] = columns["x"] + shift
+        write_vtkhdf(tmp_path / frame_name(step, ".vtkhdf", ini), frame, SerialComm())
+    for step, far in ((10, 0.5), (20, 2.0)):
+        discs = read_moment(tmp_path / frame_name(step, ".vtkhdf")).of("particles")
+        moved = discs.values("displacement_x", "")
+        # Discs are numbered along rows of 5 and of 6: the first row has the same places.
+        np.testing.assert_allclose(moved[:5], far)
+        assert np.isnan(moved[25:]).all() and np.isfinite(moved[:25]).all()
+        assert discs.value("displacement", 0).tolist() == pytest.approx([far, 0.0])
+    first = read_moment(tmp_path / frame_name(0, ".vtkhdf", True)).of("particles")
+    assert not first.has("displacement")
+    view = ModelView(layers=(Layer(object="particles", field="displacement", vectors="displacement"),))
+    layer = scene(read_moment(tmp_path / frame_name(20, ".vtkhdf")), view).layers[0]
+    assert layer.scale is not None and layer.scale.title == "displacement (m)"

@@ -15,7 +15,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.core.fields import PER_METRE
 from hpcdem.core.units import label
 from hpcdem.io.frame import Columns, Frame, Table, part
-from hpcdem.io.frames import read_frame
+from hpcdem.io.frames import list_frames, read_frame
 from hpcdem.io.vtkhdf_mesh import CONTACTS, CORNERS, FACE_CONDITIONS, MeshState, is_mesh_frame, read_mesh_frame
 from hpcdem.post import fluid, liners
 
@@ -233,15 +233,42 @@ def read_moment(path: str | os.PathLike) -> Moment:
     """The frame in a file of hpcdem, of particles or of blocks. HpcdemError if it is none, or damaged."""
     path = Path(path)
     if path.suffix != ".vtkhdf":
-        return of_particles(read_frame(path))
+        return _with_origin(of_particles(read_frame(path)), path)
     if is_mesh_frame(path):
         return of_blocks(read_mesh_frame(path, lazily=True, solid=True))
     from hpcdem.io.vtkhdf import read_vtkhdf
 
-    return of_particles(read_vtkhdf(path, lazily=True))
+    return _with_origin(of_particles(read_vtkhdf(path, lazily=True)), path)
 
 
 # ---- particles -------------------------------------------------------------------------------------------------------
+
+
+def _with_origin(moment: Moment, path: Path) -> Moment:
+    """With the displacement of discs since the last frame of the folder before this one that was written as a command
+    began (`_ini`); NaN of those that were not there yet."""
+    try:
+        begun = [file.path for file in list_frames(path.parent) if file.ini and file.step < moment.step]
+    except HpcdemError:  # a frame by itself
+        begun = []
+    if not begun or not path.name.startswith("all_"):
+        return moment
+    discs = moment.objects["particles"]
+
+    def displacement(rows: slice) -> np.ndarray:
+        table = read_frame(begun[-1], ("particles",)).tables["particles"].columns
+        gid, known = part(discs.fields, "gid", rows), np.asarray(table["gid"])
+        place = np.minimum(np.searchsorted(known, gid), max(len(known) - 1, 0))
+        found = np.full((len(gid), 2), np.nan)
+        there = known[place] == gid if len(known) else np.zeros(len(gid), bool)
+        for axis, name in enumerate("xy"):
+            now = part(discs.fields, name, rows)
+            found[there, axis] = now[there] - np.asarray(table[name])[place[there]]
+        return found
+
+    readers: dict[str, _Reader] = {name: partial(part, discs.vectors, name) for name in discs.vectors}
+    discs.vectors = Columns(readers | {"displacement": displacement}, KEPT)
+    return moment
 
 
 def of_particles(frame: Frame) -> Moment:
