@@ -20,6 +20,8 @@ POINTS = 2000
 """Points of a curve that the page gets at most, its highest and lowest ones among them."""
 MOST = 12
 """Curves of a chart."""
+LONGEST = 500
+"""Characters of a title and an expression."""
 OWN = {"time": "s", "step": ""}
 """Columns that every history has, and their units."""
 _TITLE = re.compile(r"(.*?)\s*\[([^\]]*)\]\s*")
@@ -47,8 +49,10 @@ class Curves:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._heads: dict[Path, list[str]] = {}
-        self._read: dict[Path, tuple[tuple[int, int], np.ndarray]] = {}
+        self._heads: dict[Path, tuple[int, list[str]]] = {}
+        """Size of a file, and its titles."""
+        self._read: dict[Path, tuple[int, bytes, np.ndarray]] = {}
+        """Bytes of a history that were read, the last line of them, and what they say."""
 
     def records(self) -> list[Record]:
         """The histories that are there, by name."""
@@ -125,6 +129,8 @@ class Curves:
         HpcdemError."""
         if not isinstance(x, str) or not isinstance(y, list) or not all(isinstance(one, str) for one in y):
             raise HpcdemError("a chart has an x, and a list of y")
+        if any(len(one) > LONGEST for one in (x, *y)):
+            raise HpcdemError(f"a column has at most {LONGEST} characters")
         if not 1 <= len(y) <= MOST:
             raise HpcdemError(f"a chart has 1 to {MOST} curves, not {len(y)}")
         records = {record.name: record for record in self.records()}
@@ -192,32 +198,41 @@ class Curves:
         return steps.astype(int), np.broadcast_to(filter.amount(plain, fields, text), steps.shape)
 
     def _table(self, record: Record) -> np.ndarray:
-        """(n, 3): step, time, value, in the order of steps; a line that is being written is left out. HpcdemError."""
+        """(n, 3): step, time, value, in the order of steps; a line that is being written is left out, and only what is
+        new is read. HpcdemError."""
+        known, last, rows = self._read.get(record.path, (0, b"", np.zeros((0, 3))))
         try:
-            status = record.path.stat()
-            key = status.st_mtime_ns, status.st_size
-            if record.path not in self._read or self._read[record.path][0] != key:
-                text = record.path.read_text(encoding="utf-8")
-                lines = text[: text.rfind("\n") + 1].splitlines()[1:]
-                rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, 3))
+            with open(record.path, "rb") as file:
+                file.seek(known - len(last))
+                if not known or file.read(len(last)) != last:  # another file of this name
+                    known, rows = 0, np.zeros((0, 3))
+                    file.seek(0)
+                    known += len(file.readline())
+                text = file.read()
+            text = text[: text.rfind(b"\n") + 1]
+            if text:
+                new = np.loadtxt(text.decode().splitlines(), delimiter=",", ndmin=2)
+                rows = np.concatenate([rows, new])
                 rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
-                self._read[record.path] = key, rows
+                self._read[record.path] = known + len(text), text.splitlines(keepends=True)[-1], rows
         except (OSError, ValueError) as problem:
             raise HpcdemError(f"cannot read {record.path.name}: {problem}") from None
-        return self._read[record.path][1]
+        return rows
 
     def _head(self, path: Path) -> list[str]:
-        """Titles of the columns of a file; none if it cannot be read."""
-        if path not in self._heads:
-            try:
+        """Titles of the columns of a file; none if it cannot be read. A file that grows keeps them."""
+        try:
+            size = path.stat().st_size
+            if path not in self._heads or size < self._heads[path][0]:
                 with open(path, encoding="utf-8") as file:
                     line = file.readline(4096)
-            except (OSError, UnicodeDecodeError):
-                return []
-            if not line.endswith("\n"):
-                return []
-            self._heads[path] = next(csv.reader([line.strip()]), [])
-        return self._heads[path]
+                if not line.endswith("\n"):
+                    return []
+                self._heads[path] = size, next(csv.reader([line.strip()]), [])
+        except (OSError, UnicodeDecodeError, csv.Error):
+            return []
+        self._heads[path] = size, self._heads[path][1]
+        return self._heads[path][1]
 
 
 def as_csv(told: dict[str, Any]) -> str:

@@ -57,6 +57,7 @@ def test_what_is_computed_has_a_title_and_a_unit(tmp_path: Path):
         ("time", ["2 *"], "expected a history, such as 'force above'"),
         ("time", ["__import__('way top')"], "no function __import__"),
         ("'way top' < 1", ["'way top'"], "expected"),
+        ("time", ["'way top'" + " " * 10**6], "at most 500 characters"),
         ("time", [], "1 to 12 curves"), ("time", "a", "a list of y"), (3, ["a"], "an x"),
     ],
 )  # fmt: skip
@@ -92,6 +93,27 @@ def test_a_line_that_is_being_written_is_left_out(tmp_path: Path):
     path = tmp_path / "history_way top.csv"
     path.write_text(path.read_text() + "50,0.0")
     assert Curves(tmp_path).drawn("step", ["'way top'"])["curves"][0]["x"] == [0.0, 10.0, 20.0, 30.0, 40.0]
+
+
+def test_a_history_that_grows_or_begins_anew_is_read_on(tmp_path: Path):
+    """Only what is new is read; a file of the same name with something else in it is another."""
+    pressed(tmp_path)
+    curves, path = Curves(tmp_path), tmp_path / "history_way top.csv"
+
+    def steps() -> list[float]:
+        return curves.drawn("step", ["'way top'"])["curves"][0]["x"]
+
+    assert steps() == [0.0, 10.0, 20.0, 30.0, 40.0]
+    with path.open("a") as file:
+        file.write("50,0.05,1.0\n60,")
+    assert steps()[-2:] == [40.0, 50.0]
+    with path.open("a") as file:
+        file.write("0.06,2.0\n")
+    assert steps()[-2:] == [50.0, 60.0]
+    write(tmp_path, "way top", "velocity_y [m/s]", {s: 1.0 for s in range(0, 100, 5)})
+    assert steps() == list(range(0, 100, 5))
+    write(tmp_path, "way top", "velocity_y [m/s]", {7: 1.0})
+    assert steps() == [7.0] and curves.drawn("step", ["'way top'"])["curves"][0]["unit"] == "m/s"
 
 
 def test_a_long_history_keeps_its_peak(tmp_path: Path):

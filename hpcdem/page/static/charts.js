@@ -189,6 +189,9 @@ function change(values) {
 async function choose() {
   const [kind, ...rest] = $("history").value.split(" "), name = rest.join(" ");
   if (kind === "own") return;
+  if (kind === "preset") {  // which end is above the other is known once there are numbers
+    try { presets = (await json("presets", {})).presets; } catch (error) { complain(error); return; }
+  }
   wish = { preset: () => { const { kind: _, ...one } = presets[name]; return one; },
     history: () => ({ x: "time", y: [quoted(name)] }) }[kind]?.() ?? null;
   await load();
