@@ -69,6 +69,8 @@ MOVED = ("elements", "joints")
 """What is drawn deformed; joints in space lie on faces of elements."""
 FINE = 2
 """A picture at rest is the mean of so many squared pixels for each."""
+FINEST = 2560 * 1600
+"""Larger pictures, of screens with small pixels, are as fine as these: nobody waits ten seconds for one."""
 
 
 def serve(
@@ -324,7 +326,8 @@ class Viewer:
         if self.last is not None and self.last[0] == asked:
             return self.last[2], self.last[1]
         shown = self._scene(key, moment, view)
-        picture = paint(shown, int(width), int(height), FINE if fine else 1, dark)  # type: ignore[arg-type]
+        finely = fine and width * height <= FINEST  # type: ignore[operator]
+        picture = paint(shown, int(width), int(height), FINE if finely else 1, dark)  # type: ignore[arg-type]
         self.last = asked, picture, shown
         return shown, picture
 

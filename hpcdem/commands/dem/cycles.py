@@ -27,6 +27,8 @@ STEPBAR = 1000
 """Steps between progress reports and rows of walls.csv when the script sets none."""
 NEAR = 0.5
 """Time step over the estimate of the critical one from which the true limit is computed."""
+TOLD = 1.2
+"""The log tells of the part of the stability limit again where it is so much larger than the last that it told."""
 MOST_STEPS = 2**53
 """Steps are counted exactly up to here, in frames and histories too."""
 WATCH = 100
@@ -317,7 +319,8 @@ def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
                 "critical time step",
                 f"{text}. Beyond the estimate results may be noisy; if the run blows up, repeat it with a smaller one",
             )
-        else:
+        elif 0.5 * dt * highest > TOLD * sim.told_share:
+            sim.told_share = 0.5 * dt * highest
             sim.log.info(text)
     elif dt > critical:
         sim.log.warn_once(

@@ -458,11 +458,13 @@ def _add(project: Project, mesh: Mesh) -> None:
     project.add_mesh(mesh)
     if mesh.dim == 3:
         of_hexes = hexahedra.PARTS * len(mesh.hexes)
-        hexes = f"{len(mesh.hexes)} hexahedra of {hexahedra.PARTS} elements each, " if of_hexes else ""
-        _say(project, f"mesh: {hexes}{len(mesh.cells) - of_hexes} tetrahedra, {len(mesh.points)} points")
-        return
-    triangles = int((mesh.cells[:, 3] < 0).sum())
-    _say(project, f"mesh: {triangles} triangles, {len(mesh.cells) - triangles} quads, {len(mesh.points)} points")
+        kinds = {f"hexahedra of {hexahedra.PARTS} elements each": len(mesh.hexes)}
+        kinds["tetrahedra"] = len(mesh.cells) - of_hexes
+    else:
+        triangles = int((mesh.cells[:, 3] < 0).sum())
+        kinds = {"triangles": triangles, "quads": len(mesh.cells) - triangles}
+    parts = [f"{count} {kind}" for kind, count in kinds.items() if count]
+    _say(project, f"mesh: {', '.join([*parts, f'{len(mesh.points)} points'])}")
 
 
 def _say(project: Project, text: str) -> None:

@@ -150,6 +150,7 @@ class Simulation(Model):
         self.bonds = 0
         self.bonds_looked_at: tuple[float, ...] = ()  # state of the last look for bonds of two shear stiffnesses
         self.step_limit = math.inf  # the lowest estimate of the critical time step that was told
+        self.told_share = 0.0  # the largest part of the stability limit that the log told of
         self.next_watch = 0  # the step from which on it is looked at again
         self.lost = 0
         self.rows: list[tuple[int, int]] = []

@@ -220,3 +220,14 @@ def test_what_the_log_says(tmp_path):
         and "is 1.10 of the stability limit" in said[1.1]
         and "unstable" in said[1.1]
     )
+
+
+def test_the_share_is_told_again_only_where_it_has_grown(tmp_path):
+    sim = chain(tmp_path, 5)
+    sim.settings.dt = 0.6 * 2.0 / diagnostics.highest_frequency(sim)
+    sim.log = Log(stream=io.StringIO())
+    for factor in (1.0, 1.0, 1.1, 1.4, 1.4):
+        settings.set_option(sim, "dt", factor * 0.6 * 2.0 / diagnostics.highest_frequency(sim))
+        sim.log._warned.add("critical time step")
+        cycles.cycle(sim, 1)
+    assert sim.log._stream.getvalue().count("of the stability limit") == 2
