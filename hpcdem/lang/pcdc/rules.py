@@ -98,7 +98,8 @@ def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | 
     ways = {"value": "value", "auto": "auto on", "mass-scaling": "mass-scaling"}
     if "auto" in arguments and arguments["auto"] == ():
         arguments = {**arguments, "auto": True}
-    if "update-frequency" in arguments and arguments.get("auto") is not True:
+    auto = arguments.get("auto")
+    if "update-frequency" in arguments and auto is not True and not isinstance(auto, Pending):
         raise ValueError("update-frequency goes with auto on")
     said = [told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)]
     if len(said) > 1:
