@@ -33,7 +33,7 @@ def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray,
     those that are cut come last; of points that become one the lowest stays where it is.
 
     between: elements (ne,) bool of the two sides; faces between others stay as they are. CommandError, with the place,
-    if nothing lies on each other, if a face in space is covered in part only, if bodies overlap there, or if the
+    if nothing lies on each other, if faces cannot be cut so that they fit, if bodies overlap there, or if the
     tolerance would make points of one element one.
     """
     free = _between(fit.free_faces(mesh), between)

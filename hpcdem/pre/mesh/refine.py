@@ -18,7 +18,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.tetrahedra import volumes
-from hpcdem.pre.mesh import fit
+from hpcdem.pre.mesh import fit, optional
 
 Face = tuple[int, ...]
 
@@ -45,7 +45,7 @@ class Refined:
 
 def refined(mesh: Mesh, free: fit.Free, pairs: np.ndarray, tolerance: float) -> Refined:
     """The mesh, in which these pairs (m, 2) of faces that lie on each other are pieces with the same points.
-    CommandError, with the place, for faces in space that are covered in part only, and for warped ones."""
+    CommandError, with the place, for warped faces in space, and those of which no rest can be cut into triangles."""
     if not len(pairs):
         return Refined(mesh, 0, np.arange(len(mesh.cells)))
     return (_in_space if mesh.dim == 3 else _in_plane)(mesh, free, pairs, tolerance)
@@ -169,18 +169,56 @@ class _Cut:
             self.sides.setdefault(int(free.faces[j]), []).extend((a, c, b) for a, b, c in made)
         rows = {int(face): row for row, face in enumerate(free.faces)}
         for face, made in self.sides.items():
-            self._refuse_part(rows[face], made)
+            self._complete(rows[face], made)
 
-    def _refuse_part(self, row: int, made: list[Face]) -> None:
+    def _complete(self, row: int, made: list[Face]) -> None:
+        """Triangles of what these leave of a face, beside them. CommandError if there are none that fit."""
         corners = self.free.at[row]
         whole, covered = _area(corners), sum(_area(self.points[list(one)]) for one in made)
         rim = np.sqrt(((np.roll(corners, -1, axis=0) - corners) ** 2).sum(axis=1)).sum()
-        if abs(covered - whole) > 3.0 * self.tolerance * rim:
+        slack = 3.0 * self.tolerance * rim
+        if abs(covered - whole) <= slack:
+            return
+        rest = self._rest(row, made)
+        if abs(covered + sum(_area(self.points[list(one)]) for one in rest) - whole) > slack:
             raise CommandError(
                 f"a face of element {self.free.faces[row] // 4} at {fit.places(corners.mean(axis=0)[None])} is covered "
-                f"in part only, by {covered / whole:.3g} of its area: this cannot be glued; mesh both bodies with the "
-                "same points there, or with a line of points on the rim of the smaller one"
+                f"in part only, by {covered / whole:.3g} of its area, and what is left cannot be cut into triangles; "
+                "mesh both bodies with the same points there, or with a line of points on the rim of the smaller one"
             )
+        made += rest
+
+    def _rest(self, row: int, made: list[Face]) -> list[Face]:
+        """Triangles between the rim of a face and these, counter-clockwise from outside."""
+        shapely = optional.shapely()
+        if not hasattr(shapely, "constrained_delaunay_triangles"):
+            raise CommandError(
+                f"a face of element {self.free.faces[row] // 4} is covered in part only: gluing it needs shapely 2.1 "
+                f"or newer, here is {shapely.__version__}: {optional.EXTRA}"
+            )
+        normal, ends = self.free.normal[row], self.free.points[row].tolist()
+        ring = [p for k, a in enumerate(ends) for p in (a, *self._on(a, ends[(k + 1) % len(ends)]))]
+        rim = set(zip(ring, ring[1:] + ring[:1]))
+        inner = {(a, b) for one in made for a, b in zip(one, one[1:] + one[:1])}
+        bound = {pair for pair in inner if pair[::-1] not in inner}
+        sides = (rim - bound) | {pair[::-1] for pair in bound - rim}
+        u = self.points[ends[1]] - self.points[ends[0]]
+        u = u / np.sqrt(u @ u)
+        numbers = sorted({p for pair in sides for p in pair} | {p for one in made for p in one})
+        flat = (self.points[numbers] - self.points[ends[0]]) @ np.array([u, _across(normal, u)]).T
+        at = {p: (float(x), float(y)) for p, (x, y) in zip(numbers, flat)}
+        back = {place: p for p, place in at.items()}
+        lines = shapely.linestrings([[at[a], at[b]] for a, b in sorted(sides)])
+        pieces = shapely.union_all(shapely.polygons([[at[p] for p in one] for one in made]))
+        found: list[Face] = []
+        for area in shapely.get_parts(shapely.polygonize(lines)):
+            if pieces.contains(area.representative_point()):
+                continue
+            for one in shapely.get_parts(shapely.constrained_delaunay_triangles(area)):
+                a, b, c = (back[place] for place in list(one.exterior.coords)[:3])
+                found.append((a, b, c) if _turn(at[a], at[b], at[c]) > 0.0 else (a, c, b))
+        edges = {pair for one in found for pair in zip(one, one[1:] + one[:1])}
+        return found if sides <= edges else []
 
     def _on(self, a: int, b: int) -> list[int]:
         """Points on the line from a to b, in order."""

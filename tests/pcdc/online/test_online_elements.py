@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import HpcdemError
+from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.mesh import check
 from tests.pcdc.test_excavation import Desk
 
@@ -317,3 +318,45 @@ ADDED = [
 def test_what_cannot_be_added(desk, line, message):
     with pytest.raises(HpcdemError, match=message):
         desk(QUADS + f"pcdc {line}\npcdc element group 'all'\n")
+
+
+PARTS = {
+    "in the middle": ["(0.7,0.9) (1.9,0.9) (0.7,2.2)"],
+    "at a corner": ["(0,0) (1.2,0) (0,0.8)"],
+    "at a side": ["(1.1,0) (2.3,0) (1.1,1)"],
+    "two that meet": ["(0.5,0.5) (1.5,0.5) (0.5,1.5)", "(1.5,0.7) (2.4,0.7) (1.5,1.9)"],
+    "askew": ["(1,0.3) (2.5,0.8) (0.6,1.5)"],
+}
+
+
+@pytest.mark.parametrize("name", PARTS)
+@pytest.mark.parametrize("split", [True, False])
+def test_small_blocks_on_parts_of_large_faces_in_space(desk, name, split):
+    """They become one body. Of tetrahedra an elastic stress in it is uniform to rounding; hexahedra that stay beside
+    tetrahedra share forces at their corners otherwise."""
+    text = f"split = {split}\npcdc model new dim 3\n"
+    text += "pcdc element create brick p0 (0,0,0) p1 (3,0,0) p2 (0,3,0) p3 (0,0,1) n 2 1 1 triangle [split]\n"
+    for at in PARTS[name]:
+        p0, p1, p2 = (one.rstrip(")") + ",1)" for one in at.split())
+        p3 = p0.replace(",1)", ",1.6)")
+        text += f"pcdc element create brick p0 {p0} p1 {p1} p2 {p2} p3 {p3} n 3 2 1 triangle [split]\n"
+    desk(text)
+    volume = desk.project.mesh.areas().sum()
+    desk("pcdc element glue\n")
+    mesh = desk.project.mesh
+    check(mesh)
+    assert mesh.areas().sum() == pytest.approx(volume, rel=1e-12)
+    assert connectivity.bodies(mesh.face_partners()).max() == 0
+    desk(
+        ROCK
+        + """
+pcdc node boundary apply mech-vel-b-c v-x 0 range x 0 0
+pcdc node boundary apply mech-vel-b-c v-y 0 range y 0 0
+pcdc node boundary apply mech-vel-b-c v-z 0 range z 0 0
+pcdc element-face boundary apply m-s-b-c stress-xx 3e6 stress-yy 3e6 stress-zz 3e6
+pcdc model solve elastic
+"""
+    )
+    for axis in "xyz":
+        found = np.array(desk.pcdc.values("element", f"stress-{axis}{axis}"))
+        assert found == pytest.approx(3e6, rel=1e-5) if split else found.min() > 0.0
