@@ -154,7 +154,7 @@ debian_venv() {
 
 debian_packages=(
     python3-venv python3-dev python3-mpi4py python3-petsc4py python3-h5py-mpi python3-scipy python3-matplotlib
-    openmpi-bin libopenmpi-dev slurmctld slurmd slurm-client munge libpmix-dev
+    openmpi-bin libopenmpi-dev slurmctld slurmd slurm-client munge libpmix-dev tmux
     libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1 # libraries that the gmsh wheel loads
 )
 
