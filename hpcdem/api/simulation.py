@@ -243,7 +243,13 @@ class Simulation(BlockCommands):
         ks: float = 0.0,
         fric: float = 0.0,
     ) -> None:
-        """BOX: four walls around the space of the model; particles that leave it are deleted."""
+        """BOX: four walls around the space of the model; particles that leave it are deleted.
+
+        Parameters
+        ----------
+        left, right, bottom, height : its sides [m].
+        kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient of the walls.
+        """
         dem.walls.box(self.engine, left, right, bottom, height, kn, ks, fric)
 
     @_command
@@ -259,20 +265,48 @@ class Simulation(BlockCommands):
         xv: float | None = None,
         yv: float | None = None,
     ) -> None:
-        """WALL: make a wall from node to node, or change the one with this id."""
+        """WALL: make a wall from node to node, or change the one with this id; what is left out stays.
+
+        Parameters
+        ----------
+        id : number of the wall.
+        nodes : its ends, ((x, y), (x, y)) [m]; both sides act, unless set(wallside="left").
+        kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient.
+        color : name or number.
+        xv, yv : velocity, until it is changed [m/s].
+        """
         dem.walls.wall(self.engine, id, nodes, kn, ks, fric, _color(color), xv, yv)
 
     @_command
     def ball(
         self, x: float, y: float, rad: float, id: int | None = None, color: str | int = 0, group: str = "***"
     ) -> None:
-        """BALL: one particle; without an id it gets the next free one."""
+        """BALL: one particle.
+
+        Parameters
+        ----------
+        x, y : place of its centre [m].
+        rad : radius [m].
+        id : number; left out, the next free one.
+        color, group : name or number; name.
+        """
         dem.particles.ball(self.engine, id, x, y, rad, _color(color), group)
 
     @_command
     def gen(self, num: int, rad: Iterable[float], x: Point, y: Point, color: str | int = 0, group: str = "***") -> int:
-        """GEN num: random insertion without overlap into the rectangle x, y, radii drawn from `rad`; how many fitted
-        in."""
+        """GEN num: random insertion without overlap.
+
+        Parameters
+        ----------
+        num : how many are asked for.
+        rad : radii that are drawn from [m].
+        x, y : sides of the rectangle, (least, greatest) [m].
+        color, group : name or number; name.
+
+        Returns
+        -------
+        int : how many found room.
+        """
         return dem.particles.gen(self.engine, int(num), _radii(rad), x, y, _color(color), group)
 
     @_command
@@ -285,7 +319,19 @@ class Simulation(BlockCommands):
         color: str | int = 0,
         group: str = "***",
     ) -> int:
-        """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad); how many were made."""
+        """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad).
+
+        Parameters
+        ----------
+        rad : radii that are drawn from [m].
+        x, y : sides of the rectangle, (least, greatest) [m].
+        idmin : first number; left out, the next free one.
+        color, group : name or number; name.
+
+        Returns
+        -------
+        int : how many were made.
+        """
         return dem.particles.gen_grid(self.engine, _radii(rad), x, y, idmin, _color(color), group)
 
     @_command
@@ -302,7 +348,20 @@ class Simulation(BlockCommands):
         color: str | int = 0,
         group: str = "***",
     ) -> int:
-        """GLINE: a row of particles from p1 towards p2, their distance over the sum of radii is `cratio`; how many."""
+        """GLINE: a row of particles from p1 towards p2.
+
+        Parameters
+        ----------
+        p1, p2 : ends, (x, y) [m].
+        rad : radius [m].
+        cratio : distance of neighbours over the sum of their radii.
+        kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient.
+        color, group : name or number; name.
+
+        Returns
+        -------
+        int : how many were made.
+        """
         return dem.particles.gline(self.engine, p1, p2, rad, cratio, kn, ks, fric, _color(color), group)
 
     @_command
@@ -360,9 +419,20 @@ class Simulation(BlockCommands):
         parameter: Mapping[str, float] | None = None,
         **properties: Unpack[Material],
     ) -> None:
-        """PROP: properties, velocities, colour and group of particles; what is left out stays. properties: density,
-        fric, shear, poiss, damp, kn, ks, xp, yp. law: 'file.py:function' beside the program (docs/user_laws.md), or
-        "linear"; parameter: properties that it declares; between: the law is that of pairs of discs with these two."""
+        """PROP: properties, velocities, colour and group of particles; what is left out stays.
+
+        Parameters
+        ----------
+        where : the particles.
+        hertz : contacts of Hertz and Mindlin, by shear [Pa] and poiss.
+        xv, yv, spin : velocity [m/s] and angular velocity, anticlockwise [rad/s].
+        color, group : name or number; name.
+        law : 'file.py:function' beside the program (docs/user_laws.md), or "linear".
+        between : the law is that of pairs of discs with these two laws.
+        parameter : properties that the law declares.
+        properties : density [kg/m3], of discs of unit thickness [kg/m2]; fric; shear [Pa]; poiss; damp; kn, ks [N/m];
+            xp, yp: pressures that push along x and y [Pa].
+        """
         dem.properties.prop(
             self.engine, _selection(where), hertz=hertz, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
             law=law, between=between, parameter=parameter, folder=self.directory, **properties,
@@ -385,8 +455,24 @@ class Simulation(BlockCommands):
         rubber: bool = False,
         conserving: bool = False,
     ) -> int:
-        """PROP with bond keys: bond the pairs that touch, renew the bonds that are there; how many are new. conserving:
-        one shear stiffness, touching or open, so that opening and closing make no energy."""
+        """PROP with bond keys: bond the pairs that touch, renew the bonds that are there.
+
+        Parameters
+        ----------
+        where : particles; both of a pair are among them.
+        ebmod, gbmod : Young's and shear modulus of elastic bonds [Pa].
+        tstrength, sstrength : their tensile strength and cohesion [Pa].
+        n_bond, s_bond : tensile and shear strength of contact bonds [N].
+        tolerate : largest gap that is bonded [m].
+        rext : factor on the radii in the search for pairs.
+        fric : friction coefficient of the particles.
+        rubber : mark the bonds as those of a membrane, without any effect on the motion.
+        conserving : one shear stiffness, touching or open, so that opening and closing make no energy.
+
+        Returns
+        -------
+        int : how many are new.
+        """
         return dem.bonds.bond(
             self.engine, _selection(where), ebmod=ebmod, gbmod=gbmod, tstrength=tstrength, sstrength=sstrength,
             n_bond=n_bond, s_bond=s_bond, tolerate=tolerate, rext=rext, fric=fric, rubber=rubber,
@@ -468,7 +554,12 @@ class Simulation(BlockCommands):
 
     @_command
     def cycle(self, n: int) -> None:
-        """CYC: n steps, with output at the SET intervals."""
+        """CYC: step, with output at the intervals of `set`.
+
+        Parameters
+        ----------
+        n : number of steps.
+        """
         self._refuse_only_blocks()
         engine = self.engine
         dem.cycles.cycle(engine, int(n))

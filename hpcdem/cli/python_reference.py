@@ -96,7 +96,15 @@ def _text(of: Any) -> str:
     """A docstring as Markdown: literal blocks are fenced."""
     text = inspect.getdoc(of) or ""
     text = re.sub(r"::\n\n((?:(?:    .*)?\n?)+)", lambda m: ":\n\n```\n" + inspect.cleandoc(m[1]) + "\n```\n", text)
+    text = re.sub(r"^(Parameters|Returns)\n-+\n((?:.+\n?)+)", _listed, text, flags=re.MULTILINE)
     return text.replace("``", "`")
+
+
+def _listed(section: re.Match[str]) -> str:
+    """Parameters, or what comes back, as a list."""
+    items = re.sub(r"\n +", " ", section[2].strip())
+    rows = re.sub(r"^(.+?) : ", lambda found: f"- `{found[1]}`: ", items, flags=re.MULTILINE)
+    return f"{'Returns' if section[1] == 'Returns' else 'Arguments'}:\n\n{rows}\n"
 
 
 if __name__ == "__main__":
