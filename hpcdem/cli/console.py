@@ -130,24 +130,25 @@ def serve(talk: Talk, begin: Any, requests: IO[str], answers: IO[str]) -> None:
         answers.write(f"\n{MARK}{json.dumps(content)}\n")
         answers.flush()
 
+    def failed(problem: BaseException) -> bool:
+        answers.write("interrupted\n" if isinstance(problem, KeyboardInterrupt) else f"{problem}\n")
+        return False
+
     mark(what=READY)
     for line in requests:
         wanted = json.loads(line)
         begin()
-        good, shown = True, None
+        good, told, shown = True, True, None  # what fails, or is interrupted, may have changed the model too
         try:
-            try:
-                told = talk.carry_out(wanted["text"], wanted.get("name", ""))
-            finally:
-                answers.flush()
-            if told:
-                shown = talk.show()
+            told = talk.carry_out(wanted["text"], wanted.get("name", ""))
         except SystemExit:
+            answers.flush()
             return
-        except (HpcdemError, StoppedWithCheckpoint) as error:
-            good = False
-            answers.write(f"{error}\n")
-        except KeyboardInterrupt:
-            good = False
-            answers.write("interrupted\n")
+        except (HpcdemError, StoppedWithCheckpoint, KeyboardInterrupt) as problem:
+            good = failed(problem)
+        answers.flush()
+        try:
+            shown = talk.show() if told else None
+        except (HpcdemError, KeyboardInterrupt) as problem:
+            good = failed(problem)
         mark(what=DONE, good=good, frame=None if shown is None else str(shown))

@@ -56,7 +56,7 @@ class Console:
     @property
     def busy(self) -> bool:
         """It starts, or carries something out."""
-        return self._alive() and (not self.ready or self.waiting > 0)
+        return self.alive and (not self.ready or self.waiting > 0)
 
     def said_since(self, number: Any) -> dict[str, Any]:
         """Lines after this one, and the state."""
@@ -64,7 +64,7 @@ class Console:
             since = number if isinstance(number, int) and 0 <= number <= self.count else 0
             return {
                 "lines": [[text, kind] for n, text, kind in self.lines if n > since], "last": self.count,
-                "busy": self.busy, "language": self.language, "alive": self._alive(),
+                "busy": self.busy, "language": self.language, "alive": self.alive,
             }  # fmt: skip
 
     def carry_out(self, text: str, language: str, name: str = "") -> None:
@@ -72,7 +72,7 @@ class Console:
         with self.lock:
             if self.busy:
                 raise HpcdemError("the console is at work; interrupt it first")
-            if name or not self._alive() or language != self.language:
+            if name or not self.alive or language != self.language:
                 self.start(language)
             assert self.process is not None and self.process.stdin is not None
             for line in [f"run {name}"] if name else text.rstrip("\n").split("\n"):
@@ -122,7 +122,9 @@ class Console:
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
 
-    def _alive(self) -> bool:
+    @property
+    def alive(self) -> bool:
+        """There is a process, at work or not."""
         return self.process is not None and self.process.poll() is None
 
     def _listen(self, process: subprocess.Popen[str]) -> None:

@@ -178,7 +178,7 @@ class Viewer:
         waiting: dict[str, Any] = {"drawing": not self.warm}
         if not told["sources"]:
             waiting |= self.sources.waiting()
-            if waiting["kind"] == "empty" and self.desk is not None:
+            if self.desk is not None and (waiting["kind"] == "empty" or self.desk.console.alive):
                 waiting["kind"] = "first" if self.desk.console.busy else "desk"
         return told | {"waiting": waiting}
 

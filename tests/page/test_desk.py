@@ -114,6 +114,8 @@ def test_a_run_is_interrupted_and_the_model_stays(viewing: Viewing):
     said = until_ready(viewing)
     assert any("Ctrl-C" in line for line in said)
     before = int(talk(viewing, "pcdc.cycle")[-1])
+    now = viewing.ask("state", {})["sources"][-1]["frames"]
+    assert now == [[before, False]], "the picture is that of the model as it is"
     talk(viewing, "pcdc model step 7")
     assert int(talk(viewing, "pcdc.cycle")[-1]) == before + 7 > 60
     assert refused(lambda: viewing.ask("interrupt", {}))[0] == 422
