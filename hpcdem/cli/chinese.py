@@ -143,14 +143,14 @@ TEXTS = {
     "Of which objects --field and the options below are: elements, particles, joints, ... [the first that have the "
     "field].":
     "--field 和以下选项针对的对象:elements、particles、joints 等 [有此场的第一种]。",
-    "Values of the first and the last colour [those of what is shown in all frames].":
-    "首末颜色对应的值 [所有帧中所示部分的范围]。",
+    "Values of the first and the last colour; full: the least and the greatest [those that 1 % is below or above].":
+    "首末颜色对应的值;full:最小值和最大值 [各有 1 % 的值在其外]。",
     "Colours by the logarithm.": "颜色按对数分布。",
     "viridis, cividis, yellow-brown, blue-red, ... (docs/view.md) [viridis].":
     "viridis、cividis、yellow-brown、blue-red 等(docs/view.md)[viridis]。",
     "One colour for all.": "全部用一种颜色。",
     "From 0 to 1 [1].": "从 0 到 1 [1]。",
-    "Outlines of elements and particles.": "单元和颗粒的轮廓线。",
+    "Outlines of elements and particles [of small meshes].": "单元和颗粒的轮廓线 [小网格的]。",
     "Factor on radii of particles and widths of lines [1].": "颗粒半径和线宽的倍数 [1]。",
     "Arrows of this field: displacement, velocity, force.": "此场的箭头:displacement、velocity、force。",
     "Factor on the length of arrows [1].": "箭头长度的倍数 [1]。",
@@ -336,8 +336,9 @@ TEXTS = {
     "jpg、png、tiff、pdf、svg 中的若干种,用逗号隔开 [jpg]。",
     "Particles in the colours of a field: vx, rotation, stress, ... (see `hpcdem draw --list`) [their own].":
     "颗粒按某个场着色:vx、rotation、stress 等(见 `hpcdem draw --list`)[各自的颜色]。",
-    "--field: values of the first and the last colour [those of all frames].":
-    "--field:首末颜色对应的值 [所有帧的范围]。",
+    "--field: values of the first and the last colour; full: the least and the greatest [those that 1 % is below or "
+    "above].":
+    "--field:首末颜色对应的值;full:最小值和最大值 [各有 1 % 的值在其外]。",
     "--field: viridis, cividis, blue-red, ... [viridis].": "--field:viridis、cividis、blue-red 等 [viridis]。",
     "Draw every frame all_*.vtkhdf or all_*.dat in DIR as a picture of the same name beside it.\n\nUnder mpiexec "
     "or srun the ranks share the frames.":

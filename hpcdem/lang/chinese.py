@@ -895,6 +895,7 @@ PCDC_KEYWORDS = {
     "给对象着色的物理量;hpcdem draw --list 列出帧中的物理量",
     "of which objects the field and the options below are": "物理量和以下选项所属的对象",
     "values of the first and the last colour": "色标两端的值",
+    "in the place of limits: the least and the greatest value of what is shown": "代替 limits:取所示对象的最小值和最大值",
     "colours by the logarithm": "按对数着色",
     "of the field": "物理量的色标",
     "from 0 to 1": "不透明度,0 到 1",
