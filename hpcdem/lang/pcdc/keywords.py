@@ -37,9 +37,13 @@ class Keyword:
         segments = typed.lower().split("-")
         return any(_match(segments, parts) for parts in self._parts)
 
+    @cached_property
+    def _fulls(self) -> tuple[str, ...]:
+        return tuple("-".join(full for _, full in parts) for parts in self._parts)
+
     def is_exactly(self, typed: str) -> bool:
         """Is `typed` this word in full?"""
-        return any(typed.lower() == "-".join(full for _, full in parts) for parts in self._parts)
+        return typed.lower() in self._fulls
 
     def shortest(self) -> str:
         """The compulsory letters."""

@@ -12,7 +12,7 @@ from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
 from hpcdem.lang.pcdc.kinds import Pending
 from hpcdem.lang.pcdc.lexer import Escape, Token, Vector, Word
 from hpcdem.lang.pcdc.statement import Statement, resolved, shown
-from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, Way, distinct
+from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, Way
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 
@@ -144,10 +144,10 @@ class _Line:
 
     def command(self) -> Command:
         """The words of a command, one after the other."""
-        ways: Sequence[Way] = self.table.ways
-        depth = 0
+        begun: tuple[str, ...] = ()
         while True:
-            level = distinct(ways, depth)
+            level, ways = self.table.level(begun)
+            depth = len(begun)
             ended = next((way for way in ways if len(way.words) == depth), None)
             found = self.take(level)
             if found is None:
@@ -155,10 +155,10 @@ class _Line:
                     return self._allowed(ended)
                 token = self.next("a command: " + _joined(row.keyword.name for row in level))
                 self.unknown(token, level)
-            ways = [way for way in ways if len(way.words) > depth and way.words[depth] == found.keyword]
-            depth += 1
-            self.context = f"{self.context} {found.keyword}" if depth > 1 else found.keyword.name
-            if len(ways) == 1 and len(ways[0].words) == depth:
+            begun = (*begun, found.keyword.notation)
+            self.context = f"{self.context} {found.keyword}" if depth else found.keyword.name
+            _, ways = self.table.level(begun)
+            if len(ways) == 1 and len(ways[0].words) == len(begun):
                 return self._allowed(ways[0])
 
     def _is_unknown(self, command: Command) -> bool:

@@ -207,6 +207,17 @@ class Table:
         """All words that name commands."""
         return tuple(way for command in self.commands for way in command.ways)
 
+    @cached_property
+    def _levels(self) -> dict[tuple[str, ...], tuple[list[Level], list[Way]]]:
+        return {}
+
+    def level(self, begun: tuple[str, ...]) -> tuple[list[Level], list[Way]]:
+        """Words that may follow on these notations, and all words of commands that begin with them."""
+        if begun not in self._levels:
+            ways = [way for way in self.ways if tuple(w.notation for w in way.words[: len(begun)]) == begun]
+            self._levels[begun] = distinct(ways, len(begun)), ways
+        return self._levels[begun]
+
     def command(self, name: str) -> Command:
         """The row of a command by its words in full."""
         return next(c for c in self.commands if c.name == name)
