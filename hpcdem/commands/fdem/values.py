@@ -15,6 +15,10 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh.disc_sets import DiscSet, Poles
 from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
+from hpcdem.pre.mesh.pieces import HOLE as HOLE
+from hpcdem.pre.mesh.pieces import LINE as LINE
+from hpcdem.pre.mesh.pieces import OUTLINE as OUTLINE
+from hpcdem.pre.mesh.pieces import Piece as Piece
 from hpcdem.pre.mesh.sizes import skew_grid, spaced
 
 FIGURES = (".png", ".pdf", ".svg")

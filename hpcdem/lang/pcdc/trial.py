@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from hpcdem.commands.fdem import geometry, values
+from hpcdem.commands.fdem.values import HOLE, LINE, OUTLINE, Piece
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.kinds import FunctionName, Pending, TableName
 from hpcdem.lang.pcdc.table import (
@@ -38,7 +39,6 @@ from hpcdem.physics.flow.properties import POROUS as FLUID
 from hpcdem.physics.heat.properties import FLUID_HEAT as HEAT_OF_FLUID
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT
 from hpcdem.physics.proppant.properties import PROPPANT as GRAINS
-from hpcdem.pre.mesh.pieces import HOLE, LINE, OUTLINE, Piece
 
 MODELS = {
     model.keyword.name: model.of
