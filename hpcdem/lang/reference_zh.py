@@ -106,7 +106,7 @@ def pcdc_page() -> str:
             "",
             f"`pcdc {command.notation}`",
             "",
-            _said(chinese.PCDC, command.name, command.doc),
+            _said(chinese.PCDC, command.name, command.doc) + "".join(f"也可写作 `{words}`。" for words in command.also),
             "",
             "```",
         ]

@@ -20,12 +20,14 @@ This page is made from `hpcdem/lang/pcdc/table.py` and `hpcdem/physics/fdem/prop
   name for a variable. A command that goes on in the next line ends with a backslash; `#` begins a comment.
 - All commands, and the Python between them, are read before anything runs; the first wrong line is reported with file,
   line and text. `hpcdem --check script.sc` stops there.
+- Three dots at the end of a line go on with the next, too. Vectors may stand without brackets, `0,-9.8`, and lists with
+  commas: this is how PCDC's online help writes ([all its words](pcdc_online.md), [whole scripts](from_pcdc.md)).
 - Words may be shortened: what stands in braces may be left out, from the right, in each part of a word:
   `a{s}-l{ayer}` is read in `as-layer`, `a-l` and `as-lay`. Upper and lower case are the same. A word that may mean
   several is refused with the candidates.
-- Values are numbers, texts in quotes, `on` and `off`, vectors `(x,y)`. Where a value, or a part of one, is an
-  expression of Python it stands in square brackets: `[m_R/12]`, `([i],0)`, `'layer [i]'`. In a text `[[` and `]]` are
-  brackets.
+- Values are numbers, texts in quotes, `on` and `off` (`true`, `yes`, `false`, `no`), vectors `(x,y)`. Where a value, or
+  a part of one, is an expression of Python it stands in square brackets: `[m_R/12]`, `([i],0)`, `'layer [i]'`. In a
+  text `[[` and `]]` are brackets.
 - `<f>` a number, `<i>` a whole number, `<s>` a text, `<v>` a vector; where `table <s>` may stand the value is a
   function of time.
 - Units: any consistent set; those in the tables are SI. Numbers of objects begin at 0, as in the output. Tension is
@@ -89,7 +91,7 @@ def _overview(table: Table) -> str:
 
 def _command(command: Command) -> str:
     origin = "in the manual" if command.manual else "hpcdem's own"
-    lines = [f"## {command.name}", "", f"`pcdc {command.notation}` ({origin})", "", command.doc, "", "```"]
+    lines = [f"## {command.name}", "", f"`pcdc {command.notation}` ({origin})", "", _told(command), "", "```"]
     lines += [*_syntax(command), "```", ""]
     if command.leading or command.options:
         lines += [_options(command.options, command.leading), ""]
@@ -98,6 +100,18 @@ def _command(command: Command) -> str:
         lines += [f"Models: {names}.", ""]
     lines += ["Example:" if len(command.example) == 1 else "Examples:", "", "```", *command.example, "```", ""]
     return "\n".join(lines)
+
+
+def _told(command: Command) -> str:
+    """What a command does, that it does nothing here or is refused, and other words for it."""
+    parts = [command.doc]
+    if command.idle:
+        parts.append(f"It is read and has no effect here, which the log says once: {command.idle}.")
+    if command.refused:
+        parts.append(f"It is refused: {command.refused}.")
+    if command.also:
+        parts.append(f"Also read: {', '.join(f'`{words}`' for words in command.also)}.")
+    return " ".join(parts)
 
 
 def _syntax(command: Command) -> list[str]:
