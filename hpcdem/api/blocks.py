@@ -19,6 +19,7 @@ from hpcdem.api.program import HELP, carried_out, place, spelt
 from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.bindings import Call, carry_out
+from hpcdem.lang.pcdc.keywords import matching
 from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.physics.fdem import groups as g
@@ -519,6 +520,12 @@ class Objects(Words):
     def _carry_out(self, command: str, given: Mapping[str, Any], where: Where, model: str | None = None) -> None:
         self._do(f"{self.pcdc} {command}", given, where, self.kind, model)
 
+    def _take_back(self, conditions: Sequence[str], where: Where) -> None:
+        """Conditions by their names, short or in full; all, if none is named."""
+        rows = PCDC.command(f"{self.pcdc} boundary remove").options
+        names = [next((row.name for row in matching(one.replace("_", "-"), rows)), one) for one in conditions]
+        self._carry_out("boundary remove", dict.fromkeys(names, True), where)
+
 
 @commands
 class _Modelled(Objects):
@@ -654,7 +661,7 @@ class Faces(_Modelled):
     def remove_boundary(self, *conditions: str, where: Where = None) -> None:
         """Take boundary conditions back. conditions: only
         these, as pcdc element-face boundary calls them."""
-        self._carry_out("boundary remove", dict.fromkeys(conditions, True), where)
+        self._take_back(conditions, where)
 
 
 @commands
@@ -758,7 +765,7 @@ class Nodes(Objects):
     def remove_boundary(self, *conditions: str, where: Where = None) -> None:
         """Take boundary conditions back, those of fluid and heat too. conditions: only
         these, as pcdc node boundary calls them."""
-        self._carry_out("boundary remove", dict.fromkeys(conditions, True), where)
+        self._take_back(conditions, where)
 
     def initial_velocity(
         self,
@@ -875,7 +882,7 @@ class BoltNodes(Objects):
 
     def remove_boundary(self, *conditions: str, where: Where = None) -> None:
         """Take back what was prescribed. conditions: only these, as pcdc bolt-node boundary calls them."""
-        self._carry_out("boundary remove", dict.fromkeys(conditions, True), where)
+        self._take_back(conditions, where)
 
 
 @commands

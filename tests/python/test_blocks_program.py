@@ -95,7 +95,7 @@ SAME: list[tuple[str, str]] = [
      "'thermal-solid-boundary-condition', 'thermal-flow-boundary-condition')"),
     ("pcdc element-face boundary remove m-s-b-c therm-c-h",
      "sim.faces.remove_boundary('mechanical-stress-boundary-condition', 'thermal-const-heat')"),
-    ("pcdc bolt-node boundary remove b-n-c", "sim.bolt_nodes.remove_boundary('bolt-node-constrain')"),
+    ("pcdc bolt-node boundary remove b-n-c", "sim.bolt_nodes.remove_boundary('b-n-c')"),
     ("pcdc bolt-node boundary remove b-n-f-b-c",
      "sim.bolt_nodes.remove_boundary('bolt-node-force-boundary-condition')"),
     ("pcdc element-face boundary mech-abs-b-c normal -1e5 dip 2e5 range boundary",
