@@ -99,7 +99,7 @@ def test_bodies_are_groups(bench, tmp_path: Path):
          "fractures lie inside of bodies"),
         ("geometry create extrude layer 'rock' along (0,0,1) as-layer 'd'", "something beside polygons"),
         ("geometry create cone (0,0,0) (0,0,1) 1 1 as-layer 'd'", "two radii that differ"),
-        ("geometry create circle (0,0,0) 1 as-layer 'd'", "'geometry create circle' is for two dimensions"),
+        ("geometry create arc (0,0,0) 1 0 90 as-layer 'd'", "'geometry create arc' is for two dimensions"),
         ("mesh create from-layer 'fault' size 1", "the outline is a body, but the layer has a plane"),
         ("mesh create from-layer 'rock' size 1 crack 'rock'", "layer 'rock' has bodies"),
         ("geometry import 'none.step' as-layer 'd'", r"none\.step"),

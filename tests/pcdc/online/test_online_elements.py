@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem import connectivity, diagnostics
 from hpcdem.physics.fdem.mesh import check
 from tests.pcdc.test_excavation import Desk
 
@@ -360,3 +360,25 @@ pcdc model solve elastic
     for axis in "xyz":
         found = np.array(desk.pcdc.values("element", f"stress-{axis}{axis}"))
         assert found == pytest.approx(3e6, rel=1e-5) if split else found.min() > 0.0
+
+
+def test_joints_between_fine_and_coarse_elements_break(tmp_path):
+    """A bar of quads that is fine in its middle, pulled to half and to one and a half of its tensile strength."""
+    for part, broken in ((0.5, False), (1.5, True)):
+        desk = Desk(tmp_path)(
+            f"pull = {part * 1e6}\n"
+            + QUADS
+            + "pcdc element densify max-length 0.5 range x 3 5\n"
+            + """
+pcdc element c-model mech-iso-e property den 2500 y 2e9 p-r 0.25 d-f 0.1
+pcdc face-joint c-model c-i-c-i property f 30 c 5e6 t-s 1e6 gf1 5 gf2 50 p-n 2e11 p-s 2e11 range x 2.9 5.1
+pcdc node boundary apply mech-vel-b-c v-x 0 range x 0
+pcdc table 'slow' data 0 0, 0.04 [pull], 1 [pull]
+pcdc element-face boundary apply m-s-b-c s-xx table 'slow' range x 8
+pcdc model solve time 0.045
+"""
+        )
+        counts = diagnostics.joint_counts(desk.blocks)
+        assert (counts[2] > 0) == broken, counts
+        cells = desk.project.mesh.cells
+        assert (cells[:, 3] < 0).any() and sum(counts) > 50  # triangles where a coarse quad has points on its sides
