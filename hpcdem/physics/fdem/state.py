@@ -233,14 +233,16 @@ class State(ModelDefinition, Model):
         scaled = f"by mass scaling, which adds {added:.3g} times the mass"
         how = "given" if o.dt else scaled if o.mass_scaling else "estimated"
         said = partial(with_prefix, unit="s")
-        allowed = f"; the safety factor {o.safety:g} allows {said(critical)}" if dt != critical else ""
+        allowed = f"; the safety factor {o.safety:g} allows {said(critical)}" if dt != critical else (
+            f", as the safety factor {o.safety:g} allows"
+        )  # fmt: skip
         self.log.info(
             f"time step {said(dt)} ({how}): {dt / limit:.2f} of the stability limit of {said(limit)}{allowed}"
         )
         if dt > critical * (1.0 + 1e-9):
             self.log.warn_once(
                 f"critical time step {dt > limit}",
-                f"the time step {dt:g} s is {dt / limit:.2f} of the stability limit {limit:.4g} s, more than the "
-                f"safety factor {o.safety:g} allows ({critical:.4g} s); a run that blows up should be repeated with a "
+                f"the time step {said(dt)} is {dt / limit:.2f} of the stability limit of {said(limit)}, more than the "
+                f"safety factor {o.safety:g} allows ({said(critical)}); a run that blows up should be repeated with a "
                 "smaller one",
             )
