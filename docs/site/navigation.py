@@ -3,15 +3,18 @@
 TUTORIALS = ("thrust_belt", "cracked_specimen", "curve_to_test", "cluster_job", "water", "heat")
 
 NAVIGATION = {
-    "Begin": [f"docs/tutorials/{page}" for page in TUTORIALS] + ["docs/notebooks", "docs/coming_from", "docs/from_pcdc", "docs/glossary"],
+    "Begin": [
+        *(f"docs/tutorials/{page}" for page in TUTORIALS),
+        "docs/notebooks", "docs/coming_from", "docs/from_pcdc", "docs/glossary",
+    ],
     "How to": [
         "docs/howto", "docs/packages", "docs/running", "docs/cases", "docs/specimens", "docs/specimens_page",
         "docs/meshes", "docs/python", "docs/sweep", "docs/view", "docs/pictures", "docs/measure",
         "docs/stress_strain", "docs/zdemss", "docs/user_laws",
     ],
     "Reference": [
-        "docs/zdem_reference", "docs/pcdc_reference", "docs/pcdc_online", "docs/options", "docs/python_reference", "docs/files",
-        "docs/fields",
+        "docs/zdem_reference", "docs/pcdc_reference", "docs/pcdc_online", "docs/options", "docs/python_reference",
+        "docs/files", "docs/fields",
     ],
     "Theory": ["docs/physics", "docs/blocks"],
     "Evidence": [

@@ -21,10 +21,10 @@ docs/fields.md`). How files are laid out: [Files](files.md). `hpcdem draw FRAME 
 Scripts of PCDC write hyphens (`stress-xx`), frames and Python underscores; Python takes both. Units are those of
 the plane, in which forces, energies and rates are of a metre of thickness; in space N/m becomes N, J/m J, m2/s m3/s.
 
-In views (`hpcdem draw`, the page, `output image`, filters, Python's `sim.frame()`) each vector of a frame is a field by its
-length and by its components: `displacement`, `displacement_x`, `displacement_y`, in space `displacement_z`; so are `velocity` of
-elements, discs, clumps, walls, bolts and liners, `force` of discs, clumps, walls, contacts and bonds, `contact_force`,
-`nodal_force` and `acceleration` ([Views](view.md)).
+In views (`hpcdem draw`, the page, `output image`, filters, Python's `sim.frame()`) each vector of a frame is a field by
+its length and by its components: `displacement`, `displacement_x`, `displacement_y`, in space `displacement_z`; so are
+`velocity` of elements, discs, clumps, walls, bolts and liners, `force` of discs, clumps, walls, contacts and bonds,
+`contact_force`, `nodal_force` and `acceleration` ([Views](view.md)).
 
 ## Particles
 
