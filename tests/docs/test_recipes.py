@@ -178,9 +178,9 @@ assert sim.particles["vx"][np.argsort(sim.particles["gid"])].tolist() == [2.0, 0
         [
             (
                 "lang/pcdc/table.py",
-                '    Command("mod{el} grav{ity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),',
+                '    Command("mod{el} g{ravity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),',
                 '=    Command("mod{el} moon", "Gravity of the moon.", '
-                '("pcdc model moon",)),\n    Command("mod{el} grav{ity}", "Gravity from now on.", '
+                '("pcdc model moon",)),\n    Command("mod{el} g{ravity}", "Gravity from now on.", '
                 '("pcdc model gravity (0,-9.81)",),',
             ),
             (
@@ -331,8 +331,8 @@ assert abs(frame.tables["particles"].columns["activity"] - 0.99**5).max() < 1e-1
         [
             (
                 "physics/fdem/surface_loads.py",
-                'ORDER = ("discs", "fluid", "proppant", "heat", "bolts", "liners", "free_field")',
-                '=ORDER = ("discs", "fluid", "proppant", "heat", "bolts", "liners", "free_field", "wind")',
+                'ORDER = ("discs", "fluid", "proppant", "heat", "bolts", "liners", "free_field", "water")',
+                '=ORDER = ("discs", "fluid", "proppant", "heat", "bolts", "liners", "free_field", "water", "wind")',
             )
         ],
         """

@@ -191,9 +191,16 @@ pcdc geometry create circle (0,0) 1 as-layer 'circle'
 pcdc geometry create arc (0,0) 1 0 90 as-layer 'arc'
 pcdc geometry create point (0,0) as-layer 'point'
 pcdc geometry create fractures orientation fixed 0 length fixed 1 p21 1 inside 'circle' seed 1 as-layer 'cracks'
+pcdc geometry export 'polygon' file 'polygon.dxf'
 pcdc mesh structured (0,0) (2,1) cells 2 1
+pcdc element create brick p0 (0,0) p1 (2,0) p2 (0,1) n 2 1
+pcdc element create geometry layer 'polygon' mesh-size 0.5
+pcdc element create geometry-patch boundary-close-polyline array (0,0) (1,0) (1,1) mesh-size 0.5
+pcdc element create geometry-boundary boundary (0,0) (1,0) (1,1) mesh-size 0.5
+pcdc element create hollow-circle center (0,0) radius 3 inner-radius 1 mesh-size 0.7
 pcdc mesh equilateral (0,0) (2,1) size 0.5
 pcdc bolt create polyline (0,0) (1,1) length 0.1
+pcdc bolt-element create (0,0) (1,1)
 pcdc table create 'times' values (0,0) (1,1)
 pcdc history create 'time' model value time
 pcdc history export 'all.csv'
