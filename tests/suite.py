@@ -1,6 +1,6 @@
 """What the suite knows about itself: how long its files take, which modules they reach, how a run ended.
 
-As a plugin of pytest it starts the longest files first and says how much time is left. Where ``scripts/test`` names a
+As a plugin of pytest it says how much time is left. Where ``scripts/test`` names a
 folder (HPCDEM_TEST_RESULTS), it records the result of each part and which modules of hpcdem each file of tests loads,
 in this process and in the programs that it starts.
 
@@ -58,7 +58,7 @@ def seconds_of(file: str) -> float:
 
 
 class Suite:
-    """One run of pytest. In a worker of xdist it only orders the tests and counts those that are left out."""
+    """One run of pytest. In a worker of xdist it only counts the tests that are left out."""
 
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
@@ -83,11 +83,6 @@ class Suite:
                 os.environ["PYTHONPATH"] = os.pathsep.join([*filter(None, places), recorder])
 
     # In each process
-
-    @pytest.hookimpl(trylast=True)
-    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """The longest files first: a long one that begins last keeps all others waiting."""
-        items.sort(key=lambda item: -round(seconds_of(_file(item.nodeid))))
 
     def pytest_deselected(self, items: list[pytest.Item]) -> None:
         self.slow += sum(item.get_closest_marker("slow") is not None for item in items)

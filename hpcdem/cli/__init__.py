@@ -18,7 +18,7 @@ from hpcdem.cli.common import HELP, messages_only, read_command_line, run_progra
 from hpcdem.cli.programs import BY_NAME, FIRST
 from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
-from hpcdem.core.chinese import wanted
+from hpcdem.core.chinese import wanted as wants_chinese
 from hpcdem.core.errors import EXIT_OK, EXIT_USAGE
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import launch, shutdown
@@ -55,7 +55,7 @@ def main() -> NoReturn:
     words, cores_before = sys.argv[1:], launch.cores()
     if not words:
         with launch.one_voice():
-            if wanted(encoding=getattr(sys.stdout, "encoding", None)):
+            if wants_chinese(encoding=getattr(sys.stdout, "encoding", None)):
                 from hpcdem.cli.chinese import FIRST as IN_CHINESE
 
                 click.echo(IN_CHINESE, err=True)

@@ -416,7 +416,7 @@ def test_refusals():
     changes.element_model(sim, [one], MOHR_COULOMB, SOIL)
     with pytest.raises(CommandError, match="dilation must not be above friction"):
         sim.element_property([one], {"dilation": 40.0})
-    with pytest.raises(CommandError, match="needs cohesion"):
-        changes.element_model(sim, [one], MOHR_COULOMB, {k: v for k, v in SOIL.items() if k != "cohesion"})
+    with pytest.raises(CommandError, match="needs two of young"):
+        changes.element_model(sim, [one], MOHR_COULOMB, {k: v for k, v in SOIL.items() if k != "shear"})
     with pytest.raises(CommandError, match="has no property cohesion"):
         sim.element_property(None, {"cohesion": 1e6})

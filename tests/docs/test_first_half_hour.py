@@ -48,6 +48,10 @@ class Terminal:
         """Its rows, without empty ones at the end."""
         return self("capture-pane", "-p", "-t", "w").rstrip("\n")
 
+    def scrolled(self) -> str:
+        """The same with the rows that have left it at the top."""
+        return self("capture-pane", "-p", "-S", "-2000", "-t", "w").rstrip("\n")
+
     def keys(self, *keys: str) -> None:
         self("send-keys", "-t", "w", *keys)
 
@@ -56,12 +60,12 @@ class Terminal:
         self.count += 1
         self.keys(f"clear; {line}; echo DONE{self.count}=$?", "Enter")
 
-    def waits(self, words: str) -> str:
-        """The screen once it shows these words."""
+    def waits(self, words: str, scrolled: bool = False) -> str:
+        """The screen once it shows these words, or has shown them."""
         seen = [""]
 
         def there() -> object:
-            seen[0] = self.screen()
+            seen[0] = self.scrolled() if scrolled else self.screen()
             return re.search(words, seen[0])
 
         until(there, lambda: f"{words!r} on\n{seen[0]}")
@@ -100,7 +104,7 @@ def test_the_first_commands_in_a_terminal(terminal: Terminal, tmp_path: Path) ->
     script = (tmp_path / "push.py").read_text()
     assert script == LONG
     terminal.types("hpcdem push.py --resume")
-    said = terminal.waits(r"going on from .*\.sav, step \d+")
+    terminal.waits(r"going on from .*\.sav,\s+step \d+", scrolled=True)
     said = terminal.waits(r"steps, \d+ left")
     terminal.keys("C-c")
     terminal.end(85)

@@ -65,7 +65,7 @@ def test_channels_are_coloured_by_what_is_in_them(tmp_path: Path) -> None:
         (found,) = coloured(blocks.draw(state, blocks.Looks((word,))))
         shown = fluid.PICTURES[word]
         expected = np.abs(joints[column][wet if not shown.dry else np.isfinite(joints["aperture"])])
-        unit = blocks.unit_of(shown, shown.range(state))[0] if unit is None else unit
+        unit = blocks.unit_of(shown, shown.range(state), state)[0] if unit is None else unit
         assert np.sort(np.asarray(found)) == pytest.approx(np.sort(expected / unit)), word
     assert len(set(np.round(coloured(blocks.draw(state, blocks.Looks(("pressure",))))[0]))) == 3  # 750, 500, 250 kPa
     dry = frames.whole(_without(tmp_path))

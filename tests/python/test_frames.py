@@ -137,6 +137,7 @@ def test_progress_in_a_notebook(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
     display = type("display", (), {"HTML": str, "display": staticmethod(lambda text, display_id: Handle())})
     monkeypatch.setitem(__import__("sys").modules, "IPython", type("IPython", (), {"display": display}))
     monkeypatch.setitem(__import__("sys").modules, "IPython.display", display)
+    monkeypatch.delitem(__import__("sys").modules, "ipykernel", raising=False)
     monkeypatch.setattr("hpcdem.runtime.progress.in_notebook", lambda: True)
     monkeypatch.setattr(notebook.NotebookBar, "REDRAW", -1.0)
     log = Log()

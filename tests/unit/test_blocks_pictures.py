@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -169,8 +170,14 @@ def test_levels_are_round_and_hold_the_range(low, high):
 
 
 def test_units_of_stress():
-    stress = blocks.CONTOURS["stress"]
-    assert [blocks.unit_of(stress, (0, v))[1] for v in (2e9, 5e6, -3e4, 7.0, 0.0)] == ["GPa", "MPa", "kPa", "Pa", "Pa"]
+    stress, state = blocks.CONTOURS["stress"], SimpleNamespace(units="")
+    assert [blocks.unit_of(stress, (0, v), state)[1] for v in (2e9, 5e6, -3e4, 7.0, 0.0)] == [
+        "GPa",
+        "MPa",
+        "kPa",
+        "Pa",
+        "Pa",
+    ]
 
 
 @pytest.mark.figures
