@@ -19,9 +19,12 @@ from hpcdem.runtime.stop_requests import NONE, SAVE, STOP, StopRequests, parse_l
 @pytest.fixture
 def stop() -> Iterator[StopRequests]:
     """Requests that have the signals of this process."""
+    # The watchdog of a session that an earlier test left in this process would end it after the second Ctrl-C.
+    others = signal.set_wakeup_fd(-1)
     requests = StopRequests().install()
     yield requests
     requests.uninstall()
+    signal.set_wakeup_fd(others)
 
 
 def send(name: str) -> None:

@@ -117,12 +117,14 @@ def ended(monkeypatch) -> Iterator[tuple[StopRequests, list[int]]]:
     monkeypatch.setattr(watchdog, "SAME_SIGNAL", 0.1)
     monkeypatch.setattr("hpcdem.runtime.stop_requests.SAME_SIGNAL", 0.1)
     codes: list[int] = []
+    others = signal.set_wakeup_fd(-1)  # those of a session that an earlier test left in this process
     stop = StopRequests().install()
     stop._watchdog._leave = codes.append
     stop._watchdog._timeout = 0.4
     stop._watchdog._grace = 0.3
     yield stop, codes
     stop.uninstall()
+    signal.set_wakeup_fd(others)
 
 
 def one_call(seconds: float, codes: list[int]) -> None:
