@@ -345,7 +345,7 @@ class Mesh(Words):
     ) -> None:
         """Triangles in the inside of closed lines, with a mesh size for each piece. layer: (names, size); circle:
         (centre, radius, size); arc: (centre, start, end, size), counter-clockwise; True as a last item: it bounds the
-        mesh, as the first piece does where none is said to. Others become edges of the mesh."""
+        mesh, as the first piece does if none is marked as boundary. Others become edges of the mesh."""
         size = ("mesh_size", "is_boundary")
         given = {
             "layer": [_named(one, "value", *size) for one in layer] or None,

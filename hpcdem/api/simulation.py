@@ -298,7 +298,7 @@ class Simulation(BlockCommands):
 
         Parameters
         ----------
-        num : how many are asked for.
+        num : number of particles to place.
         rad : radii that are drawn from [m].
         x, y : sides of the rectangle, (least, greatest) [m].
         color, group : name or number; name.
