@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import pytest
 
 from hpcdem.core.errors import HpcdemError
@@ -11,12 +13,13 @@ from tests.conftest import absent
 
 @pytest.fixture
 def gmsh():
-    """For tests that mesh with gmsh (and cut lines with shapely)."""
+    """For tests that mesh with gmsh (and cut lines with shapely). SIGPIPE, which gmsh takes, is given back."""
     try:
         optional.shapely()
-        return optional.gmsh()
+        yield optional.gmsh()
     except HpcdemError as error:
         absent("gmsh", str(error))
+    signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
 
 
 @pytest.fixture

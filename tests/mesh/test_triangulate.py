@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -270,6 +271,16 @@ def test_the_same_input_makes_the_same_mesh(kind):
         meshed(curves, holes=["h"], cracks=[("f", 0)], refine=[Refinement("h", 0.1)], kind=kind) for _ in range(2)
     )
     same(one.mesh, other.mesh)
+
+
+def test_a_closed_pipe_is_an_error_after_meshing(gmsh):
+    """Gmsh resets SIGPIPE to its default, which would end the process without a message."""
+    meshed({"o": BOX})
+    reading, writing = os.pipe()
+    os.close(reading)
+    with pytest.raises(BrokenPipeError):
+        os.write(writing, b"a word")
+    os.close(writing)
 
 
 def test_gmsh_is_left_as_it_was_found(gmsh):

@@ -24,8 +24,7 @@ def begun() -> Any:
     """The library, ready for a model."""
     from hpcdem.pre.mesh import optional
 
-    gmsh = optional.gmsh()
-    gmsh.initialize(["hpcdem"], readConfigFiles=False, interruptible=False)
+    gmsh = optional.gmsh_started()
     for name, value in OPTIONS:
         gmsh.option.setNumber(name, value)
     return gmsh

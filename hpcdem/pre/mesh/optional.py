@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -43,6 +45,16 @@ def gmsh() -> ModuleType:
     module = _wanted("gmsh", "Meshing of arbitrary outlines", load)
     if not hasattr(getattr(module, "lib", None), "gmshInitialize"):
         raise HpcdemError(f"the package gmsh is installed without its library libgmsh: install it again, {EXTRA}")
+    return module
+
+
+def gmsh_started() -> ModuleType:
+    """The package gmsh, initialised. It resets SIGPIPE to its default; a later write to a closed pipe or socket would
+    end the process without a message, so Python's choice is restored."""
+    module = gmsh()
+    module.initialize(["hpcdem"], readConfigFiles=False, interruptible=False)
+    with contextlib.suppress(AttributeError, ValueError):  # no SIGPIPE on Windows; only the main thread may set it
+        signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
     return module
 
 

@@ -346,7 +346,7 @@ def _filled(
     gmsh = optional.gmsh()
     ours = not gmsh.isInitialized()  # a Python program may be using gmsh itself
     if ours:
-        gmsh.initialize(["hpcdem"], readConfigFiles=False, interruptible=False)
+        optional.gmsh_started()
     before = {name: gmsh.option.getNumber(name) for name in _OPTIONS}
     theirs = gmsh.model.getCurrent()
     try:
