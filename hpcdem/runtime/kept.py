@@ -124,7 +124,9 @@ class _OfPackage(Files):
         source = Path(function.__code__.co_filename)
         place = store()[0] / f"{source.stem}-{_digest(source)}"
         name = re.sub(r"[<>]", "", function.__qualname__)
-        made = hashlib.sha256(_made_of(function).encode()).hexdigest()[:8]
+        given = _sources_of(function) - _sources(source)  # a factory's module knows nothing of what it is given
+        digests = "".join(sorted(map(_digest, given)))
+        made = hashlib.sha256((_made_of(function) + digests).encode()).hexdigest()[:8]
         super().__init__(place, f"{name}-{function.__code__.co_firstlineno}-{made}")
 
     def save_overload(self, signature: Any, found: Any) -> None:
@@ -140,6 +142,14 @@ def _made_of(function: Any) -> str:
     inner = [_made_of(cell.py_func) if hasattr(cell, "py_func") else repr(cell) for cell in cells]
     code = function.__code__
     return repr((function.__qualname__, code.co_firstlineno, code.co_code.hex(), code.co_names, inner))
+
+
+def _sources_of(function: Any) -> set[Path]:
+    """Modules of it and of the kernels that the function that made it has put into it."""
+    kernels = [cell.cell_contents for cell in function.__closure__ or () if hasattr(cell.cell_contents, "py_func")]
+    inner = [_sources_of(kernel.py_func) for kernel in kernels]
+    own = Path(function.__code__.co_filename)
+    return ({own} if own.is_file() else set[Path]()).union(*inner)
 
 
 @contextlib.contextmanager
@@ -191,13 +201,25 @@ def has(kernel: Any, types: tuple[Any, ...]) -> bool:
 def _digest(source: Path) -> str:
     """Of a module and of all modules that its first column imports: kernels take functions and constants from them, and
     numba does not see when these change."""
-    text = source.read_text(encoding="utf-8")
-    digest, wanted = hashlib.sha256(text.encode()), sorted(_imported(text) & _files(), key=_parts)
+    digest = hashlib.sha256(source.read_bytes())
+    for name in _reached(source):
+        digest.update((_PACKAGE / name).read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _sources(source: Path) -> set[Path]:
+    """What the digest of a module is made of."""
+    return {source, *(_PACKAGE / name for name in _reached(source))}
+
+
+@cache
+def _reached(source: Path) -> list[str]:
+    """The modules of hpcdem that a module imports in its first column, and those that these import."""
+    wanted = sorted(_imported(source.read_text(encoding="utf-8")) & _files(), key=_parts)
     for name in wanted:
         text = (_PACKAGE / name).read_text(encoding="utf-8")
-        digest.update(text.encode())
         wanted += sorted((_imported(text) & _files()).difference(wanted), key=_parts)
-    return digest.hexdigest()[:12]
+    return wanted
 
 
 def _parts(name: str) -> list[str]:

@@ -101,8 +101,8 @@ def test_kernels_are_known_by_what_they_are_made_of(base, tmp_path, monkeypatch,
     source = tmp_path / "kernels_of_a_test.py"
 
     def digest() -> str:
-        kept._digest.cache_clear()
-        kept._files.cache_clear()
+        for known in (kept._digest, kept._reached, kept._files):
+            known.cache_clear()
         return kept._digest(source)
 
     first = digest()
@@ -116,8 +116,8 @@ def test_kernels_are_known_by_what_they_are_made_of(base, tmp_path, monkeypatch,
     assert len({first, second, third}) == 3
     (package / "other.py").write_text("C = 3\n")
     assert digest() == third
-    kept._digest.cache_clear()
-    kept._files.cache_clear()
+    for known in (kept._digest, kept._reached, kept._files):
+        known.cache_clear()
 
 
 def test_kernels_of_a_factory_are_told_apart_by_what_was_put_into_them(base):
@@ -140,6 +140,30 @@ def test_kernels_of_a_factory_are_told_apart_by_what_was_put_into_them(base):
     assert one(1) == 4 and same(1) == 4 and other(1) == 6
     hits = [sum(kernel.stats.cache_hits.values()) for kernel in (one, same, other)]
     assert hits == [0, 1, 0]
+
+
+def test_a_kernel_of_a_factory_is_made_anew_when_a_kernel_that_it_was_given_changes(base, tmp_path, monkeypatch):
+    """A constant of the law is no part of the factory's module, nor of the law's byte code."""
+    kept.install()
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python tells texts of one size and second not apart
+    factory = "from numba import njit\ndef loop(law):\n    @njit(cache=True)\n    def run(x):\n        return law(x)\n"
+    law = "from numba import njit\n@njit(cache=True)\ndef law(x):\n    return {} * x\n"
+
+    def module(name, text):
+        (tmp_path / f"{name}.py").write_text(text)
+        spec = importlib.util.spec_from_file_location(f"hpcdem.{name}", tmp_path / f"{name}.py")
+        found = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, f"hpcdem.{name}", found)
+        spec.loader.exec_module(found)
+        return found
+
+    def value(factor):
+        for known in (kept._digest, kept._reached):
+            known.cache_clear()
+        run = module("factory", factory + "    return run\n").loop(module("law", law.format(factor)).law)
+        return run(1.0), sum(run.stats.cache_hits.values())
+
+    assert [value(factor) for factor in (2.0, 2.0, 3.0)] == [(2.0, 0), (2.0, 1), (3.0, 0)]
 
 
 ALONE = """
