@@ -618,6 +618,9 @@ class Faces(_Modelled):
         xx: Number | None = None,
         yy: Number | None = None,
         zz: Number | None = None,
+        xy: Number | None = None,
+        xz: Number | None = None,
+        yz: Number | None = None,
         normal: Number | None = None,
         dip: Number | None = None,
         quiet: bool | None = None,
@@ -626,12 +629,13 @@ class Faces(_Modelled):
         incoming_z: Number | None = None,
         where: Where = None,
     ) -> None:
-        """Traction on surfaces [Pa], tension positive; normal turns with the surface, dip is shear along it,
-        counter-clockwise about the body. Numbers or names of tables of time. quiet: waves leave through them in dynamic
-        runs; incoming_x, _y, _z: velocity [m/s] of a plane wave that comes in through them. Without a range: the whole
-        surface of the model."""
+        """Traction on surfaces [Pa], tension positive; normal turns with the surface, dip is shear along it in
+        the plane, counter-clockwise about the body, xy, xz and yz are components of the stress. Numbers or
+        names of tables of time. quiet: waves leave through them in dynamic runs; incoming_x, _y, _z: velocity [m/s] of
+        a plane wave that comes in through them. Without a range: the whole surface of the model."""
         given = {
-            "stress_xx": xx, "stress_yy": yy, "stress_zz": zz, "stress_normal": normal, "dip": dip,
+            "stress_xx": xx, "stress_yy": yy, "stress_zz": zz, "stress_xy": xy, "stress_xz": xz, "stress_yz": yz,
+            "stress_normal": normal, "dip": dip,
             "quiet": quiet,
             "incoming_x": incoming_x, "incoming_y": incoming_y, "incoming_z": incoming_z,
         }  # fmt: skip
@@ -1036,8 +1040,8 @@ class Tables(Words):
         self._do("table delete", {"name": name})
 
     def over(self, name: str, axis: str) -> Over:
-        """For a property: the table over "x" or "y" in the mesh, over "plastic-strain" (what softens or hardens), or
-        over "temperature" (moduli and strengths)."""
+        """For a property: the table over "x", "y" or in space "z" in the mesh, over "plastic-strain" (what softens or
+        hardens), or over "temperature" (moduli and strengths)."""
         if axis not in AXES:
             raise ValueError(f"axis: expected {', '.join(map(repr, AXES))}, got {axis!r}")
         return Over(name, AXES.index(axis))

@@ -10,11 +10,11 @@ Correlated: the spectral representation of a Gaussian field with covariance C(r)
 wave vectors k_i drawn from the spectral density of C, one in each of N strata of equal probability of its size, so that
 the covariance of one field is near that of all:
 
-    exponential  C = exp(-r / L)       P(|k| < q) = 1 - (1 + q^2 L^2)^(-1/2)
-    gaussian     C = exp(-(r / L)^2)   P(|k| < q) = 1 - exp(-q^2 L^2 / 4)
+    exponential  C = exp(-r / L)       P(|k| < q) = 1 - I(1/2, d/2; 1 / (1 + q^2 L^2)), d = 2: 1 - (1 + q^2 L^2)^(-1/2)
+    gaussian     C = exp(-(r / L)^2)   P(|k| < q) = P(d/2; q^2 L^2 / 4), d = 2: 1 - exp(-q^2 L^2 / 4)
 
-(the two-dimensional Fourier transforms of C, integrated over directions). Values with the wanted distribution are its
-quantiles at u = Phi(Z), Phi: normal distribution.
+(the Fourier transforms of C in d dimensions, integrated over directions; I, P: the regularized incomplete beta and
+gamma functions). Values with the wanted distribution are its quantiles at u = Phi(Z), Phi: normal distribution.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import betaincinv, gammaincinv, ndtr, ndtri
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.rng import uniforms
@@ -35,7 +35,14 @@ BLOCK = 4096
 WEIBULL, NORMAL, LOGNORMAL = "weibull", "normal", "lognormal"
 EXPONENTIAL, GAUSSIAN = "exponential", "gaussian"
 _STREAMS = {"element": 1, "element-face": 2, "face-joint": 3}
-_DIRECTION, _SIZE, _PHASE = 4, 5, 6
+_DIRECTION, _SIZE, _PHASE, _HEIGHT = 4, 5, 6, 7
+_SQUARES = {
+    (EXPONENTIAL, 2): lambda p: (1.0 - p) ** -2 - 1.0,
+    (EXPONENTIAL, 3): lambda p: 1.0 / betaincinv(0.5, 1.5, 1.0 - p) - 1.0,
+    (GAUSSIAN, 2): lambda p: -4.0 * np.log1p(-p),
+    (GAUSSIAN, 3): lambda p: 4.0 * gammaincinv(1.5, p),
+}  # fmt: skip
+"""Squares of the sizes |k| L that are not exceeded with the probability p, by covariance and dimensions."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +90,7 @@ class RandomField:
 
     def values(self, kind: str, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
         """(n,) values of objects of a kind ("element", "element-face", "face-joint") with these numbers at these places
-        (n, 2) [m]."""
+        (n, 2), in space (n, 3) [m]."""
         if self.correlation > 0.0:
             u = ndtr(self.gaussian(places))
         else:
@@ -96,17 +103,18 @@ class RandomField:
         """(n,) of mean 0, variance 1 and the wanted covariance."""
         i = np.arange(WAVES)
         part = (i + uniforms(self.seed, _SIZE, i)) / WAVES
-        if self.covariance == GAUSSIAN:
-            size = 2.0 * np.sqrt(-np.log1p(-part)) / self.correlation
-        else:
-            size = np.sqrt((1.0 - part) ** -2 - 1.0) / self.correlation
+        dim = places.shape[1]
+        size = np.sqrt(_SQUARES[self.covariance, dim](part)) / self.correlation
         angle = 2.0 * math.pi * uniforms(self.seed, _DIRECTION, i)
-        kx, ky = size * np.cos(angle), size * np.sin(angle)
+        waves = [size * np.cos(angle), size * np.sin(angle)]
+        if dim > len(waves):  # directions on the sphere: the height is uniform
+            height = 2.0 * uniforms(self.seed, _HEIGHT, i) - 1.0
+            waves = [np.sqrt(1.0 - height * height) * k for k in waves] + [size * height]
         phase = 2.0 * math.pi * uniforms(self.seed, _PHASE, i)
         out = np.empty(len(places))
         for at in range(0, len(places), BLOCK):
-            x, y = places[at : at + BLOCK, :1], places[at : at + BLOCK, 1:]
-            out[at : at + BLOCK] = np.cos(x * kx + y * ky + phase).sum(axis=1)
+            along = sum(x[:, None] * k for x, k in zip(places[at : at + BLOCK].T, waves))
+            out[at : at + BLOCK] = np.cos(along + phase).sum(axis=1)
         return math.sqrt(2.0 / WAVES) * out
 
     def probability(self, value: float) -> float:

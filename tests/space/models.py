@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from hpcdem.commands.fdem.project import joined
-from hpcdem.physics.fdem import changes, creep, diagnostics, user_laws
+from hpcdem.numerics.random_field import LOGNORMAL, RandomField
+from hpcdem.physics.fdem import changes, creep, diagnostics, user_functions, user_laws
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, TEMPERATURE, Over, Value
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, TEMPERATURE, Drawn, Over, Value
 from hpcdem.physics.fdem.water import Water
 from hpcdem.physics.heat.model import Heat
 from tests.parallel.model import Found, Model
@@ -193,10 +194,12 @@ LAWS = Path(__file__).with_name("laws") / "rock.py"
 def load_laws(sim: Blocks) -> None:
     """Laws of the user, before they are assigned or restored."""
     user_laws.load(sim, LAWS, "rock.py:mises")
+    user_functions.load(sim, LAWS, "rock.py:shove")
 
 
 def hexes_that_obey(sim: Blocks) -> None:
-    """Of the same a part has a law of the user, as some of the tetrahedra do; it is warm here and there."""
+    """Of the same a part has a law of the user, as some of the tetrahedra do; it is warm here and there, pushed by a
+    function of place and time, and its density differs from place to place."""
     blocks_of_hexes(sim)
     sim.rayleigh(0.02, 60.0, part="mass")
     mesh = sim.mesh
@@ -204,6 +207,12 @@ def hexes_that_obey(sim: Blocks) -> None:
     x, of_hexes = mesh.centroids()[:, 0], mesh.hex_of() >= 0
     soft = {**ROCK, "young": 1e8, "damp_factor": 0.02}
     changes.element_model(sim, np.flatnonzero((x > 0.8) & (x < 2.1) | ~of_hexes), mises, {**soft, "limit": 1.5e4})
+    sim.random_field("rho", RandomField.of(LOGNORMAL, 2700.0, 100.0, 5, 0.4))
+    sim.random_field("each", RandomField.of(LOGNORMAL, 2700.0, 50.0, 5))
+    sim.element_property(np.flatnonzero(x < 1.2), {"density": Drawn("rho")})
+    sim.element_property(np.flatnonzero(x >= 1.2), {"density": Drawn("each")})
+    top = np.flatnonzero((mesh.points[:, 2] > 0.29) & (mesh.points[:, 2] < 0.31) & (mesh.points[:, 0] < 2.0))
+    sim.force_condition(top, fy=user_functions.load(sim, LAWS, "rock.py:shove"))
     heat = Heat.of(sim)
     heat.assign(None, {**ROCK_OF_HEAT, "transfer_coeficient": 0.0})
     heat.initial(None, 20.0)

@@ -226,18 +226,19 @@ def stress(
     zz: Number | None = None,
     incoming_z: Number | None = None,
     dip: Number | None = None,
+    xy: Number | None = None,
+    xz: Number | None = None,
+    yz: Number | None = None,
 ) -> None:
     """Traction of faces [Pa], dip: along them; quiet: waves leave through them; incoming_x, _y, _z: velocity [m/s] of
     one that comes in. Without a range: all faces on the surface of the model."""
-    _known(project, xx, yy, zz, normal, incoming_x, incoming_y, incoming_z, dip)
+    given = {
+        "xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz, "normal": normal, "incoming_x": incoming_x,
+        "incoming_y": incoming_y, "incoming_z": incoming_z, "dip": dip,
+    }  # fmt: skip
+    _known(project, *given.values())
     faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
     blocks = project.ready()
-    given = {
-        "xx": xx, "yy": yy, "zz": zz, "normal": normal, "incoming_x": incoming_x, "incoming_y": incoming_y,
-        "incoming_z": incoming_z, "dip": dip,
-    }  # fmt: skip
-    if dip is None:
-        del given["dip"]
     blocks.stress_condition(faces, quiet=quiet, **from_now(project, blocks.time_now(), given))
 
 

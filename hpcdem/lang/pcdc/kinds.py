@@ -68,7 +68,7 @@ class Kind:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """What a table that stands for it can be over."""
+        """What a table that stands for it can be over; z in space only."""
         there = {PLASTIC_STRAIN: self.softens, TEMPERATURE: self.warms}
         return tuple(axis for k, axis in enumerate(AXES) if there.get(k, True))
 

@@ -335,11 +335,12 @@ class _Line:
         if matching(token.text, [_FIELD]):
             return _later(Drawn, self.one(kinds.STRING, _FIELD))
         name = self.one(kinds.STRING, _TABLE)
+        axes = [axis for axis in kind.axes if axis != "z" or self.dim != 2]
         if self.take([_OVER]) is None:
-            over = " or ".join(f"'over {axis}'" for axis in kind.axes)
+            over = " or ".join(f"'over {axis}'" for axis in axes)
             word = self.next(over)
             raise ValueError(f"read {word}, expected {over} after the name of the table")
-        axis = self.one(kinds.choice(*kind.axes), _OVER)
+        axis = self.one(kinds.choice(*axes), _OVER)
         return _later(lambda name, axis: Over(name, AXES.index(axis)), name, axis)
 
     def _value_follows(self, ahead: int = 0) -> bool:

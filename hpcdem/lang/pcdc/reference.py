@@ -180,12 +180,9 @@ def _recorded() -> str:
 
 
 IN_THE_PLANE = {
-    "random fields": "随机场",
-    "conditions by functions of place and time": "随位置和时间变化的边界条件函数",
     "free-field": "自由场边界",
     "elements that come back after they were taken out": "挖去后回填的单元",
     "`relax` of elements that are taken out from joints between hexahedra": "六面体节理旁开挖的逐步释放(`relax`)",
-    "tables `over z`": "`over z` 的表",
     "discs that touch blocks": "与块体接触的圆盘",
 }
 """What no word of the table tells, in English and Chinese: refused as it is met, before the run."""

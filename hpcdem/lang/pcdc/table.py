@@ -359,6 +359,8 @@ STRESS = Model(
     (Option("s{tress}-x{x}", (TABLED,), "stress xx", "Pa", also=("x{x}",)),
      Option("s{tress}-y{y}", (TABLED,), "stress yy", "Pa", also=("y{y}",)),
      Option("s{tress}-z{z}", (TABLED,), "stress zz", "Pa", dims=SPACE, also=("z{z}",)),
+     *(Option(f"s{{tress}}-{c}", (TABLED,), f"stress {c}", "Pa", dims=SPACE if "z" in c else BOTH, also=(c,))
+       for c in ("xy", "xz", "yz")),
      Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
             "pressure", "Pa", also=("n{ormal}",)),
      Option("d{ip}", (TABLED,), "shear stress along the surface, counter-clockwise about the body", "Pa", dims=PLANE),
@@ -1321,7 +1323,7 @@ _OBJECTS = (
             ranged="node", dims=BOTH),
     Command("n{ode} func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
-            ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
+            ("pcdc node function 'pump.py:wave'",), (_FUNCTION,), dims=BOTH),
     Command("n{ode} bou{ndary} r{emove}", "Takes boundary conditions of nodes back.",
             ("pcdc node boundary remove range group 'platen' set 'bc'",
              "pcdc node boundary remove mech-vel-b-c range group 'platen' set 'bc'"),
@@ -1481,9 +1483,9 @@ _RECORDS = (
                     more=(Option("cov{ariance}", (choice("exponential", "gaussian"),), "exp(-r/L), or exp(-(r/L)2), "
                                  "which is smooth", "", "exponential"),)),
              Option("least", (FLOAT,), "the distribution is cut below", "", "none"),
-             Option("great{est}", (FLOAT,), "the distribution is cut above", "", "none"))),
+             Option("great{est}", (FLOAT,), "the distribution is cut above", "", "none")), dims=BOTH),
     Command("field del{ete}", "Forgets a random field; what was drawn from it stays.",
-            ("pcdc field delete 'strength'",), (_NAME,)),
+            ("pcdc field delete 'strength'",), (_NAME,), dims=BOTH),
     Command("his{tory} cr{eate}", "Records a number during the run: of one object, of those of a range or, without "
             "one, of all (sum, mean, minimum or maximum), or of the model.",
             ("pcdc history create 'load' node value reaction-y sum every 100 range group 'platen' set 'bc'",

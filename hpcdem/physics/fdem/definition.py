@@ -36,7 +36,7 @@ from hpcdem.physics.fdem.properties import (
     softening_table,
     temperature_table,
 )
-from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, TEMPERATURE, Drawn, Over, Table, Value
+from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN, TEMPERATURE, Drawn, Over, Table, Value
 from hpcdem.physics.fdem.user_functions import FUNCTIONS
 
 Numbers = np.ndarray | Sequence[int] | None
@@ -608,22 +608,26 @@ class ModelDefinition:
         if isinstance(value, Over):
             if value.table not in self.tables:
                 self._value(name, value.table)
-            return self.tables[value.table].at(self._places(on, of)[:, value.axis])
+            places = self._places(on, of)
+            if value.axis >= self.dim:
+                self._only_in_space(f"{AXES[value.axis]} for table '{value.table}' of {name} to be over", value)
+            return self.tables[value.table].at(places[:, value.axis])
         if isinstance(value, Drawn):
-            self.refuse_in_space("random fields")
             if value.field not in self.fields:
                 known = ", ".join(f"'{n}'" for n in self.fields) or "none"
                 raise CommandError(f"{name}: there is no field '{value.field}' (fields: {known})")
-            return self.fields[value.field].values(on, of, self._places(on, of))
+            mesh = self._mesh()
+            numbers = mesh.of_one(of) if on == ELEMENT else mesh.of_one_side(of)
+            return self.fields[value.field].values(on, numbers, self._places(on, of))
         numbers = np.asarray(value, np.float64)
         if numbers.shape != (len(of),):
             raise CommandError(f"{name}: {len(of)} numbers are needed, one for each {on}, got {numbers.shape}")
         return numbers
 
     def _places(self, on: str, of: np.ndarray) -> np.ndarray:
-        """(n, 2), in space (n, 3) [m] in the mesh: centres of elements, middles of faces and joints."""
-        mesh = self._mesh()
-        return mesh.centroids(of) if on == ELEMENT else mesh.points[mesh.face_points(of)].mean(axis=1)
+        """(n, 2), in space (n, 3) [m] in the mesh: centres of elements, middles of faces and joints. Hexahedra and
+        their sides are one object."""
+        return self._mesh().centroids(of) if on == ELEMENT else self._mesh().side_middles(of)
 
     def initial_stress(
         self,
@@ -801,7 +805,6 @@ class ModelDefinition:
         chosen = self.corners_of_nodes(nodes)
         mesh, at = self._mesh(), np.flatnonzero(chosen)
         points = np.unique(mesh.cells.reshape(-1)[at])
-        self._refuse_functions(changes)
         for name, value in changes.items():
             user_functions.check(name, value, mesh.points[points], self.time_now())
         some = nodes is not None and sides.are_there(np.asarray(nodes).reshape(-1))
@@ -999,7 +1002,7 @@ class ModelDefinition:
         their dashpots see the velocity less twice this."""
         self._only_in_space("stress zz, xz and yz, and incoming z, on faces", zz, xz, yz, incoming_z)
         if dip is not None and self.dim == 3:
-            raise CommandError("dip is for two dimensions: in three say the components of the stress")
+            raise CommandError("dip is for two dimensions: shear on faces in three is stress-xy, stress-xz, stress-yz")
         given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal, "zz": zz, "xz": xz, "yz": yz, "dip": dip}
         changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
         waves = {"incoming_x": incoming_x, "incoming_y": incoming_y, "incoming_z": incoming_z}
@@ -1009,21 +1012,17 @@ class ModelDefinition:
         if not changes:
             raise CommandError("a stress condition needs a stress, or quiet")
         at = self.numbers_of_faces(faces)
-        self._refuse_functions(changes)
         for row in np.unique(self.load_row[at]).tolist():
             wanted = replace(self.loads[row], **changes)
             if not wanted.quiet and any(getattr(wanted, name) != 0.0 for name in waves):
                 axes = " and ".join(f"incoming-{axis}" for axis in "xyz"[: self.dim])
                 raise CommandError(f"a wave comes in through quiet faces only: quiet on goes with {axes}")
+        middles = self._mesh().points[self._mesh().face_points(at)].mean(axis=1)
         for name, value in changes.items():
-            user_functions.check(f"stress {name}", value, self._places(FACE, at), self.time_now())
+            user_functions.check(f"stress {name}", value, middles, self.time_now())
         self.before_change()
         self._change_rows(self.loads, self.load_row, at, changes)
         self.changed(stiffness=quiet is not None)  # dashpots limit the time step
-
-    def _refuse_functions(self, changes: Mapping[str, Any]) -> None:
-        if any(isinstance(value, str) and value in FUNCTIONS for value in changes.values()):
-            self.refuse_in_space("conditions by functions of place and time")
 
     @staticmethod
     def _change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:

@@ -101,6 +101,27 @@ class Mesh:
         out[self.hexes[:, 8, None] + np.arange(hexahedra.PARTS)] = np.arange(len(self.hexes))[:, None]
         return out
 
+    def of_one(self, elements: np.ndarray) -> np.ndarray:
+        """(n,) these elements; of parts of a hexahedron its first one."""
+        of = self.hex_of()[elements]
+        return np.where(of >= 0, np.append(self.hexes[:, 8], -1)[of], elements)
+
+    def of_one_side(self, faces: np.ndarray) -> np.ndarray:
+        """(n,) these faces; of the two halves of a side of a hexahedron the lower one."""
+        if not len(self.hexes):
+            return faces
+        other = self._other_half[faces]
+        return np.where(other >= 0, np.minimum(faces, other), faces)
+
+    def side_middles(self, faces: np.ndarray) -> np.ndarray:
+        """(n, dim) [m] of these faces (n,); of half a side of a hexahedron between those of both halves."""
+        middle = self.points[self.face_points(faces)].mean(axis=1)
+        if len(self.hexes):
+            other = self._other_half[faces]
+            half = other >= 0
+            middle[half] = 0.5 * (middle[half] + self.points[self.face_points(other[half])].mean(axis=1))
+        return middle
+
     def inside_hexes(self, faces: np.ndarray) -> np.ndarray:
         """(n,) bool: of these faces (n,) those within a hexahedron, between two of its six elements."""
         if not len(self.hexes):

@@ -53,14 +53,14 @@ class Table:
         return np.column_stack([self.times, self.values]).tolist()
 
 
-AXES = ("x", "y", "plastic-strain", "temperature")
+AXES = ("x", "y", "z", "plastic-strain", "temperature")
 """What a property can follow a table over: from place to place, or with what an object goes through."""
-PLASTIC_STRAIN, TEMPERATURE = 2, 3
+PLASTIC_STRAIN, TEMPERATURE = 3, 4
 
 
 @dataclass(frozen=True)
 class Over:
-    """A property that follows a table over one of `AXES` (its number), the first two coordinates in the mesh."""
+    """A property that follows a table over one of `AXES` (its number), the first three coordinates in the mesh."""
 
     table: str
     axis: int

@@ -3,10 +3,10 @@
     def wave(x, y, t):
         return 0.1 * math.sin(300.0 * t - x)
 
-A function takes numbers by these names: x, y [m]: where the node, or the middle of the face, lies in the mesh (it stays
-the same when things move, as in ranges of commands); t [s]: model time, at which tables are read too. It returns one
-number in the unit of the condition. It is compiled by numba and evaluated in each step at the nodes and faces that have
-it. Files are read, named in checkpoints and refused as those of laws (user_files.py).
+A function takes numbers by these names: x, y, in space z [m]: where the node, or the middle of the face, lies in the
+mesh (it stays the same when things move, as in ranges of commands); t [s]: model time, at which tables are read too. It
+returns one number in the unit of the condition. It is compiled by numba and evaluated in each step at the nodes and
+faces that have it. Files are read, named in checkpoints and refused as those of laws (user_files.py).
 """
 
 from __future__ import annotations
@@ -27,20 +27,22 @@ if TYPE_CHECKING:
 
     from hpcdem.physics.model import Model
 
-ARGUMENTS = "x", "y", "t"
+ARGUMENTS = "x", "y", "z", "t"
 
 
 @dataclass(frozen=True)
 class UserFunction:
-    """title: FILE:FUNCTION; loop: a kernel (places (n, 2), t, out (n,))."""
+    """title: FILE:FUNCTION; arguments: their names; loop: a kernel (places (n, 3), t, out (n,))."""
 
     title: str
+    arguments: tuple[str, ...]
     loop: Any
 
     def at(self, places: np.ndarray, time: float) -> np.ndarray:
-        """Values (n,) at places (n, 2) [m] and a time [s]."""
-        out = np.empty(len(places))
-        self.loop(np.ascontiguousarray(places), float(time), out)
+        """Values (n,) at places (n, 2), in space (n, 3) [m] and a time [s]."""
+        out, wide = np.empty(len(places)), np.zeros((len(places), 3))
+        wide[:, : places.shape[1]] = places
+        self.loop(wide, float(time), out)
         return out
 
 
@@ -75,36 +77,42 @@ def _made(text: str, path: str, name: str, function: str) -> UserFunction:
     found = compiled(kernel, (types.float64,) * len(names), path, line)
     if found != types.float64:
         raise Wrong(line, f"'{function}' must return one float (0.0, not 0), it returns {found}")
-    order = [ARGUMENTS.index(name) for name in names]
-    if len(order) == 1:
-        first = second = third = order[0]
-        call = njit(error_model="numpy")(lambda x, y, t: kernel((x, y, t)[first]))
-    elif len(order) == 2:
-        first, second = order
-        call = njit(error_model="numpy")(lambda x, y, t: kernel((x, y, t)[first], (x, y, t)[second]))
-    else:
-        first, second, third = order
-        call = njit(error_model="numpy")(lambda x, y, t: kernel((x, y, t)[first], (x, y, t)[second], (x, y, t)[third]))
+    call = njit(error_model="numpy")(lambda at, *arguments: kernel(*arguments))
+    for argument in names:
+        call = _with_one_more(call, ARGUMENTS.index(argument))
 
     @njit(error_model="numpy", nogil=True)
     def loop(places, t, out):
         for i in range(len(places)):
-            out[i] = call(places[i, 0], places[i, 1], t)
+            out[i] = call((places[i, 0], places[i, 1], places[i, 2], t))
 
     compiled(loop, (types.float64[:, ::1], types.float64, types.float64[::1]), path, line)
-    return UserFunction(name.partition(MARK)[0], loop)
+    return UserFunction(name.partition(MARK)[0], names, loop)
+
+
+def _with_one_more(call: Any, k: int) -> Any:
+    """A function of where and when (x, y, z, t), and more numbers, that calls one with the k-th before them."""
+    from numba import njit
+
+    return njit(error_model="numpy")(lambda at, *arguments: call(at, at[k], *arguments))
 
 
 def check(what: str, value: Any, places: np.ndarray, time: float) -> None:
-    """CommandError if a value is a function that is not finite at one of these places (n, 2) [m] now."""
+    """CommandError if a value is a function that is not finite at one of these places (n, 2 or 3) [m] now, or asks for
+    a coordinate that they do not have."""
     if not isinstance(value, str) or value not in FUNCTIONS:
         return
     function = FUNCTIONS[value]
+    axes = "xyz"[: places.shape[1]]
+    if "z" in function.arguments and "z" not in axes:
+        raise CommandError(
+            f"{what}: {function.title} is a function of z, and a model in two dimensions has x and y only"
+        )
     found = function.at(places, time)
     wrong = ~np.isfinite(found)
     if wrong.any():
-        (x, y), number = places[wrong][0], found[wrong][0]
-        raise CommandError(f"{what}: {function.title} is {number:g} at x {x:g}, y {y:g}, t {time:g}")
+        where = ", ".join(f"{axis} {c:g}" for axis, c in zip(axes, places[wrong][0].tolist()))
+        raise CommandError(f"{what}: {function.title} is {found[wrong][0]:g} at {where}, t {time:g}")
 
 
 def used(one: DataclassInstance) -> dict[str, UserFunction]:
@@ -128,7 +136,7 @@ def check_restored(state: Mapping[str, Any]) -> None:
 class Placed:
     """Rows of a table of conditions for each object whose condition is a function: behind those of all.
 
-    conditions: by row; of (n,): row of each object; places (n, 2) [m]. After that `of` are the new rows.
+    conditions: by row; of (n,): row of each object; places (n, 2 or 3) [m]. After that `of` are the new rows.
     """
 
     def __init__(self, conditions: Sequence[DataclassInstance], of: np.ndarray, places: np.ndarray) -> None:

@@ -90,3 +90,18 @@ def mohr_coulomb(
         p + two_mu * (e11 - p11), p + two_mu * (e22 - p22), two_mu * (e12 - p12), p + two_mu * (e33 - p33),
         two_mu * (e13 - p13), two_mu * (e23 - p23), p11, p22, p12, p33, p13, p23, work,
     )  # fmt: skip
+
+
+def pump(x, y, z, t):
+    """Velocity [m/s] that grows with height, and with time where both other coordinates are large."""
+    return 0.1 * z + 1e3 * x * y * t
+
+
+def drag(y):
+    """Shear stress [Pa] of a stream that is faster on one side."""
+    return 1e6 * y
+
+
+def shove(x, z, t):
+    """Force [N] that comes and goes along a bar."""
+    return 40.0 * z * math.sin(600.0 * t - 3.0 * x)
