@@ -58,6 +58,12 @@ class Mailboxes:
     def Isend(self, buffer: np.ndarray, dest: int, tag: int) -> Request:
         return self.Send_init(buffer, dest, tag).start()
 
+    def Recv(self, buffer: np.ndarray, source: int, tag: int) -> None:
+        self.Recv_init(buffer, source, tag).finish()
+
+    def Send(self, buffer: np.ndarray, dest: int, tag: int) -> None:
+        self.Send_init(buffer, dest, tag).start()
+
 
 class Pretended(SerialComm):
     """One of the ranks. counts: messages sent to other ranks, reductions, lists as long as there are ranks ("lists"),
@@ -68,6 +74,7 @@ class Pretended(SerialComm):
         self.counts: Counter = Counter()
         self.most = 0
         self.mpi = Mailboxes(ranks, rank, self.counts)
+        self.crowded = True  # they are threads of one process
 
     def watch(self) -> None:
         """Count from now on."""
