@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import doctor, launch, run_folder, shutdown, speed
@@ -24,7 +25,7 @@ from hpcdem.runtime.pace import Pace
 
 if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.reproducibility import Reproduction
@@ -41,7 +42,7 @@ class Session:
     has said how many threads, so that a model may take fewer.
     """
 
-    comm: SerialComm
+    comm: Comm
     log: Log
     stop: StopRequests
     threads: int = 1
@@ -186,9 +187,7 @@ class Session:
             run_folder.leave(Path(sim.outdir), self.comm, state, sim.clock.step)
 
 
-def prepare(
-    comm: SerialComm, log: Log, kinds: Sequence[str], *threads: int, ready: Collection[str] = frozenset()
-) -> Path:
+def prepare(comm: Comm, log: Log, kinds: Sequence[str], *threads: int, ready: Collection[str] = frozenset()) -> Path:
     """Collective: have the kernels of kinds, see KINDS, and of those that they need compiled, for each number of
     threads; but not those that are `ready`. Returns the folder in which they are kept."""
     from hpcdem.runtime.kernels import prepare_kernels
@@ -317,7 +316,7 @@ def draw_last_state(sim: Simulation, log: Log) -> None:
 
 
 def greet(
-    comm: SerialComm, log: Log, cores_before: int, threads: int, warnings: list[str], outdir: Path | None = None
+    comm: Comm, log: Log, cores_before: int, threads: int, warnings: list[str], outdir: Path | None = None
 ) -> None:
     """Collective: the first line of the log, and what is wrong with the launch and with where results will go."""
     places = comm.allgather(launch.place(cores_before, threads))

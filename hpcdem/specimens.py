@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.io.agreed import Alone, atomic_path, make_folder
+from hpcdem.core.comm import SerialComm
+from hpcdem.io.agreed import atomic_path, make_folder
 from hpcdem.io.clumps import Clumps, write_clumps
 from hpcdem.io.ppdem import write_ppdem
 from hpcdem.post import specimen as draw
@@ -77,7 +78,7 @@ class Outputs:
 
     def write(self, folder: Path) -> list[Path]:
         """Write all files into a folder, each complete or not at all. Raises HpcdemError."""
-        make_folder(folder, Alone())
+        make_folder(folder, SerialComm())
         paths = []
         for name, writer in self.files.items():
             writer(folder / name)

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 
 TIMEOUT = 120.0
 

@@ -19,13 +19,14 @@ from hpcdem.cli.programs import BY_NAME, FIRST
 from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
 from hpcdem.core.chinese import wanted as wants_chinese
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import EXIT_OK, EXIT_USAGE
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import launch, shutdown
 from hpcdem.session import OF_BLOCKS, OF_PARTICLES, Session, greet, prepare
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 __all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "start_zdemss"]
@@ -96,7 +97,7 @@ def read_options(words: list[str]) -> Options:
     return Options(**read_command_line(hpcdem, "hpcdem", words))
 
 
-def new_session(comm: SerialComm, log: Log, options: Options, threads: int) -> Session:
+def new_session(comm: Comm, log: Log, options: Options, threads: int) -> Session:
     """Collective: the session of a command line."""
     from hpcdem.runtime.stop_requests import StopRequests, slurm_end_time
 
@@ -117,7 +118,7 @@ def run_warmup(words: list[str]) -> NoReturn:
             again = [sys.executable, "-m", "hpcdem", "warmup", "-j", str(threads), "--of"]
             sys.exit(max(subprocess.run([*again, one], check=False).returncode for one in KERNELS))
         launch.prepare_environment(threads)
-        from hpcdem.halo.comm import SerialComm
+        from hpcdem.core.comm import SerialComm
         from hpcdem.runtime.kernels import warmup as compile_all
         from hpcdem.runtime.progress import Log
 

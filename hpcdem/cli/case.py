@@ -10,10 +10,11 @@ import click
 
 from hpcdem.cli.common import HELP, PATH, run_program
 from hpcdem.core import chinese
+from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
     from hpcdem.cases.base import Case
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 PROGRAM = "hpcdem case"
@@ -51,7 +52,7 @@ def _known(context: click.Context, argument: click.Parameter, value: str | None)
     return value
 
 
-def show(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def show(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """The list of cases, in the language of the user."""
     from hpcdem.cases import CASES, find
     from hpcdem.cli.case_chinese import TITLES
@@ -85,7 +86,7 @@ def command(kind: type[Case]) -> click.Command:
     return click.Command(kind.name, context_settings=HELP, params=options, help=f"{kind.title}: write its script.")
 
 
-def work(kind: type[Case], comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(kind: type[Case], comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: write the script, on rank 0. UsageError on all ranks."""
     from hpcdem.core.errors import ScriptError, UsageError
     from hpcdem.io.agreed import atomic_path, on_first

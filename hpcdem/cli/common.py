@@ -16,7 +16,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.runtime import launch, shutdown
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 HELP = {"help_option_names": ["-h", "--help", "--hlep"], "max_content_width": 110}
@@ -46,7 +46,7 @@ class Finite(click.ParamType):
 
 
 FINITE, POSITIVE = Finite(), Finite(0.0, above=True)
-Work = Callable[["SerialComm", "Log"], None]
+Work = Callable[["Comm", "Log"], None]
 
 
 def read_command_line(command: click.Command, program: str, words: list[str]) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def messages_only() -> Iterator[None]:
 
 
 def run_program(
-    command: click.Command, program: str, words: list[str], work: Callable[[SerialComm, Log, dict[str, Any]], None]
+    command: click.Command, program: str, words: list[str], work: Callable[[Comm, Log, dict[str, Any]], None]
 ) -> NoReturn:
     """A program that looks at finished runs: read its command line, start the ranks, call `work(comm, log, options)`
     on each, end together. An option called "threads" is the number of threads per rank."""

@@ -16,7 +16,7 @@ from hpcdem.runtime import launch, shutdown
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.doctor import Finding
 
 STYLES = {"OK": "green", "WARNING": "yellow", "PROBLEM": "bold red"}
@@ -56,14 +56,14 @@ def start(words: list[str], cores_before: int) -> NoReturn:
     shutdown.leave(shutdown.run_together(comm, work))
 
 
-def communicator() -> tuple[SerialComm, str]:
+def communicator() -> tuple[Comm, str]:
     """All ranks, or this process alone with the reason why MPI cannot begin; other processes leave then."""
     try:
         return launch.start_mpi(), ""
     except HpcdemError as error:
         if not launch.speaks_for_all():
             sys.exit(EXIT_OK)
-        from hpcdem.halo.comm import SerialComm
+        from hpcdem.core.comm import SerialComm
 
         return SerialComm(), str(error)
 

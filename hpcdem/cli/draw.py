@@ -12,9 +12,10 @@ import click
 
 from hpcdem.cli.common import FINITE, HELP, PATH, POSITIVE
 from hpcdem.cli.pictures import Formats, Numbers, number, processes
+from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.io.axes import View
     from hpcdem.post.series import ViewJob
     from hpcdem.post.view.model import ModelView
@@ -84,7 +85,7 @@ def draw(**options: Any) -> None:
     """
 
 
-def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: draw. Raises HpcdemError on all ranks."""
     from hpcdem.io.agreed import on_first
     from hpcdem.post.series import draw_all

@@ -13,9 +13,10 @@ import click
 
 from hpcdem.cli.common import FINITE, HELP, PATH
 from hpcdem.cli.measure import Formats
+from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.pre.specimen import Grading, Request, Specimen
     from hpcdem.pre.specimen.classes import Grains
     from hpcdem.runtime.progress import Log
@@ -71,7 +72,7 @@ def grade(**options: Any) -> None:
     """
 
 
-def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: rank 0 does it. HpcdemError on all ranks."""
     from hpcdem.io.agreed import on_first
 
@@ -262,7 +263,8 @@ def described(found: Grains, curve: Grading | None) -> dict[str, Any]:
 
 def draw(found: Grains, curve: Grading | None, options: dict[str, Any]) -> list[Path]:
     """The figures of the grains of a file."""
-    from hpcdem.io.agreed import Alone, make_folder
+    from hpcdem.core.comm import SerialComm
+    from hpcdem.io.agreed import make_folder
     from hpcdem.physics.polyarc.outlines import boxes
     from hpcdem.post import specimen as figures
     from hpcdem.post.measure.figures import save
@@ -286,5 +288,5 @@ def draw(found: Grains, curve: Grading | None, options: dict[str, Any]) -> list[
         "sizes": figures.histogram(found.sizes, found.counts),
     }
     folder = options["out"]
-    make_folder(folder, Alone())
+    make_folder(folder, SerialComm())
     return [save(figure, folder / f"{name}.{kind}") for name, figure in drawn.items() for kind in options["formats"]]

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.runtime import run_folder
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 
@@ -29,7 +30,7 @@ def info(**options: Any) -> None:
     """What is in a checkpoint (.sav), a frame (.vtkhdf, .dat) or the output folder of a run."""
 
 
-def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective; rank 0 looks and prints. HpcdemError if something is damaged."""
     from hpcdem.io.agreed import on_first
 

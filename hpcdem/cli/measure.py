@@ -9,9 +9,10 @@ import click
 
 from hpcdem.cli import pictures
 from hpcdem.cli.common import FINITE, HELP, PATH, POSITIVE
+from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks", "fragments", "emission", "fluid",
@@ -134,7 +135,7 @@ def measure(**options: Any) -> None:
     """
 
 
-def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: what the command does once the ranks are together."""
     from hpcdem.post.measure import report
 

@@ -13,9 +13,10 @@ import click
 
 from hpcdem.cli.common import HELP, PATH, POSITIVE
 from hpcdem.cli.pictures import ManualCommand, common_view, looks, number, processes, style_of
+from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.post.series import Job, ViewJob
     from hpcdem.runtime.progress import Log
 
@@ -50,7 +51,7 @@ def movie(**options: Any) -> None:
     """
 
 
-def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: make the film. Raises HpcdemError on all ranks."""
     from hpcdem.io.agreed import on_first
 
@@ -126,7 +127,7 @@ def targets(options: dict[str, Any]) -> list[tuple[str, Path]]:
     return [(k, output.with_name(f"{output.name}.{k}")) for k in ("gif", "mp4") if kind in (k, "both")]
 
 
-def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> list[Path]:
+def draw(comm: Comm, log: Log, options: dict[str, Any], scratch: Path) -> list[Path]:
     """Collective: the pictures of all frames, at one view."""
     from hpcdem.core.errors import HpcdemError
     from hpcdem.io.agreed import on_first

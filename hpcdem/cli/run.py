@@ -17,6 +17,7 @@ from hpcdem.cli.chinese import in_chinese, translated
 from hpcdem.cli.common import HELP, PATH, POSITIVE, Finite
 from hpcdem.cli.programs import GROUPS, suggestion
 from hpcdem.core import chinese
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import launch, run_folder
 from hpcdem.runtime.run_folder import Job, Retention, claim
@@ -25,7 +26,7 @@ from hpcdem.session import Session
 from hpcdem.session import enter as enter_session
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.lang.zdem.parser import Script
     from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.runtime.progress import Log
@@ -295,7 +296,7 @@ def speaks_zdem(path: Path) -> bool:
     return _BEGINS_ZDEM.fullmatch(first) is not None
 
 
-def read_script(comm: SerialComm, path: Path) -> bytes:
+def read_script(comm: Comm, path: Path) -> bytes:
     """Collective: the script, read once. UsageError on all ranks if rank 0 cannot read it."""
     source, error = b"", None
     if comm.rank == 0:
@@ -346,7 +347,7 @@ def other_options(command: click.Command) -> click.Command:
     return command
 
 
-def saved_script(comm: SerialComm, folder: Path, before: float = math.inf) -> bytes:
+def saved_script(comm: Comm, folder: Path, before: float = math.inf) -> bytes:
     """Collective: the text of the script that the newest checkpoint of a folder holds."""
     from hpcdem.io import checkpoint
     from hpcdem.io.agreed import on_first

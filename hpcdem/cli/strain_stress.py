@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import FINITE, HELP, PATH
+from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 
@@ -44,7 +45,7 @@ def strain_stress(**options: Any) -> None:
     """
 
 
-def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: what the command does once the ranks are together; options by the names of its parameters."""
     load_kernels(comm)
     from hpcdem.post.strain_stress import Options, run
@@ -61,7 +62,7 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     )  # fmt: skip
 
 
-def load_kernels(comm: SerialComm) -> None:
+def load_kernels(comm: Comm) -> None:
     """Collective: compile or load what writes text, which runs share. Before any import of hpcdem.io."""
     from hpcdem.runtime.progress import Log
     from hpcdem.session import prepare

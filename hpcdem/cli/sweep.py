@@ -13,11 +13,12 @@ import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line, run_program
 from hpcdem.cli.measure import WHAT, Words, measure, request
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import EXIT_CHECKPOINT, EXIT_ERROR, EXIT_OK, UsageError
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
     from hpcdem.sweep import Sweep
 
@@ -113,7 +114,7 @@ def start(words: list[str]) -> NoReturn:
         sys.exit(carry_out(read_command_line(sweep, PROGRAM, words)))
 
 
-def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: `hpcdem sweep report`."""
     from hpcdem.sweep import plan, report
 

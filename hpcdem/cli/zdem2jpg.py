@@ -10,10 +10,11 @@ import click
 
 from hpcdem.cli.common import HELP, PATH, POSITIVE
 from hpcdem.cli.pictures import Formats, ManualCommand, Numbers, looks, number, processes, style_of
+from hpcdem.core.comm import Comm
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.post.view.model import Layer
     from hpcdem.runtime.progress import Log
 
@@ -62,7 +63,7 @@ def of_field(options: dict[str, Any], files: list[Path]) -> Layer | None:
     return shared(view, (read_moment(file) for file in files)).layers[0]
 
 
-def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: draw all frames of the folder. Raises HpcdemError on all ranks."""
     from hpcdem.core.errors import HpcdemError
     from hpcdem.io.agreed import on_first

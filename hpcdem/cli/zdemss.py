@@ -9,10 +9,11 @@ import click
 
 from hpcdem.cli.common import HELP, PATH, POSITIVE, Finite
 from hpcdem.cli.pictures import Formats, ManualCommand, number, processes
+from hpcdem.core.comm import Comm
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 FORMATS = ("jpg", "png", "tiff", "pdf", "svg", "ps")
@@ -106,7 +107,7 @@ def zdemss(**options: object) -> None:
     """
 
 
-def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: draw what the command line asks for. Raises HpcdemError on all ranks."""
     from hpcdem.post.sections import draw, panels
 

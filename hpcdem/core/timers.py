@@ -17,7 +17,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter_ns
-from typing import Any
+
+from hpcdem.core.comm import Comm
 
 WAITING = frozenset({"halo", "exchange", "migrate", "reduce", "output", "checkpoint", "figure", "callback"})
 """Stages in which a rank mostly waits for others or for the disk; all others are its own work."""
@@ -131,7 +132,7 @@ class Timers:
             return sum(self.watches[n].seconds for n in names if n in self.watches)
         return sum(w.seconds for n, w in self.watches.items() if n.rpartition(": ")[2] not in WAITING)
 
-    def merge(self, comm: Any) -> Summary:
+    def merge(self, comm: Comm) -> Summary:
         """Collective: the same summary on every rank."""
         mine = (
             {name: (w.seconds, w.calls) for name, w in self.watches.items()},

@@ -1,6 +1,4 @@
-"""The communicator: one set of operations for one rank and for many.
-
-`SerialComm` does nothing where nothing needs doing, so that no other module asks how many ranks there are.
+"""The communicator of several ranks, over mpi4py.
 
 MPI libraries wait by spinning, which is the fastest way while every rank has a core of its own. With more ranks than
 cores on a host, a spinning rank keeps the core from the one it waits for, and a step takes milliseconds instead of
@@ -10,7 +8,6 @@ operations are built on them.
 
 from __future__ import annotations
 
-import math
 import os
 import pickle
 import time
@@ -18,87 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
-
-
-class SerialComm:
-    """One rank: every collective operation is the identity."""
-
-    rank = 0
-    size = 1
-    mpi: Any = None
-    crowded = False
-    """More ranks than cores on some host."""
-
-    def barrier(self) -> None:
-        """Wait for all ranks."""
-
-    def bcast(self, obj: Any, root: int = 0) -> Any:
-        """The object of rank `root`, on all ranks."""
-        return obj
-
-    def gather(self, obj: Any) -> list | None:
-        """List of the objects of all ranks on rank 0, None elsewhere."""
-        return [obj]
-
-    def allgather(self, obj: Any) -> list:
-        """List of the objects of all ranks, on all ranks."""
-        return [obj]
-
-    def any(self, flag: bool) -> bool:
-        """True everywhere if true anywhere."""
-        return bool(flag)
-
-    def max_into(self, array: np.ndarray) -> np.ndarray:
-        """Elementwise maximum over the ranks, in place."""
-        return array
-
-    def min_into(self, array: np.ndarray) -> np.ndarray:
-        """Elementwise minimum over the ranks, in place."""
-        return array
-
-    def sum_into(self, array: np.ndarray) -> np.ndarray:
-        """Elementwise sum over the ranks, in place. Exact for integers; float sums are for printing only."""
-        return array
-
-    def exscan(self, count: int) -> int:
-        """Sum of the counts of all lower ranks."""
-        return 0
-
-    def exchange(self, parcels: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-        """Collective: hand parcels (n,) i8 to the ranks they are for (not to oneself); returns what came, by sender, in
-        order of ranks. Costs messages for these parcels only, however many ranks there are."""
-        assert not parcels, "there is no other rank"
-        return {}
-
-    def to_ranks(self, target: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Collective: rows (n, ...) of these columns go to the ranks `target` (n,) i8, to oneself too.
-
-        Returns the rank (m,) i8 that each row that came is from, then the columns; in the order of ranks, those of one
-        rank in the order in which it had them. Types and shapes of rows are equal on all ranks. One `exchange`.
-        """
-        small = target.astype(np.uint16) if self.size <= 1 << 16 else target  # which numpy sorts in linear time
-        order = np.argsort(small, kind="stable")
-        cuts = np.flatnonzero(np.diff(target[order])) + 1
-        parts = {int(target[rows[0]]): rows for rows in np.split(order, cuts) if len(rows)}
-        parcels = {to: _packed([c[rows] for c in columns]) for to, rows in parts.items() if to != self.rank}
-        arrived = {source: _unpacked(parcel, columns) for source, parcel in self.exchange(parcels).items()}
-        if self.rank in parts:
-            arrived[self.rank] = [column[parts[self.rank]] for column in columns]
-        ranks = sorted(arrived)
-        sources = np.repeat(np.array(ranks, np.int64), [len(arrived[rank][0]) for rank in ranks])
-        every = [np.concatenate([c[:0], *(arrived[rank][k] for rank in ranks)]) for k, c in enumerate(columns)]
-        return sources, *every
-
-    def agree(self, error: str | None) -> None:
-        """Collective: raise HpcdemError on every rank if any rank hands in a message (the lowest rank's is used)."""
-        if error is not None:
-            raise HpcdemError(error)
-
-    def abort(self, code: int) -> None:
-        """End the whole job at once."""
-        raise SystemExit(code)
-
 
 PARCELS = 21
 """Tag of messages of `exchange`; every other call uses the next one."""
@@ -106,27 +24,27 @@ NAP = 2e-5
 """Sleep between two questions on a crowded host [s]; the kernel adds some 50 us."""
 
 
-class MpiComm(SerialComm):
+class MpiComm(Comm):
     """The same operations over an mpi4py communicator."""
 
     def __init__(self, mpi: Any) -> None:
         from mpi4py import MPI
 
         self._wait_all, self._test_all = MPI.Request.Waitall, MPI.Request.Testall
-        self.start_all = MPI.Prequest.Startall
-        """Start the persistent requests of a list."""
+        self._start_all = MPI.Prequest.Startall
         self.mpi = mpi
         self.rank = mpi.Get_rank()
         self.size = mpi.Get_size()
         self.crowded = _more_ranks_than_cores(mpi)
         self._exchanges = 0
 
+    def start_all(self, requests: list[Any]) -> None:
+        self._start_all(requests)
+
     def wait(self, *requests: Any) -> None:
-        """Until all these requests are done."""
         self.wait_all(list(requests))
 
     def wait_all(self, requests: list) -> None:
-        """Until all requests of the list are done."""
         if not self.crowded:
             self._wait_all(requests)
             return
@@ -245,23 +163,6 @@ def _pickled(obj: Any) -> np.ndarray:
 
 def _unpickled(payload: np.ndarray, counts: np.ndarray) -> list:
     return [pickle.loads(part.data) for part in np.split(payload, np.cumsum(counts)[:-1])]
-
-
-def _packed(columns: list[np.ndarray]) -> np.ndarray:
-    """(words,) i8: number of rows, then one column after the other, each filled up to whole words."""
-    whole = [np.frombuffer(c.tobytes() + bytes(-c.nbytes % 8), np.int64) for c in columns]
-    return np.concatenate([np.array([len(columns[0])]), *whole])
-
-
-def _unpacked(parcel: np.ndarray, like: tuple[np.ndarray, ...]) -> list[np.ndarray]:
-    """The columns of a parcel; like: arrays with rows of the same type and shape."""
-    n, at, found = int(parcel[0]), 8, []
-    flat = parcel.view(np.uint8)
-    for column in like:
-        size = n * column.dtype.itemsize * math.prod(column.shape[1:])
-        found.append(flat[at : at + size].view(column.dtype).reshape(n, *column.shape[1:]))
-        at += size + -size % 8
-    return found
 
 
 def _starts(counts: np.ndarray) -> np.ndarray:

@@ -3,21 +3,21 @@ alone."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+
+from hpcdem.core.comm import Comm
 
 COPIES = 31
 """Tag of messages."""
 
 
-def _home(comm: Any, numbers: np.ndarray, total: int) -> np.ndarray:
+def _home(comm: Comm, numbers: np.ndarray, total: int) -> np.ndarray:
     """The rank that keeps the address of each number (n,): equal parts of all numbers."""
     return numbers * comm.size // max(total, 1)
 
 
 def moved(
-    comm: Any, total: int, had: np.ndarray, rows: np.ndarray, mine: np.ndarray, wanted: np.ndarray
+    comm: Comm, total: int, had: np.ndarray, rows: np.ndarray, mine: np.ndarray, wanted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows that go over to new owners. Collective.
 
@@ -41,7 +41,7 @@ def moved(
     return kept, _answered(comm, _home(comm, wanted, total), asker, answers)
 
 
-def _answered(comm: Any, target: np.ndarray, source: np.ndarray, answers: np.ndarray) -> np.ndarray:
+def _answered(comm: Comm, target: np.ndarray, source: np.ndarray, answers: np.ndarray) -> np.ndarray:
     """Answers to the questions that went to the ranks `target`, in the order in which they were asked."""
     _, came = comm.to_ranks(source, answers)
     out = np.empty_like(came)
@@ -52,7 +52,7 @@ def _answered(comm: Any, target: np.ndarray, source: np.ndarray, answers: np.nda
 class Copies:
     """Rows first .. of a table (n, k) f8 that are copies of other ranks' rows."""
 
-    def __init__(self, comm: Any, mine: np.ndarray, wanted: np.ndarray, owner: np.ndarray, table: np.ndarray) -> None:
+    def __init__(self, comm: Comm, mine: np.ndarray, wanted: np.ndarray, owner: np.ndarray, table: np.ndarray) -> None:
         """mine (m,): numbers of the first rows of the table, ascending; wanted (w,): those of the others, in the order
         of their owners (w,). Collective."""
         self.comm, self.table, self.requests = comm, table, []

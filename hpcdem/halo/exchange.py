@@ -9,11 +9,10 @@ contiguous piece on the other side: the requests work on the rows themselves, no
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from hpcdem.core.cells import COLUMN
+from hpcdem.core.comm import Comm
 from hpcdem.core.memory import aligned, take_rows
 
 TO_LEFT, TO_RIGHT = 11, 12
@@ -29,7 +28,7 @@ class Halo:
     lets the messages travel while the inside is moved.
     """
 
-    def __init__(self, comm: Any, n_own: int, first: int, last: int) -> None:
+    def __init__(self, comm: Comm, n_own: int, first: int, last: int) -> None:
         self.comm, self.n_own, self.first, self.last = comm, n_own, first, last
         self.requests: list = []
         self.more: list = []
@@ -136,7 +135,13 @@ def _bytes(rows: np.ndarray) -> np.ndarray:
 
 
 def connect(
-    comm: Any, hot: np.ndarray, order: np.ndarray, cell: np.ndarray, borders: np.ndarray, threads: int, columns: int = 1
+    comm: Comm,
+    hot: np.ndarray,
+    order: np.ndarray,
+    cell: np.ndarray,
+    borders: np.ndarray,
+    threads: int,
+    columns: int = 1,
 ) -> tuple[np.ndarray, Halo]:
     """Storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it fresh.
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+
+from hpcdem.core.comm import Comm
 
 
 class Migration:
@@ -15,7 +15,7 @@ class Migration:
     costs does not grow with the number of ranks.
     """
 
-    def __init__(self, comm: Any, n: int, leave: np.ndarray, owner: np.ndarray) -> None:
+    def __init__(self, comm: Comm, n: int, leave: np.ndarray, owner: np.ndarray) -> None:
         self.comm = comm
         by_owner = np.argsort(owner, kind="stable")
         self.leave, self.leave_to = leave[by_owner], owner[by_owner]
@@ -69,7 +69,7 @@ class Trail:
         if self._left is not None and len(gid):
             self._left.append((gid, owner))
 
-    def follow(self, comm: Any, mine: np.ndarray, gid: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
+    def follow(self, comm: Comm, mine: np.ndarray, gid: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
         """Collective: of rows (n, ...) about the particles gid (n,) i8, which were here at the `begin`, those about
         `mine` (m,) i8, the owned ones of now; gid, then the columns. Rows about particles that are gone are dropped.
 

@@ -5,10 +5,9 @@ Borders decide who computes, never what. That is why wall-clock timings may ente
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import UsageError
 from hpcdem.decomp import balance, strips
 
@@ -21,7 +20,7 @@ class Ownership:
     balance_on: borders follow the measured load; otherwise they move only when asked to (`wanted`).
     """
 
-    def __init__(self, comm: Any, balance_on: bool) -> None:
+    def __init__(self, comm: Comm, balance_on: bool) -> None:
         self.comm, self.balance_on = comm, balance_on
         self.borders = np.zeros(0, np.int64)
         self.side = 1.0

@@ -9,35 +9,17 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from hpcdem.core.comm import Comm, SerialComm
 from hpcdem.core.errors import EXIT_USAGE, HpcdemError, UsageError
 from hpcdem.io.disk import explain, publish, remove
 
 _T = TypeVar("_T")
 
 
-class Alone:
-    """The little that is asked of a communicator here, for one process that writes a file of its own."""
-
-    rank, size, mpi = 0, 1, None
-
-    def gather(self, value: _T) -> list[_T]:
-        return [value]
-
-    def bcast(self, value: _T) -> _T:
-        return value
-
-    def sum_into(self, values: _T) -> _T:
-        return values
-
-    def agree(self, error: str | None) -> None:
-        if error is not None:
-            raise HpcdemError(error)
-
-
 @contextmanager
-def atomic_path(path: str | os.PathLike, comm: Any = Alone()) -> Iterator[str]:  # noqa: B008
+def atomic_path(path: str | os.PathLike, comm: Comm = SerialComm()) -> Iterator[str]:  # noqa: B008
     """Collective. Hands out ``path.tmp``; when the body is done on all ranks, that file takes the name `path`.
 
     An OSError or HpcdemError on any rank removes the temporary file and raises HpcdemError on all ranks. The body
@@ -70,7 +52,7 @@ def atomic_path(path: str | os.PathLike, comm: Any = Alone()) -> Iterator[str]: 
         raise
 
 
-def on_first(comm: Any, action: Callable[[], _T]) -> _T:
+def on_first(comm: Comm, action: Callable[[], _T]) -> _T:
     """Collective: what `action` gives on rank 0, on all ranks; its HpcdemError or OSError too."""
     result, error = None, None
     if comm.rank == 0:
@@ -86,7 +68,7 @@ def on_first(comm: Any, action: Callable[[], _T]) -> _T:
     return result  # type: ignore[return-value]
 
 
-def make_folder(path: str | os.PathLike, comm: Any) -> None:
+def make_folder(path: str | os.PathLike, comm: Comm) -> None:
     """Collective: the folder exists afterwards on all ranks. Raises HpcdemError."""
     error = None
     if comm.rank == 0:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
 
 ROOM = 256 << 20
@@ -114,12 +115,12 @@ class Deliveries:
         if file is not None:
             self._files.append(file)
 
-    def look(self, comm: Any) -> None:
+    def look(self, comm: Comm) -> None:
         """Raise HpcdemError on all ranks if a file is known to have failed. Collective, waits for no disk."""
         if self._expected:
             comm.agree(self._first_error())
 
-    def settle(self, comm: Any) -> None:
+    def settle(self, comm: Comm) -> None:
         """Wait until all files have their names. Raises HpcdemError on all ranks if one has failed. Collective."""
         if not self._expected:
             return

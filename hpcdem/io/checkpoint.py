@@ -29,9 +29,10 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm, SerialComm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io import seal
-from hpcdem.io.agreed import Alone, on_first
+from hpcdem.io.agreed import on_first
 from hpcdem.io.frame import Table
 from hpcdem.io.h5 import reading, writing_to
 from hpcdem.io.parts import read_parts, share
@@ -87,7 +88,7 @@ def _crc(state: str, sums: str) -> int:
     return zlib.crc32(sums.encode("utf-8", "surrogateescape"), zlib.crc32(state.encode("utf-8", "surrogateescape")))
 
 
-def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str, Table], comm: Any) -> None:
+def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str, Table], comm: Comm) -> None:
     """Collective. Writes to a temporary name, reads it back, then renames. HpcdemError on all ranks if anything
     fails."""
 
@@ -120,7 +121,7 @@ Tables = dict[str, dict[str, np.ndarray]]
 
 def read(
     path: str | os.PathLike,
-    comm: Any = Alone(),  # noqa: B008
+    comm: Comm = SerialComm(),  # noqa: B008
     whole: Callable[[str], bool] = lambda table: False,
 ) -> tuple[dict[str, Any], Tables]:
     """Collective: the state of a checkpoint, on all ranks, and of every table this rank's rows. HpcdemError on all
@@ -153,7 +154,7 @@ def _verify(path: str | os.PathLike) -> None:
         n = column.shape[0]
         step = max(1, 8 * _PART // max(column.row, 1))
         pieces = [(at, min(at + step, n)) for at in range(0, n, step)]
-        found = [check(column.values(read_parts(Alone(), path, [column.part(*p)])[0]), p[0]) for p in pieces]
+        found = [check(column.values(read_parts(SerialComm(), path, [column.part(*p)])[0]), p[0]) for p in pieces]
         sums.append(sum(found) & _ALL_BITS)
     _compare(path, columns, sums)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-from typing import Any
 
+from hpcdem.core.comm import Comm
 from hpcdem.io.disk import explain, publish, remove
 
 
-def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: float | None, comm: Any) -> None:
+def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: float | None, comm: Comm) -> None:
     """Collective. Add rows to the file.
 
     since: None to append; at the first call of a run the step it starts from: what the file has after that step is cut

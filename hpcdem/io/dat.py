@@ -26,8 +26,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from hpcdem.core.comm import Comm, SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.io.agreed import Alone, on_first
+from hpcdem.io.agreed import on_first
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.disk import explain
 from hpcdem.io.files import write_sections
@@ -48,7 +49,7 @@ _TABLES = ("particles", "contacts", "bonds", "wall_contacts")
 # --- writing ---------------------------------------------------------------------------------------------------
 
 
-def write_dat(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
+def write_dat(path: str | os.PathLike, frame: Frame, comm: Comm, later: Deliveries | None = None) -> None:
     """Collective: write the frame to `path`, the same bytes for any number of ranks.
 
     Columns a table does not have are written as nan (numbers) or 0 (flags, colours). Raises HpcdemError on all ranks.
@@ -56,7 +57,7 @@ def write_dat(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliverie
     write_sections(path, comm, lambda: _sections(frame, comm, os.path.basename(path)), later)
 
 
-def _sections(frame: Frame, comm: Any, file: str) -> list[Section]:
+def _sections(frame: Frame, comm: Comm, file: str) -> list[Section]:
     walls, particles = frame.walls, frame.tables["particles"]
     n_walls = len(walls["id"])
     index = np.arange(n_walls)
@@ -189,7 +190,7 @@ def _getter(table: Table) -> Callable[..., np.ndarray]:
     return get
 
 
-def _wide_enough(columns: list[tuple[Column, np.ndarray]], comm: Any) -> list[tuple[Column, np.ndarray]]:
+def _wide_enough(columns: list[tuple[Column, np.ndarray]], comm: Comm) -> list[tuple[Column, np.ndarray]]:
     """The integer columns widened to their largest number on any rank, with a blank in front."""
     whole = [np.max(np.abs(v), initial=0) * (-10 if np.any(v < 0) else 1) for c, v in columns if c.kind == INT]
     largest = comm.max_into(np.array([abs(w) for w in whole], dtype=np.int64))
@@ -287,7 +288,7 @@ def is_frame(path: str | os.PathLike) -> bool:
 def read_dat(
     path: str | os.PathLike,
     tables: Collection[str] | None = None,
-    comm: Any = Alone(),  # noqa: B008
+    comm: Comm = SerialComm(),  # noqa: B008
 ) -> Frame:
     """The frame in a .dat file of hpcdem or ZDEM. Collective: of each table every rank gets some of the rows; of that
     of the particles a slab, in ascending order of ids. No rank has them all in memory, if lines end as on Unix.
@@ -334,7 +335,7 @@ def read_dat(
     return frame
 
 
-def _agree_on_columns(comm: Any, frame: Frame) -> None:
+def _agree_on_columns(comm: Comm, frame: Frame) -> None:
     """Collective: the same groups on all ranks, in the order of the whole table; and columns that are there on some
     ranks only, as they are nearly always zero, on all."""
     p, mine = frame.tables["particles"].columns, frame.group_names
@@ -443,7 +444,7 @@ def _let_go(data: bytes | mmap.mmap, end: int) -> None:
         data.madvise(mmap.MADV_DONTNEED, 0, end)
 
 
-def _tables(comm: Any, path: str, places: list[_Place], in_place: bool) -> dict[str, list[_RawTable]]:
+def _tables(comm: Comm, path: str, places: list[_Place], in_place: bool) -> dict[str, list[_RawTable]]:
     """Of each table the rows of this rank, by section; all of those of walls. Collective."""
     raw: dict[str, list[_RawTable]] = {}
     error, texts = None, {}
@@ -476,7 +477,7 @@ def _tables(comm: Any, path: str, places: list[_Place], in_place: bool) -> dict[
     return raw
 
 
-def _alike(comm: Any, place: _Place, table: _RawTable) -> _RawTable:
+def _alike(comm: Comm, place: _Place, table: _RawTable) -> _RawTable:
     """The table with the same types on all ranks. Collective."""
     words = [name for name in ("group", "name") if name in table]
     size = np.array([1] + [table[name].dtype.itemsize for name in words if len(table[name])]).max(keepdims=True)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from typing import Any
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.rootfile import root_file
@@ -17,7 +17,7 @@ from hpcdem.io.transport import Places, Section, size_of, text_in_blocks, to_roo
 
 def write_sections(
     path: str | os.PathLike,
-    comm: Any,
+    comm: Comm,
     build: Callable[[], Sequence[Section]],
     later: Deliveries | None = None,
 ) -> None:
@@ -45,7 +45,7 @@ def write_sections(
             places[rank].write(file, piece, lambda piece=piece: used(piece))  # type: ignore[misc]
 
 
-def _places(comm: Any, sections: Sequence[Section]) -> list[Places]:
+def _places(comm: Comm, sections: Sequence[Section]) -> list[Places]:
     """Where the text of each rank goes; on rank 0 only. Collective."""
     sizes = [rows * width for rows, width in map(size_of, sections)]
     of_ranks = [sizes] if comm.size == 1 else comm.gather(sizes)

@@ -10,9 +10,10 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
+
+from hpcdem.core.comm import Comm
 
 
 class Columns(Mapping[str, np.ndarray]):
@@ -91,7 +92,7 @@ class Frame:
     group_names: list[str] = field(default_factory=list)
 
 
-def whole(frame: Frame, comm: Any) -> Frame | None:
+def whole(frame: Frame, comm: Comm) -> Frame | None:
     """Collective: the frame with all rows on rank 0, None elsewhere."""
     parts = comm.gather({name: table.columns for name, table in frame.tables.items()})
     if parts is None:

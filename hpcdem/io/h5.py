@@ -19,6 +19,7 @@ os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
 import h5py
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.behind import Deliveries
@@ -30,7 +31,7 @@ from hpcdem.io.transport import Places, rows_in_blocks, to_root, used
 _FAILURES = (OSError, RuntimeError, ValueError)
 
 
-def has_mpi(comm: Any) -> bool:
+def has_mpi(comm: Comm) -> bool:
     """Whether this h5py can write through `comm` in parallel, and should: on a crowded host every collective write
     waits for its turn on a core, and rank 0 alone is quicker."""
     return comm.mpi is not None and comm.size > 1 and not comm.crowded and bool(h5py.get_config().mpi)
@@ -146,7 +147,7 @@ class Writer:
     file: rank 0's, None on other ranks; with MPI in h5py it must be one that is written at once.
     """
 
-    def __init__(self, path: str | os.PathLike, temporary: str, comm: Any, file: RootFile | None) -> None:
+    def __init__(self, path: str | os.PathLike, temporary: str, comm: Comm, file: RootFile | None) -> None:
         self.comm, self._file = comm, file
         self._path, self._temporary = os.fspath(path), temporary
         self._steps: list[Callable[[_Description], None]] = []
@@ -255,7 +256,7 @@ def _write_rows(made: Any, rows: np.ndarray, offset: int, how: Any = None) -> No
 
 
 @contextmanager
-def writing(path: str | os.PathLike, comm: Any, later: Deliveries | None = None) -> Iterator[Writer]:
+def writing(path: str | os.PathLike, comm: Comm, later: Deliveries | None = None) -> Iterator[Writer]:
     """Collective: a Writer whose file appears whole under `path`, or not at all. Raises HpcdemError on all ranks; with
     `later` the file may be on its way afterwards, and whoever settles the deliveries hears of the disk."""
     if has_mpi(comm):
@@ -278,7 +279,7 @@ def writing(path: str | os.PathLike, comm: Any, later: Deliveries | None = None)
 
 
 @contextmanager
-def writing_to(path: str | os.PathLike, comm: Any, check: Callable[[str], None] | None = None) -> Iterator[Writer]:
+def writing_to(path: str | os.PathLike, comm: Comm, check: Callable[[str], None] | None = None) -> Iterator[Writer]:
     """The same, at once. check: called on rank 0 with the finished file's temporary name; its HpcdemError keeps the
     file from getting its name."""
     with atomic_path(path, comm) as temporary:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.io.disk import explain
 
 Parts = Sequence[tuple[int, int]]
@@ -17,12 +17,12 @@ _MORE = 4096
 """Bytes in which the end of a line is looked for at a time."""
 
 
-def share(n: int, comm: Any) -> tuple[int, int]:
+def share(n: int, comm: Comm) -> tuple[int, int]:
     """First and one after the last of n things in a row that this rank takes: nearly equally many on all ranks."""
     return n * comm.rank // comm.size, n * (comm.rank + 1) // comm.size
 
 
-def read_parts(comm: Any, path: str | os.PathLike, parts: Parts) -> list[np.ndarray]:
+def read_parts(comm: Comm, path: str | os.PathLike, parts: Parts) -> list[np.ndarray]:
     """Collective: parts of a file, to each rank those it names, as bytes (n,) u1. HpcdemError on all ranks.
 
     Every rank reads for itself. On a host that does not see the file, or not yet all of it, rank 0 reads for it.
@@ -61,7 +61,7 @@ def _read(path: str | os.PathLike, parts: Parts) -> tuple[list[np.ndarray], str 
     return found, None
 
 
-def read_lines(comm: Any, path: str | os.PathLike, begin: int, end: int) -> bytes:
+def read_lines(comm: Comm, path: str | os.PathLike, begin: int, end: int) -> bytes:
     """Collective: of the bytes `begin` to `end` of a text file the lines that begin in this rank's share of them, with
     their ends; put one after the other they are all of these bytes. HpcdemError on all ranks."""
     first, last = (begin + at for at in share(end - begin, comm))

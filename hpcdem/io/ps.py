@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.io import colours
 from hpcdem.io.axes import View, particle_extent, view
 from hpcdem.io.behind import Deliveries
@@ -44,7 +44,7 @@ gsave {left:.3f} {bottom:.3f} {width:.3f} {height:.3f} rectclip
 """
 
 
-def write_ps(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
+def write_ps(path: str | os.PathLike, frame: Frame, comm: Comm, later: Deliveries | None = None) -> None:
     """Collective: the picture of the frame, the same bytes for any number of ranks. Raises HpcdemError on all ranks."""
     write_sections(path, comm, lambda: _sections(frame, comm), later)
 
@@ -72,7 +72,7 @@ def _page(seen: View) -> _Page:
     return _Page(seen, scale, left, scale * seen.width, scale * seen.height)
 
 
-def _sections(frame: Frame, comm: Any) -> list[Section]:
+def _sections(frame: Frame, comm: Comm) -> list[Section]:
     left, right, bottom, top = particle_extent(frame)
     lows = comm.min_into(np.array([left, bottom]))
     highs = comm.max_into(np.array([right, top]))

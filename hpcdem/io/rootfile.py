@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.disk import explain, publish, remove
 
@@ -169,7 +170,7 @@ def _write_run(handle: int, run: list[memoryview], at: int) -> None:
 
 
 @contextmanager
-def root_file(path: str | os.PathLike, comm: Any, later: Deliveries | None = None) -> Iterator[RootFile | None]:
+def root_file(path: str | os.PathLike, comm: Comm, later: Deliveries | None = None) -> Iterator[RootFile | None]:
     """Collective: rank 0's file, None on other ranks; it gets its name after the body, or is removed if that raises.
 
     Raises HpcdemError on all ranks if it cannot be written; with `later`, whoever settles the deliveries does.

@@ -7,11 +7,11 @@ rank holding one contiguous slab. No rank ever holds more than its own rows and 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numba import njit
 
+from hpcdem.core.comm import Comm
 from hpcdem.io.frame import Table
 
 _BINS_PER_RANK = 64
@@ -19,7 +19,7 @@ _SMALL_GID = 1 << 31
 
 
 def to_slabs(
-    comm: Any, key_columns: Sequence[str], columns: dict[str, np.ndarray], chosen: np.ndarray | None = None
+    comm: Comm, key_columns: Sequence[str], columns: dict[str, np.ndarray], chosen: np.ndarray | None = None
 ) -> Table:
     """Collective: this rank's slab of the table whose rows are all ranks' rows in ascending order of the keys.
 
@@ -94,7 +94,7 @@ def order_of(keys: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _redistributed(
-    comm: Any, key: str, arrays: dict[str, np.ndarray], chosen: np.ndarray | None
+    comm: Comm, key: str, arrays: dict[str, np.ndarray], chosen: np.ndarray | None
 ) -> dict[str, np.ndarray]:
     """The rows of all ranks whose key lies in this rank's key range."""
     arrays = {
@@ -105,7 +105,7 @@ def _redistributed(
     return dict(zip(arrays, comm.to_ranks(target, *arrays.values())[1:]))
 
 
-def _targets(comm: Any, keys: np.ndarray) -> np.ndarray:
+def _targets(comm: Comm, keys: np.ndarray) -> np.ndarray:
     """The rank that gets each key: ranges of keys, chosen from a histogram over all ranks so that they hold about
     equally many rows."""
     info = np.iinfo(np.int64)
@@ -123,7 +123,7 @@ def _targets(comm: Any, keys: np.ndarray) -> np.ndarray:
     return owner[index]
 
 
-def by_ranges(comm: Any, key: str, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def by_ranges(comm: Comm, key: str, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Collective: the rows of all ranks in ascending order of an int64 column. Rows of equal keys come to one rank, in
     the order of ranks; tables with the same keys are cut in the same places."""
     if comm.size > 1:
@@ -132,7 +132,7 @@ def by_ranges(comm: Any, key: str, columns: dict[str, np.ndarray]) -> dict[str, 
     return {name: values[order] for name, values in columns.items()}
 
 
-def find_rows(comm: Any, keys: Sequence[np.ndarray], wanted: Sequence[np.ndarray]) -> np.ndarray:
+def find_rows(comm: Comm, keys: Sequence[np.ndarray], wanted: Sequence[np.ndarray]) -> np.ndarray:
     """Collective: the global row of each wanted key in a table held in slabs, -1 where there is no such row.
 
     keys: this rank's slab of one or two key columns, ascending over all ranks; wanted: as many columns of the keys
@@ -147,7 +147,7 @@ def find_rows(comm: Any, keys: Sequence[np.ndarray], wanted: Sequence[np.ndarray
     return ask(comm, holders(comm, mine, asked), asked, lambda q: _local_rows(mine, q, offset))
 
 
-def holders(comm: Any, mine: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def holders(comm: Comm, mine: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Collective: the rank whose slab has, or would have, each wanted key (m,) i8; its own where there are no rows.
 
     mine (n,) i8: this rank's slab of the keys, ascending over all ranks.
@@ -163,7 +163,9 @@ def holders(comm: Any, mine: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return ranks[np.maximum(np.searchsorted(starts[ranks], wanted, side="right") - 1, 0)]
 
 
-def ask(comm: Any, target: np.ndarray, questions: np.ndarray, answer: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+def ask(
+    comm: Comm, target: np.ndarray, questions: np.ndarray, answer: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
     """Collective: the answers (n, ...) of the ranks `target` (n,) i8 to these questions (n,), row by row; `answer` is
     what this rank says to those it is asked."""
     sources, asked = comm.to_ranks(target, questions)

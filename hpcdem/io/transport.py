@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.io.rootfile import RootFile
 from hpcdem.io.textnum import TextTable
 
@@ -91,7 +91,7 @@ def size_of(section: Section) -> tuple[int, int]:
     return (len(section), 1) if isinstance(section, bytes) else (section.rows, section.width)
 
 
-def to_root(comm: Any, blocks: Iterator[Block]) -> Iterator[tuple[int, np.ndarray]]:
+def to_root(comm: Comm, blocks: Iterator[Block]) -> Iterator[tuple[int, np.ndarray]]:
     """Collective generator, to be run to its end on every rank: on rank 0, yields (rank, bytes) for the blocks of rank
     1, 2, ... one rank after the other, each valid until it is handed to `used`.
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.files import write_sections
 from hpcdem.io.frame import Frame
@@ -20,7 +20,7 @@ from hpcdem.io.transport import Section
 _WHOLE = 21  # characters that hold any int64 and a blank
 
 
-def write_vtk(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
+def write_vtk(path: str | os.PathLike, frame: Frame, comm: Comm, later: Deliveries | None = None) -> None:
     """Collective: the particles in `path`, usually ``all_<step>.vtk``, and the walls in ``wall_<step>.vtk`` beside it.
 
     Particles are points and vertices with scalars radius, id, color, group (number) and vectors velocity. The same
@@ -45,7 +45,7 @@ def write_vtk(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliverie
     write_wall_vtk(Path(path).with_name("wall_" + name.removeprefix("all_")), frame, comm, later)
 
 
-def write_wall_vtk(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
+def write_wall_vtk(path: str | os.PathLike, frame: Frame, comm: Comm, later: Deliveries | None = None) -> None:
     """Collective: the walls as lines, with cell scalars id, color and vectors velocity, force.
 
     Raises HpcdemError on all ranks.

@@ -16,6 +16,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io import h5
 from hpcdem.io.behind import Deliveries
@@ -30,7 +31,7 @@ _LINK_NAMES = {"x": "contact_x", "y": "contact_y"}
 _FILL_INT = {"id1": -1, "id2": -1}
 
 
-def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
+def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Comm, later: Deliveries | None = None) -> None:
     """Collective: write the frame to `path` (usually ``*.vtkhdf``).
 
     Needs the tables particles (with gid, x, y), contacts and bonds (with id1, id2) as slabs in order, wall_contacts

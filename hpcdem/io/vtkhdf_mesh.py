@@ -13,10 +13,10 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io import h5
 from hpcdem.io.behind import Deliveries
@@ -83,7 +83,7 @@ class MeshState:
     units: str = ""
 
 
-def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
+def whole(frame: MeshFrame, comm: Comm) -> MeshState | None:
     """Collective: the frame with all rows on rank 0, None elsewhere."""
     further = frame.tables.values()
     parts = comm.gather([table.columns for table in (frame.corners, frame.elements, frame.joints, *further)])
@@ -179,7 +179,7 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool =
             raise HpcdemError(f"{os.fspath(path)} is no frame of blocks, or damaged: {problem}") from None
 
 
-def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later: Deliveries | None = None) -> None:
+def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Comm, later: Deliveries | None = None) -> None:
     """Collective: write the frame to `path` (usually ``*.vtkhdf``). The content does not depend on the number of ranks.
     Raises HpcdemError on all ranks; `later`: see `h5.writing`."""
     corners, elements, joints = frame.corners, frame.elements, frame.joints

@@ -7,10 +7,11 @@ at the end. Used wherever a sum is written to a file or feeds back into the run.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import njit
+
+from hpcdem.core.comm import Comm
 
 _LOW = 26  # the 53-bit mantissa is split in 27 + 26 bits, so that a bin has room for 2**36 numbers
 _BINS = 2112
@@ -94,7 +95,7 @@ def from_integer(total: int) -> float:
         return math.inf if total > 0 else -math.inf
 
 
-def rounded_sums(bins: np.ndarray, comm: Any) -> np.ndarray:
+def rounded_sums(bins: np.ndarray, comm: Comm) -> np.ndarray:
     """Sums over all ranks of bins (k, 2, 2112) i8, each correctly rounded, (k,) f8. Collective.
 
     Only the part of the exponents that is in use travels.
@@ -113,7 +114,7 @@ def rounded_sums(bins: np.ndarray, comm: Any) -> np.ndarray:
     return np.array([rounded(b) for b in bins])
 
 
-def exact_sum(values: np.ndarray, comm: Any) -> float:
+def exact_sum(values: np.ndarray, comm: Comm) -> float:
     """Correctly rounded sum over all ranks; the same bits for any distribution of the values. Collective.
 
     Returns NaN if any value anywhere is not finite.

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from hpcdem.core.clock import Clock
+from hpcdem.core.comm import Comm, SerialComm
 from hpcdem.core.timers import Timers
-from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.ownership import Ownership
 
 
@@ -18,7 +18,7 @@ class Model:
 
     def __init__(
         self,
-        comm: Any = None,
+        comm: Comm | None = None,
         threads: int = 1,
         outdir: Path | str = "data",
         log: Any = None,

@@ -24,13 +24,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.runtime.kept import store
 from hpcdem.runtime.kernels import turn_of
 from hpcdem.runtime.launch import patient_barrier
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.physics.model import Model
 
 TOLD = 0.1
@@ -114,7 +115,7 @@ def agreed(sim: Model, path: Path, what: str, kind: str, take: Callable[[str, st
     return made[0]
 
 
-def in_turn(comm: SerialComm, act: Callable[[], None]) -> float:
+def in_turn(comm: Comm, act: Callable[[], None]) -> float:
     """One rank of each machine type acts first, then one of each host, then the rest: what the first ones compile is
     kept for the others (`made_of`). Returns the seconds that this took if it compiled something and took long enough to
     be told, else 0. Collective."""

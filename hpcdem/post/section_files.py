@@ -6,8 +6,8 @@ import os
 
 import numpy as np
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.io import h5
-from hpcdem.io.agreed import Alone
 from hpcdem.io.files import write_sections
 from hpcdem.io.textnum import INT, Column, TextTable, sci
 from hpcdem.post.section import Section
@@ -32,14 +32,14 @@ def write_out(path: str | os.PathLike, section: Section, since: str) -> None:
         f"# frame {section.name} step {section.step} time {section.time:.12g} s, stress over {section.average:.12g} m, "
         f"strain {'on the grid' if section.smooth else 'of nearest neighbours'} since {since}\n#{words[1:]}\n"
     )
-    write_sections(path, Alone(), lambda: [head.encode(), TextTable(columns)])
+    write_sections(path, SerialComm(), lambda: [head.encode(), TextTable(columns)])
 
 
 def write_grid(path: str | os.PathLike, section: Section) -> None:
     """The fields as VTKHDF ImageData 2.0 (https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html): one
     point per node, z = 0."""
     nx, ny = len(section.x), len(section.y)
-    with h5.writing(path, Alone()) as out:
+    with h5.writing(path, SerialComm()) as out:
         out.group(
             "VTKHDF",
             {

@@ -13,6 +13,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.axes import View
 from hpcdem.io.disk import explain
@@ -91,7 +92,7 @@ class Task(Protocol):
         """Do it. Raises HpcdemError."""
 
 
-def draw_all(tasks: Sequence[Task], comm: Any, workers: int = 1, report: Report | None = None) -> None:
+def draw_all(tasks: Sequence[Task], comm: Comm, workers: int = 1, report: Report | None = None) -> None:
     """Collective: do all tasks, equal on all ranks. The same bytes on any number of ranks and workers.
 
     Several ranks take turns, each works alone; one rank starts `workers` processes. A task that fails does not keep the

@@ -20,8 +20,9 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
+from hpcdem.core.comm import Comm, SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.io.agreed import Alone, on_first
+from hpcdem.io.agreed import on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.frames import FrameFile, left_out, list_frames, read_frame
 from hpcdem.post import grid as grids
@@ -58,7 +59,7 @@ class Options:
     smooth: bool = False
 
 
-def run(comm: Any, log: Any, options: Options) -> Path:
+def run(comm: Comm, log: Any, options: Options) -> Path:
     """Collective: the folder with the results. Results of an earlier call stay until the new ones are complete.
     Raises HpcdemError (on all ranks) for frames that cannot be read or do not fit together."""
     if not (np.isfinite(options.size) and options.size > 0.0):
@@ -140,7 +141,7 @@ def _replace(fresh: Path, results: Path, names: list[str]) -> None:
     fresh.rmdir()
 
 
-def _each(comm: Any, action: Callable[[], _T]) -> _T:
+def _each(comm: Comm, action: Callable[[], _T]) -> _T:
     """Collective: each rank's own result; if one fails, all do."""
     result, error = _tried(action)
     comm.agree(error)
@@ -382,16 +383,9 @@ def _each_way(combine: np.ufunc, values: np.ndarray, reach: int) -> np.ndarray:
 # --- all frames ------------------------------------------------------------------------------------------------
 
 
-class _Single(Alone):
-    """The communicator of a rank that goes through the frames by itself."""
-
-    mpi: Any = None
-
-    def to_ranks(self, target: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
-        return target, *columns
-
-
-def _rounds(comm: Any, log: Any, frames: list[FrameFile], options: Options, output: _Output, sums: strain.Sums) -> None:
+def _rounds(
+    comm: Comm, log: Any, frames: list[FrameFile], options: Options, output: _Output, sums: strain.Sums
+) -> None:
     """Collective over `comm`: one frame per rank and round."""
     last = _Last()
     began = told = time.monotonic()
@@ -412,7 +406,7 @@ class _Last(NamedTuple):
 
 
 def _round(
-    comm: Any, frames: list[FrameFile], first: int, last: _Last, options: Options, output: _Output, sums: strain.Sums
+    comm: Comm, frames: list[FrameFile], first: int, last: _Last, options: Options, output: _Output, sums: strain.Sums
 ) -> _Last:
     mine = first + comm.rank
     file = frames[mine] if mine < len(frames) else None
@@ -443,7 +437,7 @@ def _none(now: Snapshot) -> np.ndarray:
     return np.tile(strain.IDENTITY, (int(now.inside.sum()), 1))
 
 
-def _to_next(comm: Any, rows: np.ndarray) -> np.ndarray:
+def _to_next(comm: Comm, rows: np.ndarray) -> np.ndarray:
     """Collective: every rank's rows (n, k) go to the next rank, the last one's to rank 0; what came from the one
     before."""
     _, arrived = comm.to_ranks(np.full(len(rows), (comm.rank + 1) % comm.size), rows)
@@ -457,7 +451,7 @@ def _write(section: Section, options: Options, first: FrameFile, folder: Path) -
     write_section(section, folder / f"{section.name}.npz")
 
 
-def _together(comm: Any, log: Any, frames: list[FrameFile], options: Options, output: _Output) -> None:
+def _together(comm: Comm, log: Any, frames: list[FrameFile], options: Options, output: _Output) -> None:
     """Collective: rank 0 goes through the frames, all ranks sum their columns of the grids."""
     error = None
     if comm.rank == 0:
@@ -468,7 +462,7 @@ def _together(comm: Any, log: Any, frames: list[FrameFile], options: Options, ou
             return {name: np.concatenate([part[name] for part in parts], axis=1) for name in parts[0]}
 
         try:
-            _, error = _tried(lambda: _rounds(_Single(), log, frames, options, output, shared))
+            _, error = _tried(lambda: _rounds(SerialComm(), log, frames, options, output, shared))
         finally:
             with suppress(HpcdemError):
                 comm.bcast(None)
@@ -478,6 +472,6 @@ def _together(comm: Any, log: Any, frames: list[FrameFile], options: Options, ou
     comm.agree(error)
 
 
-def _my_columns(comm: Any, grid: grids.Grid, what: tuple, how: dict) -> dict[str, np.ndarray]:
+def _my_columns(comm: Comm, grid: grids.Grid, what: tuple, how: dict) -> dict[str, np.ndarray]:
     how = {**how, "columns": (grid.nx * comm.rank // comm.size, grid.nx * (comm.rank + 1) // comm.size)}
     return grids.sums(grid, *what, **how)

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io import checkpoint
 from hpcdem.io.agreed import on_first
@@ -21,7 +22,7 @@ def newest_first(folders: list[Path], before: float = math.inf) -> tuple[list[Pa
     return [path for _, time, path in ranked if time <= latest], damaged
 
 
-def go_back_to(path: Path, folders: list[Path], comm: Any) -> None:
+def go_back_to(path: Path, folders: list[Path], comm: Comm) -> None:
     """The run goes on from this checkpoint: later ones in the folders, and frames that came after it, do not count
     any more. Collective."""
 

@@ -20,13 +20,14 @@ from typing import TYPE_CHECKING
 
 import filelock
 
+from hpcdem.core.comm import Comm
 from hpcdem.runtime import cgroups, kept, launch
 from hpcdem.runtime.compilers import compile_in_processes
 from hpcdem.runtime.kept import late
 from hpcdem.runtime.launch import patient_barrier
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 __all__ = ["late", "prepare_kernels", "turn_of", "warmup"]
@@ -39,7 +40,7 @@ MEMORY = 700e6
 """Of one of them, at most [bytes]."""
 
 
-def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[[], None]]) -> Path:
+def prepare_kernels(comm: Comm, log: Log, warm_ups: Mapping[str, Callable[[], None]]) -> Path:
     """Collective: have the kernels of all kinds compiled that no process has compiled before; returns the folder of the
     store. warm_ups: by kind, what calls all of its kernels once, a function that can be pickled. Rank 0 logs progress.
 

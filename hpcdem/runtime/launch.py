@@ -18,11 +18,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.runtime import cgroups
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
 
 LAUNCHERS = {
     # who: (size of the job, rank in it)
@@ -200,13 +201,14 @@ def one_voice() -> Iterator[None]:
             raise SystemExit(0) from None
 
 
-def start_mpi() -> SerialComm:
+def start_mpi() -> Comm:
     """The communicator of the run. MPI is started only when a launcher started several processes.
 
     UsageError when the launcher says n processes and MPI says one: n copies of the same run would overwrite each
     other's files. HpcdemError when no MPI library can be loaded.
     """
-    from hpcdem.halo.comm import MpiComm, SerialComm
+    from hpcdem.core.comm import SerialComm
+    from hpcdem.halo.comm import MpiComm
 
     who = launcher()
     if who is None or who.size == 1:
@@ -273,7 +275,7 @@ def slurm_mpi_type(library: str) -> str:
     return "pmix" if "Open MPI" in library else "pmi2"
 
 
-def patient_barrier(comm: SerialComm) -> None:
+def patient_barrier(comm: Comm) -> None:
     """Wait for all ranks without keeping a core busy, for waits of seconds and more."""
     if comm.mpi is not None:
         request = comm.mpi.Ibarrier()

@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.timers import Summary, Timers
 from hpcdem.core.units import counted, in_one_unit, with_prefix
 from hpcdem.io.run_record import PROGRESS
@@ -352,7 +353,7 @@ class Log:
 
     # -- the end ---------------------------------------------------------------------------------------------
 
-    def stages(self, timers: Timers, comm: Any, body: str = "particle") -> Summary:
+    def stages(self, timers: Timers, comm: Comm, body: str = "particle") -> Summary:
         """Collective: the table of stages. body: what the timers count, "particle" or "element"."""
         summary = timers.merge(comm)
         if not self._speaks:
@@ -362,7 +363,7 @@ class Log:
         self._print(closing_line(summary, body))
         return summary
 
-    def stages_of_both(self, particles: Timers, blocks: Timers, comm: Any) -> None:
+    def stages_of_both(self, particles: Timers, blocks: Timers, comm: Comm) -> None:
         """Collective: the table of stages of particles and blocks in one run."""
         parts = {"particles": particles, "blocks": blocks}
         whole, *each = (timers.merge(comm) for timers in (Timers.joined(parts, BETWEEN), *parts.values()))

@@ -21,6 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
@@ -55,7 +56,7 @@ class Job:
         return {"host": socket.gethostname(), "pid": os.getpid(), "script": self.script, "began": _now()}
 
 
-def claim(folder: Path, comm: Any, job: Job) -> bool:
+def claim(folder: Path, comm: Comm, job: Job) -> bool:
     """Lock a folder that is there; nothing happens to one that is not. Returns False if its file system has no locks.
     UsageError on all ranks if another run writes into it, or if it cannot become a folder."""
 
@@ -63,7 +64,7 @@ def claim(folder: Path, comm: Any, job: Job) -> bool:
     return on_first(comm, lambda: _claim(folder, job) if folder.is_dir() else True)
 
 
-def refuse_file(folder: Path, comm: Any) -> None:
+def refuse_file(folder: Path, comm: Comm) -> None:
     """Collective: UsageError if something that is no folder stands where a folder of results, or one above it, would be
     made."""
 
@@ -79,7 +80,7 @@ def refuse_file(folder: Path, comm: Any) -> None:
 
 
 def enter(
-    folder: Path, comm: Any, job: Job, version: str, resumed: bool, restored: tuple[Path, int] | None = None
+    folder: Path, comm: Comm, job: Job, version: str, resumed: bool, restored: tuple[Path, int] | None = None
 ) -> bool:
     """Make the folder, lock it, and write run.json; a resumed run keeps what it says of older files. restored: the
     checkpoint that the script began with, and its step; if it is one of this folder, the frames up to there belong to
@@ -118,7 +119,7 @@ def enter(
     return on_first(comm, work)
 
 
-def leave(folder: Path, comm: Any, state: str, step: int) -> None:
+def leave(folder: Path, comm: Comm, state: str, step: int) -> None:
     """Note in run.json how the run ended. Not collective; a disk that refuses it is no reason to fail once more."""
     if comm.rank > 0:
         return
@@ -161,7 +162,7 @@ class Retention:
         return any(time <= mark * (1.0 + ROUNDING) < later for mark in marks)
 
 
-def retire(folder: Path, comm: Any, step: int, keep: Retention) -> None:
+def retire(folder: Path, comm: Comm, step: int, keep: Retention) -> None:
     """After the checkpoint of `step`: remove those of this run that are too many, numbered ones before the last
     `keep.last`, automatic ones before the last two and from before the last numbered one, but for those that `keep`
     spares. Not collective.

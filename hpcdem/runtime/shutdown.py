@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from hpcdem.core.chinese import beside
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import EXIT_ERROR, EXIT_OK, HpcdemError, StoppedWithCheckpoint
 
 EXIT_INTERRUPTED, EXIT_TERMINATED = 130, 143
@@ -74,7 +75,7 @@ def _line_of_script(error: BaseException) -> str:
     return place
 
 
-def run_together(comm: Any, work: Callable[[], None]) -> ExitStatus:
+def run_together(comm: Comm, work: Callable[[], None]) -> ExitStatus:
     """Call `work` on every rank and bring all ranks together at its end, with the message of an error printed.
 
     If only some ranks fail, the lowest of them prints and the job is aborted; this function does not return then.
@@ -87,12 +88,12 @@ def run_together(comm: Any, work: Callable[[], None]) -> ExitStatus:
     return come_together(comm, channel, None)
 
 
-def private_channel(comm: Any) -> Any:
+def private_channel(comm: Comm) -> Any:
     """Collective, at the start of a run: the communicator of the abort barrier, apart from all other messages."""
     return comm.mpi.Dup() if comm.mpi is not None else None
 
 
-def come_together(comm: Any, channel: Any, failure: Failure | None) -> ExitStatus:
+def come_together(comm: Comm, channel: Any, failure: Failure | None) -> ExitStatus:
     """The end of a run on this rank; see `run_together`. channel: of `private_channel`."""
     if failure is not None and failure.code == EXIT_OK:
         failure = None

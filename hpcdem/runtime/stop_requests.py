@@ -37,6 +37,7 @@ from datetime import datetime
 from types import FrameType
 from typing import Any, Literal
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.runtime.watchdog import SAME_SIGNAL, Watchdog
 
@@ -220,7 +221,7 @@ class StopRequests:
         if self.ended is not None:
             raise self.ended
 
-    def poll(self, comm: Any) -> Decision:
+    def poll(self, comm: Comm) -> Decision:
         """Collective: the decision of all ranks, where no other reduction can carry the code."""
         import numpy as np
 

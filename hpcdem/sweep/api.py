@@ -146,7 +146,7 @@ class Sweep:
             if name not in Options.__annotations__:
                 near = hint(name, Options.__annotations__)
                 raise UsageError(f"report has no option '{name}'{near}; there is {', '.join(Options.__annotations__)}")
-        from hpcdem.halo.comm import SerialComm
+        from hpcdem.core.comm import SerialComm
         from hpcdem.post.measure.scene import Request
         from hpcdem.sweep import report
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import on_first
 from hpcdem.io.frames import list_frames, list_mesh_frames
@@ -34,7 +35,7 @@ class _Quiet:
         self.log.warn(f"{self.name}: {text}")
 
 
-def run(comm: Any, log: Any, plan: Plan, request: Request, kinds: Sequence[str] = ("csv",)) -> Report:
+def run(comm: Comm, log: Any, plan: Plan, request: Request, kinds: Sequence[str] = ("csv",)) -> Report:
     """Collective: measure as asked, write tables and figures into `report` of the sweep's folder (or request.output),
     and return the tables (on rank 0; empty elsewhere). Raises HpcdemError where no member is done."""
     on_first(comm, lambda: tables.check(kinds))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands import fdem
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.groups import Span
 from hpcdem.physics.fdem.simulation import Blocks

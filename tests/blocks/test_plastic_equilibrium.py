@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.kernels.plastic_stiffness import principal_slopes
 from hpcdem.physics.fdem.kernels.plasticity import SHEAR_NOW, principal_return

@@ -15,10 +15,10 @@ from hpcdem.commands.fdem import settings as settings_
 from hpcdem.commands.fdem import steps as stepping
 from hpcdem.commands.fdem import summary as summary_
 from hpcdem.commands.fdem.project import Project
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
 from hpcdem.core.timers import Timers
 from hpcdem.engine import output
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.physics.fdem import diagnostics

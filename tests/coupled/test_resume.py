@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from tests.pcdc.test_whole import tables

@@ -30,7 +30,7 @@ SCRIPT = """
 import io, sys
 from pathlib import Path
 import numpy as np
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.lang.zdem.execute import Interpreter
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.physics.dem.simulation import Simulation

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels

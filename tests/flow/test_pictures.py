@@ -12,8 +12,8 @@ import pytest
 
 from hpcdem.commands import fdem
 from hpcdem.commands.fdem import frames, summary
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.axes import View
 from hpcdem.physics.fdem.groups import Span
 from hpcdem.physics.fdem.simulation import Blocks

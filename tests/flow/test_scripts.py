@@ -9,8 +9,8 @@ import pytest
 
 from hpcdem.commands import fdem
 from hpcdem.commands.fdem import frames
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, JOINT, NODE, Ids, InGroup, OnLayer, Span
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.conftest import absent

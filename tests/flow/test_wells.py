@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels

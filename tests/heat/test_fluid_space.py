@@ -10,8 +10,8 @@ from scipy.special import erfc
 
 from hpcdem.commands import fdem
 from hpcdem.commands.fdem import frames
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes, saved_state
 from hpcdem.physics.fdem.groups import CHANNEL
 from hpcdem.physics.fdem.mesh import Mesh

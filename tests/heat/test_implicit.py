@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hpcdem.commands import fdem
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import changes, diagnostics, equilibrium
 from hpcdem.physics.fdem.groups import Span

@@ -7,8 +7,8 @@ import pytest
 
 from hpcdem.commands import fdem
 from hpcdem.commands.fdem import frames
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem.groups import ELEMENT, NODE, Ids, OnLayer, Span
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.heat.support import GRANITE

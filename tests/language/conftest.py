@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.lang.zdem.execute import Interpreter
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.physics.dem.simulation import Simulation

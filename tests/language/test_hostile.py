@@ -7,8 +7,8 @@ import json
 
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import EXIT_USAGE, HpcdemError, ScriptError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.lang import detect
 from hpcdem.lang.zdem.execute import Interpreter
 from hpcdem.lang.zdem.parser import parse_text, read_script

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.core.fields import BOX_IDS
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat
 from hpcdem.lang.zdem import check
 from hpcdem.lang.zdem.execute import Interpreter

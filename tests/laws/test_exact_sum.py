@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.numerics.exact_sum import exact_sum, partial_bins, rounded, rounded_sums
 
 finite = st.floats(allow_nan=False, allow_infinity=False)

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.halo.comm import MpiComm, SerialComm
+from hpcdem.core.comm import SerialComm
+from hpcdem.halo.comm import MpiComm
 from hpcdem.physics.fdem import convergence, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.dem import bonds, clumps, cycles, particles, properties, settings, walls
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.fields import FX
 from hpcdem.core.selection import Interval
-from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.migrate import Migration, Trail
 from hpcdem.io import checkpoint, parts
 from hpcdem.io.dat import write_dat

@@ -15,7 +15,8 @@ import hashlib, math, sys
 import numpy as np
 from mpi4py import MPI
 from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.halo.comm import MpiComm, SerialComm
+from hpcdem.core.comm import SerialComm
+from hpcdem.halo.comm import MpiComm
 from hpcdem.pre.mesh import geometry, once
 from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
 from hpcdem.pre.mesh.fractures import network

@@ -14,9 +14,9 @@ import numpy as np
 
 from hpcdem.commands.fdem import Project
 from hpcdem.core.clock import Clock
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
 from hpcdem.core.timers import Timers
-from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.connectivity import centroids

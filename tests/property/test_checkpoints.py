@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from hpcdem.commands.dem import bonds, cycles, particles, properties, walls
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.physics.dem import saved_state

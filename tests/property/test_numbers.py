@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hpcdem.commands.dem import cycles, particles, walls
+from hpcdem.core.comm import SerialComm
 from hpcdem.engine import output
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat, write_dat
 from hpcdem.io.textnum import format_floats
 from tests.support import model

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from hpcdem import session
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hpcdem.cases import ProppantClosure
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.pcdc.fake import Bench
 

@@ -10,8 +10,8 @@ import pytest
 
 from hpcdem.commands import fdem
 from hpcdem.commands.fdem import frames
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.proppant.model import Proppant

@@ -9,7 +9,7 @@ import pytest
 
 from hpcdem.commands import fdem
 from hpcdem.commands.fdem import frames
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem.groups import CHANNEL
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels

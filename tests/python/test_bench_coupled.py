@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from tests.conftest import ROOT, run
 
 sys.path.insert(0, str(ROOT / "scripts" / "lib"))

@@ -17,8 +17,8 @@ import pytest
 from hpcdem.api import blocks as api
 from hpcdem.api import simulation
 from hpcdem.api.simulation import Simulation
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import ScriptError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.lang.pcdc import bindings, execute
 from hpcdem.lang.pcdc.kinds import FunctionName

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError, PhysicsError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frames import read_frame
 from hpcdem.physics.dem import diagnostics, saved_state
 from hpcdem.physics.dem.simulation import Simulation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.kernels.elements import TALLY
 from hpcdem.physics.fdem.kernels.joints import HISTORY

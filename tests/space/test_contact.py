@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes, connectivity, convergence, diagnostics, overlaps
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.pairs import Kinds

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, reference, saved_state
 from hpcdem.physics.fdem.kernels import creep_tets
 from hpcdem.physics.fdem.mesh import Mesh

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes, diagnostics, saved_state
 from hpcdem.physics.fdem.kernels import space, tets
 from hpcdem.physics.fdem.reference import Solid, tetrahedron_forces

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.numerics.lanes import CAPACITY
 from hpcdem.physics.fdem import changes, convergence, diagnostics, reference
 from hpcdem.physics.fdem.kernels import plastic_tets

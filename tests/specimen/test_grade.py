@@ -15,8 +15,8 @@ import pytest
 
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.grade import grade, work
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import EXIT_USAGE, HpcdemError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.clumps import read_clumps
 from hpcdem.io.ppdem import read_ppdem
 from hpcdem.lang.detect import kind

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.vtkhdf import write_vtkhdf
 

@@ -10,8 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.axes import View
 from hpcdem.io.frame import Table
 from hpcdem.io.frames import list_mesh_frames

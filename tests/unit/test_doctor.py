@@ -24,7 +24,7 @@ import pytest
 from click.testing import CliRunner
 
 from hpcdem.cli import doctor as program
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.runtime import cgroups, doctor, launch
 from hpcdem.runtime.doctor import CHECKS, Level, Machine, host, merged, software, storage
 from hpcdem.runtime.doctor.machine import Finding, ok, problem, size, warning

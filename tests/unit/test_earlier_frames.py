@@ -13,8 +13,8 @@ import pytest
 
 from hpcdem.cli import info, measure, movie, strain_stress, zdem2jpg, zdemss
 from hpcdem.cli.common import read_command_line
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io import vtkhdf_mesh
 from hpcdem.io.frames import left_out, list_frames, list_mesh_frames
 from hpcdem.io.run_record import read

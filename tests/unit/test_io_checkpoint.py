@@ -12,8 +12,8 @@ import h5py
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint, seal
 from hpcdem.io.frame import Table
 

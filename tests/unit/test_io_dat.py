@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat, write_dat
 from hpcdem.io.frame import Frame
 from tests.unit.io_synthetic import GROUPS, assert_same, make_frame

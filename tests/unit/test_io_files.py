@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.agreed import atomic_path, make_folder
 from hpcdem.io.disk import explain
 from hpcdem.io.files import write_sections
@@ -92,7 +92,8 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import hpcdem.io.dat, hpcdem.io.ps, hpcdem.io.vtk, hpcdem.io.vtkhdf
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import MpiComm, SerialComm
+from hpcdem.core.comm import SerialComm
+from hpcdem.halo.comm import MpiComm
 from tests.unit.io_synthetic import make_frame
 
 comm = SerialComm()

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import write_dat
 from hpcdem.io.frames import frame_name, list_frames, read_frame
 from hpcdem.io.vtkhdf import write_vtkhdf

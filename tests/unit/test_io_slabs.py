@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.slabs import find_rows, order_of, to_slabs
 
 ROOT = Path(__file__).resolve().parents[2]

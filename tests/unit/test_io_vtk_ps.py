@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.io import colours
 from hpcdem.io.axes import View, view
 from hpcdem.io.ps import write_ps

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.vtkhdf import BOND, CONTACT, PARTICLE, read_vtkhdf, write_vtkhdf
 from tests.unit.io_synthetic import assert_same, make_frame
 

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frame import Table
 from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame
 from tests.conftest import ROOT

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frame import Table
 from hpcdem.io.vtkhdf_mesh import MeshFrame, read_mesh_frame, write_mesh_frame
 from hpcdem.post.measure import blocks, emission

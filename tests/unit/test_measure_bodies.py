@@ -10,8 +10,8 @@ import pytest
 
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.measure import measure, work
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.post.measure import block_figures, blocks, bodies
 from tests.conftest import Launcher

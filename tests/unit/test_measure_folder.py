@@ -12,8 +12,8 @@ import pytest
 
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.measure import measure, request, work
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import write_dat
 from hpcdem.io.frames import read_frame
 from hpcdem.post.section import write_section

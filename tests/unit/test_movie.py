@@ -12,8 +12,8 @@ import pytest
 
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.movie import movie, work
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io import colours
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.post import movie as films

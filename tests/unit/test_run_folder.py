@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.lock import FolderLock, Taken, holder_of
 from hpcdem.runtime import run_folder
 from hpcdem.runtime.run_folder import Job, Retention

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from hpcdem.cli.run import speaks_zdem
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime import doctor
 from hpcdem.runtime import launch as launching
 from hpcdem.runtime.launch import Launcher, Place

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.timers import Timers
-from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime.progress import Log, StepStatus, duration, folded, rate
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError, StoppedWithCheckpoint
-from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime import shutdown
 
 

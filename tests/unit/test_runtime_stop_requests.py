@@ -11,8 +11,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime.stop_requests import NONE, SAVE, STOP, StopRequests, parse_limit, slurm_end_time
 
 

@@ -7,8 +7,8 @@ import time
 import pytest
 
 from hpcdem.core.clock import Clock
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.timers import Timers
-from hpcdem.halo.comm import SerialComm
 
 
 class Ranks(SerialComm):

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from hpcdem import session
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.model import Heat
@@ -172,7 +172,7 @@ from hpcdem.runtime import launch
 launch.prepare_environment(1)
 from functools import partial
 from numba.core import event
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.runtime import kernels
 from hpcdem.runtime.progress import Log
 from hpcdem.session import warm_up
@@ -308,7 +308,7 @@ def test_kernels_of_two_processes_are_told_apart(tmp_path, apart):
 MANY = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.runtime import kernels, launch
 from hpcdem.runtime.progress import Log
 launch.mask = lambda: frozenset({0})

@@ -14,8 +14,8 @@ from click.testing import CliRunner
 
 from hpcdem.cli.strain_stress import load_kernels
 from hpcdem.cli.strain_stress import strain_stress as command
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat, write_dat
 from hpcdem.io.frame import Frame
 from hpcdem.io.vtkhdf import write_vtkhdf

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.post import strain, strain_stress, stress

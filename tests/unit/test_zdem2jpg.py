@@ -16,8 +16,8 @@ import pytest
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.pictures import as_usual, style_of
 from hpcdem.cli.zdem2jpg import of_field, work, zdem2jpg
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, ScriptError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io import colours
 from hpcdem.io.dat import write_dat
 from hpcdem.io.vtkhdf import write_vtkhdf

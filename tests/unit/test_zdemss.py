@@ -14,8 +14,8 @@ import pytest
 
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.zdemss import work, zdemss
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.axes import View
 from hpcdem.post.cpt import INVAR2, VOLUME, parse_cpt, stress_table
 from hpcdem.post.section import Section, read_section

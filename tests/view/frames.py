@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame

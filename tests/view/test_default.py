@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frames import frame_name
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame

@@ -12,9 +12,9 @@ import pytest
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.draw import draw as command
 from hpcdem.cli.draw import work
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.looks import COLOURS
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.axes import View
 from hpcdem.io.frame import Columns
 from hpcdem.io.vtkhdf import read_vtkhdf

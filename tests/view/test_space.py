@@ -12,9 +12,9 @@ import pytest
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.movie import movie
 from hpcdem.cli.movie import work as film
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.looks import EYES
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.axes import View
 from hpcdem.physics.fdem import tetrahedra
 from hpcdem.post.view import reference, space

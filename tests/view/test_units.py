@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame, write_mesh_frame
 from hpcdem.page.sources import Sources

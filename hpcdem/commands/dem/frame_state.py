@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.core.fields import BOX_IDS, FX, FY, TORQUE, sides_of_box
 from hpcdem.core.material import PROPERTIES
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat
 from hpcdem.io.frame import Frame
 from hpcdem.io.slabs import ask, holders
@@ -80,7 +80,7 @@ class _Discs:
     """x, y, radius [m] of the discs of a frame and whether they are kept, for those who ask by id. gid (n,): this
     rank's slab of them; rows (n, 4)."""
 
-    def __init__(self, comm: SerialComm, gid: np.ndarray, rows: np.ndarray) -> None:
+    def __init__(self, comm: Comm, gid: np.ndarray, rows: np.ndarray) -> None:
         self.comm, self.gid, self._rows = comm, gid, rows
 
     def of(self, ids: np.ndarray) -> np.ndarray:
@@ -95,7 +95,7 @@ class _Discs:
         return ask(self.comm, holders(self.comm, self.gid, ids), ids, answer)
 
 
-def _checked(comm: SerialComm, frame: Frame, path: str) -> Frame:
+def _checked(comm: Comm, frame: Frame, path: str) -> Frame:
     """The frame, if a model can be made of it. Collective."""
     p = frame.tables["particles"].columns
     gid = p.get("gid", np.empty(0, np.int64))
@@ -162,7 +162,7 @@ def _take_walls(sim: Simulation, frame: Frame) -> np.ndarray:
     return rows
 
 
-def _rows(comm: SerialComm, columns: np.ndarray, row: Callable[[list[float]], int]) -> np.ndarray:
+def _rows(comm: Comm, columns: np.ndarray, row: Callable[[list[float]], int]) -> np.ndarray:
     """The row (n,) of a table of properties for each row of `columns` (n, k); `row` makes it, on all ranks alike and in
     ascending order of properties. Collective."""
     distinct, of = np.unique(columns, axis=0, return_inverse=True)

@@ -11,9 +11,9 @@ import numpy as np
 from hpcdem.commands.dem.frame_state import load_frame
 from hpcdem.commands.dem.properties import chosen
 from hpcdem.core import limits
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.core.selection import Selection
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import is_frame
 from hpcdem.io.files import write_sections
 from hpcdem.io.parts import read_lines, share
@@ -231,7 +231,7 @@ def export(sim: Simulation, path: Path | str, with_group: bool = False, where: S
     write_sections(path, sim.comm, lambda: [text.encode()])
 
 
-def check_circles(comm: SerialComm, rows: np.ndarray) -> None:
+def check_circles(comm: Comm, rows: np.ndarray) -> None:
     """As limits.check_circle, for (n, 3) rows x, y, r of all ranks. Collective."""
 
     def worst(of: np.ndarray) -> np.ndarray:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from hpcdem.commands.dem import bonds, clumps, cycles, particles, properties, settings, walls
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.selection import Ids
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.kernels import laws

@@ -6,8 +6,8 @@ import numpy as np
 
 from hpcdem.commands.fdem import assignments, frames, meshes, settings, steps
 from hpcdem.commands.fdem.project import Project
+from hpcdem.core.comm import SerialComm
 from hpcdem.decomp import strips
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import saved_state
 from hpcdem.physics.fdem import warm_up as physics
 from hpcdem.physics.fdem.groups import OnLayer

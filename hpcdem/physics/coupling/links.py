@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.cells import keys
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import GID, RADIUS, X, Y
 from hpcdem.physics.coupling.kernels import disc_faces
@@ -260,7 +261,7 @@ class Link:
                     into.append(comm.mpi.Send_init(_bytes(outof[rank]), rank, tag))
 
     def _travel(self, requests: list[Any], outof: dict[int, np.ndarray], into: dict[int, np.ndarray]) -> None:
-        comm: Any = self.comm
+        comm: Comm = self.comm
         if requests:
             comm.start_all(requests)
         if comm.rank in into:

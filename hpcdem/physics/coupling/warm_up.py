@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.coupling.model import Coupled
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.simulation import Simulation

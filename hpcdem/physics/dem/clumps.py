@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import PhysicsError
 from hpcdem.core.fields import CLUMP_SPIN, CLUMP_VX, CLUMP_VY, CLUMP_WIDTH, CLUMP_X, CLUMP_Y, FREE
 from hpcdem.core.memory import aligned, take_rows
@@ -116,7 +117,7 @@ class Clumps:
 
     # ---- commands ----------------------------------------------------------------------------------------------------
 
-    def whole(self, p: Particles, which: np.ndarray, comm: Any) -> np.ndarray:
+    def whole(self, p: Particles, which: np.ndarray, comm: Comm) -> np.ndarray:
         """Flags (n_own,) with every clump chosen of which a member is. Collective."""
         clump = p.clump
         found = np.unique(np.concatenate(comm.allgather(np.unique(clump[which]))))
@@ -143,7 +144,7 @@ class Clumps:
         if self._bodies is not None:
             self._bodies.read(p.rigid)
 
-    def of_first_members(self, p: Particles, values: np.ndarray, comm: Any) -> np.ndarray:
+    def of_first_members(self, p: Particles, values: np.ndarray, comm: Comm) -> np.ndarray:
         """`values` (n_own,) with those of members replaced by that of the first member of their clump. Collective."""
         clump, gid = p.clump, p["gid"]
         first = clump == gid

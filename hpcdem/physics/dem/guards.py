@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import PhysicsError
 from hpcdem.core.fields import RADIUS
 from hpcdem.physics.dem.particles import Particles
@@ -28,7 +27,7 @@ def _first(particles: Particles, which: np.ndarray) -> np.ndarray:
     return at[np.argsort(particles["gid"][at])][:NAMED]
 
 
-def places(particles: Particles, which: np.ndarray, comm: Any) -> str:
+def places(particles: Particles, which: np.ndarray, comm: Comm) -> str:
     """Flagged particles by id, place and velocity, over all ranks: the lowest ids, at most NAMED. Collective."""
     at = _first(particles, which)
     columns = [particles[name][at].tolist() for name in ("gid", "x", "y", "vx", "vy")]
@@ -37,7 +36,7 @@ def places(particles: Particles, which: np.ndarray, comm: Any) -> str:
 
 
 def stop_on_runaway(
-    particles: Particles, origin: np.ndarray, dt: float, step: int, broken: bool, mixed_laws: bool, comm: Any,
+    particles: Particles, origin: np.ndarray, dt: float, step: int, broken: bool, mixed_laws: bool, comm: Comm,
     alone: np.ndarray,
 ) -> None:  # fmt: skip
     """Name the particles that cannot be right, and stop on all ranks: raises PhysicsError. Collective.

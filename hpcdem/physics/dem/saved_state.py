@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.clock import Clock
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.core.fields import (
     AREA,
@@ -31,7 +32,6 @@ from hpcdem.core.fields import (
     OFFSET_Y,
     TORQUE,
 )
-from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.migrate import Trail
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
@@ -294,7 +294,7 @@ def _take_particles(sim: Simulation, tables: checkpoint.Tables) -> np.ndarray:
 
 
 def histories(
-    comm: SerialComm, gid: np.ndarray, pairs: Mapping[str, np.ndarray], walls: Mapping[str, np.ndarray]
+    comm: Comm, gid: np.ndarray, pairs: Mapping[str, np.ndarray], walls: Mapping[str, np.ndarray]
 ) -> Histories:
     """What the particles of this rank remember, gid (n,) i8: ascending over all ranks. Collective.
 

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from hpcdem.core.cells import columns, keys
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import CLUMP, FIELDS, FX, GID, RADIUS, TORQUE, WIDTH, X, Y
 from hpcdem.core.memory import aligned, take_rows
@@ -108,7 +109,7 @@ class Simulation(Model):
 
     def __init__(
         self,
-        comm: Any = None,
+        comm: Comm | None = None,
         threads: int = 1,
         outdir: Path | str = "data",
         log: Any = None,

@@ -90,7 +90,7 @@ class Diffusion:
     @staticmethod
     def warm_up(threads: int) -> None:
         """Two discs that touch."""
-        from hpcdem.halo.comm import SerialComm
+        from hpcdem.core.comm import SerialComm
         from hpcdem.physics.dem.simulation import Simulation
 
         sim = Simulation(SerialComm(), threads, Path("."))

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError
 
 MANY = 400_000
@@ -124,9 +125,9 @@ def rigid_movements(arm: np.ndarray) -> np.ndarray:
     return out
 
 
-def _on_first(comm: Any, pieces: list[Pieces], take: Callable[[list[Pieces]], str | None]) -> None:
+def _on_first(comm: Comm, pieces: list[Pieces], take: Callable[[list[Pieces]], str | None]) -> None:
     """Rank 0 takes all pieces, in the order of their numbers. CommandError on all ranks with what it says is wrong."""
-    parts = comm.gather(pieces) if comm.size > 1 else [pieces]
+    parts = comm.gather(pieces) or []
     error = take([Pieces.joined(list(of)) for of in zip(*parts)]) if comm.rank == 0 else None
     if (error := comm.bcast(error)) is not None:
         raise CommandError(error)
@@ -139,7 +140,7 @@ class Direct:
     name = "direct (SciPy)"
     flows = False
 
-    def __init__(self, comm: Any, unknowns: Unknowns, owner: np.ndarray) -> None:
+    def __init__(self, comm: Comm, unknowns: Unknowns, owner: np.ndarray) -> None:
         self.comm, self.unknowns = comm, unknowns
         self._factors: Any = None
         self._coupling: Any = np.empty(0)
@@ -195,7 +196,7 @@ class Condensed:
     name = "direct (SciPy), condensed onto joints"
     flows = True
 
-    def __init__(self, comm: Any, unknowns: Unknowns, nodes: np.ndarray) -> None:
+    def __init__(self, comm: Comm, unknowns: Unknowns, nodes: np.ndarray) -> None:
         """nodes: those of joints and fluid."""
         self.comm, self.unknowns = comm, unknowns
         number = unknowns.number[np.unique(nodes)].reshape(-1)
@@ -288,7 +289,7 @@ class Petsc:
 
     flows = False
 
-    def __init__(self, comm: Any, unknowns: Unknowns, owner: np.ndarray, x: np.ndarray | None = None) -> None:
+    def __init__(self, comm: Comm, unknowns: Unknowns, owner: np.ndarray, x: np.ndarray | None = None) -> None:
         """Of each node: owner (nn,): its rank; x (nn, 3) [m]: in space, where it is."""
         from petsc4py import PETSc
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import sides
 from hpcdem.physics.fdem.simulation import Blocks

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.clock import Clock
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
@@ -23,7 +24,7 @@ from hpcdem.physics.fdem.state import Crack, Creep
 from hpcdem.physics.fdem.surface_loads import SHARED_OUT
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
     from hpcdem.physics.fdem.simulation import Blocks
 
 KIND = checkpoint.BLOCKS
@@ -147,7 +148,7 @@ def without_particles(tables: checkpoint.Tables) -> checkpoint.Tables:
     return {name: table for name, table in tables.items() if not name.startswith(others) and name != checkpoint.LINKS}
 
 
-def read(comm: SerialComm, path: Path | str, kind: str, what: str) -> tuple[dict[str, Any], checkpoint.Tables]:
+def read(comm: Comm, path: Path | str, kind: str, what: str) -> tuple[dict[str, Any], checkpoint.Tables]:
     """The state in a checkpoint of this kind, and its tables: slabs of those of elements, contacts and particles, all
     rows of the others. Collective. what: its name in messages. CommandError if the file is missing, foreign or damaged.
     """

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.rebuild import RebuildState
 from hpcdem.core.units import with_prefix
 from hpcdem.physics.fdem import hexahedra
@@ -115,7 +116,7 @@ class State(ModelDefinition, Model):
 
     def __init__(
         self,
-        comm: Any = None,
+        comm: Comm | None = None,
         threads: int = 1,
         outdir: Path | str = "data",
         log: Any = None,

@@ -42,8 +42,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import properties as known
 from hpcdem.physics.fdem.properties import ELEMENT, MODELS, USER, Model, Property
 from hpcdem.physics.user_files import (

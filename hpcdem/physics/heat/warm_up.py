@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks

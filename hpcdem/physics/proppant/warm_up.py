@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hpcdem.halo.comm import SerialComm
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks

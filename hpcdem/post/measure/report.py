@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.fields import sides_of_box
 from hpcdem.io.agreed import atomic_path, on_first
@@ -49,7 +50,7 @@ FRAMES = {
 }
 
 
-def run(comm: Any, log: Any, request: Request, without: Sequence[str] = ()) -> list[Path]:
+def run(comm: Comm, log: Any, request: Request, without: Sequence[str] = ()) -> list[Path]:
     """Collective: the files that were written (on rank 0). Without `what` all that the folder allows, `without` some,
     else exactly what is asked for. Raises HpcdemError on all ranks."""
     began = time.monotonic()
@@ -125,7 +126,7 @@ class _NothingThere(HpcdemError):
 # --- frames ----------------------------------------------------------------------------------------------------
 
 
-def _measure(comm: Any, log: Any, plan: Plan, what: Sequence[str]) -> dict[str, Done]:
+def _measure(comm: Comm, log: Any, plan: Plan, what: Sequence[str]) -> dict[str, Done]:
     """Collective: the parts of all frames by measurement, on rank 0 (empty elsewhere).
 
     Each rank takes a stretch of consecutive frames, and reads the frame before it where that is needed.
@@ -210,7 +211,7 @@ def _of_blocks(request: Request) -> list[str]:
     return [kind for kind in BLOCK_KINDS if there[kind] and (kind in request.what or not request.what)]
 
 
-def _blocks(comm: Any, log: Any, request: Request, what: Sequence[str]) -> list[Path]:
+def _blocks(comm: Comm, log: Any, request: Request, what: Sequence[str]) -> list[Path]:
     """Collective: what is asked for of blocks."""
     files = on_first(comm, lambda: blocks.frames(request))
     if files:

@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path, make_folder
 from hpcdem.io.axes import View
@@ -53,7 +54,7 @@ class Request:
     maxstress: float = 300.0
 
 
-def draw_folder(request: Request, comm: Any, log: Any, workers: int = 1) -> None:
+def draw_folder(request: Request, comm: Comm, log: Any, workers: int = 1) -> None:
     """Collective: draw and write everything, on one rank by `workers` processes. log: `info(text)`, `warn(text)`.
     Raises HpcdemError on all ranks."""
     ss = request.folder / "ss"
@@ -210,7 +211,7 @@ def _without_date(path: str) -> None:
 # -- ranks --------------------------------------------------------------------------------------------------------
 
 
-def _collective(comm: Any, read: Callable[[], Any]) -> Any:
+def _collective(comm: Comm, read: Callable[[], Any]) -> Any:
     """What rank 0 reads, on all ranks; its HpcdemError on all ranks, of its own class."""
     result = None
     if comm.rank == 0:
@@ -224,7 +225,7 @@ def _collective(comm: Any, read: Callable[[], Any]) -> Any:
     return result
 
 
-def _survey(files: Sequence[Path], comm: Any) -> list[survey.Outline]:
+def _survey(files: Sequence[Path], comm: Comm) -> list[survey.Outline]:
     mine: dict[int, survey.Outline] = {}
 
     def look(k: int) -> None:
@@ -237,7 +238,7 @@ def _survey(files: Sequence[Path], comm: Any) -> list[survey.Outline]:
     return [found[k] for k in range(len(files))]
 
 
-def _shared(tasks: Sequence[tuple[Callable[..., None], tuple[Any, ...]]], comm: Any) -> None:
+def _shared(tasks: Sequence[tuple[Callable[..., None], tuple[Any, ...]]], comm: Comm) -> None:
     """Collective: every task on one of the ranks."""
     error = None
     try:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, HpcdemError
 
 T = TypeVar("T")
 
 
-def made_once(comm: Any, make: Callable[[], T]) -> T:
+def made_once(comm: Comm, make: Callable[[], T]) -> T:
     """The result of `make()`, called on rank 0 only. Collective; an error of it is raised on all ranks.
 
     comm: a communicator of `hpcdem.halo.comm`.

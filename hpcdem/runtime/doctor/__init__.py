@@ -12,12 +12,13 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
+from hpcdem.core.comm import Comm
 from hpcdem.runtime.doctor import host, software, storage
 from hpcdem.runtime.doctor.machine import Finding, Findings, Level, Machine, warning
 from hpcdem.runtime.launch import patient_barrier
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import Comm
 
 __all__ = ["CHECKS", "Check", "Finding", "Level", "Machine", "examine", "start_warnings"]
 
@@ -97,13 +98,13 @@ def merged(of_ranks: Sequence[Found], hosts: Sequence[str]) -> list[Finding]:
     return result
 
 
-def start_warnings(machine: Machine, comm: SerialComm) -> list[str]:
+def start_warnings(machine: Machine, comm: Comm) -> list[str]:
     """Collective: what the log of a run says at its start, on rank 0; empty elsewhere and where all is well."""
     of_ranks = comm.gather(look(machine, at_start=True))
     return [finding.line() for finding in merged(of_ranks or [], [p.host for p in machine.places])]
 
 
-def examine(machine: Machine, comm: SerialComm) -> list[Finding]:
+def examine(machine: Machine, comm: Comm) -> list[Finding]:
     """Collective: all findings, on rank 0; empty elsewhere. Takes some seconds, writes a few files and removes them."""
     machine.token = comm.bcast(storage.existing(machine.directory) / f".hpcdem-doctor-{time.time_ns()}")
     with suppress(OSError):

@@ -20,7 +20,7 @@ SPACES = 10.0
 
 def make_frames(folder: Path, n: int, count: int, suffix: str) -> int:
     """A close packing in random order of ids that is sheared more and more; contacts and bonds of all neighbours."""
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import SerialComm
     from hpcdem.io.dat import write_dat
     from hpcdem.io.frame import Frame, Table
     from hpcdem.io.vtkhdf import write_vtkhdf

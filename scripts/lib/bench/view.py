@@ -121,7 +121,7 @@ def _ask(url: str, name: str, content: dict[str, Any]) -> bytes:
 
 def _blocks(folder: Path, size: int, frames: int, suffix: str) -> int:
     """Triangles of squares, with a stress that differs from frame to frame."""
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import SerialComm
     from hpcdem.io.frame import Table
     from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame
 

@@ -197,7 +197,7 @@ def mohr_coulomb(confining: list[float], q: list[float]) -> tuple[float, float, 
 def serial(folder: Path) -> Iterator[None]:
     """Simulations of this process belong to one rank without MPI; relative file names begin at `folder`."""
     from hpcdem import session
-    from hpcdem.halo.comm import SerialComm
+    from hpcdem.core.comm import SerialComm
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.stop_requests import StopRequests
 
