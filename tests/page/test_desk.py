@@ -426,7 +426,6 @@ def test_blocks_of_python_are_typed_as_at_its_prompt(bench: Bench):
     page.keyboard.press("End")
     for _ in range(2):
         page.keyboard.press("Enter")
-        page.wait_for_timeout(300)
     bench.says("item 20")
     assert "item 10" not in page.inner_text("#output") and page.input_value("#input") == ""
     bench.wait()
@@ -437,6 +436,43 @@ def test_blocks_of_python_are_typed_as_at_its_prompt(bench: Bench):
     page.keyboard.type("print('sum', a + 1)")
     page.keyboard.press("Enter")
     bench.says("sum 6")
+
+
+def test_a_tab_that_was_chosen_stays(browser: Any, viewing: Viewing):
+    """A script that comes late is shown to who has chosen nothing yet."""
+    context = browser.new_context()
+    page = context.new_page()
+    waiting: list[Any] = []
+    page.route("**/scripts", lambda route: waiting.append(route), times=1)
+    page.goto(viewing.url)
+    page.click("#tab-console")
+    until(lambda: waiting, pause=lambda seconds: page.wait_for_timeout(1e3 * seconds))
+    waiting[0].continue_()
+    page.wait_for_selector("body[data-desk]")
+    assert page.is_visible("#input") and page.evaluate("document.activeElement.id") == "input"
+    context.close()
+
+
+def test_who_types_faster_than_the_server_answers_loses_nothing(bench: Bench):
+    """The next line is there at once, and takes what is typed and entered before the first one is judged."""
+    page = bench.page
+    page.click("#tab-console")
+    bench.wait()
+    waiting: list[Any] = []
+    page.route("**/whole", lambda route: waiting.append(route))
+    page.focus("#input")
+    page.keyboard.type("for i in range(3):\nprint('item', 10 * i)\n\nb = 7")
+    assert page.input_value("#input") == "for i in range(3):\n    print('item', 10 * i)\n    \n    b = 7"
+    for k in range(3):
+        bench.until(lambda: len(waiting) > k)  # noqa: B023
+        waiting[k].continue_()
+    bench.says("item 20")
+    bench.wait()
+    assert page.input_value("#input") == "b = 7", "what was typed ahead"
+    assert [route.request.post_data_json["text"].count("\n") for route in waiting] == [0, 1, 2]
+    page.unroute("**/whole")
+    page.keyboard.type("; print('next', b + 1)\n")
+    bench.says("next 8")
 
 
 def test_a_late_completion_touches_nothing(bench: Bench):

@@ -67,15 +67,6 @@ async function carryOut(text, name = "") {
   show();
 }
 
-async function typed() {
-  const text = $("input").value;
-  if (!text.trim() || state.busy) return;
-  await carryOut(text.replace(/\s+$/, text.includes("\n") ? "\n" : ""));
-  if (asked.at(-1) !== text) asked.push(text);
-  place = asked.length;
-  type("");
-}
-
 function type(text) {
   $("input").value = text;
   grow();
@@ -84,15 +75,33 @@ function type(text) {
 /** As high as what stands in it. */
 function grow() { $("input").rows = Math.min(10, $("input").value.split("\n").length); }
 
-/** Enter: what is whole is carried out, a block of Python goes on, as at Python's own prompt. */
+let entered = [];  // ends of what was entered and not yet judged
+
+/** Enter: what is whole is carried out, a block of Python goes on, as at Python's own prompt. The next line is there at once:
+ * what is typed while the server judges belongs into it, another Enter too. */
 async function enter() {
-  const field = $("input"), text = field.value, last = !text.slice(field.selectionEnd).includes("\n");
-  if (!text.trim() || state.busy) return;
+  const field = $("input"), last = !field.value.slice(field.selectionEnd).includes("\n");
+  if (!field.value.trim() || state.busy) return;
   if (!last) { goOn(field); return; }
+  entered.push(field.value.length);
+  goOn(field, field.value.length);
+  if (entered.length > 1) return;
+  try {
+    while (entered.length) await judge(field);
+  } finally { entered = []; }
+}
+
+async function judge(field) {
+  const text = field.value.slice(0, entered[0]);
   const { whole } = await json("whole", { text, language: state.language });
-  if (field.value !== text) return;  // it was changed meanwhile
-  if (whole) await typed();
-  else goOn(field, text.length);
+  if (!field.value.startsWith(`${text}\n`)) { entered = []; return; }  // it was changed meanwhile
+  entered.shift();
+  if (!whole) return;
+  entered = [];  // what follows waits until this is done
+  await carryOut(text.replace(/\s+$/, text.includes("\n") ? "\n" : ""));
+  if (asked.at(-1) !== text) asked.push(text);
+  place = asked.length;
+  type(field.value.slice(text.length + 1).trimStart());
 }
 
 /** Another line, as far in as this one, farther behind a colon. */
@@ -499,6 +508,8 @@ async function restart(language) {
   show();
 }
 
+let picked = false;  // whether a tab was chosen, before the first script is there
+
 function tab(name) {
   for (const one of ["console", "editor"]) {
     $(one).hidden = one !== name;
@@ -530,7 +541,7 @@ export async function begin(complained, ready) {
     $("desk-toggle").setAttribute("aria-expanded", !$("desk").hidden);
   });
   on("desk-edge", "pointerdown", drag);
-  for (const one of ["console", "editor"]) on(`tab-${one}`, "click", () => tab(one));
+  for (const one of ["console", "editor"]) on(`tab-${one}`, "click", () => { picked = true; tab(one); });
   on("input", "keydown", consoleKey);
   on("input", "input", () => { close(); grow(); });
   on("input", "blur", close);
@@ -559,7 +570,7 @@ export async function begin(complained, ready) {
   try {
     const { first } = await json("scripts", {});
     await open(first);
-    if (first) tab("editor");
+    if (first && !picked) tab("editor");
   } catch (error) {
     complain(error);
     if (!opened) turn(new Paper({}));
