@@ -34,7 +34,10 @@ from hpcdem.core.comm import SerialComm
 from hpcdem.lang.zdem.execute import Interpreter
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.runtime import kept
 from hpcdem.runtime.progress import Log
+
+kept.install()
 
 def play(*lines, begin=("START", "SET dt 1e-3 disk on")):
     sim = Simulation(SerialComm(), 1, Path("data"), Log(0, io.StringIO()))
@@ -378,11 +381,10 @@ assert re.search(r"^gravity = 2(.0)? +# m/s2", said, re.M), said
 }
 
 
-def copy_of_the_package(folder: Path, compiled: bool) -> Path:
-    """Links to its files; what is changed becomes a file. compiled: with the kernels that are there, which know nothing
-    of changes in what they call."""
+def copy_of_the_package(folder: Path) -> Path:
+    """Links to its files; what is changed becomes a file. Kernels that it does not reach come from the store."""
     for file in PACKAGE.rglob("*"):
-        if file.is_file() and file.suffix != ".pyc" and (compiled or file.suffix == ".py"):
+        if file.is_file() and file.suffix != ".pyc":
             link = folder / file.relative_to(ROOT)
             link.parent.mkdir(parents=True, exist_ok=True)
             link.symlink_to(file)
@@ -395,7 +397,7 @@ SLOW = "a pair law", "a property of the material"
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in RECIPES])
 def test_a_recipe_is_complete(tmp_path: Path, name: str) -> None:
-    recipe, package = RECIPES[name], copy_of_the_package(tmp_path, name not in SLOW)
+    recipe, package = RECIPES[name], copy_of_the_package(tmp_path)
     for file, line, text in recipe.edits:
         before = (package / file).read_text()
         assert before.count(f"{line}\n") == 1, f"{file}: {line}"
