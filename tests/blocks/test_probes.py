@@ -17,6 +17,7 @@ from hpcdem.physics.fdem.local import Local
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import jointed, model, rectangle
 from tests.space.support import body, box
+from tests.tables import each
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +58,7 @@ def solid() -> Blocks:
 ROWS = [(dim, name) for dim in (2, 3) for name, quantity in QUANTITIES.items() if dim in quantity.dims]
 
 
-@pytest.mark.parametrize(("dim", "name"), ROWS)
+@each(("dim", "name"), ROWS)
 def test_a_few_are_what_they_are_among_all(request, dim, name):
     broken = request.getfixturevalue("broken" if dim == 2 else "solid")
     known = whole(broken, name)

@@ -15,6 +15,7 @@ from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, 
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Drawn, Over
 from tests.blocks.support import JOINT, ROCK, model, rectangle
+from tests.tables import each
 
 COHESIVE, CONTACT, ELASTIC = "classic_intrinsic_cohesive_interface", "contact_mohr_coulomb", "mech_iso_elastic"
 N = 200_000
@@ -151,8 +152,8 @@ OBJECTS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("way", ["property", "model"])
-@pytest.mark.parametrize(("on", "name", "given", "one", "unit"), OBJECTS, ids=[f"{o[0]} {o[3]}" for o in OBJECTS])
+@each("way", ["property", "model"])
+@each(("on", "name", "given", "one", "unit"), OBJECTS, ids=[f"{o[0]} {o[3]}" for o in OBJECTS])
 def test_every_property_of_everything_takes_fields_tables_and_numbers(on, name, given, one, unit, way):
     """One mechanism: what each object gets is the value of the rule at its place."""
     sim = rock()

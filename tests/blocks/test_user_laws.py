@@ -21,6 +21,7 @@ from tests.blocks.laws import rock
 from tests.blocks.support import ROCK, jointed, model, near, rectangle, shaken
 from tests.blocks.test_yielding import deform
 from tests.pcdc.test_plastic import run
+from tests.tables import each
 
 LAWS = Path(__file__).with_name("laws") / "rock.py"
 STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress_zz")
@@ -289,7 +290,7 @@ WRONG = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", WRONG)
+@each("case", WRONG)
 def test_what_is_wrong_with_a_law_is_told_by_file_and_line(case, tmp_path):
     text, message = WRONG[case]
     sim = model(rectangle(2, 2, 1.0, 1.0))

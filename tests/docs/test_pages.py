@@ -20,12 +20,13 @@ from hpcdem.lang import chinese, fields_reference, reference_zh
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.lang.zdem.table import ZDEM
 from tests.docs.pages import DOCS, PAGES, ROOT, anchors, blocks, links, prose, without_blocks
+from tests.tables import each
 
 NAVIGATION = runpy.run_path(str(DOCS / "site" / "navigation.py"))["NAVIGATION"]
 IDS = [str(page.relative_to(ROOT)) for page in PAGES]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
+@each("page", PAGES, ids=IDS)
 def test_links_lead_somewhere(page: Path) -> None:
     for link in links(page):
         name, _, anchor = link.partition("#")
@@ -35,14 +36,14 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert anchor in anchors(target.resolve()), f"{link}: {sorted(anchors(target.resolve()))}"
 
 
-@pytest.mark.parametrize("page", [*PAGES, ROOT / "CHANGELOG.md"], ids=[*IDS, "CHANGELOG.md"])
+@each("page", [*PAGES, ROOT / "CHANGELOG.md"], ids=[*IDS, "CHANGELOG.md"])
 def test_headings_leave_no_level_out(page: Path) -> None:
     """The site refuses a page that does."""
     levels = [len(head) for head in re.findall(r"^(#+) ", without_blocks(page), re.MULTILINE)]
     assert levels[0] == 1 and all(after <= before + 1 for before, after in pairwise(levels))
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
+@each("page", PAGES, ids=IDS)
 def test_tests_that_pages_name_are_there(page: Path) -> None:
     """`tests/FILE.py::NAME`, and files and folders of tests by themselves."""
     for file, name in re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", page.read_text(encoding="utf-8")):
@@ -63,7 +64,7 @@ def test_every_page_has_its_place() -> None:
     assert set(placed) == there | outside
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
+@each("page", PAGES, ids=IDS)
 def test_python_of_the_pages_is_python(page: Path) -> None:
     """Lines of PCDC in it are left out here."""
     for block in blocks(page):
@@ -90,7 +91,7 @@ def command_lines(page: Path) -> list[str]:
     return [line for line in (re.sub(r"\s#.*", "", line) for line in found) if not _GAPS.search(line)]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
+@each("page", PAGES, ids=IDS)
 def test_command_lines_of_the_pages_can_be_read(page: Path) -> None:
     """By the parsers of the programs: every option is one that they have, and takes such a value."""
     for line in command_lines(page):

@@ -16,6 +16,7 @@ from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.execute import refuse_unexecuted
 from hpcdem.lang.zdem.parser import parse_text, read_script
 from hpcdem.lang.zdem.plan import expected_steps
+from tests.tables import each
 
 EXTENTS = {"left": 0.0, "right": 500.0, "bottom": 0.0, "top": 4000.0}
 
@@ -88,7 +89,7 @@ def calls_of(*lines):
 A = Group("a")
 
 
-@pytest.mark.parametrize(
+@each(
     ("line", "calls"),
     [
         ("BOX left 0 right 9 bottom 0 height 5 fric 0.1",

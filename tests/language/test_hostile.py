@@ -15,6 +15,7 @@ from hpcdem.lang.zdem.parser import parse_text, read_script
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.runtime.progress import Log
 from tests.language.hostile import BEFORE, BEGIN, BOX, COORDINATES, LINES, RUNS, SCRIPTS, spoiled
+from tests.tables import each
 
 
 def error_of(source):
@@ -23,8 +24,8 @@ def error_of(source):
     return caught.value
 
 
-@pytest.mark.parametrize(("line", "message"), LINES, ids=[f"{i}:{line[:30]!a}" for i, (line, _) in enumerate(LINES)])
-@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@each(("line", "message"), LINES, ids=[f"{i}:{line[:30]!a}" for i, (line, _) in enumerate(LINES)])
+@each("end", ["\n", "\r\n"])
 def test_bad_lines(line, message, end):
     error = error_of((BEFORE + line + "\nCYC 1\nSTOP\n").replace("\n", end))
     assert message in error.message
@@ -34,7 +35,7 @@ def test_bad_lines(line, message, end):
     assert error.exit_code == EXIT_USAGE
 
 
-@pytest.mark.parametrize(("source", "line", "message"), SCRIPTS)
+@each(("source", "line", "message"), SCRIPTS)
 def test_bad_scripts(source, line, message):
     error = error_of(source)
     assert (error.line, message in error.message) == (line, True), str(error)
@@ -150,7 +151,7 @@ def test_scripts_that_cannot_be_carried_out(workplace, source, message):
     refused(workplace, source, message, line)
 
 
-@pytest.mark.parametrize("name", COORDINATES)
+@each("name", COORDINATES)
 def test_files_that_are_no_coordinates(workplace, name):
     (workplace / "bad.dat").write_bytes(COORDINATES[name])
     for before, line in (("", 1), ("START\n", 2)):

@@ -11,6 +11,7 @@ from hpcdem.core.errors import ScriptError, UsageError
 from hpcdem.core.selection import Chain, Ellipse, Expression, Group, Ids, Interval, Polygon
 from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.parser import parse_text, read_script
+from tests.tables import each
 
 BEFORE = """START
 SET DT 5e-2
@@ -43,7 +44,7 @@ def error_of_line(line):
 SQUARE = ((2e-2, 0.0), (3e-2, 0.0), (1e-2, 2e-2), (1e-2, 1e-2))
 
 
-@pytest.mark.parametrize(
+@each(
     ("line", "command", "arguments"),
     [
         ("STOP", "STOP", {}),
@@ -139,7 +140,7 @@ def test_beginnings(text, command, arguments):
 X, Y = Interval("x", 1.0, 10.0), Interval("y", 1.0, 10.0)
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "selection"),
     [
         ("y 6000.0 99999.0", Interval("y", 6000.0, 99999.0)),
@@ -164,7 +165,7 @@ X, Y = Interval("x", 1.0, 10.0), Interval("y", 1.0, 10.0)
         ("ell ({left} 0) 1 2", Ellipse(Expression("{left}", ("left",)), 0.0, 1.0, 2.0)),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("command", ["DEL", "BOND break", "PROP fric 0.3", "FIX x", "EXP a.dat GROUP"])
+@each("command", ["DEL", "BOND break", "PROP fric 0.3", "FIX x", "EXP a.dat GROUP"])
 def test_ranges(command, text, selection):
     assert parse_line(f"{command} RANGE {text}").selection == selection
     assert parse_line(f"{command.lower()} ran {text}").selection == selection

@@ -17,6 +17,7 @@ from hpcdem.core.errors import ScriptError
 from hpcdem.engine import output
 from hpcdem.physics.dem.simulation import Simulation
 from tests.support import at_wall, body, force, pair, position, value, velocity
+from tests.tables import each
 
 
 def model(play, *lines: str, **how) -> Simulation:
@@ -171,7 +172,7 @@ CHOSEN = [
 ]
 
 
-@pytest.mark.parametrize(("where", "chosen"), CHOSEN, ids=[where for where, _ in CHOSEN])
+@each(("where", "chosen"), CHOSEN, ids=[where for where, _ in CHOSEN])
 def test_range(play, where, chosen):
     groups = ["PROP group even", "PROP group odd RANGE id 1 or id 3 or id 5 or id 7 or id 9"]
     sim = model(play, *ROW, *groups, f"PROP color red RANGE {where}")

@@ -8,6 +8,7 @@ import pytest
 
 from hpcdem.lang.zdem import execute, parser
 from hpcdem.lang.zdem import table as t
+from tests.tables import each
 
 ROWS = {command.name: command.options for command in t.COMMANDS} | {"RANGE": t.RANGE_TERMS}
 
@@ -18,7 +19,7 @@ def test_no_word_stands_for_two_commands():
             assert not b.accepts(word), (a.name, b.name, word)
 
 
-@pytest.mark.parametrize("command", ROWS)
+@each("command", ROWS)
 def test_no_word_stands_for_two_keywords(command):
     for row in ROWS[command]:
         for word in (row.name.lower(), row.full, *row.also):
@@ -33,7 +34,7 @@ def test_no_keyword_is_taken_for_range(command):
     assert not any(t.ZDEM.range_row.accepts(option.full) or option.accepts("range") for option in ROWS[command])
 
 
-@pytest.mark.parametrize(
+@each(
     ("word", "name"),
     [
         *[(stem, name) for stem, name in [
@@ -55,7 +56,7 @@ def test_words_that_are_no_commands(word):
     assert t.ZDEM.command(word) is None
 
 
-@pytest.mark.parametrize(
+@each(
     ("command", "word", "name"),
     [
         ("PROP", "den", "density"), ("PROP", "dens", "density"), ("PROP", "poisson", "poiss"),
@@ -92,7 +93,7 @@ def test_every_kind_is_read_and_every_command_is_bound():
     assert set(execute._COMMANDS) == {command.same_as or command.name for command in t.COMMANDS}
 
 
-@pytest.mark.parametrize("line", [line for command in t.COMMANDS for line in command.example])
+@each("line", [line for command in t.COMMANDS for line in command.example])
 def test_every_example_parses(line):
     statement = parser._LineParser(next(parser.lexer.read_lines(line.encode(), "s.py")), "s.py", t.ZDEM).statement()
     parser.rules.check_statement(statement)

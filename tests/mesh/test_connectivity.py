@@ -12,6 +12,7 @@ from hpcdem.pre.mesh import structured
 from hpcdem.pre.mesh.cracks import edges_on, with_cracks
 from hpcdem.pre.mesh.geometry import polyline
 from hpcdem.pre.mesh.sizes import spaced
+from tests.tables import each
 
 
 def grid(nx: int, ny: int, kind: str = "quad", diagonal: str = "alternate") -> Mesh:
@@ -203,7 +204,7 @@ WRONG = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", WRONG)
+@each("name", WRONG)
 def test_check_names_the_element_or_point(name):
     points, cells, more, message = WRONG[name]
     with pytest.raises(HpcdemError, match=message) as error:

@@ -18,6 +18,7 @@ from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
 from hpcdem.pre.mesh.fractures import Fractures, clipped, crossings, network, of_curves, poisson
 from hpcdem.pre.mesh.regions import polygon_of
+from tests.tables import each
 
 CONFIDENCE = 3.29
 RANDOM = (np.arange(20_000) + 0.5) / 20_000
@@ -232,7 +233,7 @@ def test_traces_of_curves():
     assert len(Fractures()) == 0 and len(of_curves([], 0, 1.0)) == 0
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "message"),
     [
         ({"density": 0.0}, "fracture set 0: the density must be positive"),

@@ -15,6 +15,7 @@ from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.dxf import read_dxf
 from hpcdem.pre.mesh.geometry import Layers, distance, enclosed_area, sampled, transformed
 from tests.pcdc.fake import FakeBlocks
+from tests.tables import each
 
 
 def test_lengths_and_areas():
@@ -92,7 +93,7 @@ def test_layers_by_name_and_back_from_arrays():
     assert list(Layers.from_tables(Layers().tables())) == []
 
 
-@pytest.mark.parametrize(
+@each(
     ("call", "message"),
     [
         (lambda: geometry.polyline([(0, 0)]), "1 points given, at least 2"),

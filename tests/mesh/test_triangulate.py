@@ -17,6 +17,7 @@ from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.pre.mesh.quality import corner_angles, quality
 from hpcdem.pre.mesh.sizes import Refinement, SizeField
 from hpcdem.pre.mesh.triangulate import Meshed, Region, Wishes, triangulate
+from tests.tables import each
 
 pytestmark = pytest.mark.usefixtures("gmsh")
 
@@ -371,7 +372,7 @@ def test_slivers_of_the_outline_are_told():
     assert len(made.notes) == 1 and made.notes[0].startswith("the smallest angle is 0.1 degrees, in element ")
 
 
-@pytest.mark.parametrize(
+@each(
     ("curves", "regions", "wishes", "message"),
     [
         ({"o": BOX}, [Region("zz")], {}, "no geometry layer 'zz'"),

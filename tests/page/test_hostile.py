@@ -25,6 +25,7 @@ from hpcdem.page.sources import Sources
 from hpcdem.page.viewer import Viewer
 from tests.conftest import PATIENCE
 from tests.page.test_server import ask
+from tests.tables import each
 from tests.view import frames
 
 QUICK = 5.0
@@ -213,7 +214,7 @@ VIEW = {"layers": [LAYER, {"object": "joints"}], "title": "step {step}"}
 PICTURE = {"source": 0, "frame": -1, "view": VIEW, "width": 40, "height": 30, "fine": False, "dark": False}
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "content", "status", "words"),
     [
         ("tell", {"what": ["stop"]}, 400, "what: expected text, read a list"),

@@ -13,6 +13,7 @@ from hpcdem.page import maker
 from hpcdem.page.limits import LIMITS, MOST_ROWS
 from hpcdem.post.specimen import class_colours
 from hpcdem.pre.specimen import PLACEMENTS, SHAPES, make_specimen
+from tests.tables import each
 
 TYPES = {"f4": "<f4", "i4": "<i4", "u1": "u1"}
 
@@ -84,7 +85,7 @@ def test_every_class_has_a_colour_of_its_own():
         assert all(len(c) == 7 and c[0] == "#" and int(c[1:], 16) >= 0 for c in colours)
 
 
-@pytest.mark.parametrize(
+@each(
     ("rows", "message"),
     [
         ([["3", "100"], ["2", "abc"]], r"table:2: read '2 abc', expected a size in mm and the per cent finer"),
@@ -119,8 +120,8 @@ def test_empty_rows_are_passed_over(wanted):
     assert maker.request_of(wanted(rows=with_gaps)) == maker.request_of(wanted())
 
 
-@pytest.mark.parametrize("name", LIMITS)
-@pytest.mark.parametrize(
+@each("name", LIMITS)
+@each(
     "value",
     ["below", "above", None, True, "7", [1], float("nan"), float("inf"), 10**400, "missing"],
     ids=lambda value: str(value)[:9],

@@ -10,6 +10,7 @@ from hpcdem.lang.pcdc.bindings import BINDINGS
 from hpcdem.lang.pcdc.parser import parse
 from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
 from hpcdem.physics.fdem.tables import Drawn, Over
+from tests.tables import each
 
 SAMPLES: dict[str, tuple[str, object]] = {
     "<f>": ("0.25", 0.25), "<f>|table <s>|function <s>": ("0.25", 0.25),
@@ -129,7 +130,7 @@ def written(command: Command, model: Model | None, term: Option | None, writer: 
 ROWS = rows(2) + rows(3)
 
 
-@pytest.mark.parametrize(("command", "model", "term", "dim"), [row[1:] for row in ROWS], ids=[row[0] for row in ROWS])
+@each(("command", "model", "term", "dim"), [row[1:] for row in ROWS], ids=[row[0] for row in ROWS])
 def test_every_value_can_be_an_expression(command, model, term, dim, monkeypatch):
     """The same line, written out and with expressions, is the same command in the end; whether its values make sense
     together is no matter."""

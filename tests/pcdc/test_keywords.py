@@ -8,6 +8,7 @@ import pytest
 
 from hpcdem.lang.pcdc.keywords import HasKeyword, Keyword, beginning, matching
 from hpcdem.lang.pcdc.table import PCDC, PROPERTY, RANGE, SET, distinct
+from tests.tables import each
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,7 @@ def test_there_are_many():
     assert len(CHOICES) > 150
 
 
-@pytest.mark.parametrize(("where", "rows"), CHOICES, ids=[name for name, _ in CHOICES])
+@each(("where", "rows"), CHOICES, ids=[name for name, _ in CHOICES])
 def test_no_word_is_ambiguous_when_its_compulsory_letters_are_typed(where, rows):
     for row in rows:
         # `size` after refine-layer is that of the layer: words that belong to another come first in the parser.

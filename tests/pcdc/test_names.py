@@ -10,6 +10,7 @@ import pytest
 from hpcdem.core.errors import HpcdemError
 from hpcdem.lang.pcdc.vector import Vector
 from tests.pcdc.fake import Bench
+from tests.tables import each
 
 BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right group 'rock' set 'domain'\n"
 
@@ -128,7 +129,7 @@ HOSTILE = [
 ]
 
 
-@pytest.mark.parametrize(("what", "given", "message"), HOSTILE, ids=[str(given)[:40] for _, given, _ in HOSTILE])
+@each(("what", "given", "message"), HOSTILE, ids=[str(given)[:40] for _, given, _ in HOSTILE])
 def test_what_a_file_says_is_not_executed(bench, monkeypatch, what, given, message):
     monkeypatch.chdir(bench.project.directory)
     bench("m_a = 1\npcdc model save 'test.sav'\n")

@@ -12,6 +12,7 @@ from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.parser import parse
 from hpcdem.lang.pcdc.statement import Statement
 from hpcdem.lang.pcdc.table import PCDC
+from tests.tables import each
 
 
 def read(words: str) -> Statement:
@@ -33,7 +34,7 @@ def test_words_and_values():
     assert statement.range == (("group", {"value": "rock", "set": "domain"}), ("x", (-1.0, 2.5)))
 
 
-@pytest.mark.parametrize(
+@each(
     ("words", "arguments"),
     [
         ("model new", {}),
@@ -236,7 +237,7 @@ REFUSED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("words", "message"), REFUSED, ids=[words or "nothing" for words, _ in REFUSED])
+@each(("words", "message"), REFUSED, ids=[words or "nothing" for words, _ in REFUSED])
 def test_refusals_name_file_line_text_and_what_was_expected(words, message):
     with pytest.raises(ScriptError) as caught:
         read(words)

@@ -7,6 +7,7 @@ import pytest
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.lang.pcdc import check
+from tests.tables import each
 
 ROCK = "element c-model mech-iso-e property density 2500 "
 JOINT = "face-joint c-model c-i-c-i property cohesion 1e6 tensile-strength 1e6 "
@@ -58,7 +59,7 @@ REFUSED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("line", "told"), REFUSED, ids=[line[:40] for line, _ in REFUSED])
+@each(("line", "told"), REFUSED, ids=[line[:40] for line, _ in REFUSED])
 def test_check_refuses_the_line(line, told):
     with pytest.raises(HpcdemError) as error:
         check.summary(f"x = 1\npcdc {line}\n", "script.sc")

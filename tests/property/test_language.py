@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 from typing import Any
 
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -17,6 +16,7 @@ from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.lexer import read_lines
 from hpcdem.lang.zdem.parser import Script, parse_text
 from tests.property.grammar import MISTAKES, Model, good_models, models, same_but_noisy
+from tests.tables import each
 
 ALWAYS_THE_SAME = settings(
     max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
@@ -145,7 +145,7 @@ def test_the_models_use_every_word_of_the_language() -> None:
     assert {term.name for term in t.RANGE_TERMS} - terms == set()
 
 
-@pytest.mark.parametrize("name", MISTAKES)
+@each("name", MISTAKES)
 def test_every_mistake_can_be_made(name: str) -> None:
     """On any model, and most of them make another script of it."""
     other: list[bool] = []

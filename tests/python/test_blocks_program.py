@@ -29,6 +29,7 @@ from tests.conftest import ROOT, Launcher
 from tests.pcdc.fake import Bench
 from tests.property.workers import Resident
 from tests.short_push import contents
+from tests.tables import each
 
 # ---- every command ---------------------------------------------------------------------------------------------------
 
@@ -502,7 +503,7 @@ def bench(tmp_path: Path) -> Bench:
     return Bench(tmp_path)
 
 
-@pytest.mark.parametrize(("line", "call"), SAME + IN_SPACE)
+@each(("line", "call"), SAME + IN_SPACE)
 def test_a_method_is_the_command(bench: Bench, tmp_path: Path, monkeypatch: Any, line: str, call: str) -> None:
     recorders = Recorder(), Recorder()
     for module in (bindings, execute, api, simulation):
@@ -663,7 +664,7 @@ WRONG = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", WRONG)
+@each("case", WRONG)
 def test_a_mistake_is_named_with_its_line(bench: Bench, case: str) -> None:
     text, expected = WRONG[case]
     sim = program(bench)

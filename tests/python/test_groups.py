@@ -19,6 +19,7 @@ from hpcdem.api.program import carried_out, spelt
 from hpcdem.core import units
 from hpcdem.core.errors import ScriptError, UnknownNameError, WrongTypeError, WrongValueError
 from hpcdem.sweep import Sweep
+from tests.tables import each
 
 GROUPS = simulation.Particles, simulation.Walls, simulation.Bonds
 
@@ -98,7 +99,7 @@ WORDS = [of for of in vars(blocks).values() if inspect.isclass(of) and issubclas
 METHODS = [one for of in (Simulation, Frame, Sweep, blocks.BlockCommands, *WORDS) for one in public(of)]
 
 
-@pytest.mark.parametrize(("name", "method"), METHODS)
+@each(("name", "method"), METHODS)
 def test_no_method_takes_what_it_does_not_name(name: str, method: Callable[..., Any]) -> None:
     """`**options: Any` tells an editor nothing. Words of a TypedDict, and numbers of what was added, are told."""
     for parameter in inspect.signature(method).parameters.values():

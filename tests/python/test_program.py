@@ -9,9 +9,11 @@ import pytest
 
 from tests.conftest import ROOT, Launcher
 from tests.property.workers import Resident
+from tests.tables import each
 
 HEAD = """\
 import hpcdem
+from tests.tables import each
 
 sim = hpcdem.Simulation()
 sim.set(dt=1e-3, gravity=(0.0, -9.8))
@@ -54,7 +56,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("case", WRONG)
+@each("case", WRONG)
 def test_a_mistake_is_named_with_its_line(resident: Resident, tmp_path: Path, case: str) -> None:
     text, expected = WRONG[case]
     program(tmp_path, text + "\n")

@@ -12,6 +12,7 @@ from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.pre.specimen import counts as number_of
 from hpcdem.pre.specimen.grading import grading, parse_grading, read_grading
 from tests.specimen.shapes import EXAMPLE, WINDOW
+from tests.tables import each
 
 
 def test_counts_of_the_manuals_example() -> None:
@@ -100,7 +101,7 @@ def test_file(tmp_path: Path) -> None:
         read_grading(tmp_path / "nothing")
 
 
-@pytest.mark.parametrize(
+@each(
     "text, line, message",
     [
         ("", 1, "holds no rows"),

@@ -13,6 +13,7 @@ from hpcdem.physics.polyarc.outlines import boxes
 from hpcdem.pre.specimen import Request, Specimen, make_specimen
 from hpcdem.pre.specimen.dense import closest
 from tests.specimen.shapes import EXAMPLE, KINDS, WINDOW, shapely_polygons
+from tests.tables import each
 
 PER_ARC = 32
 """Chords per arc for shapely: they leave out at most d / 2 (1 - cos(pi / 64)) = 6e-4 d of a half circle, 2e-5 d of
@@ -163,7 +164,7 @@ def test_grading_by_true_areas(curve: tuple, shape: str) -> None:
     assert sum(row.count for row in made.rows) == 20000
 
 
-@pytest.mark.parametrize(
+@each(
     "words, message",
     [
         ({"number": 0}, "number of grains 0, expected 1 to 1000000"),

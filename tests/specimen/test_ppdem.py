@@ -15,6 +15,7 @@ from hpcdem.pre.specimen import Request, make_specimen
 from hpcdem.pre.specimen.classes import classified
 from hpcdem.pre.specimen.files import to_clumps, to_ppdem, xyr
 from tests.specimen.shapes import KINDS, WINDOW
+from tests.tables import each
 
 ROWS = Path(__file__).parent / "ppdem_rows.txt"
 """Twelve triangles of the one sample file there is, a lost zero in the third put back."""
@@ -109,7 +110,7 @@ def test_mixed_kinds(tmp_path: Path) -> None:
     assert found.area[2] == pytest.approx(12.0)
 
 
-@pytest.mark.parametrize(
+@each(
     "text, line, message",
     [
         ("", 1, "holds no grains"),

@@ -17,6 +17,7 @@ from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.pcdc import check
 from tests.conftest import Launcher, absent
 from tests.pcdc.fake import Bench
+from tests.tables import each
 
 KINDS = [find(name) for name in CASES]
 
@@ -52,7 +53,7 @@ def test_numbers_read_back_to_the_last_bit():
         assert float(number(value)) == value
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@each("kind", KINDS)
 def test_every_alternative_is_a_correct_script(kind):
     for case in alternatives(kind):
         summary = check.summary(case.script(), f"{kind.name}.sc")
@@ -76,7 +77,7 @@ def test_every_parameter_has_an_effect_and_every_result_is_made(kind):
         assert re.search(rf"\b{field.name}\b[\w, ]* =", made), field.name
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@each("kind", KINDS)
 def test_the_command_in_the_script_makes_the_script(kind):
     given = {name: field.default * 1.01 for name, field in kind.model_fields.items()
              if isinstance(field.default, float) and 0 < field.default < 0.02}  # fmt: skip

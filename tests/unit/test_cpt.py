@@ -10,6 +10,7 @@ import pytest
 
 from hpcdem.core.errors import UsageError
 from hpcdem.post.cpt import INVAR, INVAR2, VOLUME, parse_cpt, read_cpt, stress_table
+from tests.tables import each
 
 
 def colour(text: str, value: float) -> list[float]:
@@ -108,7 +109,7 @@ def test_dos_line_ends_and_a_byte_order_mark_do_no_harm(tmp_path: Path) -> None:
     assert (255 * read_cpt(tmp_path / "a.cpt").colours(np.array(1.0))).tolist() == pytest.approx([4, 5, 6])
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "line", "said"),
     [
         ("0 1 2 3 1 4 5 6\n2 1 2 3 4 4 5 6", 2, "begins at 2, the one before ends at 1"),

@@ -16,6 +16,7 @@ from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io import checkpoint, seal
 from hpcdem.io.frame import Table
+from tests.tables import each
 
 STATE = {"clock": {"step": 12, "time": 0.1}, "script": "START\n", "position": 3}
 
@@ -148,12 +149,12 @@ def test_what_describes_the_rows_is_under_seal(file):
             checkpoint.read(file)
 
 
-@pytest.mark.parametrize(
+@each(
     "text",
     [b"", b"{}", b"[]", b"nonsense", b'{"length": 3, "rows": []}', b'{"length": 3, "rows": [[2, 9], [1, 1]]}',
      b'{"length": 3, "rows": [[0, 1e400]]}', b'{"length": 3, "rows": [["a"]]}', b'{"length": 3, "rows": [[-5, 1]]}'],
 )  # fmt: skip
-@pytest.mark.parametrize("count", [None, 0, 2**64 - 1])
+@each("count", [None, 0, 2**64 - 1])
 def test_a_seal_that_makes_no_sense_is_broken(tmp_path, text, count):
     path = tmp_path / "x"
     path.write_bytes(b"abc" + text + seal._END.pack(len(text) if count is None else count, 7, seal.MARK))

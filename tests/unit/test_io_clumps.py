@@ -9,6 +9,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.io.clumps import read_clumps, write_clumps
 from tests.clumped import write_lattice
 from tests.property.workers import Resident
+from tests.tables import each
 
 GOOD = """\
 hpcdem clumps 1
@@ -78,7 +79,7 @@ HOSTILE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@each("name", HOSTILE)
 def test_bad_files_are_refused_with_their_line(tmp_path, name):
     text, message = HOSTILE[name]
     path = tmp_path / "bad.clumps"

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hpcdem.io.textnum import FIXED, INT, WORD, Column, TextTable, format_floats, format_table, sci
+from tests.tables import each
 
 any_float = st.floats(width=64, allow_subnormal=True)
 
@@ -23,8 +24,8 @@ def test_floats_are_written_like_python_does(values: list[float], digits: int) -
     assert format_floats(array, digits) == python_text(array, digits)
 
 
-@pytest.mark.parametrize("digits", [1, 2, 5, 9, 13, 15])
-@pytest.mark.parametrize("kind", ["any bits", "denormal", "near one", "halves", "ties of integers", "powers of ten"])
+@each("digits", [1, 2, 5, 9, 13, 15])
+@each("kind", ["any bits", "denormal", "near one", "halves", "ties of integers", "powers of ten"])
 def test_many_random_floats_are_written_like_python_does(kind: str, digits: int) -> None:
     rng = np.random.default_rng(7)
     n = 20000

@@ -12,6 +12,7 @@ from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.lang.zdem.lexer import Token, expression, number
 from hpcdem.lang.zdem.parser import parse_text
 from tests.conftest import ROOT, sources
+from tests.tables import each
 
 PACKAGE = ROOT / "hpcdem"
 
@@ -237,7 +238,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@each("name", HOSTILE)
 def test_hostile_expressions_are_refused_at_once(name):
     began = time.process_time()
     with pytest.raises(ScriptError) as caught:

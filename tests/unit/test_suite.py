@@ -14,6 +14,7 @@ import pytest
 
 from tests import suite
 from tests.conftest import ROOT
+from tests.tables import each
 
 
 def test_files_of_tests_that_a_change_can_break() -> None:
@@ -128,3 +129,16 @@ def test_a_run_writes_down_what_it_found(tmp_path: Path) -> None:
     assert record["skipped"] == {"no such thing": 1} and list(record["failed"]) == ["test_two.py::test_bad"]
     (loaded,) = (results / "reach" / "test_two.py").glob("*")
     assert "hpcdem.core.units" in loaded.read_text().split()
+
+
+def test_a_table_in_one_test_names_each_row_that_fails() -> None:
+    @each(("number", "square"), [(2, 4), (3, 10), (4, 15)])
+    def of(number: int, square: int) -> None:
+        assert number * number == square
+
+    with pytest.raises(pytest.fail.Exception) as caught:
+        of()
+    said = str(caught.value)
+    assert (
+        said.startswith("2 of 3") and "\n3, 10: AssertionError" in said and "\n4, 15: " in said and "2, 4" not in said
+    )

@@ -19,6 +19,7 @@ from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.physics.dem.settings import Settings
 from hpcdem.physics.dem.simulation import Simulation
 from tests.pcdc.fake import Bench
+from tests.tables import each
 
 
 class Told:
@@ -38,7 +39,7 @@ class Told:
     def set_interval(self, explicit): ...
 
 
-@pytest.mark.parametrize(
+@each(
     ("system", "name", "unit", "value", "said"),
     [
         ("si", "density", "kg/m3", 2.7, "looks like g/cm3; x 1000 makes it 2700"),
@@ -218,7 +219,7 @@ def bench(tmp_path):
 # -- prefixes ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
+@each(
     ("value", "unit", "text"),
     [
         (2.5e6, "Pa", "2.5 MPa"), (-3.2e4, "Pa", "-32 kPa"), (3e10, "Pa", "30 GPa"), (0.02, "Pa", "0.02 Pa"),

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tables import each
+
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "wishes.md"
 ROWS = [
@@ -36,7 +38,7 @@ def test_each_wish_has_a_row():
     assert [n for n in sorted(numbers) if not n.isdigit()] == list("abcdefghij")
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
+@each("row", ROWS, ids=lambda row: row[0])
 def test_tests_of_a_row_are_there(row):
     _, _, what, tests = row
     named = re.findall(r"`(tests/[\w/]+\.py)::(test_\w+)`", tests.rstrip(" |"))

@@ -20,6 +20,7 @@ from hpcdem.post.view.model import Layer, ModelView
 from hpcdem.post.view.moment import POLYGONS, Moment, Objects, read_moment
 from hpcdem.post.view.paper import figure_of
 from hpcdem.post.view.scene import STEPS, Scale, scene, shared
+from tests.tables import each
 from tests.view import frames
 
 SHOWN = {"camera": (0.0, 3.0, 0.0, 3.0)}
@@ -55,7 +56,7 @@ def test_numbers_of_a_bar(low: float, high: float, unit: str, title: str, texts:
         assert low + place * (high - low) == pytest.approx(float(text) * size, abs=1e-6 * (high - low))
 
 
-@pytest.mark.parametrize("seed", range(50))
+@each("seed", range(50))
 def test_any_bar_has_five_numbers_at_least_and_a_dozen_at_most(seed: int):
     rng = np.random.default_rng(seed)
     low = float(rng.choice([-1.0, 0.0, 1.0]) * 10.0 ** rng.uniform(-9, 12))

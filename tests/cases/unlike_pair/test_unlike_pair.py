@@ -13,13 +13,14 @@ import pytest
 
 from hpcdem.commands.dem import particles, properties
 from tests.support import force, model, only, pair, steps
+from tests.tables import each
 
 MATERIALS = [((2.9e9, 0.2), (2.9e9, 0.2)), ((2.9e9, 0.2), (1.1e9, 0.35))]
 
 
-@pytest.mark.parametrize(("first", "second"), MATERIALS)
-@pytest.mark.parametrize("overlap", [1e-3, 1.0, 17.0])
-@pytest.mark.parametrize("direction", [0.0, 0.7, 2.5, -1.9])
+@each(("first", "second"), MATERIALS)
+@each("overlap", [1e-3, 1.0, 17.0])
+@each("direction", [0.0, 0.7, 2.5, -1.9])
 def test_v12_force(tmp_path, first, second, overlap, direction):
     rt = 2.0 * 60.0 * 80.0 / 140.0
     assert rt == pytest.approx(68.5714, abs=5e-5)

@@ -8,6 +8,7 @@ import pytest
 from hpcdem.core.errors import ScriptError
 from hpcdem.physics.fdem.mesh import Mesh, check
 from tests.pcdc.test_excavation import Desk
+from tests.tables import each
 
 
 @pytest.fixture
@@ -176,7 +177,7 @@ HOSTILE = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("line", "message"), HOSTILE)
+@each(("line", "message"), HOSTILE)
 def test_what_is_refused(desk, line, message):
     with pytest.raises(ScriptError, match=message):
         desk(RIM + LINE + f"pcdc {line}\n")
