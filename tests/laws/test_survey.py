@@ -1,0 +1,108 @@
+"""What a look at all discs says, against closed forms of one, two and three of them."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hpcdem.commands.dem import cycles, particles, properties, settings, walls
+from hpcdem.physics.dem import diagnostics
+from hpcdem.physics.dem.kernels import slips
+from hpcdem.physics.dem.simulation import Simulation
+from tests.support import body, model, only
+
+KN, KS = 2e6, 3e6
+
+
+def pair(folder: Path, gravity: tuple[float, float] = (0.0, 0.0), overlap: float = 0.1, **fixed: Any) -> Simulation:
+    """Discs of radius 1 and 0.5 m side by side, which overlap."""
+    sim = model(folder, disk="on", gravity=gravity)
+    particles.ball(sim, 0, 0.0, 0.0, 1.0)
+    particles.ball(sim, 1, 1.5 - overlap, 0.0, 0.5)
+    properties.prop(sim, density=1000.0, kn=KN, ks=KS, fric=0.5)
+    for name, gid in fixed.items():
+        properties.fix(sim, (name,), only(gid))
+    cycles.prepare(sim)
+    sim.step()
+    return sim
+
+
+def test_kinetic_energy_of_motion_and_of_spin(tmp_path: Path) -> None:
+    sim = pair(tmp_path)
+    p = sim.particles
+    p["vx"][:], p["vy"][:], p["spin"][:] = (3.0, -1.0), (4.0, 2.0), (5.0, -7.0)
+    expected = 0.0
+    for gid, v2, w in ((0, 25.0, 5.0), (1, 5.0, 7.0)):
+        m, inertia = body(sim, gid)
+        assert inertia == pytest.approx(0.5 * m * (1.0, 0.5)[gid] ** 2)
+        expected += 0.5 * m * v2 + 0.5 * inertia * w * w
+    assert diagnostics.kinetic_energy(sim) == pytest.approx(expected, rel=1e-14)
+    assert diagnostics.survey(sim).kinetic == diagnostics.kinetic_energy(sim)
+
+
+def test_the_unbalanced_force_is_that_of_free_directions(tmp_path: Path) -> None:
+    """The force of the one contact stands for the mean; weights count, but not along what is fixed."""
+    (tmp_path / "a").mkdir()
+    sim = pair(tmp_path / "a")
+    seen = diagnostics.survey(sim)
+    assert seen.unbalanced == pytest.approx(1.0, rel=1e-12) and (seen.particles, seen.contacts) == (2, 1)
+    assert seen.deepest == pytest.approx(0.1 / 0.5, rel=1e-2)
+    assert seen.critical_dt == pytest.approx(0.8 * math.sqrt(body(sim, 1)[0] / max(KN, KS) * 2.0), rel=1e-6)
+    (tmp_path / "b").mkdir()
+    sim = pair(tmp_path / "b", gravity=(30.0, -9.8), x=0, y=1)
+    (fn,) = np.abs(sim.lists.owned_forces()[:1, 0])
+    weights = [body(sim, gid)[0] for gid in (0, 1)]
+    free = max(9.8 * weights[0], fn + 30.0 * weights[1])  # y of the first, x of the second
+    assert diagnostics.survey(sim).unbalanced == pytest.approx(free / fn, rel=1e-6)
+    for gid in (0, 1):
+        properties.fix(sim, ("x", "y"), only(gid))
+    assert diagnostics.survey(sim).unbalanced == 0.0 and diagnostics.survey(sim).critical_dt == math.inf
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_the_highest_frequency_of_a_disc_on_a_wall(tmp_path: Path, mu: float) -> None:
+    """Along the normal k_n / m, along the wall k_s (1 / m + a^2 / I) with friction; two springs in series each."""
+    sim = model(tmp_path, disk="on")
+    particles.ball(sim, 0, 0.3, 0.98, 1.0)
+    properties.prop(sim, density=1000.0, kn=KN, ks=KS, fric=mu)
+    walls.wall(sim, 1, ((-3.0, 0.0), (3.0, 0.0)), kn=KN, ks=KS, fric=mu)
+    settings.set_option(sim, "dt", 1e-9)
+    cycles.prepare(sim)
+    sim.step()
+    m, inertia = body(sim)
+    arm = 1.0 - 0.5 * 0.02
+    normal, shear = 0.5 * KN / m, 0.5 * KS * (1.0 / m + arm * arm / inertia)
+    expected = shear if mu else normal
+    assert diagnostics.highest_frequency(sim) == pytest.approx(math.sqrt(expected), rel=1e-3)
+
+
+def test_a_point_that_crosses_a_segment() -> None:
+    """Against exact arithmetic, in the frame of the segment, which moves along; and a still point that a turning
+    segment runs over, or does not reach."""
+    crosses = getattr(slips._crosses, "py_func", slips._crosses)
+    rng = np.random.default_rng(3)
+    seen = 0
+    for _ in range(300):
+        p, q, point, way, gone = rng.uniform(-1.0, 1.0, (5, 2))
+        before = point - gone + way  # where the point was, seen from the segment as it is now
+        edge, a, b = ([Fraction(float(v)) for v in values] for values in (q - p, before - p, point - p))
+
+        def side(v: list[Fraction], edge: list[Fraction] = edge) -> Fraction:
+            return edge[0] * v[1] - edge[1] * v[0]
+
+        expected = False
+        if side(a) * side(b) < 0:
+            part = side(a) / (side(a) - side(b))
+            at = [s + part * (e - s) for s, e in zip(a, b, strict=True)]
+            expected = 0 <= at[0] * edge[0] + at[1] * edge[1] <= edge[0] ** 2 + edge[1] ** 2
+        assert crosses(*p, *q, *point, tuple(way), tuple(way), tuple(gone)) == expected
+        seen += expected
+    assert 20 < seen < 200
+    still, turned = (0.0, 0.0), (1.0, -1.0)  # the far end has come from (0, 1) to (1, 0), the near one stays at (0, 0)
+    for x, y, expected in ((0.5, 0.2, True), (1.2, 0.2, False), (0.5, -0.2, False)):
+        assert crosses(0.0, 0.0, 1.0, 0.0, x, y, still, turned, still) == expected, (x, y)
