@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import cycles, particles, properties, settings, walls
+from hpcdem.commands.dem import bonds, cycles, particles, properties, settings, walls
+from hpcdem.core.fields import VX, VY, X
 from hpcdem.physics.dem import diagnostics
-from hpcdem.physics.dem.kernels import slips
+from hpcdem.physics.dem.kernels import fast, laws, slips
+from hpcdem.physics.dem.kernels.histories import Histories
 from hpcdem.physics.dem.simulation import Simulation
 from tests.support import body, model, only
 
@@ -62,6 +64,34 @@ def test_the_unbalanced_force_is_that_of_free_directions(tmp_path: Path) -> None
     for gid in (0, 1):
         properties.fix(sim, ("x", "y"), only(gid))
     assert diagnostics.survey(sim).unbalanced == 0.0 and diagnostics.survey(sim).critical_dt == math.inf
+
+
+def test_a_bond_is_as_stiff_as_its_length_makes_it(tmp_path: Path) -> None:
+    """E A / L, L from centre to centre, of an open bond that is stiffer than the contact."""
+    sim = pair(tmp_path, overlap=-1e-4)
+    bonds.bond(sim, ebmod=1e9, gbmod=1e8, tstrength=1e9, sstrength=1e9, tolerate=1e-3)
+    cycles.prepare(sim)
+    sim.step()
+    area = laws.pair_geometry(1.5, 0.0, 1.0, 0.5)[4]
+    expected = 0.8 * math.sqrt(body(sim, 1)[0] / (1e9 * area / 1.5))
+    assert diagnostics.survey(sim).critical_dt == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("broken", [(0, np.inf), (2, np.inf), (3, np.nan)])
+def test_a_fast_disc_that_is_not_finite_is_told(broken: tuple[int, float]) -> None:
+    """Its place or its speed alone is enough."""
+    hot, out = np.zeros((1, 8)), np.zeros(4)
+    hot[0, 2:5] = 1.0
+    look = (0, np.zeros((1, 2)), np.array([0]), np.array([5.0]), np.array([True]), 0.1, 0.0, (-9.0, 9.0, -9.0, 9.0))
+    fast.survey(hot, *look, out)
+    assert out[fast.FAST_BROKEN] == 0.0
+    hot[0, {0: X, 2: VX, 3: VY}[broken[0]]] = broken[1]
+    fast.survey(hot, *look, out)
+    assert out[fast.FAST_BROKEN] == 1.0
+
+
+def test_no_memory_has_a_beginning_for_each_particle_and_an_end() -> None:
+    assert Histories.empty(3).ptr.tolist() == [0, 0, 0, 0] and len(Histories.empty(3).rows) == 0
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.5])

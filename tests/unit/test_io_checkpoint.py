@@ -50,6 +50,20 @@ def test_it_comes_back(file):
         assert np.array_equal(found["particles"][name], values)
 
 
+def test_rows_of_several_numbers_come_back_and_are_checked(tmp_path):
+    """Rows are found by their bytes; one bit in the last of them is noticed."""
+    values = np.random.default_rng(4).normal(size=(50, 3))
+    checkpoint.write(tmp_path / "a.sav", STATE, {"places": Table({"x": values}, 0, 50)}, SerialComm())
+    assert np.array_equal(checkpoint.read(tmp_path / "a.sav")[1]["places"]["x"], values)
+    with h5py.File(tmp_path / "a.sav") as opened:
+        at = opened["places/x"].id.get_offset() + opened["places/x"].nbytes - 1
+    whole = bytearray((tmp_path / "a.sav").read_bytes())
+    whole[at] ^= 1
+    (tmp_path / "a.sav").write_bytes(whole)
+    with pytest.raises(HpcdemError, match="checksum of places/x is wrong"):
+        checkpoint.read(tmp_path / "a.sav")
+
+
 @pytest.mark.parametrize("dtype", [np.float64, np.int64, np.int32])
 def test_checksums_of_slabs_add_up(dtype):
     values = np.random.default_rng(2).integers(-(2**31), 2**31 - 1, (1001, 3)).astype(dtype)

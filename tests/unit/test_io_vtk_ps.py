@@ -128,3 +128,13 @@ def test_what_is_seen() -> None:
     for name in p:
         p[name] = p[name][:0]
     assert view(frame) == View(0.0, 1.0, 0.0, 1.0)  # nothing at all
+
+
+def test_steps_of_ticks_that_are_asked_for() -> None:
+    """Kilometres: major ticks every 2 km, minor ones every 500 m, or a tenth of the major ones."""
+    view = View(0.0, 10000.0, 1000.0, 5000.0)
+    assert view.unit == (1000.0, "km")
+    x, y = view.ticks(2000.0, 500.0)
+    assert x.major == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0] and y.major == [2.0, 4.0]
+    assert y.minor == [1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0]
+    assert len(view.ticks(2000.0)[1].minor) == 21 and len(view.ticks(None, 500.0)[1].minor) == 9
