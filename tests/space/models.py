@@ -57,6 +57,13 @@ def dig(sim: Blocks) -> None:
         changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] > 2.2), relax=300.0 * sim.clock.dt)
 
 
+def dig_and_fill(sim: Blocks) -> None:
+    """Half of the piece comes back, of another rock, before it has let go."""
+    dig(sim)
+    if sim.clock.step == 380:
+        changes.element_model(sim, np.flatnonzero(~sim.alive)[:10], "mech_iso_elastic", {**ROCK, "young": 5e7})
+
+
 def yielding(sim: Blocks) -> None:
     """The same bar and its flier, of soil that yields: in the middle of the bar it softens, its end is elastic."""
     swinging(sim)
@@ -263,6 +270,16 @@ def dig_hexes(sim: Blocks) -> None:
         changes.null(sim, np.flatnonzero((sim.mesh.centroids()[:, 0] > 2.1) & (sim.mesh.hex_of() >= 0)))
 
 
+def dig_hexes_and_fill(sim: Blocks) -> None:
+    """A piece of the bar is out for a while before."""
+    dig_hexes(sim)
+    piece = np.arange(120, 144)
+    if sim.clock.step == 20:
+        changes.null(sim, piece)
+    if sim.clock.step == 60:
+        changes.element_model(sim, piece, "mech_iso_elastic", {**ROCK, "young": 5e7})
+
+
 def settling(sim: Blocks) -> None:
     """A slab that comes into static balance with its weight and what is prescribed, in small strains."""
     sim.take_mesh(box((16, 3, 3), (8.0, 1.0, 1.0), shaken=0.15))
@@ -461,7 +478,7 @@ def it_swings(found: Found) -> None:
     assert np.nanmax(found["displacement_x"]) > 1.5  # flies from one end to the other
     bar = found["displacement_z"][: 13 * 9]
     assert np.nanmax(np.abs(bar)) > 1e-3
-    assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
+    assert np.isnan(found["stress_xx"]).sum() == 10  # dug out
 
 
 def flow(sim: Blocks, notes: dict[str, Any]) -> Found:
@@ -474,7 +491,7 @@ def it_flows(found: Found) -> None:
     assert np.nanmax(found["displacement_x"]) > 1.5
     assert (found["plastic_shear_strain"] > 1e-3).sum() > 40
     assert len({int(state) for state in found["plastic_state"] if not np.isnan(state)}) > 4
-    assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
+    assert np.isnan(found["stress_xx"]).sum() == 10  # dug out
 
 
 def crept(sim: Blocks, notes: dict[str, Any]) -> Found:
@@ -572,7 +589,7 @@ def it_is_warm(found: Found) -> None:
 def it_crowds(found: Found) -> None:
     assert len(found["contact_face"]) > 50
     assert np.nanmax(found["displacement_x"]) > 0.3
-    assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
+    assert np.isnan(found["stress_xx"]).sum() == 10  # dug out
     assert found["about"][0] > 10
 
 
@@ -589,7 +606,7 @@ def it_settles(found: Found) -> None:
 
 
 MODELS = {
-    "swinging": Model(swinging, result, it_swings, dig, steps=1000, middle=401, come=10),
+    "swinging": Model(swinging, result, it_swings, dig_and_fill, steps=1000, middle=401, come=10),
     "soil that swings": Model(yielding, flow, it_flows, dig_soil, steps=1000, middle=401, come=10),
     "salt bar": Model(creeping, crept, it_creeps, creep_more, steps=1000, middle=401),
     "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
@@ -601,7 +618,7 @@ MODELS = {
     "soil that gets warm": Model(
         warm_soil, warm_and_flowing, it_is_warm, dig_soil, steps=1000, middle=401, come=10, slow=True
     ),
-    "hexahedra": Model(damped_blocks_of_hexes, touching, it_hits, dig_hexes, steps=900, middle=401, come=10),
+    "hexahedra": Model(damped_blocks_of_hexes, touching, it_hits, dig_hexes_and_fill, steps=900, middle=401, come=10),
     "hexahedra that flow": Model(
         hexes_that_flow, flow_and_creep, they_flow_and_creep, dig_hexes_that_flow, steps=900, middle=401, come=10
     ),

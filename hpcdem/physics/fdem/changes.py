@@ -7,12 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics, user_laws
+from hpcdem.physics.fdem import backfill, diagnostics, hexahedra, user_laws
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
 from hpcdem.physics.fdem.kernels.creep_tets import IN_KELVIN
 from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
-from hpcdem.physics.fdem.local import element_table
 from hpcdem.physics.fdem.properties import ELEMENT, KELVIN_STRAIN, MECH_BURGERS, model
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
@@ -80,7 +79,7 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
         sim.complete(ELEMENT, asked, model(name, ELEMENT), {}, given)  # refused before anything is done
         back = asked[~sim.alive[asked]]
         if len(back):
-            sim.refuse_in_space("elements that come back after they were taken out")
+            sim.refuse_parts(back)
             _bring_back(sim, back)
     sim.set_element_model(elements, name, given)
 
@@ -100,19 +99,11 @@ def _bring_back(sim: Blocks, back: np.ndarray) -> None:
     x, u, v = (
         diagnostics.corner_values(sim, name, corner)[corner] for name in ("position", "displacement", "velocity")
     )
-    mass = np.zeros((len(beside), 4))
-    build.masses(
-        beside,
-        sim.reference.points,
-        sim.reference.cells,
-        sim.element_row,
-        element_table(sim.element_rows),
-        mass,
-    )
+    mass = sim.corner_masses(beside)
     one = np.ones(len(corner))
     rim = _weighted(x, one, point, n_points)
     apart = np.zeros(n_points)
-    np.maximum.at(apart, point, np.hypot(*(x - rim[point]).T))
+    np.maximum.at(apart, point, np.linalg.norm(x - rim[point], axis=1))
     known = (np.bincount(point, minlength=n_points) > 0) & (apart <= allowed)
     given = np.hstack([rim - mesh.points, _weighted(u, one, point, n_points), _weighted(v, mass[use], point, n_points)])
     found = backfill.extended(mesh.points, own, known, given) if sim.comm.rank == 0 else None
@@ -131,7 +122,7 @@ def _bring_back(sim: Blocks, back: np.ndarray) -> None:
     rows = meshes.crack_rows(mesh, mesh.edges())
     cracked[mesh.edges().faces[rows, 0]] = True
     cracked |= np.where(sim.partner >= 0, cracked[sim.partner], False)
-    ends = connectivity.face_points(cells, faces)
+    ends = mesh.face_points(faces)
     hold = ~cracked[faces] & (known[ends].all(axis=1) | np.isin(over // 4, back))
     for side, other in ((faces, over), (over, faces)):
         sim.open[side] = ~hold
@@ -157,16 +148,18 @@ def _bring_back(sim: Blocks, back: np.ndarray) -> None:
 
 
 def _refuse_overlap(sim: Blocks, back: np.ndarray, places: np.ndarray, allowed: float) -> None:
-    """CommandError if elements (n,) cannot be at places (n, 4, 2): turned inside out, over others. Collective."""
+    """CommandError if elements (n,) cannot be at places (n, 4, dim): turned inside out, over others. Collective."""
     cells = sim.the_mesh().cells
-    numbers = np.where(cells[back] >= 0, np.arange(4 * len(back)).reshape(-1, 4), -1)
-    flat = np.flatnonzero(connectivity.areas(places.reshape(-1, 2), numbers) <= 0.0)
+    moved = sim.the_mesh().with_own_points(back, places)
+    flat = back[moved.areas()[back] <= 0.0]
+    if len(moved.hexes):
+        bad = hexahedra.volumes(moved.points, moved.hexes).min(axis=1) <= 0.0
+        flat = np.union1d(flat, moved.hexes[bad, 8])
     if len(flat):
         raise CommandError(
-            f"element {back[flat[0]]} cannot come back: its place has closed, an element there would be turned "
-            "inside out"
+            f"element {flat[0]} cannot come back: its place has closed, an element there would be turned inside out"
         )
-    everyone = diagnostics.corner_values(sim, "position").reshape(-1, 4, 2)
+    everyone = diagnostics.corner_values(sim, "position").reshape(-1, 4, sim.dim)
     everyone[back] = places
     problem = backfill.deepest(cells, everyone, back, np.flatnonzero(sim.alive), allowed)
     if problem is not None:
@@ -180,13 +173,13 @@ def _refuse_overlap(sim: Blocks, back: np.ndarray, places: np.ndarray, allowed: 
 def _append(
     sim: Blocks, back: np.ndarray, places: np.ndarray, shown: np.ndarray, speed: np.ndarray, real: np.ndarray
 ) -> None:
-    """Rows of elements (n,) that this rank owns from now on: corners (n, 4, 2) at places [m], displacements shown
+    """Rows of elements (n,) that this rank owns from now on: corners (n, 4, dim) at places [m], displacements shown
     there [m] and velocities [m/s]; real (n, 4): which are corners."""
 
     def rows(values: np.ndarray, width: int) -> np.ndarray:
-        out = np.zeros((len(back), width))
-        count = min(4, width // 2)
-        out[:, : 2 * count] = np.where(real[:, :, None], values, 0.0)[:, :count].reshape(len(back), -1)
+        out, count = np.zeros((len(back), width)), min(4, width // sim.stride)
+        own = np.pad(np.where(real[:, :, None], values, 0.0), ((0, 0), (0, 0), (0, sim.stride - sim.dim)))[:, :count]
+        out[:, : sim.stride * count] = own.reshape(len(back), -1)
         return out
 
     sim.number = np.concatenate([sim.number, back])
@@ -194,26 +187,27 @@ def _append(
     sim.v = np.concatenate([sim.v, rows(speed, sim.v.shape[1])])
     repeat(sim, sim.x)
     for name, values in sim.cold.items():
-        new = rows(places - shown, 8) if name == "home" else np.zeros((len(back), values.shape[1]))
+        new = rows(places - shown, values.shape[1]) if name == "home" else np.zeros((len(back), values.shape[1]))
         sim.cold[name] = np.concatenate([values, new])
     sim.histories = sim.histories.joined(np.zeros(len(back), np.int64), sim.histories.rows[:0])
 
 
 def _move_as_one(sim: Blocks, back: np.ndarray, corner: np.ndarray, v: np.ndarray, mass: np.ndarray) -> None:
     """Corners that have become one node by elements that came back get one velocity: that of those that were there
-    (m,) together keeps their momentum, v (m, 2) [m/s], mass (m,) [kg/m]."""
+    (m,) together keeps their momentum, v (m, dim) [m/s], mass (m,) [kg/m], in space [kg]."""
     node = sim.node.reshape(-1)
     shared = np.zeros(len(sim.shared_nodes), bool)
     shared[sim.node[back][sim.node[back] >= 0]] = True
     use = shared[node[corner]]
     total = np.bincount(node[corner][use], mass[use], minlength=len(shared))
     mean = _weighted(v[use], mass[use], node[corner][use], len(shared))
-    mine = sim.node[sim.number][:, : 4 if sim.wide else 3]
+    mine = sim.node[sim.number][:, : sim.corners]
     i, k = np.nonzero(mine >= 0)
     j = mine[i, k]
     one = shared[j] & (total[j] > 0.0)
     i, k, j = i[one], k[one], j[one]
-    sim.v[i, 2 * k], sim.v[i, 2 * k + 1] = mean[j, 0], mean[j, 1]
+    for axis in range(sim.dim):
+        sim.v[i, sim.stride * k + axis] = mean[j, axis]
     repeat(sim, sim.v)
 
 
@@ -355,7 +349,7 @@ def _chosen_corners(sim: Blocks, nodes: Numbers) -> np.ndarray:
     sim.before_change()
     mesh = sim.the_mesh()
     chosen = sim.corners_of_nodes(nodes, whole=True).reshape(mesh.cells.shape)
-    return chosen[sim.number, : 4 if sim.wide or sim.dim == 3 else 3]
+    return chosen[sim.number, : sim.corners]
 
 
 def repeat(sim: Blocks, rows: np.ndarray) -> None:

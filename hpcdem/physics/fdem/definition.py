@@ -128,14 +128,6 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Reference:
-    """Where elements are free of strain: points (n, 2) [m] and, for each element, the rows of its corners (ne, 4)."""
-
-    points: np.ndarray
-    cells: np.ndarray
-
-
-@dataclass
 class Relaxation:
     """Forces that elements which were taken out leave behind: corners (element * 4 + k), forces (n, 2) [N/m], from
     when on and for how long they die down (model time, or steps in static mode)."""
@@ -171,7 +163,7 @@ class ModelDefinition:
         """Elements that came back after they were taken out, ascending."""
         self.birthplace = np.empty((0, 4, 2))
         """Where their corners were then [m]."""
-        self._reference: Reference | None = None
+        self._reference: Mesh | None = None
         self._closed: np.ndarray | None = None
         self.sided = False
         """Conditions were said of single sides of points: corners of one node may have different rows."""
@@ -232,7 +224,13 @@ class ModelDefinition:
     def numbers_of_elements(self, elements: Any) -> np.ndarray:
         """Checked element numbers, ascending; None: all that are there. CommandError for others."""
         at = self.existing(elements, self.alive, "element")
-        if len(self._mesh().hexes) and elements is not None:
+        if elements is not None:
+            self.refuse_parts(at)
+        return at
+
+    def refuse_parts(self, at: np.ndarray) -> None:
+        """CommandError if these elements (n,) are some parts of a hexahedron, and not the others."""
+        if len(self._mesh().hexes):
             of = self._mesh().hex_of()[at]
             count = np.bincount(of[of >= 0], minlength=len(self._mesh().hexes))
             part = np.flatnonzero((count > 0) & (count < hexahedra.PARTS))
@@ -242,7 +240,6 @@ class ModelDefinition:
                     f"elements {first} to {first + hexahedra.PARTS - 1} are one hexahedron: they go together, only "
                     f"{count[part[0]]} of them were given"
                 )
-        return at
 
     def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
         """Checked numbers of points of the mesh with an element that is there; None: all of them. Of sides (sides.py)
@@ -362,26 +359,22 @@ class ModelDefinition:
         return self._closed
 
     @property
-    def reference(self) -> Reference:
-        """The mesh, and for elements that came back where they did."""
+    def reference(self) -> Mesh:
+        """Where elements are free of strain: the mesh, and for those that came back where they did, with points of
+        their own there (hexahedra share those of their parts)."""
         mesh = self._mesh()
         if self._reference is None:
-            cells, points = mesh.cells, mesh.points
-            if len(self.born):
-                cells = cells.copy()
-                own = len(points) + np.arange(4 * len(self.born)).reshape(-1, 4)
-                cells[self.born] = np.where(cells[self.born] >= 0, own, -1)
-                points = np.concatenate([points, self.birthplace.reshape(-1, 2)])
-            self._reference = Reference(points, cells)
+            self._reference = mesh.with_own_points(self.born, self.birthplace) if len(self.born) else mesh
         return self._reference
 
     def take_births(self, born: np.ndarray, places: np.ndarray) -> None:
-        """Elements (n,) have come back, their corners at places (n, 4, 2) [m]."""
+        """Elements (n,) have come back, their corners at places (n, 4, dim) [m]."""
         stay = ~np.isin(self.born, born)
         number = np.concatenate([self.born[stay], born])
         order = np.argsort(number, kind="stable")
         self.born = number[order]
-        self.birthplace = np.concatenate([self.birthplace[stay], places])[order]
+        known = self.birthplace[stay].reshape(-1, 4, self.dim)
+        self.birthplace = np.concatenate([known, places])[order]
         self._reference = None
 
     # ---- models --------------------------------------------------------------------------------------------------

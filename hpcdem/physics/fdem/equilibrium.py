@@ -501,7 +501,7 @@ def place_corners(sim: Blocks, x: np.ndarray) -> None:
 def _put(sim: Blocks, rows: np.ndarray, values: np.ndarray) -> None:
     """Values of the nodes (nn, dim) into the corners of rows (n, w) of positions or velocities."""
     node, stride = sim.node[sim.number], sim.stride
-    for k in range(4 if sim.wide or sim.dim == 3 else 3):
+    for k in range(sim.corners):
         at = np.flatnonzero(node[:, k] >= 0)
         rows[at, stride * k : stride * k + sim.dim] = values[node[at, k]]
     if sim.dim == 2:

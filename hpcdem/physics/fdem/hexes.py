@@ -17,19 +17,21 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 
-def place_masses(sim: State, mass: np.ndarray) -> None:
-    """True masses (n, 4) [kg] of the corners of all hexahedra held here, ghosts too: at the first corner of each point,
-    nothing at the others."""
-    mesh = sim.the_mesh()
+def place_masses(sim: State, number: np.ndarray, mass: np.ndarray) -> None:
+    """True masses (n, 4) [kg] of the corners of all hexahedra among these elements (n,): at the first corner of each
+    point, nothing at the others."""
+    mesh = sim.reference
     of = mesh.hex_of()
-    held = np.unique(of[sim.number[of[sim.number] >= 0]])
+    held = np.unique(of[number[of[number] >= 0]])
     if not len(held):
         return
     rows = mesh.hexes[held]
     density = np.array(sim.element_rows.column("density"))[sim.element_row[rows[:, 8]]]
     parts = hexahedra.corner_volumes(mesh.points, rows) * density[:, None]
     first, _ = hexahedra.places(mesh.cells, rows)
-    storage = sim.where[rows[:, 8, None] + np.arange(PARTS)]
+    where = np.zeros(len(mesh.cells), np.int64)
+    where[number] = np.arange(len(number))
+    storage = where[rows[:, 8, None] + np.arange(PARTS)]
     mass[storage.reshape(-1)] = 0.0
     mass[np.take_along_axis(storage, first // 4, axis=1), first % 4] = parts
 
@@ -43,7 +45,7 @@ class Hexes:
 
     def __init__(self, sim: State, true_mass: np.ndarray) -> None:
         self.sim = sim
-        mesh, own = sim.the_mesh(), sim.owned
+        mesh, own = sim.reference, sim.owned
         start = sim.where[mesh.hexes[:, 8]]
         mine = np.flatnonzero((start >= own.start) & (start < own.stop))
         mine = mine[np.argsort(start[mine])]
@@ -73,7 +75,7 @@ class Hexes:
 
     def _make_constants(self, model: np.ndarray, mass: np.ndarray) -> None:
         """parts (blocks, 10, 10, 32), h (count + 3, 20): see `hexes.forces`."""
-        sim, mesh, n = self.sim, self.sim.the_mesh(), self.count
+        sim, mesh, n = self.sim, self.sim.reference, self.count
         models = element_table(sim.element_rows)
         volume = hexahedra.volumes(mesh.points, np.column_stack([self.nodes, self.number]))
         blocks, every = -(-n // hexes.BLOCK), np.arange(n)
@@ -194,7 +196,7 @@ class Hexes:
         x = np.zeros_like(self.sim.x)
         flat = x.reshape(-1)
         for axis in range(3):
-            flat[self.place[: self.count] + axis] = self.sim.the_mesh().points[self.nodes, axis]
+            flat[self.place[: self.count] + axis] = self.sim.reference.points[self.nodes, axis]
         k = np.empty((self.count, 24, 24))
         h = h.copy()
         h[:, :6] = 0.0

@@ -222,12 +222,18 @@ class Local:
 
     # ---- tables --------------------------------------------------------------------------------------------------
 
+    @staticmethod
+    def corner_masses(sim: State, number: np.ndarray) -> np.ndarray:
+        """True masses (n, 4) [kg/m], in space [kg], of the corners of these elements."""
+        mesh, mass = sim.reference, np.zeros((len(number), 4))
+        build.masses(number, mesh.points, mesh.cells, sim.element_row, element_table(sim.element_rows), mass)
+        return mass
+
     def _make_constants(self) -> None:
         """Reference geometry, moduli, true masses, initial stress."""
         sim, mesh, count = self.sim, self.sim.reference, self.count
         models = element_table(sim.element_rows)
-        self._true_mass = np.zeros((len(sim.number), 4))
-        build.masses(sim.number, mesh.points, mesh.cells, sim.element_row, models, self._true_mass)
+        self._true_mass = self.corner_masses(sim, sim.number)
         self.c = np.zeros((count + 3, elements.TRIANGLE))
         self.q = np.zeros((len(self.quad_rows), elements.QUAD))
         build.constants(

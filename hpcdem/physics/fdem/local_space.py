@@ -55,20 +55,18 @@ class LocalSpace(LawsSpace):
         """Made when they are asked for: steps have no need of them."""
         if self.true_masses() and len(self._mass):
             return self._mass
-        mass = self._quarters()
-        if len(self.sim.the_mesh().hexes):
-            place_masses(self.sim, mass)
+        mass = self.corner_masses(self.sim, self.sim.number)
         return mass
 
     @property
     def mass(self) -> np.ndarray:
         return self._mass if len(self._mass) else self.true_mass
 
-    def _quarters(self) -> np.ndarray:
-        """Of the mass of each tetrahedron (n, 4) [kg], also where six of them store a hexahedron."""
-        sim, mesh = self.sim, self.sim.the_mesh()
-        mass = np.zeros((len(sim.number), 4))
-        space.masses(sim.number, mesh.points, mesh.cells, sim.element_row, element_table(sim.element_rows), mass)
+    @staticmethod
+    def corner_masses(sim: State, number: np.ndarray) -> np.ndarray:
+        mass = _quarters(sim, number)
+        if len(sim.the_mesh().hexes):
+            place_masses(sim, number, mass)
         return mass
 
     def _set_masses(self) -> None:
@@ -77,12 +75,12 @@ class LocalSpace(LawsSpace):
             self._mass = np.empty((0, 4))
 
     def _make_constants(self) -> None:
-        sim, mesh = self.sim, self.sim.the_mesh()
+        sim, mesh = self.sim, self.sim.reference
         models = element_table(sim.element_rows)
         self.c = np.zeros((self.count + 3, tets.TET))
         space.constants(
             sim.number, mesh.points, mesh.cells, sim.element_row, models, sim.options.dynamic, self.rows[: self.count],
-            self._quarters(), self.c,
+            _quarters(sim, sim.number), self.c,
         )  # fmt: skip
         self.hexes: Hexes | None = None
         if len(mesh.hexes):
@@ -203,13 +201,13 @@ class LocalSpace(LawsSpace):
         """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: of its joints,
         k = P sqrt(A) / 3 with the largest P, and what the contact of its free faces can have, k = P A (1 / h + 1 /
         h_other) / 3 per face, h_other: the smallest of all; rho c_p A / 3 of quiet faces."""
-        sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
+        sim, own = self.sim, self.sim.owned
         springs, dashpots = np.zeros((sim.n_own, 4)), np.zeros((sim.n_own, 4))
         faces = (4 * sim.number[own][:, None] + np.arange(4)).reshape(-1)
         quiet = sim.quiet_faces()[faces].reshape(-1, 4)
         if quiet.any():
             impedance = self._impedances(sim.number[own])[0][:, None] / 3.0
-            each = np.where(quiet, impedance * face_areas(mesh.points, mesh.cells[sim.number[own]]), 0.0)
+            each = np.where(quiet, impedance * face_areas(sim.reference, sim.number[own]), 0.0)
             for k in range(4):
                 dashpots[:, FACES[k]] += each[:, k, None]
         names = ("penalty_normal", "penalty_overlay", "penalty_shear")
@@ -562,3 +560,10 @@ class LocalSpace(LawsSpace):
             if sim.budget is not None:
                 sim.budget.pause(sim)
             self._set_masses()
+
+
+def _quarters(sim: State, number: np.ndarray) -> np.ndarray:
+    """Of the mass of each of these tetrahedra (n, 4) [kg], also where six of them store a hexahedron."""
+    mesh, mass = sim.reference, np.zeros((len(number), 4))
+    space.masses(number, mesh.points, mesh.cells, sim.element_row, element_table(sim.element_rows), mass)
+    return mass

@@ -8,7 +8,7 @@ calls an edge is a face with three points. `hpcdem.pre.mesh` makes meshes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -121,6 +121,23 @@ class Mesh:
             half = other >= 0
             middle[half] = 0.5 * (middle[half] + self.points[self.face_points(other[half])].mean(axis=1))
         return middle
+
+    def with_own_points(self, elements: np.ndarray, places: np.ndarray) -> Mesh:
+        """The same with these elements (n,) at places (n, 4, dim) [m], by points of their own that parts of a
+        hexahedron share."""
+        cells, hexes = self.cells.copy(), self.hexes.copy()
+        own = cells[elements]
+        real = own >= 0
+        key = (self.of_one(elements)[:, None] * len(self.points) + own)[real]
+        _, first, number = np.unique(key, return_index=True, return_inverse=True)
+        own[real] = len(self.points) + number.reshape(-1)
+        cells[elements] = own
+        at = np.flatnonzero(np.isin(hexes[:, 8], elements))
+        if len(at):
+            corner, _ = hexahedra.places(self.cells, hexes[at])
+            parts = cells[hexes[at, 8, None] + np.arange(hexahedra.PARTS)].reshape(len(at), -1)
+            hexes[at, :8] = np.take_along_axis(parts, corner, axis=1)
+        return replace(self, points=np.concatenate([self.points, places[real][first]]), cells=cells, hexes=hexes)
 
     def inside_hexes(self, faces: np.ndarray) -> np.ndarray:
         """(n,) bool: of these faces (n,) those within a hexahedron, between two of its six elements."""

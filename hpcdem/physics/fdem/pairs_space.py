@@ -19,6 +19,7 @@ from hpcdem.physics.fdem.pairs import Kinds, Surfaces, smallest_overlay
 from hpcdem.physics.fdem.tetrahedra import FACES
 
 if TYPE_CHECKING:
+    from hpcdem.physics.fdem.mesh import Mesh
     from hpcdem.physics.fdem.state import State
 
 
@@ -95,16 +96,15 @@ class Surface(NamedTuple):
         return high[self.clusters].max(axis=1) > low[self.clusters].min(axis=1)
 
 
-def face_areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+def face_areas(mesh: Mesh, elements: np.ndarray) -> np.ndarray:
     """(ne, 4) [m2] of the faces of tetrahedra."""
-    a, b, c = np.moveaxis(points[cells[:, FACES]], 2, 0)
+    a, b, c = np.moveaxis(mesh.points[mesh.cells[elements][:, FACES]], 2, 0)
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=2)
 
 
 def lengths(sim: State) -> np.ndarray:
     """(ne,) [m] median altitude of the elements of each element's body in the mesh."""
-    mesh = sim.the_mesh()
-    altitudes = 3.0 * sim.areas[:, None] / face_areas(mesh.points, mesh.cells)
+    altitudes = 3.0 * sim.areas[:, None] / face_areas(sim.reference, np.arange(len(sim.areas)))
     body = connectivity.bodies(sim.partner)
     order = np.argsort(body, kind="stable")
     parts = np.split(altitudes[order], np.flatnonzero(np.diff(body[order])) + 1)
@@ -118,10 +118,9 @@ class ShapesSpace:
     nodes, least = 4.0, 0.0
 
     def __init__(self, sim: State, numbers: np.ndarray) -> None:
-        mesh = sim.the_mesh()
         munjiza = sim.options.potential == MUNJIZA
         self.slope = 4.0 if munjiza else 1.0
-        self.area = face_areas(mesh.points, mesh.cells[numbers])
+        self.area = face_areas(sim.reference, numbers)
         self.double_area = Surface.of(sim).length[numbers]
         if munjiza:
             self.double_area = (3.0 * sim.areas[numbers][:, None] / self.area).mean(axis=1)

@@ -87,8 +87,8 @@ def tables(sim: Blocks) -> dict[str, Table]:
         stress0 = {f"s{k}": sim.stress0[:, k] for k in range(sim.stress0.shape[1])}
         tables["stress0"] = _whole({**stress0, "row": sim.stress0_row.astype(np.int64)}, root)
     if len(sim.born):
-        born_at = sim.birthplace.reshape(-1, 8)
-        tables["born"] = _whole({"number": sim.born, **{f"p{k}": born_at[:, k] for k in range(8)}}, root)
+        born_at = sim.birthplace.reshape(len(sim.born), -1)
+        tables["born"] = _whole({"number": sim.born, **{f"p{k}": of for k, of in enumerate(born_at.T)}}, root)
     tables |= {name: _whole(of, root) for name, of in sim.surface_loads.saved_tables().items()}
     tables |= {name: to_slabs(sim.comm, ("number",), of) for name, of in sim.surface_loads.saved_rows().items()}
     own = sim.owned
@@ -198,8 +198,8 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
             # In files without this column an initial stress did not follow the moduli: it is that of the present ones.
             sim.stress0_row[:] = tables["stress0"].get("row", sim.element_row)
         if "born" in tables:
-            born_at = np.column_stack([tables["born"][f"p{k}"] for k in range(8)])
-            sim.take_births(tables["born"]["number"].astype(np.int64), born_at.reshape(-1, 4, 2))
+            born_at = np.column_stack([tables["born"][f"p{k}"] for k in range(4 * sim.dim)])
+            sim.take_births(tables["born"]["number"].astype(np.int64), born_at.reshape(-1, 4, sim.dim))
     sim.take_definition_state(state["scene"])
     sim.clock = Clock(**state["clock"])
     sim.untouched = sim.clock.step == 0

@@ -95,9 +95,16 @@ class Blocks(State):
         self._start_with(mesh)
 
     def take_births(self, born: np.ndarray, places: np.ndarray) -> None:
-        """Elements (n,) have come back, their corners at places (n, 4, 2) [m]."""
+        """Elements (n,) have come back, their corners at places (n, 4, dim) [m]."""
         super().take_births(born, places)
-        self.areas = connectivity.areas(self.reference.points, self.reference.cells)
+        self.areas = self.reference.areas()
+
+    def _tables(self) -> type[Local]:
+        return LocalSpace if self.dim == 3 else Local
+
+    def corner_masses(self, number: np.ndarray) -> np.ndarray:
+        """(n, 4) true masses [kg/m], in space [kg], of the corners of these elements. Not collective."""
+        return self._tables().corner_masses(self, number)
 
     def place_mesh(self, mesh: Mesh) -> None:
         """The same for a mesh that is known to be good."""
@@ -672,7 +679,7 @@ class Blocks(State):
         with self.timers("halo"):
             self._store(order, cell)
         with self.timers("neighbour"):
-            self.local = LocalSpace(self) if self.dim == 3 else Local(self)
+            self.local = self._tables()(self)
             if not frozen:
                 self.origin = self.places()
                 self.listed = self.origin  # until lists are renewed without storage

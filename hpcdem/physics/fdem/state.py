@@ -160,6 +160,11 @@ class State(ModelDefinition, Model):
         return self.x.shape[1] == 12
 
     @property
+    def corners(self) -> int:
+        """Corners for which rows of elements have places."""
+        return 4 if self.wide or self.dim == 3 else 3
+
+    @property
     def stride(self) -> int:
         """Words from one corner of a row of positions or velocities to the next."""
         return 4 if self.dim == 3 else 2

@@ -27,7 +27,7 @@ class Hexes:
 
     def __init__(self, blocks: Blocks, k: np.ndarray) -> None:
         """k (hexahedra of the mesh, 6): conductivities, see `kernels_space.conductances`."""
-        mesh = blocks.the_mesh()
+        mesh = blocks.reference
         held = np.flatnonzero(blocks.where[mesh.hexes[:, 8]] >= 0)
         hexes = mesh.hexes[held]
         self.number = hexes[:, 8]

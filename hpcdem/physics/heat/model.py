@@ -178,9 +178,8 @@ class Heat(SurfaceLoad):
         """The columns of elements; the model is open."""
         cold, n = self.blocks.cold, len(self.blocks.number)
         if TEMPERATURE not in cold:
-            width = 4 if self.blocks.wide or self.blocks.dim == 3 else 3
             for name in (TEMPERATURE, GIVEN, CAPACITY):
-                cold[name] = np.zeros((n, width))
+                cold[name] = np.zeros((n, self.blocks.corners))
             cold[UNSTRESSED] = np.zeros((n, 1))
 
     def _take_unstressed(self, elements: np.ndarray) -> None:
