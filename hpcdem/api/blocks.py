@@ -232,9 +232,10 @@ class Geometry(Words):
         rotate: float | None = None,
         about: Point | None = None,
         move: Point | None = None,
+        axis: Point | None = None,
     ) -> None:
-        """Scale, then turn about a point, then move a layer."""
-        given = {"layer": layer, "scale": scale, "rotate": rotate, "about": about, "move": move}
+        """Scale, then turn about a point, in space about an axis through it, then move a layer."""
+        given = {"layer": layer, "scale": scale, "rotate": rotate, "about": about, "move": move, "axis": axis}
         self._do("geometry transform", given)
 
     def scale(self, factors: Point, layer: Sequence[str] | None = None) -> None:

@@ -481,6 +481,7 @@ IN_SPACE: list[tuple[str, str]] = [
     ("pcdc node boundary mech-m-b-c type 3 (0,1,1)", "sim.nodes.move(3, (0, 1, 1))"),
     ("pcdc node initial velocity (1,2,3)", "sim.nodes.initial_velocity((1, 2, 3))"),
     ("pcdc element-face boundary m-s-b-c stress-zz -1 range boundary", "sim.faces.stress(zz=-1, where='boundary')"),
+    ("pcdc geometry transform 'l' rotate 30 axis (1,0,0)", "sim.geometry.transform('l', rotate=30, axis=(1, 0, 0))"),
     ("pcdc element-face boundary m-s-b-c xy 1 stress-xz table 'v' yz 2", "sim.faces.stress(xy=1, xz='v', yz=2)"),
     ("pcdc element initial stress-xz 1 stress-yz 2 gradient (0,0,1)",
      "sim.elements.initial_stress(xz=1, yz=2, gradient={'yz': (0, 0, 1)})"),

@@ -100,22 +100,29 @@ def transform(
     layer: str,
     scale: float = 1.0,
     rotate: float = 0.0,
-    about: Vector = (0.0, 0.0),
-    move: Vector = (0.0, 0.0),
+    about: Vector | None = None,
+    move: Vector | None = None,
+    axis: Vector | None = None,
 ) -> None:
-    """Scale, then turn [degrees, counter-clockwise] about a point, then move a layer [m]."""
+    """Scale, then turn [degrees, counter-clockwise, in space right-handed about an axis] about a point, then move [m] a
+    layer."""
     if scale <= 0.0:
         raise CommandError(f"a scale is above 0, got {scale:g}")
-    project.layers.transform(layer, translate=move, rotate=rotate, scale=scale, about=about)
+    given = {"about": about, "translate": move, "axis": axis}
+    moved(project, [layer], scale=scale, rotate=rotate, **{k: v for k, v in given.items() if v is not None})
 
 
 def moved(project: Project, layers: Sequence[str] | None = None, **how: Any) -> None:
-    """Scale (factors along x and y) or translate [m] layers; None: all of them."""
+    """Scale (factors along the axes), turn or translate [m] layers; None: all of them."""
     every = list(project.layers) if layers is None else list(dict.fromkeys(layers))
     for layer in every:
         _ = project.layers[layer]
-    changed = {layer: [shapes.transformed(curve, **how) for curve in project.layers[layer]] for layer in every}
+    changed = {layer: [_transformed(one, **how) for one in project.layers[layer]] for layer in every}
     project.layers.curves.update(changed)
+
+
+def _transformed(one: Any, **how: Any) -> Any:
+    return (shapes if isinstance(one, shapes.Curve) else solids).transformed(one, **how)
 
 
 def export(project: Project, layers: Sequence[str], path: str) -> None:

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hpcdem.core.errors import CommandError
 
@@ -482,6 +483,62 @@ def made(kind: str, *values: Any) -> Any:
     solid = KINDS[kind](*map(_plain, values))
     solid.check()
     return solid
+
+
+_PLACES, _WAYS, _LENGTHS = {"first", "second", "centre", "corners", "about", "point"}, {"way"}, {"radius", "other"}
+"""Fields of solids that are points, go along with them, or are lengths; of the others `normal` stays upright on its
+surface, and `axis` turns as before."""
+
+
+def transformed(
+    solid: Any,
+    translate: Sequence[float] = (0.0, 0.0, 0.0),
+    rotate: float = 0.0,
+    scale: float | Sequence[float] = 1.0,
+    about: Sequence[float] = (0.0, 0.0, 0.0),
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+) -> Any:
+    """Scaled and then turned by an angle [degrees], right-handed about an axis through the point `about`, then moved by
+    `translate` [m].
+
+    A negative factor mirrors. CommandError if something round would become oval, for a solid of a CAD file, and if a
+    number is not finite or an axis or factor is zero.
+    """
+    factors = np.broadcast_to(np.array(scale, np.float64), 3)
+    numbers = np.concatenate([factors, translate, about, axis, [rotate]]).astype(np.float64)
+    if not np.isfinite(numbers).all() or not factors.all() or not any(axis):
+        raise CommandError(
+            "transform: factors, an axis, vectors and the angle must be finite, factors and axis not zero"
+        )
+    name = next(kind for kind, of in KINDS.items() if type(solid) is of)
+    if name == "brep":
+        raise CommandError("a solid of a CAD file stays as the file has it: geometry import scale, or move it in there")
+    if isinstance(solid, (Sphere, _Round, Revolved, Disc)) and np.ptp(np.abs(factors)) > 0.0:
+        raise CommandError(f"transform: factors ({', '.join(f'{f:g}' for f in factors)}) would make a {name} oval")
+    turn = Rotation.from_rotvec(math.radians(rotate) * _unit(axis)).as_matrix()
+    if rotate % 90.0 == 0.0 and np.count_nonzero(axis) == 1:
+        turn = np.round(turn)  # so that what lies along the axes stays so
+    matrix, centre = turn * factors, np.array(about, np.float64)
+    if isinstance(solid, Box) and np.count_nonzero(matrix) > 3:
+        (x, y, z), (u, v, w) = solid.bounds().tolist()
+        solid, name = made("extrude", ((x, y, z), (u, y, z), (u, v, z), (x, v, z)), (0.0, 0.0, w - z)), "extrude"
+    mirrors = float(np.prod(np.sign(factors)))
+
+    def new(field: str, value: Any) -> Any:
+        if field in _PLACES:
+            return ((np.array(value) - centre) @ matrix.T + centre + translate).tolist()
+        if field in _LENGTHS:
+            return value * abs(factors[0])
+        if field in _WAYS:
+            return (matrix @ value).tolist()
+        if field == "normal":
+            return (np.linalg.inv(matrix).T @ value).tolist()
+        return (mirrors * (matrix @ value)).tolist() if field == "axis" else value
+
+    values = [new(field, value) for field, value in asdict(solid).items()]
+    if name == "shell" and mirrors < 0.0:  # its triangles face outwards
+        values[0] = np.array(values[0]).reshape(-1, 3, 3)[:, ::-1].reshape(-1, 3).tolist()
+    return made(name, *values)
 
 
 def _plain(value: Any) -> Any:
