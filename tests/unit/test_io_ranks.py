@@ -10,8 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.halo.comm import SerialComm
 from hpcdem.io import transport
 from hpcdem.io.dat import read_dat, write_dat
 from hpcdem.io.disk import publish
