@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.dem import bonds, cycles, particles, properties, settings, walls
-from hpcdem.core.fields import VX, VY, X
+from hpcdem.core.fields import VX, VY, X, Y
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.kernels import fast, laws, slips
 from hpcdem.physics.dem.kernels.histories import Histories
@@ -75,6 +75,42 @@ def test_a_bond_is_as_stiff_as_its_length_makes_it(tmp_path: Path) -> None:
     area = laws.pair_geometry(1.5, 0.0, 1.0, 0.5)[4]
     expected = 0.8 * math.sqrt(body(sim, 1)[0] / (1e9 * area / 1.5))
     assert diagnostics.survey(sim).critical_dt == pytest.approx(expected, rel=1e-3)
+
+
+def test_what_breaks_a_contact_bond_is_the_force_that_was_given(tmp_path: Path) -> None:
+    """Of an elastic bond it is the strength times 2 Rt."""
+    sim = pair(tmp_path, overlap=-1e-4)
+    for given, area in (
+        ({"n_bond": 7.0, "s_bond": 5.0}, 1.0),
+        ({"ebmod": 1e9, "tstrength": 7.0, "sstrength": 5.0}, 4.0 / 3.0),
+    ):
+        bonds.bond(sim, tolerate=1e-3, **given)
+        cycles.prepare(sim)
+        columns = diagnostics.frame(sim).tables["bonds"].columns
+        assert columns["law_tension"] == pytest.approx([7.0 * area], rel=1e-3)
+        assert columns["law_shear"] == pytest.approx([5.0 * area], rel=1e-3)
+
+
+def test_the_highest_frequency_of_a_pair(tmp_path: Path) -> None:
+    """Shear and turning of both: k_s (1 / m + a^2 / I) of each, two springs in series."""
+    sim = pair(tmp_path)
+    arms = [1.0 - 0.05, 0.5 - 0.05]
+    freedom = sum(1.0 / m + a * a / i for a, (m, i) in zip(arms, (body(sim, 0), body(sim, 1)), strict=True))
+    assert diagnostics.highest_frequency(sim) == pytest.approx(math.sqrt(0.5 * KS * freedom), rel=1e-3)
+
+
+def test_discs_in_one_place_have_a_normal() -> None:
+    assert laws.pair_geometry(0.0, 0.0, 1.0, 0.5)[:4] == (0.0, 1.0, 0.0, 1.5)
+
+
+def test_who_crosses_a_wall_that_is_not_steep() -> None:
+    hot, out = np.zeros((1, 8)), np.zeros(1, np.int8)
+    hot[0, [X, Y]] = 1.0, 0.8
+    none, ends, still = np.zeros(1, np.int64), np.array([[0.0, 0.0, 2.0, 1.0]]), np.zeros((1, 2))
+    slips._through_walls(none, none, hot, np.array([[1.0, 0.6]]), ends, still, 0, out)
+    assert out[0] == 0
+    slips._through_walls(none, none, hot, np.array([[1.0, 0.2]]), ends, still, 0, out)
+    assert out[0] == slips.WALL
 
 
 @pytest.mark.parametrize("broken", [(0, np.inf), (2, np.inf), (3, np.nan)])
