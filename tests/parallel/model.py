@@ -13,6 +13,9 @@ from hpcdem.core.comm import SerialComm
 from hpcdem.halo.comm import MpiComm
 from hpcdem.physics.fdem import convergence, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.runtime import kept
+
+kept.install()  # else each worker and each of its ranks compiles every kernel for itself
 
 Found = dict[str, np.ndarray]
 """What became of a model: all that may not depend on ranks, and `about`, which may."""
