@@ -167,6 +167,10 @@ _RANKS = {"needs_mpi", "needs_parallel_hdf5"}
 """Fixtures of tests that start several ranks and wait for their end, however long it takes."""
 
 
+_ELSEWHERE = {"browser", "slurm"}
+"""Fixtures of tests that look at hpcdem from outside of it, through programs of others: scripts/test --nightly."""
+
+
 @pytest.hookimpl(tryfirst=True)  # before pytest sorts out what `-m` asks for
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """A mark is a promise about the machine: let it check the machine too. And who needs how much of it."""
@@ -176,6 +180,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for mark in ("mpi", "petsc"):
             if item.get_closest_marker(mark):
                 item.fixturenames.insert(0, f"needs_{mark}")
+        if item.get_closest_marker("slurm") or not _ELSEWHERE.isdisjoint(item.fixturenames):
+            item.add_marker("nightly")
         if item.get_closest_marker("slurm") or not _WATCHES.isdisjoint(item.fixturenames):
             item.add_marker("alone")
         elif not item.get_closest_marker("alone") and not _RANKS.isdisjoint(item.fixturenames):

@@ -36,6 +36,9 @@ EVERY = 60.0
 BUDGET = 120.0
 """Seconds by the clock that the tests of a change may take."""
 
+HOW = ("slow", "nightly")
+"""Marks of tests that a run leaves out unless it is asked for them by an option of this name."""
+
 
 @cache
 def measured() -> dict[str, dict[str, Any]]:
@@ -73,7 +76,7 @@ class Suite:
         self.outcomes: Counter[str] = Counter()
         self.skipped: Counter[str] = Counter()
         self.failed: dict[str, str] = {}
-        self.slow = 0
+        self.left_out: Counter[str] = Counter()
         self.reach = self.results / "reach" if self.results else None
         if self.reach:  # a pytest that a test starts is no part of this run, but the programs that it starts are
             os.environ.pop("HPCDEM_TEST_RESULTS", None)
@@ -85,7 +88,8 @@ class Suite:
     # In each process
 
     def pytest_deselected(self, items: list[pytest.Item]) -> None:
-        self.slow += sum(item.get_closest_marker("slow") is not None for item in items)
+        for item in items:
+            self.left_out.update([name for name in HOW if item.get_closest_marker(name)][:1])
 
     def pytest_runtest_setup(self, item: pytest.Item) -> None:
         """Programs that this test starts write down what they have loaded. Resident ones serve many files."""
@@ -100,7 +104,7 @@ class Suite:
 
     def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
         if not self.controls:
-            self.config.workeroutput["slow"] = self.slow  # type: ignore[attr-defined]
+            self.config.workeroutput["left_out"] = dict(self.left_out)  # type: ignore[attr-defined]
         elif self.results:
             record = {
                 "part": os.environ.get("HPCDEM_TEST_PART", "pytest"),
@@ -108,7 +112,7 @@ class Suite:
                 "outcomes": self.outcomes,
                 "skipped": self.skipped,
                 "failed": self.failed,
-                "slow": self.slow,
+                "left_out": self.left_out,
                 "files": self.seconds,
                 "exit": int(exitstatus),
             }
@@ -130,7 +134,7 @@ class Suite:
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object) -> None:
-        self.slow = max(self.slow, getattr(node, "workeroutput", {}).get("slow", 0))
+        self.left_out |= Counter(getattr(node, "workeroutput", {}).get("left_out", {}))
 
     def _expect(self, ids: Iterable[str]) -> None:
         self.asked = Counter(map(_file, ids))
@@ -202,8 +206,9 @@ def summary(folder: Path) -> int:
     skipped = sum((Counter(part["skipped"]) for part in parts), Counter[str]())
     for reason, count in skipped.most_common():
         print(f"skipped: {count} x {reason}")
-    if slow := max((part["slow"] for part in parts), default=0):
-        print(f"not run: {slow} slow tests (./scripts/test --slow)")
+    for name in HOW:
+        if count := max((part["left_out"].get(name, 0) for part in parts), default=0):
+            print(f"not run: {count} {name} tests (./scripts/test --{name})")
     failed = {name: message for part in parts for name, message in part["failed"].items()}
     for name, message in failed.items():
         print(f"failed:  {name}\n         {message}")

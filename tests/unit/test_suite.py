@@ -76,7 +76,7 @@ def part(**given: Any) -> str:
         "outcomes": {},
         "skipped": {},
         "failed": {},
-        "slow": 0,
+        "left_out": {},
         "files": {},
         "exit": 0,
     }
@@ -92,16 +92,17 @@ def test_one_summary_of_all_parts(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     (reach / "tests+b.py" / "resident").touch()
     (reach / "resident" / "1").write_text("hpcdem\nhpcdem.io")
     (tmp_path / "1.json").write_text(
-        part(part="side by side", outcomes={"passed": 7}, files={"tests/a.py": 3.0}, slow=4)
+        part(part="side by side", outcomes={"passed": 7}, files={"tests/a.py": 3.0}, left_out={"slow": 4, "nightly": 3})
     )
     (tmp_path / "2.json").write_text(
-        part(part="one by one", outcomes={"passed": 1, "failed": 1, "skipped": 2}, skipped={"no lmp": 2}, slow=1,
-             failed={"tests/a.py::test_x": "assert 1 == 2"}, files={"tests/a.py": 1.0})
+        part(part="one by one", outcomes={"passed": 1, "failed": 1, "skipped": 2}, skipped={"no lmp": 2},
+             left_out={"slow": 1}, failed={"tests/a.py::test_x": "assert 1 == 2"}, files={"tests/a.py": 1.0})
     )  # fmt: skip
     assert suite.summary(tmp_path) == 1
     said = capsys.readouterr().out
     assert said.splitlines()[-1] == "8 passed, 1 failed, 2 skipped"
     assert "2 x no lmp" in said and "4 slow tests" in said and "assert 1 == 2" in said and "1:01 min" in said
+    assert "not run: 3 nightly tests (./scripts/test --nightly)" in said
     assert "./scripts/test 'tests/a.py::test_x'" in said
     kept = json.loads(suite.MEASURED.read_text())
     assert kept["seconds"] == {"tests/a.py": 4.0}
@@ -124,7 +125,7 @@ def test_a_run_writes_down_what_it_found(tmp_path: Path) -> None:
     words = ["-n", "2", "-m", "not slow", "-o", "markers=slow: slow"]
     subprocess.run([*command, *words], cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
     (record,) = [json.loads(path.read_text()) for path in results.glob("*.json")]
-    assert record["part"] == "two" and record["exit"] == 1 and record["slow"] == 1
+    assert record["part"] == "two" and record["exit"] == 1 and record["left_out"] == {"slow": 1}
     assert record["outcomes"] == {"passed": 2, "failed": 1, "skipped": 1}
     assert record["skipped"] == {"no such thing": 1} and list(record["failed"]) == ["test_two.py::test_bad"]
     (loaded,) = (results / "reach" / "test_two.py").glob("*")
