@@ -10,8 +10,10 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, diagnostics, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.heat import kernels, reference
-from hpcdem.physics.heat.model import SAFETY, Heat
+from hpcdem.physics.field import kernels
+from hpcdem.physics.field.diffusing import SAFETY
+from hpcdem.physics.heat import reference
+from hpcdem.physics.heat.model import Heat
 from hpcdem.pre.mesh import structured
 from tests.blocks.models import COHESIVE
 from tests.blocks.support import JOINT, ROCK, model, rectangle, shaken

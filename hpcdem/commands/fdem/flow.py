@@ -12,8 +12,8 @@ from hpcdem.commands.fdem.heat import of_heat as heat_of
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import JOINT, Range
-from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.field.assigned import Number
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow import wells as w
 from hpcdem.physics.flow.model import Flow

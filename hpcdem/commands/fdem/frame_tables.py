@@ -11,12 +11,13 @@ import numpy as np
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import CONTACTS, CORNERS, FACE_CONDITIONS, FLOW_NODES, NODE_CONDITIONS
-from hpcdem.physics.fdem import diagnostics, said, sides
+from hpcdem.physics.fdem import diagnostics, sides
 from hpcdem.physics.fdem.definition import TRACTIONS
 from hpcdem.physics.fdem.groups import FLOW_NODE
 from hpcdem.physics.fdem.kernels import nodes, space
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.user_functions import Placed
+from hpcdem.physics.field import assigned
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.model import Heat
 
@@ -138,7 +139,7 @@ def _node_conditions(blocks: Blocks) -> Columns | None:
         columns[f"nodal_force_{axis}"] = table[:, force + k].copy()
     columns |= {"fixed": fixed, "constraint": kind}
     if heat is not None:
-        now = [said.now(blocks.tables, value, heat.time) for value in heat.prescribed]
+        now = [assigned.now(blocks.tables, value, heat.time) for value in heat.prescribed]
         columns["temperature"] = np.where(heat.held[numbers] > 0, np.array(now)[heat.held[numbers]], np.nan)
     return columns
 
@@ -169,7 +170,7 @@ def _face_conditions(blocks: Blocks) -> Columns | None:
         columns["water_pressure"][np.searchsorted(numbers, wet["number"])] = wet["pressure"]
     if heat is not None:
         for name in ("flux", "transfer", "environment"):
-            now = [said.now(blocks.tables, _or_nan(getattr(one, name)), heat.time) for one in heat.faces]
+            now = [assigned.now(blocks.tables, _or_nan(getattr(one, name)), heat.time) for one in heat.faces]
             columns[_OF_HEAT[name]] = np.array(now, float)[heat.face[numbers]]
     return columns
 

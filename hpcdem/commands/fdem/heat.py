@@ -12,8 +12,8 @@ from hpcdem.commands.fdem.choices import chosen, points
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, OnBoundary, Range
-from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.field.assigned import Number
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.heat.properties import ISO_HEAT
 
@@ -68,7 +68,7 @@ def of_heat(project: Project) -> Heat:
 def condition(project: Project, temperature: Number, where: Range | None = None) -> None:
     """Temperature of nodes."""
     heat = of_heat(project)
-    heat.prescribe(points(project, where), **assignments.from_now(project, heat.time, {"temperature": temperature}))
+    heat.prescribe(points(project, where), **assignments.from_now(project, heat.time, {"value": temperature}))
 
 
 def fluid_condition(project: Project, temperature: Number, where: Range | None = None) -> None:

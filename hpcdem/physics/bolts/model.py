@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.bolts import kernels, layout
 from hpcdem.physics.bolts.properties import BOLT
@@ -254,10 +255,7 @@ class Bolts(Structure):
         }  # fmt: skip
         given = found["work_of_conditions"] + self.commands
         taken = float(work[[kernels.ON_ROCK, kernels.IN_BARS, kernels.IN_GROUT, kernels.IN_DASHPOTS]].sum())
-        largest = max(map(abs, found.values()))
-        found["closing"] = stored - self._stored_at_start + taken - given
-        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
-        return found
+        return closed(found, stored - self._stored_at_start + taken - given)
 
     def _stored(self) -> float:
         bars, nodes = self.elements, self.nodes

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import GID, X, Y
 from hpcdem.core.rebuild import CheckInterval
@@ -502,10 +503,9 @@ class Coupled(SurfaceLoad):
         found["lost"] = -(discs + faces) - (stored - before)
         if self.particles.energy is not None and self.blocks.budget is not None:
             one, other = self.particles.energy.look(self.particles), of_blocks.energies(self.blocks)
-            found["closing"] = one.closing + other["closing"]
             flows = [abs(v) for name, v in vars(one).items() if name not in ("closing", "relative")]
             flows += [abs(v) for name, v in other.items() if name not in ("closing", "relative")]
-            found["relative"] = abs(found["closing"]) / max(max(flows), 1e-300)
+            return closed(found, one.closing + other["closing"], flows)
         return found
 
     # ---- state -------------------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.core.account import closed
 from hpcdem.numerics.exact_sum import exact_sum, from_integer
 from hpcdem.physics.fdem.kernels import energy, plasticity
 
@@ -138,12 +139,9 @@ class Budget:
         }
         given = work["gravity"] + work["outside"] + self.heat + by_commands
         taken = joints_lost - work["contact"] - work["viscous"] - work["plastic"] - work["creep"]
-        found["closing"] = change + taken - given
         flows = [joints_lost, *(work[name] for name in WORK[1:]), self.heat, by_commands]
         flows += [sum(map(abs, part.values())) for part in (stored, start)]
-        largest = max(map(abs, flows))
-        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
-        return found
+        return closed(found, change + taken - given, flows)
 
     def add_from_discs(self, work: int) -> None:
         """Say how much of the work from outside discs did, this rank's share, as an integer of

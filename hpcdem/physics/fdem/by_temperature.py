@@ -23,10 +23,10 @@ TEMPERATURE, UNSTRESSED = "temperature", "unstressed"
 """Columns of elements, see physics/heat/model.py."""
 
 
-def means(sim: State) -> np.ndarray:
-    """(n_own,) mean temperatures [K] of the owned elements, parts of a hexahedron have that of all of it; the model is
-    closed."""
-    mesh, t = sim.the_mesh(), sim.cold[TEMPERATURE]
+def means(sim: State, name: str = TEMPERATURE) -> np.ndarray:
+    """(n_own,) mean temperatures [K], or values of the field with this name, of the owned elements, parts of a
+    hexahedron have that of all of it; the model is closed."""
+    mesh, t = sim.the_mesh(), sim.cold[name]
     found = of_corners(mesh, sim.number[sim.owned], t)
     if len(mesh.hexes):
         hexes = sim.hex_rows()

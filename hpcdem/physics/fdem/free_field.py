@@ -53,11 +53,6 @@ class FreeField(SurfaceLoad):
         self.nodes: dict[str, np.ndarray] = {name: np.zeros((0, n), of) for name, (of, n) in _NODES.items()}
         self._wrong: str | None = None
 
-    @staticmethod
-    def there(blocks: Blocks) -> FreeField | None:
-        """Those of a model, None if it has none. Not collective."""
-        return next((load for load in blocks.surface_loads if isinstance(load, FreeField)), None)
-
     # ---- what is said --------------------------------------------------------------------------------------------
 
     @staticmethod

@@ -10,7 +10,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -68,20 +68,6 @@ class Structure(SurfaceLoad):
 
     def __len__(self) -> int:
         return len(self.nodes["x"])
-
-    @classmethod
-    def there(cls, blocks: Blocks) -> Self | None:
-        """Those of a model, None if it has none. Not collective."""
-        return next((load for load in blocks.surface_loads if isinstance(load, cls)), None)
-
-    @classmethod
-    def of(cls, blocks: Blocks) -> Self:
-        """Those of a model, made on the first call. Not collective."""
-        found = cls.there(blocks)
-        if found is None:
-            found = cls(blocks)
-            blocks.surface_loads.add(found)
-        return found
 
     @classmethod
     def node_columns(cls, dim: int) -> Columns:

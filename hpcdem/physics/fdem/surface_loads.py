@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -26,6 +26,25 @@ class SurfaceLoad(ABC):
     """Kind of the kernels that it needs besides those of blocks, see `session.KINDS`."""
     of_both: ClassVar[bool] = False
     """They are the same in the plane and in space."""
+
+    @classmethod
+    def there(cls, blocks: Any) -> Self | None:
+        """That of a model, None if it has none. Not collective."""
+        return next((load for load in blocks.surface_loads if isinstance(load, cls)), None)
+
+    @classmethod
+    def of(cls, blocks: Any) -> Self:
+        """That of a model, made on the first call. Not collective."""
+        found = cls.there(blocks)
+        if found is None:
+            found = cls.new(blocks)
+            blocks.surface_loads.add(found)
+        return found
+
+    @classmethod
+    def new(cls, blocks: Any) -> Self:
+        """One for a model that has none. Not collective."""
+        return cls(blocks)  # type: ignore[call-arg]
 
     @property
     def stays(self) -> bool:

@@ -46,11 +46,6 @@ class Water(SurfaceLoad):
         return True
 
     @staticmethod
-    def there(blocks: Blocks) -> Water | None:
-        """That of a model, None if it has none. Not collective."""
-        return next((load for load in blocks.surface_loads if isinstance(load, Water)), None)
-
-    @staticmethod
     def create(blocks: Blocks, elements: Numbers, levels: Sequence[Level], density: float) -> int:
         """Water of this density stands before faces of these elements that lie below the levels; 0: none. Returns
         before how many faces it will stand once they are free. Collective."""

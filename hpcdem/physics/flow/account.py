@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hpcdem.core.account import closed as with_closing
+
 ENTRIES = ("pumped", "leaked", "viscous", "fluid", "pushed", "strain", "joints", "fracture", "outside")
 """pumped: by conditions and wells at the pressure and height of their nodes; leaked: left with what leaks; viscous:
 lost by the flow; fluid: stored by its compression and height; pushed: done on the blocks; strain: in elements; joints:
@@ -12,5 +14,4 @@ def closed(entries: dict[str, float]) -> dict[str, float]:
     """With closing: pumped + outside - all others but pushed, and relative: that over the largest."""
     taken = ("leaked", "viscous", "fluid", "strain", "joints", "fracture")
     closing = entries["pumped"] + entries["outside"] - sum(entries[name] for name in taken)
-    largest = max(map(abs, entries.values()))
-    return {**entries, "closing": closing, "relative": abs(closing) / largest if largest > 0.0 else 0.0}
+    return with_closing(entries, closing)

@@ -16,15 +16,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
+from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.units import counted, with_prefix
-from hpcdem.halo.copies import Copies, moved
-from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import said
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, JOINT
-from hpcdem.physics.fdem.said import Number
-from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.field import assigned
+from hpcdem.physics.field.assigned import Number
+from hpcdem.physics.field.model import Assigned, Field, Travelling
 from hpcdem.physics.flow import account, kernels, kernels_space
 from hpcdem.physics.flow.network import LINKS, Network, around, at_nodes, faces_of, links_of, sides_and_free
 from hpcdem.physics.flow.properties import FLUID, POROUS
@@ -49,6 +48,8 @@ MANY = 100_000
 _PROPERTIES = tuple(one.name for one in POROUS.properties)
 _COLUMNS = ("fluid", "volume", "given", "leaked", "removed", "inflow", "pressure", "saturation")
 """Of nodes, as they are saved: kernels.W .. INFLOW, then P and S."""
+_ACCOUNT = {"given": kernels.GIVEN, "leaked": kernels.LEAKED, "removed": kernels.REMOVED}
+"""Columns of nodes in the account."""
 BY_CONDITION, BY_WELL = 1, 2
 """Bits of what says that water stands before a face, should it be free."""
 
@@ -136,7 +137,7 @@ class Slurry(Protocol):
         """The fluid has flowed by a step, also an implicit one. Collective."""
 
 
-class Flow(SurfaceLoad):
+class Flow(Assigned, Travelling, Field):
     """The fluid of a model of blocks. Methods are collective unless they say otherwise; CommandError, alike on all
     ranks, for what makes no sense.
 
@@ -148,36 +149,36 @@ class Flow(SurfaceLoad):
 
     name: ClassVar[str] = "fluid"
     kernel_kind: ClassVar[str] = "flow"
-    of_mesh: ClassVar[bool] = True
+    of_objects: ClassVar[str] = JOINT
+    model = POROUS
+    kind_of_model: ClassVar[str] = "hydraulic"
+    alike = FLUID
+    stiffens: ClassVar[bool] = True
 
     def __init__(self, blocks: Blocks) -> None:
-        self.blocks = blocks
+        Assigned.__init__(self, blocks)
+        Travelling.__init__(self)
         mesh = blocks.the_mesh()
-        self.row = np.zeros(mesh.cells.size, np.int32)
         self.since = np.full(mesh.cells.size, math.inf)
         self.condition = np.zeros(len(mesh.points), np.int32)
         self.said_wet = np.zeros(mesh.cells.size, np.int8)
-        self.rows: list[tuple[float, ...]] = []
         self._fluid: dict[str, float] = {}
         self.conditions: list[Condition] = [Condition()]
         self.wells: list[Well] = []
-        self.number = np.empty(0, np.int64)
         self.nodes = np.empty((0, kernels.NODE))
         self.state = np.empty((0, kernels.STATE))
-        self.removed = dict.fromkeys(("given", "leaked", "removed"), 0.0)
+        self.removed = dict.fromkeys(_ACCOUNT, 0.0)
         """Accounts of nodes that are gone [m2]."""
         self.energy: dict[str, float] | None = dict.fromkeys(account.ENTRIES, 0.0)
         """Of implicit steps [J/m], in space [J], see `energies`; None: not known any more."""
-        self.time = blocks.clock.time
-        self.cycles = self.waited = self.sub_steps = 0
-        self.dt = self.implicit_dt = 0.0
+        self._start_clock(blocks.clock.time)
+        self.implicit_dt = 0.0
         self.since_peak = self.passed = 0
         self._network: Network | None = None
         self._reshaped = False
         self._found_for: list[float] = []
         self._checked = False
         """The length of a sub-step that was said is one that can be."""
-        self._copies: Copies | None = None
         self.held = np.empty(0, np.int64)
         self.shore = Shore()
         self.frozen = False
@@ -207,52 +208,29 @@ class Flow(SurfaceLoad):
         return True
 
     @property
+    def keeps_time(self) -> bool:
+        return self.blocks.options.hydraulic
+
+    @property
     def implicit(self) -> bool:
         """Implicit steps are being done."""
         return self.p0 > 0.0
-
-    @staticmethod
-    def there(blocks: Blocks) -> Flow | None:
-        """That of a model, None if it has none. Not collective."""
-        return next((load for load in blocks.surface_loads if isinstance(load, Flow)), None)
-
-    @staticmethod
-    def of(blocks: Blocks) -> Flow:
-        """That of a model, made on the first call. Not collective."""
-        found = Flow.there(blocks)
-        if found is None:
-            found = Flow(blocks)
-            blocks.surface_loads.add(found)
-        return found
 
     # ---- what is said --------------------------------------------------------------------------------------------
 
     def assign(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
         """Joints (None: all) are channels with these properties. Fluid that has no room any more goes with it; new room
         is dry."""
-        at = self.blocks.numbers_of_joints(joints)
+        at = self._numbers(joints)
         if not len(at):
             raise CommandError("there is no joint here that could be a channel")
-        self._put(at, self.blocks.complete(JOINT, at, POROUS, {}, given))
+        super().assign(at, given)
 
-    def adjust(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
-        """Change some properties of channels among these joints; None: of all channels."""
-        at = self.network.channels if joints is None else self.blocks.numbers_of_joints(joints)
-        bare = at[self.row[at] == 0]
-        if len(bare):
-            raise CommandError(f"{JOINT} {bare[0]} has no hydraulic model whose properties could be changed")
-        old = np.array(self.rows)[self.row[at] - 1]
-        self._put(at, self.blocks.complete(JOINT, at, POROUS, dict(zip(_PROPERTIES, old.T)), given))
+    def _have_it(self) -> np.ndarray:
+        return self.network.channels
 
-    def _put(self, at: np.ndarray, values: np.ndarray) -> None:
-        """Channels (n,) have these complete properties, (n, k) or (1, k) for all."""
-        blocks = self.blocks
-        rows, row = said.with_rows(self.rows, self.row, at, values)
-        said.refuse_different(rows, row, _PROPERTIES, FLUID, "there is one fluid in all channels")
-        blocks.before_change()
-        self.rows, self.row, self._found_for, self._fluid = rows, row, [], {}
-        self._network, self._reshaped = None, True
-        blocks.changed()
+    def _assigned(self) -> None:
+        self._found_for, self._fluid, self._network, self._reshaped = [], {}, None, True
 
     def prescribe(self, nodes: np.ndarray | None, does: int, value: Number) -> None:
         """What holds at flow nodes among these points (None: all) from now on, see `Condition`. A pressure or a level
@@ -264,14 +242,11 @@ class Flow(SurfaceLoad):
             both = np.intersect1d(well.points, at)
             if len(both):
                 raise CommandError(f"node {both[0]} belongs to well '{well.name}', whose stages say what holds there")
-        values = said.checked(self.blocks.tables, value, "a condition of a flow node")
+        values = assigned.checked(self.blocks.tables, value, "a condition of a flow node")
         if does == kernels.PRESSURE and values.min() < 0.0:
             raise CommandError(f"the pressure of a fluid must not be negative, got {values.min():g} Pa")
         self.blocks.before_change()
-        wanted = Condition(does, value)
-        if wanted not in self.conditions:
-            self.conditions.append(wanted)
-        row = self.conditions.index(wanted)
+        row = assigned.row_of(self.conditions, Condition(does, value))
         self.condition[at], self.condition[beside] = row, 0 if does == kernels.RATE else row
         if does == kernels.RATE:
             self._dry(np.union1d(at, beside))
@@ -319,7 +294,7 @@ class Flow(SurfaceLoad):
     def stage(self, name: str, does: str, value: Number, duration: float, limit: float) -> None:
         """One more stage of a well, see `Stage`; duration [s] of flow time."""
         well = self.well(name)
-        values = said.checked(self.blocks.tables, value, f"the {does} of a well")
+        values = assigned.checked(self.blocks.tables, value, f"the {does} of a well")
         if does == HELD and values.min() < 0.0:
             raise CommandError(f"the pressure of a well must not be negative, got {values.min():g} Pa")
         if not duration > 0.0:
@@ -339,23 +314,19 @@ class Flow(SurfaceLoad):
 
     def set_clock(self, time: float) -> None:
         """The clock of flow shows this time [s]; stages of wells and leak-off go on as they were."""
-        self.blocks.before_change()
         ahead = time - self.time
+        super().set_clock(time)
         self.since += ahead
         for well in self.wells:
             well.stages = [replace(one, begin=one.begin + ahead, end=one.end + ahead) for one in well.stages]
-        self.time = time
-        self.blocks.changed(stiffness=False)
 
     def remove_conditions(self, nodes: np.ndarray | None) -> None:
         """Take back what is prescribed at these points (None: all)."""
-        self.blocks.before_change()
-        self.condition[slice(None) if nodes is None else nodes] = 0
+        self._unset(self.condition, nodes)
         if nodes is None:
             self.said_wet &= ~BY_CONDITION
         else:
             self._dry(nodes)
-        self.blocks.changed(stiffness=False)
 
     def fill(self, nodes: np.ndarray | None, pressure: float | None = None, saturation: float | None = None) -> None:
         """Flow nodes among these points (None: all) hold fluid of this pressure [Pa], or fill this part of their
@@ -400,7 +371,7 @@ class Flow(SurfaceLoad):
         """Whether a node or a stage that is not over follows this table. Not collective."""
         stages = (one for well in self.wells for one in well.stages)
         return any(one.value == name and one.end > self.time for one in stages) or any(
-            self.conditions[row].value == name for row in np.unique(self.condition).tolist()
+            one.value == name for one in assigned.in_use(self.conditions, self.condition)
         )
 
     def fluid(self, name: str) -> float:
@@ -555,14 +526,10 @@ class Flow(SurfaceLoad):
         the beginning, stored, leaked into the rock, removed with channels that were taken away; closing: what does not
         add up, relative: that over the largest."""
         self.blocks.close_model()
-        comm, nodes = self.blocks.comm, self.nodes
-        found = {"stored": exact_sum(nodes[:, kernels.W], comm)}
-        for name, column in (("given", kernels.GIVEN), ("leaked", kernels.LEAKED), ("removed", kernels.REMOVED)):
-            found[name] = exact_sum(np.append(nodes[:, column], self.removed[name] if comm.rank == 0 else 0.0), comm)
-        largest = max(map(abs, found.values()))
-        found["closing"] = found["given"] - found["stored"] - found["leaked"] - found["removed"]
-        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
-        return found
+        found = {"stored": self._sum(self.nodes[:, kernels.W])}
+        for name, column in _ACCOUNT.items():
+            found[name] = self._sum(self.nodes[:, column], self.removed[name])
+        return closed(found, found["given"] - found["stored"] - found["leaked"] - found["removed"])
 
     def energies(self) -> dict[str, float]:
         """The energy of the fluid and the blocks in implicit steps [J/m], in space [J]: `account.ENTRIES`, what does
@@ -763,16 +730,10 @@ class Flow(SurfaceLoad):
         self._forget_nodes(~network.there[self.number])
         n = len(self.number)
         had = np.column_stack([self.nodes, self.state[:n, : kernels.E]])
-        rows, owner = moved(comm, points, self.number, had, mine, wanted)
-        order = np.lexsort((wanted, owner))
-        wanted, owner = wanted[order], owner[order]
-        self.number, self.nodes = mine, np.ascontiguousarray(rows[:, : kernels.NODE])
-        count = len(mine) + len(wanted)
-        self.state = np.zeros((count + len(self.shore), kernels.STATE))
+        rows, wanted = self._fetch(had, mine, wanted, kernels.STATE, len(self.shore))
+        self.nodes = np.ascontiguousarray(rows[:, : kernels.NODE])
         self.state[: len(mine), : kernels.E] = rows[:, kernels.NODE :]
-        if self._copies is not None:
-            self._copies.close()
-        self._copies = Copies(comm, mine, wanted, owner, self.state)
+        count = len(mine) + len(wanted)
         self.held = np.concatenate([mine, wanted])
         local = np.full(points, -1, np.int64)
         local[mine], local[wanted] = np.arange(len(mine)), len(mine) + np.arange(len(wanted))
@@ -803,7 +764,7 @@ class Flow(SurfaceLoad):
             )
         self._shrink()
         self._take_heights()
-        self._copies.refresh()
+        self._refresh()
         self.find_shore()
         self._reshaped = self._checked = False
         if self._found_for != self._given():
@@ -813,14 +774,11 @@ class Flow(SurfaceLoad):
 
     def _forget_nodes(self, gone: np.ndarray) -> None:
         """Fluid of nodes (n,) bool that are no longer there is gone with them; their accounts are kept."""
-        comm = self.blocks.comm
-        if not comm.any(bool(gone.any())):
+        if not self.blocks.comm.any(bool(gone.any())):
             return
         self.nodes[gone, kernels.REMOVED] += self.nodes[gone, kernels.W]
-        for name, column in (("given", kernels.GIVEN), ("leaked", kernels.LEAKED), ("removed", kernels.REMOVED)):
-            self.removed[name] = exact_sum(
-                np.append(self.nodes[gone, column], self.removed[name] if comm.rank == 0 else 0.0), comm
-            )
+        for name, column in _ACCOUNT.items():
+            self.removed[name] = self._sum(self.nodes[gone, column], self.removed[name])
         self.state = self.state[: len(gone)][~gone]
         self.number, self.nodes = self.number[~gone], self.nodes[~gone]
 
@@ -872,10 +830,6 @@ class Flow(SurfaceLoad):
         if self.blocks.dim == 3:
             along += o.gz * flat[self._lead + 2]
         self.state[: len(self.number), kernels.E] = -rho * along
-
-    def _refresh(self) -> None:
-        if self._copies is not None:
-            self._copies.refresh()
 
     def _begins(self, corner: np.ndarray) -> np.ndarray:
         """Where corners, element * 4 + k, begin in x, flat."""
@@ -953,9 +907,7 @@ class Flow(SurfaceLoad):
 
     def mesh_replaced(self) -> None:
         """There is another mesh: `of_mesh` says that this is gone with the one before."""
-        if self._copies is not None:
-            self._copies.close()
-            self._copies = None
+        self.close()
 
     # ---- the clock -----------------------------------------------------------------------------------------------
 
@@ -970,11 +922,6 @@ class Flow(SurfaceLoad):
         o = self.blocks.options
         switches = [float(o.mechanical), float(o.dynamic), float(o.flow_every), float(o.flow_steps), o.flow_dt]
         return [*switches, *self._gravity(), self.blocks.clock.dt if o.mechanical else 0.0]
-
-    def _gravity(self) -> list[float]:
-        """By components [m/s2]."""
-        o = self.blocks.options
-        return [o.gx, o.gy, o.gz][: self.blocks.dim]
 
     def _find_step(self) -> None:
         """Sub-steps of a cycle and their length, from what was said and what is stable."""
@@ -1050,8 +997,7 @@ class Flow(SurfaceLoad):
         least = float(self.blocks.comm.min_into(np.array([least]))[0])
         if self.dt > FAR * least:
             said_by = "time-step" if self.blocks.options.flow_dt > 0.0 else "sub-step"
-            first = self.number[stable == least].min(initial=len(self.condition))
-            first = int(self.blocks.comm.min_into(np.array([first], np.int64))[0])
+            first = self._lowest(self.number[stable == least])
             raise CommandError(
                 f"model {said_by} hydraulic: sub-steps of {self.dt:.4g} s are {self.dt / least:.3g} times what is "
                 f"stable at flow node {first}, {least:.4g} s, and the flow would blow up: make them shorter, or use "
@@ -1156,7 +1102,7 @@ class Flow(SurfaceLoad):
         if not np.isfinite(room).all():
             raise self._blown_up(int(at[~np.isfinite(room).all(axis=0)][0]))
         after, bulk = np.empty(len(at)), self.fluid("fluid_bulk")
-        value_at = partial(said.now, self.blocks.tables)
+        value_at = partial(assigned.now, self.blocks.tables)
         ends = np.cumsum([len(one) for one in points])
         for well, begin, end in zip(self.wells, [0, *ends[:-1].tolist()], ends.tolist()):
             if end > begin:
@@ -1178,7 +1124,7 @@ class Flow(SurfaceLoad):
     def asked_of(self, well: Well, time: float, dt: float, passes: bool) -> Asked:
         """What a well does in an implicit step of dt [s] from this time on; passes: time does, else in so long by what
         it does now. Not collective."""
-        value = partial(said.now, self.blocks.tables)
+        value = partial(assigned.now, self.blocks.tables)
         if passes:
             return well.asked(time, time + dt, value)
         return well.asked_now(time, dt, value)
@@ -1196,16 +1142,14 @@ class Flow(SurfaceLoad):
         table = np.zeros((len(self.conditions), 2))
         height = self.fluid("fluid_density") * math.hypot(*self._gravity())
         for row, one in enumerate(self.conditions):
-            value = said.now(self.blocks.tables, one.value, time)
+            value = assigned.now(self.blocks.tables, one.value, time)
             table[row] = one.does, value * height if one.does == kernels.SURFACE else value
         return table
 
     def _check(self) -> None:
         """Stop on all ranks if the flow has blown up."""
-        bad = ~np.isfinite(self.nodes[:, kernels.W])
-        comm = self.blocks.comm
-        first = int(comm.min_into(np.array([self.number[bad].min(initial=len(self.condition))], np.int64))[0])
-        if first < len(self.condition):
+        first = self._lowest(self.number[~np.isfinite(self.nodes[:, kernels.W])])
+        if first >= 0:
             raise self._blown_up(first)
 
     def _blown_up(self, node: int) -> PhysicsError:
@@ -1254,9 +1198,8 @@ class Flow(SurfaceLoad):
     def saved_state(self) -> dict[str, Any]:
         """All but the columns, as JSON values."""
         return {
-            "rows": [[v if math.isfinite(v) else None for v in row] for row in self.rows],
-            "conditions": [asdict(one) for one in self.conditions], "removed": self.removed, "time": self.time,
-            "cycles": self.cycles, "waited": self.waited, "sub_steps": self.sub_steps, "dt": self.dt,
+            **self._saved_clock(), "rows": self._saved_properties(),
+            "conditions": [asdict(one) for one in self.conditions], "removed": self.removed,
             "implicit_dt": self.implicit_dt, "since_peak": self.since_peak, "passed": self.passed,
             "reshaped": self._reshaped, "found_for": self._found_for, "wells": [well.saved() for well in self.wells],
             "energy": self.energy, "p0": self.p0, "frozen": self.frozen,
@@ -1264,13 +1207,11 @@ class Flow(SurfaceLoad):
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
         """Channels with their properties, prescribed nodes, and faces said to be wet, of all ranks; see `condensed`."""
-        channels, points = np.flatnonzero(self.row), np.flatnonzero(self.condition)
-        faces = np.flatnonzero(self.said_wet)
+        channels, faces = assigned.numbered(self.row), np.flatnonzero(self.said_wet)
         at = {} if self.condensed is None else {"flow_condensed": dict(zip("xyz", self.condensed.T))}
         return at | {
-            "flow_channels": {"number": channels, "row": self.row[channels].astype(np.int64),
-                              "since": self.since[channels]},
-            "flow_conditions": {"number": points, "row": self.condition[points].astype(np.int64)},
+            "flow_channels": {**channels, "since": self.since[channels["number"]]},
+            "flow_conditions": assigned.numbered(self.condition),
             "flow_wet": {"number": faces, "said": self.said_wet[faces].astype(np.int64)},
         }  # fmt: skip
 
@@ -1293,25 +1234,22 @@ class Flow(SurfaceLoad):
     def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
         """Inverse of these: the blocks have this fluid; nodes go to their owners with the first storage."""
         made = Flow.of(blocks)
-        later = [one.default for one in POROUS.properties]  # properties that the file does not know yet
-        made.rows = [
-            (*(math.inf if v is None else v for v in row), *(v or 0.0 for v in later[len(row) :]))
-            for row in state["rows"]
-        ]
+        made._restore_properties(state["rows"])
+        made._restore_clock(state)
         made.wells = [Well.restored(one) for one in state["wells"]]
         made.conditions = [Condition(**one) for one in state["conditions"]]
-        made.removed, made.time = dict(state["removed"]), state["time"]
+        made.removed = dict(state["removed"])
         made.energy, made.p0 = state.get("energy", made.energy), state.get("p0", 0.0)
         if "flow_condensed" in tables:
             at = tables["flow_condensed"]
             made.condensed = np.column_stack([at[axis] for axis in "xyz" if axis in at])
-        made.cycles, made.waited = state["cycles"], state["waited"]
-        made.sub_steps, made.dt, made.implicit_dt = state["sub_steps"], state["dt"], state.get("implicit_dt", 0.0)
+        made.implicit_dt = state.get("implicit_dt", 0.0)
         made.since_peak, made.passed = state.get("since_peak", 0), state.get("passed", 0)
         made._reshaped, made._found_for = state["reshaped"], state["found_for"]
         channels, points, nodes = (tables[f"flow_{name}"] for name in ("channels", "conditions", "nodes"))
-        made.row[channels["number"]], made.since[channels["number"]] = channels["row"], channels["since"]
-        made.condition[points["number"]] = points["row"]
+        assigned.put_back(made.row, channels)
+        made.since[channels["number"]] = channels["since"]
+        assigned.put_back(made.condition, points)
         if "flow_wet" in tables:
             made.said_wet[tables["flow_wet"]["number"]] = tables["flow_wet"]["said"]
         else:

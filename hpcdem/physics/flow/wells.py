@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.said import Number
+from hpcdem.physics.field.assigned import Number
 
 SHUT, RATE, PRESSURE = "shut_in", "rate", "pressure"
 QUANTITIES = {

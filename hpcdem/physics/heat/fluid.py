@@ -16,16 +16,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import reduce
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.copies import Copies, moved
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import said
 from hpcdem.physics.fdem.properties import JOINT
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.field import assigned
+from hpcdem.physics.field.model import Assigned, Travelling
 from hpcdem.physics.flow import kernels as flowing
 from hpcdem.physics.flow.network import LINKS, at_nodes, links_of
 from hpcdem.physics.heat import kernels
@@ -54,15 +54,12 @@ FACING = {2: [1, 0], 3: [0, 2, 1]}
 """By dimensions of space: which corner of the other face faces each of the lower one."""
 LEAST = 1e-3
 """Part of its length that a link leads along the flow at least."""
-ALIKE = ("conductivity", "capacity", "second_order")
-"""Properties of the fluid: the same in all channels."""
-_NAMES = tuple(one.name for one in FLUID_HEAT.properties)
 _COLUMNS = ("temperature", "given", "had")
 """Of nodes, as they are saved: temperature [K], heat that came with fluid and by conditions [J/m], and the fluid at the
 end of the last cycle [m2]."""
 
 
-class FluidHeat:
+class FluidHeat(Assigned, Travelling):
     """The heat of the fluid of a model with heat. Methods are collective unless they say otherwise.
 
     row (4 ne,): of the table of properties, by joint, 0: none; held (np,): row of the prescribed temperatures of the
@@ -70,19 +67,21 @@ class FluidHeat:
     kernels.FLUID_STATE): of them and of other ranks' nodes beside this rank's elements.
     """
 
+    of_objects: ClassVar[str] = JOINT
+    model = FLUID_HEAT
+    kind_of_model: ClassVar[str] = "thermal"
+    alike: ClassVar[tuple[str, ...]] = ("conductivity", "capacity", "second_order")
+
     def __init__(self, heat: Rock, flow: Flow) -> None:
-        self.heat, self.flow, self.blocks = heat, flow, heat.blocks
-        mesh = self.blocks.the_mesh()
-        self.row = np.zeros(mesh.cells.size, np.int32)
-        self.held = np.zeros(len(mesh.points), np.int32)
-        self.rows: list[tuple[float, ...]] = []
-        self.number = np.empty(0, np.int64)
+        Assigned.__init__(self, heat.blocks)
+        Travelling.__init__(self)
+        self.heat, self.flow = heat, flow
+        self.held = np.zeros(len(self.blocks.the_mesh().points), np.int32)
         self.given, self.had = np.empty(0), np.empty(0)
         self.state = np.empty((0, kernels.FLUID_STATE))
         self.rho_c = 0.0
         self.sub_steps = 0
         self.rate = 0.0
-        self._copies: Copies | None = None
         self._told_obtuse = False
         self._new = np.empty(0, np.int64)
         flow.carried = np.empty(0)
@@ -98,30 +97,13 @@ class FluidHeat:
         if len(dry) or not len(at):
             which = f"joint {dry[0]} is no channel" if len(dry) else "there are no channels yet"
             raise CommandError(f"{which}: face-joint c-model hydraulic-porous-medium comes first")
-        self._put(at, self.blocks.complete(JOINT, at, FLUID_HEAT, {}, given))
-
-    def adjust(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
-        """Change some properties of channels that have the model; None: of all that have it."""
-        at = np.flatnonzero(self.row) if joints is None else self.blocks.numbers_of_joints(joints)
-        bare = at[self.row[at] == 0]
-        if len(bare):
-            raise CommandError(f"{JOINT} {bare[0]} has no thermal model whose properties could be changed")
-        old = np.array(self.rows)[self.row[at] - 1]
-        self._put(at, self.blocks.complete(JOINT, at, FLUID_HEAT, dict(zip(_NAMES, old.T)), given))
-
-    def _put(self, at: np.ndarray, values: np.ndarray) -> None:
-        rows, row = said.with_rows(self.rows, self.row, at, values)
-        said.refuse_different(rows, row, _NAMES, ALIKE, "there is one fluid in all channels")
-        self.blocks.before_change()
-        self.rows, self.row = rows, row
-        self.blocks.changed(stiffness=False)
+        super().assign(at, given)
 
     def prescribe(self, nodes: np.ndarray | None, row: int) -> None:
         """Fluid at flow nodes among these points (None: all) has this row of the prescribed temperatures."""
         at = self.flow.flow_nodes(nodes)
-        self.blocks.before_change()
-        self.held[at] = row
-        self.blocks.changed(stiffness=False)
+        with self.changing():
+            self.held[at] = row
 
     def initial(self, points: np.ndarray, temperature: float) -> None:
         """Flow nodes among these points (n,) have this temperature now."""
@@ -131,10 +113,6 @@ class FluidHeat:
         self.state[: len(self.number)][mine, kernels.T] = temperature
         self.heat.accounts["commands"] += self.content() - before
         self._refresh()
-
-    def constant(self, name: str) -> float:
-        """One that is the same everywhere. Not collective."""
-        return self.rows[self.row[np.argmax(self.row > 0)] - 1][_NAMES.index(name)]
 
     def check(self) -> None:
         """CommandError if a channel lacks a thermal model. Not collective."""
@@ -161,7 +139,7 @@ class FluidHeat:
 
     def bind(self) -> None:
         """Elements have other rows or owners, there are other channels, or something was said."""
-        blocks, flow, comm, network = self.blocks, self.flow, self.blocks.comm, self.flow.network
+        blocks, flow, network = self.blocks, self.flow, self.flow.network
         self._forget(~network.there[self.number])
         if not self.on:
             return
@@ -172,16 +150,10 @@ class FluidHeat:
         self.channels, ends = network.channels[here], links_of(network.corners[here])
         n, wanted = len(self.number), np.setdiff1d(ends, mine)
         had = np.column_stack([self.state[:n, kernels.T], self.given, self.had, np.ones(n)])
-        rows, owner = moved(comm, points, self.number, had, mine, wanted)
-        order = np.lexsort((wanted, owner))
-        wanted, owner = wanted[order], owner[order]
-        self.number = mine.copy()
+        rows, wanted = self._fetch(had, mine, wanted, kernels.FLUID_STATE)
         self.given, self.had = rows[:, 1].copy(), rows[:, 2].copy()
         self._new = np.flatnonzero(rows[:, 3] == 0.0)
-        self.state = np.zeros((len(mine) + len(wanted), kernels.FLUID_STATE))
         self.state[: len(mine), kernels.T] = rows[:, 0]
-        self.close()
-        self._copies = Copies(comm, mine, wanted, owner, self.state)
         local = np.full(points, -1, np.int64)
         local[mine], local[wanted] = np.arange(len(mine)), len(mine) + np.arange(len(wanted))
         self._ends = np.ascontiguousarray(local[ends])
@@ -246,8 +218,7 @@ class FluidHeat:
 
     def transfers(self, channels: np.ndarray) -> np.ndarray:
         """Transfer coefficients of channels (m,) [W/(m2 K)]. Not collective."""
-        h = np.array([0.0, *(row[_NAMES.index("transfer_coeficient")] for row in self.rows)])
-        return h[self.row[channels]]
+        return self.column("transfer_coeficient")[self.row[channels]]
 
     @property
     def links(self) -> int:
@@ -301,18 +272,6 @@ class FluidHeat:
         """What walls pass on at most at corners (flat) per degree [W/(m K)]. Not collective."""
         there = self._walls >= 0
         np.add.at(corner, self._walls[there], np.repeat(self._exchange, 4)[there.reshape(-1)])
-
-    def close(self) -> None:
-        """Give the requests back to MPI."""
-        if self._copies is not None:
-            self._copies.close()
-            self._copies = None
-
-    def _refresh(self) -> None:
-        if self._copies is not None:
-            self._copies.refresh()
-
-    # ---- the step ------------------------------------------------------------------------------------------------
 
     def begin_cycle(self, period: float) -> None:
         """Flow of a cycle of heat that takes so long [s]: the mean of the last cycle of flow, or that of this moment
@@ -424,15 +383,12 @@ class FluidHeat:
 
     def saved_state(self) -> dict[str, Any]:
         """As JSON values."""
-        return {"rows": [list(row) for row in self.rows], "rho_c": self.rho_c}
+        return {"rows": self._saved_properties(), "rho_c": self.rho_c}
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
         """Channels with their properties, prescribed nodes, of all ranks."""
-        found = {}
-        for name, rows in (("channels", self.row), ("flow_nodes", self.held)):
-            at = np.flatnonzero(rows)
-            found[f"heat_{name}"] = {"number": at, "row": rows[at].astype(np.int64)}
-        return found
+        rows = {"heat_channels": self.row, "heat_flow_nodes": self.held}
+        return {name: assigned.numbered(row) for name, row in rows.items()}
 
     def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
         """What this rank's flow nodes hold."""
@@ -441,10 +397,10 @@ class FluidHeat:
 
     def restore(self, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
         """Inverse of these."""
-        self.rows, self.rho_c = [tuple(row) for row in state["rows"]], state["rho_c"]
-        for name, rows in (("channels", self.row), ("flow_nodes", self.held)):
-            table = tables[f"heat_{name}"]
-            rows[table["number"]] = table["row"]
+        self._restore_properties(state["rows"])
+        self.rho_c = state["rho_c"]
+        assigned.put_back(self.row, tables["heat_channels"])
+        assigned.put_back(self.held, tables["heat_flow_nodes"])
         nodes = tables["fluid_heat"]
         self.number = nodes["number"].astype(np.int64)
         self.given, self.had = nodes["given"].copy(), nodes["had"].copy()

@@ -20,10 +20,10 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import connectivity, equilibrium
 from hpcdem.physics.fdem.linear import Direct, Petsc, Pieces, Unknowns
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.heat import kernels
-from hpcdem.physics.heat.hexes import Hexes
+from hpcdem.physics.field import kernels
+from hpcdem.physics.field.hexes import Hexes
 from hpcdem.physics.heat.implicit_fluid import Fluid
-from hpcdem.physics.heat.model import CAPACITY, GIVEN, TEMPERATURE, Heat
+from hpcdem.physics.heat.model import Heat
 
 MOST, PLENTY, CHANGE = 100, 40, 1e-7
 """Solutions of the linear system in a step with advection of second order: how many at most, from which on changes
@@ -111,7 +111,7 @@ class Implicit:
         self._prepare(dt, fluid)
         assert self.solver is not None
         begin, corner, held = heat.nodes
-        flat, before = heat.t.reshape(-1), sim.cold[TEMPERATURE].copy()
+        flat, before = heat.t.reshape(-1), sim.cold[heat.quantity].copy()
         old = flat[corner[begin[:-1]]].copy()
         new = np.where(held >= 0, np.append(heat.held_at(after), 0.0)[held], old)
         inertia = heat.capacity / dt
@@ -187,7 +187,7 @@ class Implicit:
         if math.isfinite(dt):
             brought = np.where(held >= 0, brought - dt * (self._inflow(time, dt) + walls), 0.0)
         lead = corner[begin[:-1]][self._mine] - sim.owned.start * heat.t.shape[1]
-        sim.cold[GIVEN].reshape(-1)[lead] += brought[self._mine]
+        sim.cold[heat.given].reshape(-1)[lead] += brought[self._mine]
 
     # ---- the matrix ------------------------------------------------------------------------------------------------
 
@@ -241,7 +241,7 @@ class Implicit:
         sim, heat = self.sim, self.heat
         own, number = sim.owned, sim.number[sim.owned]
         quad = sim.the_mesh().cells[number, 3] >= 0
-        g, capacity = heat.conductances[own], sim.cold[CAPACITY]
+        g, capacity = heat.conductances[own], sim.cold[heat.capacities]
         found = []
         for rows, k, pairs in ((~quad, 3, 3), (quad, 4, 6)):
             at = np.flatnonzero(rows)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.connectivity import corner_counts, face_points
@@ -306,10 +307,7 @@ class Liners(Structure):
         }  # fmt: skip
         given = found["work_of_conditions"] + found["work_of_gravity"] + self.commands
         taken = found["work_on_rock"] + found["lost_in_beams"] + found["lost_in_bond"]
-        largest = max(map(abs, found.values()))
-        found["closing"] = found["stored"] - self._stored_at_start + taken - given
-        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
-        return found
+        return closed(found, found["stored"] - self._stored_at_start + taken - given)
 
     def _stored(self) -> float:
         parts = [kernels.stored(self.elements["force"], self._element_table)]

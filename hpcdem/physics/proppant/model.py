@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
-from hpcdem.halo.copies import Copies, moved
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import said
-from hpcdem.physics.fdem.said import Number
-from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+from hpcdem.physics.field import assigned
+from hpcdem.physics.field.assigned import Number
+from hpcdem.physics.field.model import Field, Travelling
 from hpcdem.physics.flow import kernels as flowing
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.network import LINKS
@@ -56,7 +56,7 @@ def checked(given: Mapping[str, Any]) -> dict[str, float]:
     return PROPPANT.complete(given)
 
 
-class Proppant(SurfaceLoad):
+class Proppant(Travelling, Field):
     """The proppant of a model with fluid. Methods are collective unless they say otherwise; CommandError, alike on all
     ranks, for what makes no sense.
 
@@ -66,25 +66,23 @@ class Proppant(SurfaceLoad):
 
     name: ClassVar[str] = "proppant"
     kernel_kind: ClassVar[str] = "proppant"
-    of_mesh: ClassVar[bool] = True
 
     def __init__(self, blocks: Blocks, flow: Flow) -> None:
+        super().__init__()
         self.blocks, self.flow = blocks, flow
         mesh = blocks.the_mesh()
         self.values: dict[str, float] = {}
         self.carries = np.zeros(mesh.cells.size, bool)
         self.condition = np.zeros(len(mesh.points), np.int32)
         self.conditions: list[tuple[str, Number]] = [("", 0.0)]
-        self.number = np.empty(0, np.int64)
         self.nodes = np.empty((0, kernels.NODE))
         self.state = np.empty((0, kernels.STATE))
         self.given = np.empty(0)
         self.accounts = dict.fromkeys(("came", "left", "removed"), 0.0)
         """Of nodes that are gone, and what went with room that is gone [m2]."""
-        self.time = flow.time
-        self.cycles, self.sub_steps = 0, 1
+        self._start_clock(flow.time)
+        self.sub_steps = 1
         self._held: np.ndarray | None = None
-        self._copies: Copies | None = None
         self._refused = self._told = 0.0
         flow.slurry = self
         flow.carried = np.empty(0) if flow.carried is None else flow.carried
@@ -97,19 +95,9 @@ class Proppant(SurfaceLoad):
         """Not if a pack pushes on walls, the less the farther they go."""
         return not self.values.get("proppant_modulus", 0.0) > 0.0
 
-    @staticmethod
-    def there(blocks: Blocks) -> Proppant | None:
-        """That of a model, None if it has none. Not collective."""
-        return next((load for load in blocks.surface_loads if isinstance(load, Proppant)), None)
-
-    @staticmethod
-    def of(blocks: Blocks) -> Proppant:
-        """That of a model with fluid, made on the first call. Not collective."""
-        found = Proppant.there(blocks)
-        if found is None:
-            found = Proppant(blocks, Flow.of(blocks))
-            blocks.surface_loads.add(found)
-        return found
+    @classmethod
+    def new(cls, blocks: Blocks) -> Proppant:
+        return cls(blocks, Flow.of(blocks))
 
     # ---- what is said --------------------------------------------------------------------------------------------
 
@@ -152,9 +140,8 @@ class Proppant(SurfaceLoad):
                     f"there is one proppant in all channels, but {name} is {before[name]:g} and {values[name]:g}"
                 )
         limit = values["proppant_concentration_limit"]
-        for row in np.unique(self.condition).tolist():
-            kind, value = self.conditions[row]
-            if kind == CONCENTRATION and said.checked(self.blocks.tables, value, kind).max() > limit:
+        for kind, value in assigned.in_use(self.conditions, self.condition):
+            if kind == CONCENTRATION and assigned.checked(self.blocks.tables, value, kind).max() > limit:
                 raise CommandError(f"slurry that comes in would be thicker than a pack, {limit:g}: change it first")
         self.values = values
 
@@ -162,23 +149,19 @@ class Proppant(SurfaceLoad):
         """The concentration of slurry that comes in at flow nodes among these points (None: all) from now on, or a
         volume rate of proppant [m2/s] at each of them."""
         at = self._nodes(nodes)
-        values = said.checked(self.blocks.tables, value, f"the {kind} of proppant")
+        values = assigned.checked(self.blocks.tables, value, f"the {kind} of proppant")
         limit = self.values["proppant_concentration_limit"]
         if values.min() < 0.0 or (kind == CONCENTRATION and values.max() > limit):
             most = f" and at most that of a pack, {limit:g}" if kind == CONCENTRATION else ""
             wrong = values.min() if values.min() < 0.0 else values.max()
             raise CommandError(f"the {kind} of proppant must not be negative{most}, got {wrong:g}")
         self.blocks.before_change()
-        if (kind, value) not in self.conditions:
-            self.conditions.append((kind, value))
-        self.condition[at] = self.conditions.index((kind, value))
+        self.condition[at] = assigned.row_of(self.conditions, (kind, value))
         self.blocks.changed(stiffness=False)
 
     def remove_conditions(self, nodes: np.ndarray | None) -> None:
         """Take back what is prescribed at these points (None: all)."""
-        self.blocks.before_change()
-        self.condition[slice(None) if nodes is None else nodes] = 0
-        self.blocks.changed(stiffness=False)
+        self._unset(self.condition, nodes)
 
     def fill(self, nodes: np.ndarray | None, concentration: float) -> None:
         """The slurry of flow nodes among these points (None: all) has this concentration now."""
@@ -200,7 +183,7 @@ class Proppant(SurfaceLoad):
         self.flow.find_geometry()
 
     def uses_table(self, name: str) -> bool:
-        return any(self.conditions[row][1] == name for row in np.unique(self.condition).tolist())
+        return any(value == name for _, value in assigned.in_use(self.conditions, self.condition))
 
     # ---- what is asked -------------------------------------------------------------------------------------------
 
@@ -213,18 +196,12 @@ class Proppant(SurfaceLoad):
         """Volumes of proppant [m2]: came by conditions and at the beginning, stored (suspended, packed), left with
         fluid that was taken out, removed with channels; closing: what does not add up, relative: over the largest."""
         self.blocks.close_model()
-        comm, nodes = self.blocks.comm, self.nodes
-        packed = self.state[: len(self.number), kernels.PACKED]
-        n = nodes[:, kernels.N]
-        found = {"stored": exact_sum(n, comm), "packed": exact_sum(n * packed, comm)}
+        n, packed = self.nodes[:, kernels.N], self.state[: len(self.number), kernels.PACKED]
+        found = {"stored": self._sum(n), "packed": self._sum(n * packed)}
         for name, column in (("came", kernels.CAME), ("left", kernels.LEFT)):
-            gone = self.accounts[name] if comm.rank == 0 else 0.0
-            found[name] = exact_sum(np.append(nodes[:, column], gone), comm)
+            found[name] = self._sum(self.nodes[:, column], self.accounts[name])
         found["removed"] = self.accounts["removed"]
-        largest = max(map(abs, found.values()))
-        found["closing"] = found["came"] - found["stored"] - found["left"] - found["removed"]
-        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
-        return found
+        return closed(found, found["came"] - found["stored"] - found["left"] - found["removed"])
 
     def speed(self) -> float:
         """Of a single grain that settles [m/s], up if negative. Not collective."""
@@ -232,11 +209,6 @@ class Proppant(SurfaceLoad):
         law = settling.stokes if v["proppant_stokes"] > 0.0 else settling.terminal
         gravity = math.hypot(*self._gravity())
         return law(v["proppant_size"], v["proppant_density"], flow.fluid("fluid_density"), flow.viscosity, gravity)
-
-    def _gravity(self) -> list[float]:
-        """By components [m/s2]."""
-        o = self.blocks.options
-        return [o.gx, o.gy, o.gz][: self.blocks.dim]
 
     def everywhere(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, np.ndarray], None]:
         """`thicken` for all channels of the model; gathered: values of all flow nodes from those of this rank."""
@@ -297,16 +269,12 @@ class Proppant(SurfaceLoad):
         n, mine = len(self.number), flow.number
         wanted = flow.held[len(mine) :]
         had = np.column_stack([self.nodes[:, _SAVED], self.given, self.state[:n, kernels.PACKED], np.ones(n)])
-        rows, owner = moved(comm, len(network.there), self.number, had, mine, wanted)
-        self.number = mine.copy()
+        rows, _ = self._fetch(had, mine, wanted, kernels.STATE)
         self.nodes = np.zeros((len(mine), kernels.NODE))
         self.nodes[:, _SAVED] = rows[:, :5]
         self.nodes[:, kernels.ROOM_BEFORE] = self.nodes[:, kernels.ROOM]
         self.given = rows[:, 5].copy()
-        self.close()
-        self.state = np.zeros((len(flow.held), kernels.STATE))
         self.state[: len(mine), kernels.PACKED] = rows[:, 6]
-        self._copies = Copies(comm, mine, wanted, owner, self.state)
         self._held = flow.held
         new = rows[:, 7] == 0.0
         if comm.any(bool(new.any())):
@@ -366,16 +334,6 @@ class Proppant(SurfaceLoad):
 
     def mesh_replaced(self) -> None:
         self.close()
-
-    def close(self) -> None:
-        """Give the requests back to MPI."""
-        if self._copies is not None:
-            self._copies.close()
-            self._copies = None
-
-    def _refresh(self) -> None:
-        if self._copies is not None:
-            self._copies.refresh()
 
     # ---- the step ------------------------------------------------------------------------------------------------
 
@@ -491,7 +449,7 @@ class Proppant(SurfaceLoad):
         came = flow.nodes[:, flowing.GIVEN] - self.given
         self.given = flow.nodes[:, flowing.GIVEN].copy()
         kinds = np.array([kind == RATE for kind, _ in self.conditions])[self._prescribed]
-        value = np.array([said.now(tables, value, flow.time) for _, value in self.conditions])[self._prescribed]
+        value = np.array([assigned.now(tables, value, flow.time) for _, value in self.conditions])[self._prescribed]
         room = np.maximum(self.nodes[:, kernels.ROOM_BEFORE], 1e-300)
         leaves = np.minimum(came, 0.0) / room
         self.nodes[:, kernels.SOURCE] = np.where(
@@ -520,15 +478,14 @@ class Proppant(SurfaceLoad):
     def saved_state(self) -> dict[str, Any]:
         return {
             "values": self.values, "conditions": [list(one) for one in self.conditions], "accounts": self.accounts,
-            "time": self.time, "cycles": self.cycles, "sub_steps": self.sub_steps,
+            **self._saved_clock(),
         }  # fmt: skip
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
         """Channels that carry it, and prescribed nodes, of all ranks."""
-        channels, points = np.flatnonzero(self.carries), np.flatnonzero(self.condition)
         return {
-            "proppant_channels": {"number": channels},
-            "proppant_conditions": {"number": points, "row": self.condition[points].astype(np.int64)},
+            "proppant_channels": {"number": np.flatnonzero(self.carries)},
+            "proppant_conditions": assigned.numbered(self.condition),
         }
 
     def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
@@ -544,11 +501,11 @@ class Proppant(SurfaceLoad):
         made = Proppant.of(blocks)
         made.values = {name: float(state["values"][name]) for name in NAMES}
         made.conditions = [(str(kind), value) for kind, value in state["conditions"]]
-        made.accounts, made.time = dict(state["accounts"]), state["time"]
-        made.cycles, made.sub_steps = state["cycles"], state["sub_steps"]
+        made.accounts = dict(state["accounts"])
+        made._restore_clock(state)
         channels, points, nodes = (tables[f"proppant_{name}"] for name in ("channels", "conditions", "nodes"))
         made.carries[channels["number"]] = True
-        made.condition[points["number"]] = points["row"]
+        assigned.put_back(made.condition, points)
         made.number = nodes["number"].astype(np.int64)
         n = len(made.number)
         made.nodes = np.zeros((n, kernels.NODE))

@@ -1,14 +1,16 @@
-"""What is said of objects by rows of a table, and numbers that may follow tables of time: of fluid and of heat."""
+"""Properties and conditions by rows of a table, and numbers that may follow tables over time."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.tables import Table
 
+T = TypeVar("T")
 Number = float | str
 """A number, or the name of a table over the time of the physics that follows it."""
 
@@ -59,3 +61,26 @@ def now(tables: Mapping[str, Table], value: Number, time: float) -> float:
     if not isinstance(value, str):
         return value
     return tables[value](time) if value in tables else 0.0
+
+
+def row_of(rows: list[T], wanted: T, first: int = 0) -> int:
+    """Of a condition among these from `first` on, to which it is added if it is not there."""
+    if wanted not in rows[first:]:
+        rows.append(wanted)
+    return first + rows[first:].index(wanted)
+
+
+def in_use(rows: Sequence[T], row: np.ndarray, first: int = 0) -> list[T]:
+    """Those of these conditions, from `first` on, that objects have, by their rows (n,)."""
+    return [rows[k] for k in np.unique(row).tolist() if k >= first]
+
+
+def numbered(row: np.ndarray) -> dict[str, np.ndarray]:
+    """Objects that have a row, as columns of a checkpoint."""
+    at = np.flatnonzero(row)
+    return {"number": at, "row": row[at].astype(np.int64)}
+
+
+def put_back(row: np.ndarray, columns: Mapping[str, np.ndarray]) -> None:
+    """Inverse."""
+    row[columns["number"]] = columns["row"]

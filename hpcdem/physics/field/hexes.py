@@ -1,4 +1,4 @@
-"""Heat in hexahedra: the mean of that in the five tetrahedra of each of two overlays, as their stress is.
+"""A field in hexahedra: the mean of that in the five tetrahedra of each of two overlays, as their stress is.
 
 Heat flows between corners that share an edge of one of these ten: along the twelve edges and both diagonals of each
 side. Corners have the parts of the volume that their masses have, and sides of four corners are those of both ways to
@@ -13,8 +13,8 @@ import numpy as np
 
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.mesh import sizes
-from hpcdem.physics.heat import kernels_space
-from hpcdem.physics.heat.kernels_space import HEX_PAIRS
+from hpcdem.physics.field import kernels_space
+from hpcdem.physics.field.kernels_space import HEX_PAIRS
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.mesh import Mesh

@@ -1,0 +1,201 @@
+"""What every field on blocks has: properties and conditions by numbers of the mesh, a clock, an account, nodes that go
+from rank to rank."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.halo.copies import Copies, moved
+from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem.properties import ELEMENT, Model
+from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.field import assigned
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.simulation import Blocks
+
+Tables = dict[str, dict[str, np.ndarray]]
+
+
+class Assigned:
+    """Properties of the elements or joints of a model. row (n,): of the table `rows`, by number, 0: none."""
+
+    blocks: Blocks
+    of_objects: ClassVar[str] = ELEMENT
+    model: ClassVar[Model]
+    kind_of_model: ClassVar[str]
+    """As messages call it."""
+    alike: ClassVar[tuple[str, ...]] = ()
+    why_alike: ClassVar[str] = "there is one fluid in all channels"
+    """Properties that all objects have alike."""
+    stiffens: ClassVar[bool] = False
+    """What is assigned changes masses or time steps of the blocks."""
+
+    def __init__(self, blocks: Blocks) -> None:
+        self.blocks = blocks
+        cells = blocks.the_mesh().cells
+        self.row = np.zeros(len(cells) if self.of_objects == ELEMENT else cells.size, np.int32)
+        self.rows: list[tuple[float, ...]] = []
+
+    @contextmanager
+    def changing(self, stiffness: bool = False) -> Iterator[None]:
+        """The model is open meanwhile."""
+        self.blocks.before_change()
+        yield
+        self.blocks.changed(stiffness=stiffness)
+
+    def _numbers(self, asked: np.ndarray | None) -> np.ndarray:
+        of = self.blocks.numbers_of_elements if self.of_objects == ELEMENT else self.blocks.numbers_of_joints
+        return of(asked)
+
+    def _have_it(self) -> np.ndarray:
+        """Numbers of all that have the model."""
+        return np.flatnonzero(self.row)
+
+    def assign(self, numbers: np.ndarray | None, given: Mapping[str, Value]) -> None:
+        """These objects (None: all) have the model with these properties."""
+        at = self._numbers(numbers)
+        self._put(at, self.blocks.complete(self.of_objects, at, self.model, {}, given))
+
+    def adjust(self, numbers: np.ndarray | None, given: Mapping[str, Value]) -> None:
+        """Change some properties of objects that have the model; None: of all that have it."""
+        at = self._have_it() if numbers is None else self._numbers(numbers)
+        bare = at[self.row[at] == 0]
+        if len(bare):
+            raise CommandError(
+                f"{self.of_objects} {bare[0]} has no {self.kind_of_model} model whose properties could be changed"
+            )
+        old = dict(zip(self._names, np.array(self.rows)[self.row[at] - 1].T))
+        self._put(at, self.blocks.complete(self.of_objects, at, self.model, old, given))
+
+    @property
+    def _names(self) -> list[str]:
+        return [one.name for one in self.model.properties]
+
+    def _put(self, at: np.ndarray, complete: np.ndarray) -> None:
+        """Objects (n,) have these complete properties, (n, k) or (1, k) for all."""
+        rows, row = assigned.with_rows(self.rows, self.row, at, complete)
+        assigned.refuse_different(rows, row, self._names, self.alike, self.why_alike)
+        with self.changing(self.stiffens):
+            self.rows, self.row = rows, row
+            self._assigned()
+
+    def _assigned(self) -> None:
+        """Properties are others; the model is open."""
+
+    def column(self, name: str) -> np.ndarray:
+        """A property by rows (rows + 1,), 0 where there is no model. Not collective."""
+        k = self._names.index(name)
+        return np.array([0.0, *(row[k] for row in self.rows)])
+
+    def constant(self, name: str) -> float:
+        """One that all have alike. Not collective."""
+        return self.rows[self.row[np.argmax(self.row > 0)] - 1][self._names.index(name)]
+
+    def _saved_properties(self) -> list[list[float | None]]:
+        return [[v if math.isfinite(v) else None for v in row] for row in self.rows]
+
+    def _restore_properties(self, rows: Sequence[Sequence[float | None]]) -> None:
+        """Inverse, also of files that do not know the last ones yet."""
+        later = [one.default or 0.0 for one in self.model.properties]
+        self.rows = [(*(math.inf if v is None else v for v in row), *later[len(row) :]) for row in rows]
+
+
+class Travelling:
+    """Nodes of a field that go to the rank that owns the first element around them; those of other ranks beside its
+    elements are copies. number (n,): own ones, ascending; state (n + copies, k)."""
+
+    blocks: Blocks
+    _copies: Copies | None
+
+    def __init__(self) -> None:
+        self.number = np.empty(0, np.int64)
+        self.state = np.empty((0, 0))
+        self._copies = None
+
+    def _fetch(
+        self, had: np.ndarray, mine: np.ndarray, wanted: np.ndarray, width: int, more: int = 0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of own nodes from those (n, k) of all ranks, 0 where there were none; mine are the own ones from now on,
+        with a state of so many columns, and so many more rows after the copies. wanted: numbers of copies, returned in
+        the order of their owners. Collective."""
+        comm = self.blocks.comm
+        rows, owner = moved(comm, len(self.blocks.the_mesh().points), self.number, had, mine, wanted)
+        order = np.lexsort((wanted, owner))
+        wanted, owner = wanted[order], owner[order]
+        self.number = mine.copy()
+        self.close()
+        self.state = np.zeros((len(mine) + len(wanted) + more, width))
+        self._copies = Copies(comm, mine, wanted, owner, self.state)
+        return rows, wanted
+
+    def _refresh(self) -> None:
+        if self._copies is not None:
+            self._copies.refresh()
+
+    def close(self) -> None:
+        """Give the requests back to MPI."""
+        if self._copies is not None:
+            self._copies.close()
+            self._copies = None
+
+
+class Field(SurfaceLoad):
+    """A field of a model of blocks. Methods are collective unless they say otherwise; CommandError, alike on all ranks,
+    for what makes no sense. time: what its clock shows [s]; cycles: done so far, each of sub_steps of dt [s]; waited:
+    steps of the blocks since the last."""
+
+    of_mesh: ClassVar[bool] = True
+    blocks: Blocks
+
+    @property
+    def keeps_time(self) -> bool:
+        """Where blocks stand still time may pass by it: that of the first field that does so. Not collective."""
+        return False
+
+    def _start_clock(self, time: float) -> None:
+        self.time, self.dt = time, 0.0
+        self.cycles = self.waited = self.sub_steps = 0
+
+    def set_clock(self, time: float) -> None:
+        """The clock shows this time [s]."""
+        self.blocks.before_change()
+        self.time = time
+        self.blocks.changed(stiffness=False)
+
+    def _saved_clock(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in ("time", "cycles", "waited", "sub_steps", "dt")}
+
+    def _restore_clock(self, state: Mapping[str, Any]) -> None:
+        for name in ("time", "cycles", "waited", "sub_steps", "dt"):
+            if name in state:
+                setattr(self, name, state[name])
+
+    def _unset(self, conditions: np.ndarray, numbers: np.ndarray | None) -> None:
+        """Rows of conditions of these numbers (None: all) become 0."""
+        self.blocks.before_change()
+        conditions[slice(None) if numbers is None else numbers] = 0
+        self.blocks.changed(stiffness=False)
+
+    def _sum(self, column: np.ndarray, gone: float = 0.0) -> float:
+        """Of what all ranks hold and what is gone."""
+        comm = self.blocks.comm
+        return exact_sum(np.append(column, gone if comm.rank == 0 else 0.0), comm)
+
+    def _lowest(self, numbers: np.ndarray) -> int:
+        """Of numbers (n,) of all ranks; -1: there is none."""
+        most = np.iinfo(np.int64).max
+        found = int(self.blocks.comm.min_into(np.array([numbers.min(initial=most)], np.int64))[0])
+        return found if found < most else -1
+
+    def _gravity(self) -> list[float]:
+        """By components [m/s2]."""
+        o = self.blocks.options
+        return [o.gx, o.gy, o.gz][: self.blocks.dim]
