@@ -1177,7 +1177,7 @@ class Shared(Generic[Given, Returned]):
     def __get__(self, group: Group | None, owner: type) -> Callable[Given, Returned]:
         """The method, bound to the simulation of the group."""
         method: Any = self.method
-        return method if group is None else method.__get__(group._sim)  # type: ignore[no-any-return]
+        return method if group is None else method.__get__(group._sim)
 
 
 class Group:

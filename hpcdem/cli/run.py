@@ -342,7 +342,7 @@ def other_options(command: click.Command) -> click.Command:
     for names, value in STRESS_AND_STRAIN:
         kind = {"is_flag": True} if value is None else {"metavar": value}
         command.params.append(
-            click.Option(names, **kind, hidden=True, is_eager=True, expose_value=False, callback=only_with_s)  # type: ignore[arg-type]
+            click.Option(names, **kind, hidden=True, is_eager=True, expose_value=False, callback=only_with_s)
         )
     return command
 

@@ -65,7 +65,7 @@ def on_first(comm: Comm, action: Callable[[], _T]) -> _T:
     result, error = comm.bcast((result, error))
     if error is not None:
         raise (UsageError if error[1] == EXIT_USAGE else HpcdemError)(error[0])
-    return result  # type: ignore[return-value]
+    return result
 
 
 def make_folder(path: str | os.PathLike, comm: Comm) -> None:

@@ -293,7 +293,7 @@ def spare_c_entries() -> None:
     fourteenth of the time of compiling."""
     from numba.core.compiler import Flags
 
-    option: Any = Flags.options["no_cfunc_wrapper"]  # type: ignore[attr-defined]
+    option: Any = Flags.options["no_cfunc_wrapper"]
     option._default = True
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -219,7 +220,7 @@ def _renewed(sim: Simulation, kind: int, given: dict[str, float]) -> np.ndarray:
     return mapping
 
 
-def _slots(lists) -> np.ndarray:
+def _slots(lists: Any) -> np.ndarray:
     """Indices of the pair slots in use."""
     pieces = []
     cut, lo, _, poff, _ = lists.blocks

@@ -6,7 +6,7 @@ Particle numbers, file sizes and times are estimates, meant for choosing a machi
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -186,7 +186,7 @@ def summary(script: Script, outdir: Path | None = None) -> str:
     return console.file.getvalue().rstrip("\n")  # type: ignore[attr-defined]
 
 
-def print_report(report: Report, console=None) -> None:
+def print_report(report: Report, console: Any = None) -> None:
     """Print a report on a rich console (default: standard output)."""
     from rich.box import SIMPLE
     from rich.console import Console
@@ -271,7 +271,7 @@ def _size(n: int) -> str:
 # ---- arithmetic in which None is unknown ---------------------------------------------------------------------------
 
 
-def _sum(numbers) -> int | None:
+def _sum(numbers: Iterable[int | None]) -> int | None:
     total = 0
     for n in numbers:
         if n is None:

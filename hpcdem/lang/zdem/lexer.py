@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from hpcdem.core.errors import ScriptError
@@ -178,7 +178,7 @@ def expression(token: Token, file: str) -> Expression:
     return Expression(token.text.lower(), (*program, *reversed(waiting)))
 
 
-def _operand(piece: re.Match[str], sign: float, fail) -> list[float | str]:
+def _operand(piece: re.Match[str], sign: float, fail: Callable[[str], ScriptError]) -> list[float | str]:
     if piece["number"]:
         value = sign * float(piece["number"])
         if abs(value) == float("inf"):

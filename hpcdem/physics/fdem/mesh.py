@@ -7,9 +7,10 @@ calls an edge is a face with three points. `hpcdem.pre.mesh` makes meshes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -55,7 +56,7 @@ class Mesh:
     """(nh, 9) i8 of hexahedra (hexahedra.py): their points, and the first of their six elements."""
 
     @staticmethod
-    def of_hexes(points, hexes, layers=None, more=None) -> Mesh:
+    def of_hexes(points: Any, hexes: Any, layers: Any = None, more: Any = None) -> Mesh:
         """Hexahedra with these points (nh, 8), then tetrahedra `more` (n, 4)."""
         hexes = np.array(hexes, np.int64).reshape(-1, 8)
         cells = hexahedra.split(hexes).reshape(-1, 4)
@@ -65,7 +66,10 @@ class Mesh:
         return Mesh.of(points, cells, layers=layers, hexes=table)
 
     @staticmethod
-    def of(points, cells, groups=None, layers=None, cracks=None, crack_sets=None, hexes=None) -> Mesh:
+    def of(
+        points: Any, cells: Any, groups: Any = None, layers: Any = None, cracks: Any = None, crack_sets: Any = None,
+        hexes: Any = None,
+    ) -> Mesh:  # fmt: skip
         """A mesh from anything array-like, in the form the fields are documented in.
 
         Points of three columns are in space. Cells of three columns are triangles. Pairs get their lower point first,
@@ -330,7 +334,7 @@ def _element(mesh: Mesh, e: int, names: Names) -> str:
     return f"element {names.element(e)}{where} with the points {', '.join(map(names.point, corners))}"
 
 
-def _listed(names) -> str:
+def _listed(names: Iterable[str]) -> str:
     return ", ".join(f"'{n}'" for n in names) or "none"
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -146,12 +147,12 @@ def _constraint(one: NodeCondition) -> str:
 
 def _moved(one: NodeCondition, values: dict[str, tuple[int, Number]], keep: bool = False) -> NodeCondition:
     """With these components (kind, value) prescribed and no others; keep: the constraint too."""
-    changes: dict[str, object] = {}
+    changes: dict[str, Any] = {}
     for axis in "xyz":
         changes[f"does_{axis}"], changes[f"at_{axis}"] = values.get(axis, (moving.FREE, 0.0))
     if not keep:
         changes |= {"constraint": moving.UNBOUND, "way": (0.0, 0.0)}
-    return replace(one, **changes)  # type: ignore[arg-type]
+    return replace(one, **changes)
 
 
 def _on_a_line(one: NodeCondition, given: list[str]) -> NodeCondition:
@@ -175,9 +176,9 @@ def _on_a_line(one: NodeCondition, given: list[str]) -> NodeCondition:
             "kind are prescribed"
         )
     first = max(leading, key=lambda axis: abs(way[axis]))
-    speed = float(said[first][1]) / way[first]  # type: ignore[arg-type]
+    speed = float(said[first][1]) / way[first]
     for axis in leading:
-        if abs(float(said[axis][1]) - speed * way[axis]) > STRAIGHT * abs(speed):  # type: ignore[arg-type]
+        if abs(float(said[axis][1]) - speed * way[axis]) > STRAIGHT * abs(speed):
             raise Contradiction(f"{_constraint(one)} and {' and '.join(map(one.motion, given))}")
     kind = said[first][0]
     return _moved(one, {axis: (kind, said[axis][1] if axis in said else speed * way[axis]) for axis in way})
@@ -203,10 +204,10 @@ def _in_a_plane(one: NodeCondition, given: list[str]) -> NodeCondition:
             "kind are prescribed"
         )
     kind = said[known[0]][0]
-    out = 0.0 if still else sum(normal[axis] * float(said[axis][1]) for axis in known)  # type: ignore[arg-type]
+    out = 0.0 if still else sum(normal[axis] * float(said[axis][1]) for axis in known)
     left = [axis for axis in touched if axis not in said]
     if not left:
-        size = max(abs(normal[axis] * float(said[axis][1])) for axis in known) if not still else 0.0  # type: ignore[arg-type]
+        size = max(abs(normal[axis] * float(said[axis][1])) for axis in known) if not still else 0.0
         if abs(out) > STRAIGHT * size:
             raise Contradiction(f"{_constraint(one)} and {' and '.join(map(one.motion, known))}")
         return _moved(one, said)

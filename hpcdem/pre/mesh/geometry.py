@@ -191,7 +191,7 @@ class Layers:
         """Forget a layer."""
         del self.curves[self._known(layer)]
 
-    def transform(self, layer: str, copy_to: str | None = None, **how) -> None:
+    def transform(self, layer: str, copy_to: str | None = None, **how: Any) -> None:
         """Move the curves of a layer (see `transformed`), or add moved copies to another layer."""
         moved = [transformed(c, **how) for c in self[layer]]
         if copy_to is None:
