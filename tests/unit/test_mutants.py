@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 from tests import suite
 from tests.conftest import ROOT
@@ -117,29 +118,150 @@ def test_a_test_that_fails_anyhow_kills_nothing(tree: Path, tmp_path: Path) -> N
     assert entry["outcome"] == "survived" and entry["unsound"]
 
 
+SOURCES = """
+def f(a):
+    return a + 1
+
+
+def g(a):
+    return a * 2.0
+
+
+def adder(b):
+    def add(a):
+        return a - b
+
+    return add
+
+
+def at_once():
+    return 7
+
+
+def nowhere(a):
+    return -a
+
+
+def forever(a):
+    while a > 0:
+        a -= 1
+    return a
+
+
+SUM = at_once()
+minus = adder(2)
+"""
+TESTS = """
+import part
+
+
+def test_f():
+    assert part.f(1) == 2 and part.g(0.0) == 0.0
+
+
+def test_of_an_import():
+    assert part.SUM == 7
+
+
+def test_inner():
+    assert part.minus(5) == 3 and part.adder(1)(5) == 4
+
+
+def test_loop():
+    assert part.forever(2) == 0
+
+
+def test_fails_anyhow():
+    assert part.f(1) == part.g(1.0) + 1
+"""
+
+
+@pytest.mark.slow
 def test_the_table_and_going_on(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A function, one in a function that a factory has made before, one that an import has called, one that no test
+    calls, one that hangs."""
+    (tree / "part.py").write_text(SOURCES)
+    (tree / "tests" / "test_part.py").write_text(TESTS)
     monkeypatch.setattr(cli, "ROOT", tree)
-    tried: list[str] = []
-
-    def judge(copy: Any, mutant: seeds.Mutant, seconds: float) -> dict[str, object]:
-        tried.append(mutant.name)
-        outcome = "killed" if mutant.kind == "sign" else "survived"
-        return {"mutant": mutant.name, "file": mutant.file, "outcome": outcome, "by": "", "seconds": 30.0}
-
-    monkeypatch.setattr(cli, "judge", judge)
+    monkeypatch.setattr(cli, "PLACES", ("part.py",))
+    monkeypatch.setattr(cli, "REACH", tmp_path / "reach.jsonl")
     record = tmp_path / "record.jsonl"
 
-    def call(*words: str) -> str:
-        from click.testing import CliRunner
-
+    def call(*words: str) -> list[dict]:
         done = CliRunner().invoke(cli.main, ["part.py", "--record", str(record), *words])
         assert done.exit_code == 0, done.output
-        return done.output
+        return cli.read(record)
 
-    call("--limit", "1")
-    assert len(tried) == 1
-    said = call()
-    assert len(tried) == len(set(tried)) == 4, "each mutant once: sign, factor, and two constants"
-    assert "| part.py | 1 | 3 | 0 | 2.0 |" in said and said.count("- part.py") == 3
-    assert call("--table").strip() == said[said.index("| modules") :].strip()
-    assert len(record.read_text().splitlines()) == 4 and all(map(json.loads, record.read_text().splitlines()))
+    assert len(call("--limit", "1")) == 1
+    found = {(e["mutant"].split("::")[1].split()[0], e["kind"]): (e["outcome"], e["by"]) for e in call()}
+    assert found["f", "sign"] == ("killed", "tests/test_part.py::test_f")
+    assert found["g", "factor"] == ("survived", "")
+    assert found["adder.<locals>.add", "sign"] == ("killed", "tests/test_part.py::test_inner")
+    assert found["at_once", "constant"] == ("killed", "tests/test_part.py::test_of_an_import")
+    assert found["nowhere", "sign"] == ("untested", "")
+    assert found["forever", "statement"] == ("killed", "tests/test_part.py::test_loop"), "it ends by its time"
+    first = record.read_text()
+    call()
+    assert record.read_text() == first and (tree / "part.py").read_text() == SOURCES
+    table = CliRunner().invoke(cli.main, ["--record", str(record), "--table"]).output
+    survived = sum(outcome == "survived" for outcome, _ in found.values())
+    assert f"| {survived} | " in table and "- part.py::g factor '*' -> '/' in 'return a * 2.0'" in table
+
+
+def test_what_has_a_reason_is_not_tried_again(tmp_path: Path) -> None:
+    """Of each mutant the last result counts; a reason, which people add, stays with it."""
+    record = tmp_path / "record.jsonl"
+    entries = [("b", "survived", "equal"), ("a", "survived", None), ("a", "killed", None)]
+    lines = [
+        {"mutant": m, "file": "x/y.py", "outcome": o, "by": "", "seconds": 1.0} | ({"reason": r} if r else {})
+        for m, o, r in entries
+    ]
+    record.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    cli.tidy(record)
+    kept = [json.loads(line) for line in record.read_text().splitlines()]
+    assert [(e["mutant"], e["outcome"], e.get("reason")) for e in kept] == [
+        ("a", "killed", None),
+        ("b", "survived", "equal"),
+    ]
+    assert "| x | 1 | 0 | 1 | 0 | 0.0 |" in cli.as_table(kept) and "Survivors" not in cli.as_table(kept)
+
+
+LANES = """
+from numba import njit
+import numpy as np
+from hpcdem.numerics import lanes as L
+from hpcdem.io import digits
+
+
+@njit
+def all_of_them(table, lanes, out):
+    i = (np.uint64(0), np.uint64(8), np.uint64(16), np.uint64(8))
+    j = (np.uint64(4), np.uint64(20), np.uint64(0), np.uint64(12))
+    L.differences(lanes, L.lane(0), table, j, i)
+    L.two_columns(lanes, L.lane(4), table, i)
+    L.four_columns(lanes, L.lane(6), table, j)
+    L.put_two_columns(table, j, lanes, L.lane(0))
+    L.put_four_columns(table, i, lanes, L.lane(5))
+    L.add_in_turn(table, i, j, lanes, L.lane(1))
+    digits._store4(out, 1, np.uint32(0x31323334))
+    digits._store8(out, 7, np.uint64(0x3132333435363738))
+    return L.no_farther(1.0, 1.0), L.no_farther(2.0, 1.0), L.as_bits(-2.5), L.as_number(-1)
+
+
+L.lane = njit(L.lane)
+table, lanes, out = np.sin(np.arange(32.0)), np.cos(np.arange(12.0 * L.CAPACITY)), np.zeros(16, np.uint8)
+print(all_of_them(table, lanes, out), table.tolist(), lanes.sum(), bytes(out))
+"""
+
+
+def test_what_is_for_the_compiler_only_does_the_same_in_plain_python() -> None:
+    said = []
+    for words, env in (
+        (["-c", LANES], {}),
+        (["-c", "from mutants import plain; plain.install()" + LANES], trial.PLAIN),
+    ):
+        env = os.environ | env | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "scripts" / "lib")])}
+        done = subprocess.run([sys.executable, *words], env=env, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        said.append(done.stdout)
+    assert said[0] == said[1] != ""

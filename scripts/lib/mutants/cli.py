@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 import tempfile
-import threading
 from collections import Counter, defaultdict
-from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 
 import click
 
 from hpcdem.runtime import kept
-from mutants.seeds import Mutant, choose
-from mutants.trial import Copy, judge
-from tests import suite
+from mutants.seeds import choose
+from mutants.trial import PLAIN, Copy, judge
 
 ROOT = Path(__file__).resolve().parents[3]
 PLACES = ("hpcdem/physics", "hpcdem/lang", "hpcdem/halo", "hpcdem/io", "hpcdem/decomp", "hpcdem/numerics")
 
 
+REACH = ROOT / ".pytest_cache" / "mutants.jsonl"
+"""What tests call and how long they take, as measured on this machine."""
+RECORD = Path(__file__).with_name("results.jsonl")
+
+
 @click.command()
 @click.argument("places", nargs=-1)
-@click.option("--count", default=600, show_default=True, help="Number of mutants.")
+@click.option("--count", default=600, show_default=True, help="Number of mutants to choose from all modules.")
 @click.option("--seed", default=1, show_default=True, help="Seed of the choice.")
-@click.option("--seconds", default=120.0, show_default=True, help="Time of tests that each may take [s].")
-@click.option("--jobs", default=1, show_default=True, help="Mutants at the same time.")
+@click.option("--seconds", default=2.5, show_default=True, help="Processor time of tests that each may take [s].")
 @click.option("--limit", default=None, type=int, help="Stop after so many new trials.")
-@click.option("--record", default="mutants.jsonl", show_default=True, help="File of results; what is in it is skipped.")
+@click.option("--tests", multiple=True, help="Files or folders of tests; by default all.")
+@click.option("--record", default=str(RECORD), help="File of results; what is in it is skipped.")
+@click.option("--again", is_flag=True, help="Try once more what has survived without a reason on record.")
+@click.option("--compiled", is_flag=True, help="The same with compiled kernels: minutes for each mutant.")
+@click.option("--measure", is_flag=True, help="Measure what the tests call, and try no mutant.")
 @click.option("--list", "only_list", is_flag=True, help="List the mutants and try none.")
 @click.option("--table", is_flag=True, help="Print the table of the recorded results and try none.")
 def main(
@@ -35,65 +44,102 @@ def main(
     count: int,
     seed: int,
     seconds: float,
-    jobs: int,
     limit: int | None,
+    tests: tuple[str, ...],
     record: str,
+    again: bool,
+    compiled: bool,
+    measure: bool,
     only_list: bool,
     table: bool,
 ) -> None:
     """Change the sources in small ways, one at a time, and see which tests notice.
 
-    PLACES are files or folders of the package, by default physics, lang, halo, io, decomp and numerics. Each mutant is
-    tried in a copy of the tree with the tests that can notice it, the most specific first. Results are appended to a
-    file as they come: the same command resumes.
+    PLACES restrict what is tried to files or folders of the package; the mutants are chosen from physics, lang, halo,
+    io, decomp and numerics. Tests run in one process, with kernels as plain functions, in a copy of the tree: which
+    functions each of them calls is measured first, and a mutant meets those that call its function, the quickest first.
+    Results are appended to a file as they come: the same command resumes.
     """
     file = Path(record)
-    done = [json.loads(line) for line in file.read_text().splitlines()] if file.is_file() else []
+    done = read(file)
     if table:
         click.echo(as_table(done))
         return
-    mutants = choose(ROOT, list(places or PLACES), count, seed)
+    mutants = [] if measure else choose(ROOT, list(PLACES), count, seed)
+    if places:
+        mutants = [m for place in places for m in mutants if f"{m.file}/".startswith(f"{place.rstrip('/')}/")]
     if only_list:
         click.echo("\n".join(mutant.name for mutant in mutants))
         return
-    if not suite.measured()["seconds"]:
-        raise click.ClickException("the durations of the tests are not known: run ./scripts/test once")
-    tried = {entry["mutant"] for entry in done}
-    new = [mutant for mutant in mutants if mutant.name not in tried][:limit]
-    lock = threading.Lock()
-    store, _ = kept.store_of({})
-    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        free = [Copy(ROOT, Path(folder) / str(k), store if store.is_dir() else None).make() for k in range(jobs)]
-
-        def one(mutant: Mutant) -> None:
-            with lock:
-                copy = free.pop()
-            entry = judge(copy, mutant, seconds)
-            with lock:
-                free.append(copy)
-                done.append(entry)
+    entries = {entry["mutant"]: entry for entry in done}
+    known = {"killed"} if again else {"killed", "survived"}
+    settled = {name for name, entry in entries.items() if entry["outcome"] in known or entry.get("reason")}
+    mutants = [mutant for mutant in mutants if mutant.name not in settled]
+    with tempfile.TemporaryDirectory(prefix="mutants-", ignore_cleanup_errors=True) as folder:
+        store, _ = kept.store_of({})
+        copy = Copy(ROOT, Path(folder), store if compiled and store.is_dir() else None).make()
+        if compiled:
+            for mutant in mutants[:limit]:
+                entry = judge(copy, mutant, 20.0 * seconds)
                 with file.open("a") as out:
                     out.write(json.dumps(entry) + "\n")
                 click.echo(f"{entry['outcome']:<9}{entry['seconds']:6.0f} s  {mutant.name}  {entry['by']}")
+        else:
+            job = {
+                "root": str(copy.place / "tree"),
+                "reach": str(REACH),
+                "record": str(file.absolute()),
+                "tests": list(tests or ["tests"]),
+                "only_measure": measure,
+                "mutants": [asdict(mutant) for mutant in mutants[:limit]],
+                "seconds": seconds,
+            }
+            REACH.parent.mkdir(exist_ok=True)
+            (copy.place / "job.json").write_text(json.dumps(job))
+            words = [sys.executable, "-m", "mutants.inside", str(copy.place / "job.json")]
+            paths = [str(copy.place / "tree"), str(Path(__file__).parents[1])]
+            env = (
+                os.environ
+                | PLAIN
+                | {"PYTHONPATH": os.pathsep.join(paths), "NUMBA_CACHE_DIR": str(copy.place / "kernels")}
+            )
+            env.pop("HPCDEM_TEST_RESULTS", None)
+            subprocess.run(words, cwd=copy.place / "tree", env=env, check=False)
+    if not measure:
+        tidy(file)
+        click.echo(as_table(read(file)))
 
-        with ThreadPoolExecutor(jobs) as pool:
-            list(pool.map(one, new))
-    click.echo(as_table(done))
+
+def read(file: Path) -> list[dict]:
+    """The results, of each mutant the last."""
+    lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
+    return list({entry["mutant"]: entry for entry in map(json.loads, lines)}.values())
+
+
+def tidy(file: Path) -> None:
+    """Keep of each mutant the last result only, sorted by name: two people's results merge."""
+    found = sorted(read(file), key=lambda entry: entry["mutant"])
+    file.write_text("".join(json.dumps(entry, ensure_ascii=False) + "\n" for entry in found), encoding="utf-8")
 
 
 def as_table(done: list[dict]) -> str:
-    """Killed and survived by module in Markdown, then the mutants that survived."""
+    """Killed and survived by module in Markdown, then the mutants that survived and have no reason on record."""
     rows: dict[str, Counter[str]] = defaultdict(Counter)
     spent: Counter[str] = Counter()
     for entry in done:
         name = entry["file"].rpartition("/")[0] or entry["file"]
-        rows[name][entry["outcome"]] += 1
-        spent[name] += entry["seconds"]
-    lines = ["| modules | killed | survived | untested | minutes |", "|---|---|---|---|---|"]
-    for name in sorted(rows):
-        row = rows[name]
-        lines.append(f"| {name} | {row['killed']} | {row['survived']} | {row['untested']} | {spent[name] / 60:.1f} |")
-    alive = [entry["mutant"] for entry in done if entry["outcome"] != "killed"]
+        outcome = "explained" if entry["outcome"] != "killed" and entry.get("reason") else entry["outcome"]
+        for row in (name, "all"):
+            rows[row][outcome] += 1
+            spent[row] += entry["seconds"]
+    lines = [
+        "| modules | killed | survived | survived, with a reason | no quick test | minutes |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in sorted(rows, key=lambda name: (name == "all", name)):
+        counts = [rows[name][outcome] for outcome in ("killed", "survived", "explained", "untested")]
+        lines.append(f"| {name} | {' | '.join(map(str, counts))} | {spent[name] / 60:.1f} |")
+    alive = [entry["mutant"] for entry in done if entry["outcome"] != "killed" and not entry.get("reason")]
     if alive:
         lines += ["", "Survivors:", *(f"- {name}" for name in sorted(alive))]
     return "\n".join(lines)

@@ -12,8 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutants.seeds import Mutant
-from tests import suite
 
+PLAIN = {"NUMBA_DISABLE_JIT": "1", "NPY_PROMOTION_STATE": "weak"}
+"""Environment of a process in which kernels are plain functions. The promotion is that of numpy 2, and of numba: an
+unsigned index stays one."""
 FAILED = "FAILED "
 ERROR = "ERROR "
 
@@ -54,13 +56,16 @@ class Copy:
         else:
             store.mkdir(parents=True)
 
-    def pytest(self, words: list[str], limit: float) -> tuple[int | None, str]:
-        """Exit code, None if the limit [s] was reached, and output."""
+    def pytest(self, words: list[str], limit: float, plain: bool = False) -> tuple[int | None, str]:
+        """Exit code, None if the limit [s] was reached, and output. plain: kernels are not compiled."""
         tree = self.place / "tree"
         paths = [str(tree)]
         env = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "NUMBA_CACHE_DIR": str(self.place / "kernels")}
         env.pop("HPCDEM_TEST_RESULTS", None)
         command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--no-header", *words]
+        if plain:
+            env |= PLAIN | {"PYTHONPATH": os.pathsep.join([*paths, str(Path(__file__).parents[1])])}
+            command = [sys.executable, "-m", "mutants.plain", *command[3:]]
         process = subprocess.Popen(
             command,
             cwd=tree,
@@ -82,11 +87,29 @@ class Copy:
                 pass
             process.wait()
 
+    def fresh(self, mutant: Mutant, tests: list[str], limit: float) -> str:
+        """The test that kills a mutant, "time" or "start"; "" if none. For what imports call."""
+        file = self.place / "tree" / mutant.file
+        text = file.read_text(encoding="utf-8")
+        _write(file, mutant.applied(text))
+        try:
+            return _killer(*self.pytest(tests, limit, plain=True))
+        finally:
+            _write(file, text)
+
     def is_sound(self, test: str, limit: float) -> bool:
         """Whether a test passes without any change."""
         if test not in self.sound:
             self.sound[test] = self.pytest([test], limit)[0] == 0
         return self.sound[test]
+
+
+def _killer(code: int | None, out: str) -> str:
+    """Which test has failed in a run of pytest, "time" or "start"; "" if none has."""
+    if code in (None, 0, 5):
+        return "time" if code is None else ""
+    lines = [line for line in out.splitlines() if line.startswith((FAILED, ERROR))]
+    return lines[-1].partition(" ")[2].partition(" - ")[0] if lines else "start"
 
 
 def _write(file: Path, text: str) -> None:
@@ -108,6 +131,8 @@ def judge(copy: Copy, mutant: Mutant, seconds: float) -> dict[str, object]:
 
     seconds: time of tests, as measured before, that it is given; a mutant that takes four times as long has hung.
     """
+    from tests import suite
+
     began = time.monotonic()
     file = copy.place / "tree" / mutant.file
     text = file.read_text(encoding="utf-8")
@@ -121,10 +146,7 @@ def judge(copy: Copy, mutant: Mutant, seconds: float) -> dict[str, object]:
         code, out = copy.pytest(["-m", "not slow and not alone", *tests], 4 * seconds + 60)
     finally:
         _write(file, text)
-    by = "time" if code is None else ""
-    if code not in (None, 0, 5):
-        lines = [line for line in out.splitlines() if line.startswith((FAILED, ERROR))]
-        by = lines[-1].partition(" ")[2].partition(" - ")[0] if lines else "start"
+    by = _killer(code, out)
     if "::" in by and not copy.is_sound(by, 4 * seconds + 60):
         by = ""  # it fails without the change too
         record["unsound"] = True

@@ -1,0 +1,125 @@
+"""The process that holds the tests of a copy of the tree: measures what they call, then tries one mutant after another.
+
+python -m mutants.inside JOB     JOB: a file with what to do (cli.py)
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import hypothesis
+import pytest
+
+from mutants import plain
+from mutants.seeds import Mutant
+from mutants.trial import Copy
+from mutants.within import Session
+
+WALL = 90.0
+"""Seconds by the clock after which a file of tests, or a mutant, is given up."""
+
+
+def main() -> None:
+    job = json.loads(Path(sys.argv[1]).read_text())
+    plain.install()
+    few = {"max_examples": 10, "deadline": None, "derandomize": True, "database": None}
+    hypothesis.settings.register_profile("mutants", **few)
+    hypothesis.settings.load_profile("mutants")
+    reach = Path(job["reach"])
+    known = [json.loads(line) for line in reach.read_text().splitlines()] if reach.is_file() else []
+
+    def work(session: Session) -> None:
+        imported = session.functions()
+        with reach.open("a") as out:
+
+            def keep(said: dict[str, Any]) -> None:
+                known.append(said)
+                out.write(json.dumps(said) + "\n")
+                out.flush()
+
+            measure(session, known, keep)
+        if not job["only_measure"]:
+            try_all(session, known, imported, job)
+
+    names = ["-q", "-p", "no:cacheprovider", "--no-header", "-m", "not slow", *job["tests"]]
+    sys.exit(pytest.main(names, plugins=[Session(Path(job["root"]), work)]))
+
+
+def measure(session: Session, known: list[dict[str, Any]], keep: Callable[[dict[str, Any]], None]) -> None:
+    """What each test calls, of files that are not known yet."""
+    done = {said["file"] for said in known if "file" in said}
+    for file, items in session.measurable().items():
+        if file not in done:
+            began = time.monotonic()
+            outcomes: dict[str, int] = defaultdict(int)
+            for said in session.measure(file, items, WALL):
+                outcomes[said["outcome"]] += 1
+                keep(said)
+            keep({"file": file})
+            counts = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
+            print(f"measured {time.monotonic() - began:6.1f} s  {file}: {counts}", flush=True)
+
+
+def choice(reaching: list[tuple[float, str]], seconds: float) -> list[tuple[str, float]]:
+    """(test, seconds) in the order in which they are run: the quickest of each file, then the next of each, as many as
+    the time allows."""
+    files: dict[str, list[tuple[float, str]]] = defaultdict(list)
+    for spent, test in sorted(reaching):
+        files[test.partition("::")[0]].append((spent, test))
+    turns = [(turn, spent, test) for found in files.values() for turn, (spent, test) in enumerate(found)]
+    taken: list[tuple[str, float]] = []
+    for _, spent, test in sorted(turns):
+        if not taken or spent <= seconds:
+            taken.append((test, spent))
+            seconds -= spent
+    return taken
+
+
+def try_all(session: Session, known: list[dict[str, Any]], imported: set[str], job: dict[str, Any]) -> None:
+    """Each mutant of the job. imported: functions that were called while tests were collected."""
+    root, record = Path(job["root"]), Path(job["record"])
+    calls: dict[str, list[tuple[float, str]]] = defaultdict(list)
+    passed_tests: list[tuple[float, str]] = []
+    for said in known:
+        if said.get("outcome") == "passed" and said["test"] in session.items:
+            passed_tests.append((said["seconds"], said["test"]))
+            for function in said["reach"]:
+                calls[function].append((said["seconds"], said["test"]))
+    copy = Copy(root, root.parent)
+    for mutant in (Mutant(**given) for given in job["mutants"]):
+        began = time.monotonic()
+        name = f"{mutant.file}::{mutant.function}"
+        text = (root / mutant.file).read_text(encoding="utf-8")
+        reaching = calls[name]
+        if name in imported and not reaching:  # a table at the top of the module, say: tests that may look into it
+            callers = {
+                test.partition("::")[0] for f in calls if f.startswith(f"{mutant.file}::") for _, test in calls[f]
+            }
+            reaching = [one for one in passed_tests if one[1].partition("::")[0] in callers]
+        tests = choice(reaching, job["seconds"])
+        entry: dict[str, Any] = {"mutant": mutant.name, "file": mutant.file, "kind": mutant.kind}
+        by, passed = "", 0
+        if tests and name in imported:
+            by = copy.fresh(mutant, [test for test, _ in tests[:20]], WALL)
+            passed = 0 if by else len(tests[:20])
+        elif tests:
+            try:
+                by, passed = session.judge(mutant, text, tests, 20.0 + 8.0 * sum(spent for _, spent in tests))
+            except LookupError:
+                tests = []
+        outcome = "killed" if by else "survived" if tests else "untested"
+        entry |= {"outcome": outcome, "by": by, "passed": passed, "seconds": round(time.monotonic() - began, 1)}
+        with record.open("a") as out:
+            out.write(json.dumps(entry) + "\n")
+        because = f"{by}: {session.why}" if by else passed
+        print(f"{outcome:<9}{entry['seconds']:6.1f} s  {mutant.name}  {because}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
