@@ -398,9 +398,9 @@ def shattering_hexes(sim: Blocks) -> None:
 
 
 def dig_beam_of_hexes(sim: Blocks) -> None:
-    """A piece of the beam is taken out, damage is forgotten at one end."""
+    """A piece of the beam is taken out and lets go slowly, damage is forgotten at one end."""
     if sim.clock.step == 600:
-        changes.null(sim, np.arange(6))
+        changes.null(sim, np.arange(6), relax=200.0 * sim.clock.dt)
         holds = np.flatnonzero((sim.joint_row > 0) & sim.joint_exists() & ~sim.open)
         changes.reset_joint_state(sim, holds[:20])
 

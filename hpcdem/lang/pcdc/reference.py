@@ -181,7 +181,6 @@ def _recorded() -> str:
 
 IN_THE_PLANE = {
     "free-field": "自由场边界",
-    "`relax` of elements that are taken out from joints between hexahedra": "六面体节理旁开挖的逐步释放(`relax`)",
     "discs that touch blocks": "与块体接触的圆盘",
 }
 """What no word of the table tells, in English and Chinese: refused as it is met, before the run."""

@@ -214,8 +214,6 @@ def _move_as_one(sim: Blocks, back: np.ndarray, corner: np.ndarray, v: np.ndarra
 def _forces_left_behind(sim: Blocks, dying: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Corners that stay, and what dying elements do to them through common nodes and joints (n, dim) [N/m], in space
     [N]."""
-    if sim.dim == 3 and len(sim.the_mesh().hexes) and ((sim.joint_row > 0) & ~sim.open).any():
-        raise CommandError("relax of elements that are taken out knows no joints between hexahedra")
     seen = sim.evaluate()
     local, dim = sim.local, sim.dim
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
@@ -242,7 +240,7 @@ def _forces_left_behind(sim: Blocks, dying: np.ndarray) -> tuple[np.ndarray, np.
     face = local.slot_face[slot]
     slot = slot[dying[sim.partner[face] // 4] & ~dying[face // 4]]
     corner, force = local.corner_forces(slot)
-    parts += [(corner[:, k], local.slot_face[slot], force[:, k]) for k in range(dim)]
+    parts += [(of[of >= 0], local.slot_face[slot][of >= 0], force[of >= 0, k]) for k, of in enumerate(corner.T)]
     table = np.column_stack(
         [np.concatenate([c for c, _, _ in parts]), np.concatenate([f for _, f, _ in parts])]
     ).astype(float)

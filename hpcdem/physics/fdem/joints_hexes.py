@@ -113,6 +113,17 @@ class HexJoints:
         both = np.concatenate([near, far[:, OPPOSITE]], axis=1)
         return np.einsum("nij,kl->nikjl", both, np.eye(3)).reshape(len(which), 18, 24)
 
+    def shared(self, slots: np.ndarray, corner: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (n, 4) and forces on them (n, 4, 3) [N] of joints (n,), from those of triangles (n, 3) and (n, 3, 3):
+        on sides of hexahedra the force on the corners of `moved` goes to all four, see `joints_hexes`."""
+        corner, force = np.pad(corner, ((0, 0), (0, 1)), constant_values=-1), np.pad(force, ((0, 0), (0, 1), (0, 0)))
+        at = np.flatnonzero(np.isin(slots, self.slot))
+        which = np.searchsorted(self.slot, slots[at])
+        g, e = self.weights[which, :4], self.weights[which, 4:7]
+        force[at] -= g[:, :, None] * (e[:, :, None] * force[at, :3]).sum(axis=1)[:, None]
+        corner[at] = self.corners(which)[:, :4]
+        return corner, force
+
     def corners(self, which: np.ndarray) -> np.ndarray:
         """(n, 8): of the same the corners, element * 4 + k."""
         row, word = np.divmod(self.at[which], ROW)

@@ -516,9 +516,10 @@ class LocalSpace(LawsSpace):
         ]
 
     def corner_forces(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As in the plane, of tetrahedra."""
+        """As in the plane; beside hexahedra of four corners, -1 for the fourth of a triangle."""
         face = self.slot_face[slots]
-        return 4 * (face // 4)[:, None] + FACES[face % 4], self._edges(slots)[:, 13:].reshape(-1, 3, 3)
+        corner, force = 4 * (face // 4)[:, None] + FACES[face % 4], self._edges(slots)[:, 13:].reshape(-1, 3, 3)
+        return (corner, force) if self.sides is None else self.sides.shared(slots, corner, force)
 
     def joint_means(self, slots: np.ndarray) -> np.ndarray:
         """Mean opening, size of the mean slip [m], mean normal stress and size of the mean shear stress [Pa] (n, 4)."""
