@@ -11,7 +11,7 @@ from hpcdem.lang.pcdc import source
 from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.parser import parse
 from hpcdem.lang.pcdc.statement import Statement
-from hpcdem.lang.pcdc.table import PCDC
+from hpcdem.lang.pcdc.table import COMMANDS, INSTEAD, PCDC
 from tests.tables import each
 
 
@@ -204,7 +204,7 @@ REFUSED = [
     ("element c-model mech-iso-e den 1 y 1 p-r 0.2 colour 3", "after 'element c-model mechanical-iso-elastic'"),
     ("element c-model null density 3", "read 'density' after 'element c-model null'"),
     ("element-face c-model contact-m-c p 3", "it may mean penalty-normal (at least 'p-n'), penalty-shear"),
-    ("element-face boundary m-s-b-c", "needs at least one of stress-xx, stress-yy, stress-zz, stress-n"),
+    ("element-face boundary m-s-b-c", "needs at least one of stress-xx, stress-yy, stress-zz, stress-xy"),
     ("node group 'a' range", "the line ends where a term: group, set, id"),
     ("node group 'a' range colour 3", "read 'colour' after 'node group range', expected one of group, set, id, x, y"),
     ("node group 'a' range x", "the line ends where a number for 'x' is expected"),
@@ -260,7 +260,9 @@ REFUSED_IN_SPACE = [
     ("mesh structured (0,0,0) (1,1,1) cells 2 2", "the line ends where a whole number above 0 for 'cells' is expected"),
     ("mesh structured (0,0,0) (1,1,1) cells 2 2 2 type tri", "type tri: in three dimensions it is tet or hex"),
     ("geometry create rectangle (0,0) (1,1) as-layer 'c'",
-     "'geometry create rectangle' is for two dimensions in this version"),
+     "'geometry create rectangle' is for two dimensions; in three there is geometry create box"),
+    ("element densify maximum-length 1", "'element densify' is for two dimensions; in three there is mesh create"),
+    ("element-face boundary m-s-b-c dip 1e5", "'dip' is for two dimensions; in three there is stress-xy"),
     ("liner create range x 0 1", "'liner create' is for two dimensions"),
 ]  # fmt: skip
 
@@ -289,3 +291,14 @@ def test_keywords_of_a_keyword_come_once_the_second_is_the_command_s() -> None:
     arguments = source.read(text).statements[0].arguments
     assert arguments["region"] == [{"value": "b", "group": "c"}] and arguments["group"] == {"value": "d", "set": "e"}
     assert arguments["size"] == 2.0 and arguments["refine-layer"] == [{"value": "f", "size": 1.0}]
+
+
+def test_what_is_there_instead_is_there_in_space():
+    """Words of the advice: commands of three dimensions, and words that are for two only."""
+    plane = {command.name for command in COMMANDS if 3 not in command.dims}
+    words = {
+        str(o.keyword) for c in COMMANDS for o in (*c.options, *c.models, *(o for m in c.models for o in m.options))
+    }
+    for word, advice in INSTEAD.items():
+        assert word in plane or word in words | {str(term.keyword) for term in PCDC.range_terms}, word
+        assert not any(advice.startswith(name) for name in plane), word

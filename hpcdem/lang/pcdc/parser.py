@@ -12,7 +12,7 @@ from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
 from hpcdem.lang.pcdc.kinds import Pending
 from hpcdem.lang.pcdc.lexer import Escape, Token, Vector, Word
 from hpcdem.lang.pcdc.statement import Statement, resolved, shown
-from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, Way
+from hpcdem.lang.pcdc.table import INSTEAD, PROPERTY, RANGE, Command, Level, Model, Option, Table, Way
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 
@@ -178,7 +178,8 @@ class _Line:
         """ValueError for a word that is not there in the dimensions of this model."""
         if self.dim is not None and self.dim not in dims:
             numbers = {2: "two", 3: "three"}
-            advice = "; model new dim 3 makes a model of three" if self.dim == 2 else " in this version"
+            instead = f"; in three there is {INSTEAD[str(word)]}" if str(word) in INSTEAD else " in this version"
+            advice = "; model new dim 3 makes a model of three" if self.dim == 2 else instead
             raise Refused(f"'{word}' is for {numbers[dims[0]]} dimensions{advice}")
 
     def leading(self, option: Option, arguments: dict[str, Any]) -> None:

@@ -1598,5 +1598,32 @@ _ONLINE = (
             "node boundary mech-vel-b-c velocity-x function 'file.py:name'"),
 )  # fmt: skip
 
+INSTEAD = {
+    "geometry create polyline": "geometry create polygon, disc and plane",
+    "geometry create rectangle": "geometry create box, and polygon for a flat one",
+    "geometry create arc": "geometry create cylinder, cone and revolve",
+    "geometry create point": "mesh create size and refine-layer",
+    "geometry export": "output vtk for the mesh and its faces",
+    "segment-length": "geometry create polygon with the corners of the circle",
+    "mesh equilateral": "mesh structured type tet or hex, and mesh create",
+    "mesh quality": "the log of mesh create, with the sizes of the tetrahedra",
+    "element create geometry": "geometry create, and mesh create from-layer",
+    "element create geometry-patch": "mesh create from-layer with embed and refine-layer",
+    "element create geometry-boundary": "mesh create from-layer with hole",
+    "element create hollow-circle": "mesh create from-layer with hole, of two cylinders",
+    "element densify": "mesh create with refine-layer, before the mesh is made",
+    "length": "radius",
+    "p20": "p30",
+    "p21": "p32",
+    "geometry-along": "geometry-distance",
+    "dip": "stress-xy, stress-xz and stress-yz",
+    "profile": "history create of flow nodes, and output vtk",
+    "cracks": "output image, and output vtk with the joints",
+    "plastic": "output image of the field plastic_shear_strain",
+    "temperature": "output image of the field temperature",
+    "free-field": "quiet on at the sides, with the stress of the static stage",
+}  # fmt: skip
+"""What there is in three dimensions in place of words for two."""
+
 COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_ELEMENT_CREATE, *_OBJECTS, *_RECORDS, *_ONLINE)
 PCDC = Table(COMMANDS, RANGE_TERMS)
