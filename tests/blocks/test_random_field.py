@@ -84,7 +84,7 @@ def test_the_variogram_of_a_correlated_field(covariance):
     form = (lambda h: math.exp(-h / length)) if covariance == "exponential" else (
         lambda h: math.exp(-((h / length) ** 2)))  # fmt: skip
     at = np.random.default_rng(0).uniform(0, 10, (400, 2))
-    lags = (0.02, 0.1, 0.2, 0.4, 0.8, 1.6)
+    lags = (0.05, 0.2, 0.4, 0.8)
     for way in ((1.0, 0.0), (0.0, 1.0), (0.6, 0.8)):
         found = np.zeros(len(lags))
         for seed in range(40):

@@ -8,6 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hpcdem.io.frame import Frame, Table
+from hpcdem.runtime import kept
+
+kept.install()  # for programs of several ranks, each of which would compile the kernels for itself
 
 GROUPS = ["***", "ball_rand", "sed", "a_group_with_a_rather_long_name"]
 
