@@ -659,6 +659,21 @@ class Faces(_Modelled):
         }  # fmt: skip
         self._carry_out("boundary", given, where, "thermal-const-heat")
 
+    def field(
+        self,
+        name: str,
+        *,
+        flux: Number | None = None,
+        transfer: float | None = None,
+        environment: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """A field of elements, as "moisture": what comes in, or goes to an environment of this value, over the
+        difference to it; without a coefficient with that of the elements. Numbers or names of tables over the time of
+        the field. Without a range: the whole surface of the model."""
+        given = {"flux": flux, "transfer": transfer, "environment": environment}
+        self._carry_out("boundary", given, where, f"{name}-flux-boundary-condition")
+
     def free_field(self, *, where: Where = None) -> None:
         """Vertical sides beyond which the ground goes on, in dynamic runs: columns beside them move with the base."""
         self._carry_out("boundary", {}, where, "free-field")
@@ -762,6 +777,16 @@ class Nodes(Objects):
     def temperature(self, temperature: Number, *, where: Where = None) -> None:
         """Temperature of nodes from now on: a number or the name of a table over the time of heat."""
         self._carry_out("boundary", {"temperature": temperature}, where, "thermal-solid-boundary-condition")
+
+    def field(self, name: str, value: Number, *, where: Where = None) -> None:
+        """The value of a field of elements, as "moisture", from now on: a number or the name of a table over its
+        time."""
+        self._carry_out("boundary", {name: value}, where, f"{name}-boundary-condition")
+
+    def initial_field(self, name: str, value: float, *, where: Where = None) -> None:
+        """The value of a field of elements, as "moisture", now; elements around the nodes are free of the stress that
+        it brings then."""
+        self._carry_out("initial", {name: value}, where)
 
     def fluid_temperature(self, temperature: Number, *, where: Where = None) -> None:
         """The same of the fluid at flow nodes, and of what is injected there."""
@@ -1338,6 +1363,24 @@ class BlockCommands:
         stable)."""
         given = {"mechanical": mechanical, "hydraulic": hydraulic, "thermal": thermal}
         self._blocks("model sub-step", given)
+
+    def field_clock(
+        self, field: str, *, flows: bool | None = None, time_step: float | None = None, sub_steps: int | None = None,
+        current_time: float | None = None,
+    ) -> None:  # fmt: skip
+        """The clock of a field of elements, as "moisture": whether it flows; its sub-steps [s] (0: those of a cycle
+        take the time of the steps of the blocks), and how many in a cycle (0: as many as are stable); what it shows
+        now."""
+        given = {
+            "field": field, "flows": flows, "time_step": time_step, "sub_steps": sub_steps,
+            "current_time": current_time,
+        }  # fmt: skip
+        self._blocks("model field", given)
+
+    def field_account(self, name: str) -> dict[str, float]:
+        """The account of a field of elements, as "moisture": given, commands, stored, removed; what does not add up.
+        Collective."""
+        return fdem.fields.account(self._blocks.project(), name)
 
     def run_time(self, time: float) -> None:
         """The time [s] that `solve` takes at most from now on; 0: no end."""

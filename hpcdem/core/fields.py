@@ -76,5 +76,5 @@ FIELDS: dict[str, Field] = {
     "birth": Field(COLD, BIRTH, np.int64, "1", "step at which the particle was made"),
 }
 
-PER_METRE = {"N/m": "N", "J/m": "J", "N m/m": "N m", "m2/s": "m3/s"}
+PER_METRE = {"N/m": "N", "J/m": "J", "N m/m": "N m", "m2/s": "m3/s", "kg/m": "kg"}
 """Units in the plane, where everything is that of a metre of thickness, and in space."""

@@ -7,7 +7,9 @@ energy and have columns in checkpoints. physics/bolts is the worked example. Dis
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from hpcdem.physics.fields import kinds
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.free_field import FreeField
@@ -60,10 +62,8 @@ def _water() -> type[Water]:
     return Water
 
 
-PHYSICS: Mapping[
-    str, Callable[[], type[Structure] | type[FreeField] | type[Flow] | type[Proppant] | type[Heat] | type[Water]]
-] = {
+PHYSICS: Mapping[str, Callable[[], type[Any]]] = {
     "bolts": _bolts, "liners": _liners, "free_field": _free_field, "fluid": _fluid, "proppant": _proppant,
-    "heat": _heat, "water": _water,
+    "heat": _heat, "water": _water, **{name: kind.load_type for name, kind in kinds().items()},
 }  # fmt: skip
 """How to get each class: its import brings numba and kernels, which takes a second."""

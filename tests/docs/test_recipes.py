@@ -48,6 +48,31 @@ def play(*lines, begin=("START", "SET dt 1e-3 disk on")):
 BALLS = "BALL id 0 rad 1.0 x 0.0 y 0.0", "BALL id 1 rad 1.0 x 5.0 y 0.0", "PROP density 1e3 kn 1e6 ks 1e6 xv 2.0"
 """
 
+SALT = """
+from hpcdem.physics.fdem.properties import ELEMENT, Model, Property
+from hpcdem.physics.fields import Kind
+
+TRANSPORT = Model("salt_transport", ELEMENT, "salt in pores",
+                  (Property("salt_diffusivity", "m2/s", "diffusivity of salt", low_itself=False),))
+KIND = Kind(name="salt", unit="1", doc="mass of salt over that of the rock", amount="kg/m", flux="kg/(m2 s)",
+            transfer="kg/(m2 s)", model=TRANSPORT, load="Salt")
+"""
+SALTY = """
+import numpy as np
+from hpcdem.physics.field.diffusing import Diffusing
+from hpcdem.physics.salt.properties import TRANSPORT
+
+class Salt(Diffusing):
+    name = quantity = word = kind_of_model = "salt"
+    kernel_kind, unstressed, model = "heat", "salt_unstressed", TRANSPORT
+
+    def _capacities(self):
+        return np.array([0.0, *np.ones(len(self.rows))])
+
+    def _conductivities(self, elements):
+        k = 2000.0 * self.column("salt_diffusivity")[self.row[elements]]
+        return np.column_stack([k, k, 0.0 * k])
+"""
 DECAY = """
 from dataclasses import asdict, dataclass
 from typing import ClassVar
@@ -301,6 +326,26 @@ assert len(list(Path("data").glob("*.txt"))) == 3  # at step 20 as well
 play(*BALLS, "HIST id 3 interval 5 discs", "CYC 5")
 assert Path("data/hist_3.csv").read_text().splitlines()[-1].endswith(",2.0")
 """,
+    ),
+    "a field on blocks": Recipe(
+        [("physics/fields.py", 'FIELDS = ("moisture",)', '=FIELDS = ("moisture", "salt")')],
+        """
+import hpcdem
+sim = hpcdem.Simulation()
+sim.mesh.structured((0, 0), (1.0, 0.1), (10, 1), diagonal="right")
+sim.option(mechanical=False)
+sim.elements.model("mech-iso-elastic", density=2000, young=1e7, poisson_ratio=0.3)
+sim.elements.model("salt-transport", salt_diffusivity=1e-6)
+sim.nodes.initial_field("salt", 0.2)
+sim.nodes.field("salt", 0.1, where="x 0 0")
+sim.histories.create("s", "node", "salt", nearest=(1.0, 0.0))
+sim.step(50)
+found = sim.field_account("salt")
+assert found["given"] < 0.0 and found["relative"] < 1e-12, found
+salt = sim.nodes["salt"]
+assert salt.min() == 0.1 < salt.max() < 0.2, salt
+""",
+        {"physics/salt/__init__.py": "", "physics/salt/properties.py": SALT, "physics/salt/model.py": SALTY},
     ),
     "physics on particles": Recipe(
         [

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         clocks,
         coupling,
         cracks,
+        fields,
         flow,
         frames,
         geometry,
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Project", "assignments", "bolts", "charts", "checkpoints", "clocks", "coupling", "cracks", "flow", "frames",
-    "geometry", "heat", "histories", "liners", "meshes", "pictures", "queries", "settings", "steps", "summary",
-    "supports",
+    "fields", "geometry", "heat", "histories", "liners", "meshes", "pictures", "queries", "settings", "steps",
+    "summary", "supports",
 ]  # fmt: skip
 
 

@@ -26,6 +26,7 @@ from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.diagnostics import JOINT_SIZE, PROPERTIES, QUANTITIES
 from hpcdem.physics.fdem.groups import CHANNEL, ELEMENT, JOINT
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fields import kinds
 from hpcdem.physics.flow.model import Flow
 
 
@@ -112,6 +113,12 @@ def whole(project: Project) -> MeshState | None:
     return vtkhdf_mesh.whole(frame(project), project.comm)
 
 
+_OF_FIELDS = {f"mean_{name}": name for name in diagnostics.DIFFUSING} | {
+    name: one.name for one in kinds().values() for name in one.derived
+}
+"""Quantities that are there with columns of a field, and their names."""
+
+
 def _names(blocks: Blocks, kind: str) -> list[str]:
     """What is written of elements and joints: neither where they are, which the points say, nor single points of
     joints; of properties those that a table or a field has made different from object to object; of plastic flow and
@@ -124,7 +131,7 @@ def _names(blocks: Blocks, kind: str) -> list[str]:
         if quantity.on == kind and blocks.dim in quantity.dims
         and (quantity.framed or PROPERTIES[kind].get(name) in varied)
         and (yields or not name.startswith("plastic_")) and (creeps or not name.startswith(("creep_", "kelvin_")))
-        and (name != "mean_temperature" or "heat" in blocks.surface_loads)
+        and (name not in _OF_FIELDS or _OF_FIELDS[name] in blocks.cold)
     ] + (user_laws.quantities(blocks) if kind == ELEMENT else [])  # fmt: skip
 
 
@@ -132,8 +139,8 @@ def _corners(blocks: Blocks) -> dict[str, np.ndarray]:
     """Every corner of this rank's elements by itself, with its node: those of broken joints part."""
     axes = "xyz"[: blocks.dim]
     vectors = [f"{name}_{axis}" for name in ("position", "displacement", "velocity") for axis in axes]
-    heat = ["temperature"] if "heat" in blocks.surface_loads else []
-    columns = diagnostics.owned_values(blocks, "corner", vectors + heat)
+    fields = [name for name in diagnostics.DIFFUSING if name in blocks.cold]
+    columns = diagnostics.owned_values(blocks, "corner", vectors + fields)
     columns["node"] = blocks.the_mesh().cells[columns["number"] // 4, columns["number"] % 4].astype(np.int64)
     places = {f"position_{axis}": axis for axis in axes}
     return {places.get(name, name): values for name, values in columns.items()}

@@ -14,6 +14,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.field.assigned import Number
+from hpcdem.physics.fields import kinds
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.heat.properties import ISO_HEAT
 
@@ -48,6 +49,14 @@ def element_property(project: Project, properties: Mapping[str, Value], where: R
     others = {name: value for name, value in properties.items() if name not in thermal}
     if thermal:
         of_heat(project).adjust(chosen(project, ELEMENT, where), thermal)
+    for kind in kinds().values():
+        mine = {name: value for name, value in others.items() if kind.model.has(name)}
+        others = {name: value for name, value in others.items() if name not in mine}
+        if mine:
+            found = kind.load_type().there(project.ready())
+            if found is None:
+                raise CommandError(f"there is no {kind.name} yet: element c-model {kind.word} comes first")
+            found.adjust(chosen(project, ELEMENT, where), mine)
     if others:
         assignments.element_property(project, others, where)
 

@@ -12,6 +12,7 @@ import numpy as np
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.groups import CHANNEL, ELEMENT, JOINT, NODE, SUPPORTS
+from hpcdem.physics.fields import kinds
 from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
@@ -32,6 +33,7 @@ UNITS = {
         "position_x": "m", "position_y": "m", "position_z": "m", "displacement_x": "m", "displacement_y": "m",
         "displacement_z": "m", "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s", "reaction_x": "N/m",
         "reaction_y": "N/m", "reaction_z": "N/m", "temperature": "K",
+        **{one.name: one.unit for one in kinds().values()},
     },
     ELEMENT: {
         "stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa", "stress_xz": "Pa",
@@ -41,6 +43,8 @@ UNITS = {
         "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_strain_zz": "1", "creep_strain_xz": "1",
         "creep_strain_yz": "1", "kelvin_strain_zz": "1", "kelvin_strain_xz": "1", "kelvin_strain_yz": "1",
         "creep_work": "J/m", "mean_temperature": "K",
+        **{f"mean_{one.name}": one.unit for one in kinds().values()},
+        **{name: unit for one in kinds().values() for name, (unit, _) in one.derived.items()},
         LAW_STATE: "that of the law",
     },
     JOINT: {
@@ -64,6 +68,8 @@ UNITS = {
         "flow_time": "s", "fluid_given": "m2", "fluid_stored": "m2", "fluid_leaked": "m2",
         "proppant_came": "m2", "proppant_stored": "m2", "proppant_packed": "m2", "proppant_left": "m2",
         "heat_time": "s", "heat_given": "J/m", "heat_stored": "J/m", "heat_in_fluid": "J/m",
+        **{f"{one.name}_time": "s" for one in kinds().values()},
+        **{f"{one.name}_{part}": one.amount for one in kinds().values() for part in ("given", "stored")},
     },
 }  # fmt: skip
 """What can be recorded of each kind of object, with its unit."""
@@ -78,30 +84,12 @@ def _energy(name: str) -> Callable[[Any], float]:
     return lambda blocks: float(diagnostics.energies(blocks)[name])
 
 
-def _of_fluid(name: str) -> Callable[[Any], float]:
+def _of_field(field: Callable[[], type[Any]], name: str) -> Callable[[Any], float]:
     def measure(blocks: Blocks) -> float:
-        flow = Flow.there(blocks)
-        if flow is None:
+        found = field().there(blocks)
+        if found is None:
             return 0.0
-        return float(flow.time) if name == "time" else flow.account()[name]
-
-    return measure
-
-
-def _of_proppant(name: str) -> Callable[[Any], float]:
-    def measure(blocks: Blocks) -> float:
-        found = Proppant.there(blocks)
-        return 0.0 if found is None else found.account()[name]
-
-    return measure
-
-
-def _of_heat(name: str) -> Callable[[Any], float]:
-    def measure(blocks: Blocks) -> float:
-        heat = Heat.there(blocks)
-        if heat is None:
-            return 0.0
-        return float(heat.time) if name == "time" else heat.account()[name]
+        return float(found.time if name == "time" else found.account()[name])
 
     return measure
 
@@ -129,15 +117,20 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "liner_work": _energy("work_liners"),
     "heat_work": _energy("work_heat"),
     "energy_error": _energy("closing"),
-    "flow_time": _of_fluid("time"),
-    "fluid_given": _of_fluid("given"),
-    "fluid_stored": _of_fluid("stored"),
-    "fluid_leaked": _of_fluid("leaked"),
-    **{f"proppant_{name}": _of_proppant(name) for name in ("came", "stored", "packed", "left")},
-    "heat_time": _of_heat("time"),
-    "heat_given": _of_heat("given"),
-    "heat_stored": _of_heat("stored"),
-    "heat_in_fluid": _of_heat("fluid"),
+    "flow_time": _of_field(lambda: Flow, "time"),
+    "fluid_given": _of_field(lambda: Flow, "given"),
+    "fluid_stored": _of_field(lambda: Flow, "stored"),
+    "fluid_leaked": _of_field(lambda: Flow, "leaked"),
+    **{f"proppant_{name}": _of_field(lambda: Proppant, name) for name in ("came", "stored", "packed", "left")},
+    "heat_time": _of_field(lambda: Heat, "time"),
+    "heat_given": _of_field(lambda: Heat, "given"),
+    "heat_stored": _of_field(lambda: Heat, "stored"),
+    "heat_in_fluid": _of_field(lambda: Heat, "fluid"),
+    **{
+        f"{one.name}_{part}": _of_field(one.load_type, part)
+        for one in kinds().values()
+        for part in ("time", "given", "stored")
+    },
 }
 _OF_SEVERAL: dict[str, Callable[[np.ndarray], float]] = {
     "": lambda values: values[0], "sum": lambda values: math.fsum(values.tolist()),

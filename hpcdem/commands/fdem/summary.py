@@ -17,6 +17,7 @@ from hpcdem.io.agreed import on_first
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, Range
+from hpcdem.physics.fields import kinds
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import Proppant
@@ -121,6 +122,7 @@ def close(project: Project, figure: bool = True) -> None:
     if heat is not None:
         found = heat.account()
         log.account("heat", "heat", joule, {HEAT_WORDS[k]: found[k] for k in HEAT_WORDS}, project.units)
+    _tell_fields(project)
     _tell_both(project)
     if figure:
         path = last_figure(project)
@@ -131,6 +133,17 @@ def close(project: Project, figure: bool = True) -> None:
         log.stages(blocks.timers, project.comm, "element")
     else:
         log.stages_of_both(both.particles.timers, blocks.timers, project.comm)
+
+
+def _tell_fields(project: Project) -> None:
+    """The accounts of fields that diffuse in elements. Collective."""
+    blocks, log = project.blocks, project.log
+    for kind in kinds().values():
+        if log is not None and kind.name in blocks.surface_loads:
+            found = kind.load_type().there(blocks).account()
+            unit = kind.amount if blocks.dim == 2 else kind.amount.removesuffix("/m")
+            told = {word: found[name] for name, word in HEAT_WORDS.items() if name in found}
+            log.account(kind.name, kind.name, unit, told, project.units)
 
 
 def _tell_both(project: Project) -> None:

@@ -14,6 +14,9 @@ from hpcdem.lang.pcdc.table import (
     BOLT_FORCE,
     BOLT_VELOCITY,
     CONST_HEAT,
+    FIELD_MODELS,
+    FIELDS_AT_FACES,
+    FIELDS_AT_NODES,
     FLOW_CONDITION,
     FLUID_HEAT,
     FLUID_TEMPERATURE,
@@ -236,6 +239,11 @@ def _group(kind: str) -> Callable[[Call], None]:
     return carry_out
 
 
+def _of_field(call: Call, models: Mapping[str, Model]) -> str | None:
+    """The field whose model or condition it is."""
+    return next((name for name, one in models.items() if one.keyword.name == call["model"]), None)
+
+
 def _element_model(call: Call) -> None:
     if call["model"] == "null":
         fdem.assignments.null(call.project, **call.properties(), where=call.where)
@@ -243,6 +251,8 @@ def _element_model(call: Call) -> None:
         fdem.assignments.user_model(call.project, call["law"], call.properties(), call.where)
     elif trial.MODELS[call["model"]] is ISO_HEAT.of:
         fdem.heat.model(call.project, call.properties(), call.where)
+    elif (field := _of_field(call, FIELD_MODELS)) is not None:
+        fdem.fields.model(call.project, field, call.properties(), call.where)
     elif call["model"] in _FLUIDS:
         _FLUIDS[call["model"]](call, fdem.assignments.around(call.project, call.where))
     else:
@@ -296,6 +306,8 @@ def _node_condition(call: Call) -> None:
             fdem.heat.condition(call.project, **_over_time(call), where=call.where)
         case FLUID_TEMPERATURE.keyword.name:
             fdem.heat.fluid_condition(call.project, **_over_time(call), where=call.where)
+        case _ if (field := _of_field(call, FIELDS_AT_NODES)) is not None:
+            fdem.fields.condition(call.project, field, _over_time(call)[field], call.where)
 
 
 _KINDS = {VELOCITY: "motion", FORCE: "force", MOVE: "constraint"}
@@ -314,6 +326,13 @@ def _free_nodes(call: Call) -> None:
         fdem.flow.remove_conditions(call.project, call.where, *of_flow)
     if any(of_heat := _removed(call, TEMPERATURE, FLUID_TEMPERATURE)):
         fdem.heat.remove_conditions(call.project, call.where, *of_heat)
+    _free_of_fields(call, FIELDS_AT_NODES, g.NODE)
+
+
+def _free_of_fields(call: Call, conditions: Mapping[str, Model], kind: str) -> None:
+    for name, condition in conditions.items():
+        if any(_removed(call, condition)):
+            fdem.fields.remove(call.project, name, kind, call.where)
 
 
 def _free_faces(call: Call) -> None:
@@ -322,6 +341,7 @@ def _free_faces(call: Call) -> None:
         fdem.assignments.remove_face_conditions(call.project, call.where)
     if heat:
         fdem.heat.remove_face_conditions(call.project, call.where)
+    _free_of_fields(call, FIELDS_AT_FACES, g.FACE)
 
 
 def _free_bolt_nodes(call: Call) -> None:
@@ -342,6 +362,9 @@ def _initial_nodes(call: Call) -> None:
         fdem.assignments.force(call.project, **forces, where=call.where)
     if "temperature" in call.arguments:
         fdem.heat.initial(call.project, call["temperature"], call.where)
+    for field in FIELDS_AT_NODES:
+        if field in call.arguments:
+            fdem.fields.initial(call.project, field, call[field], call.where)
 
 
 def _initial_fluid(call: Call) -> None:
@@ -367,6 +390,9 @@ def _face_condition(call: Call) -> None:
         return
     if call["model"] == CONST_HEAT.keyword.name:
         fdem.heat.face_condition(call.project, **_over_time(call), where=call.where)
+        return
+    if (field := _of_field(call, FIELDS_AT_FACES)) is not None:
+        fdem.fields.face_condition(call.project, field, **_over_time(call), where=call.where)
         return
     given = {name.removeprefix("stress_"): value for name, value in call.properties().items()}
     if call["model"] == ABSORB.keyword.name:
@@ -546,6 +572,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "node hydraulic-initialize": _initial_fluid,
     "node history": _node_history,
     "table": _table,
+    "model field": lambda c: fdem.fields.clock(c.project, c["field"], **c.given("field")),
     "model sub-step": lambda c: fdem.flow.sub_step(c.project, **c.given()),
     "model rayleigh": lambda c: fdem.settings.rayleigh(c.project, **c.given()),
     "model creep": lambda c: fdem.settings.creep(c.project, **c.given()),

@@ -64,12 +64,12 @@ class Kind:
     softens: bool = False
     """``table 'name' over plastic-strain`` may, too."""
     warms: bool = False
-    """So may ``table 'name' over temperature``."""
+    """So may ``table 'name' over temperature``, or over another field of elements."""
 
     @property
     def axes(self) -> tuple[str, ...]:
         """What a table that stands for it can be over; z in space only."""
-        there = {PLASTIC_STRAIN: self.softens, TEMPERATURE: self.warms}
+        there = {PLASTIC_STRAIN: self.softens, **dict.fromkeys(range(TEMPERATURE, len(AXES)), self.warms)}
         return tuple(axis for k, axis in enumerate(AXES) if there.get(k, True))
 
 

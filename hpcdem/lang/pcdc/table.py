@@ -60,6 +60,7 @@ from hpcdem.lang.pcdc.kinds import (
 )  # fmt: skip
 from hpcdem.physics.bolts.properties import BOLT as BOLT_PROPERTIES
 from hpcdem.physics.fdem import properties
+from hpcdem.physics.fields import kinds
 from hpcdem.physics.flow.properties import POROUS as POROUS_PROPERTIES
 from hpcdem.physics.heat.properties import FLUID_HEAT as FLUID_HEAT_PROPERTIES
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT_PROPERTIES
@@ -322,6 +323,28 @@ ISO_HEAT = Model(
              "conductivity-a{cross}", "conductivity-ang{le}", also=_COEFFICIENTS),
     of=HEAT_PROPERTIES, dims=BOTH,
 )  # fmt: skip
+FIELD_MODELS = {
+    one.name: Model(one.word, "", f"Diffusion of {one.doc}, beside the mechanical model of the elements, all of which "
+                    "need it where one has it. It crosses joints until they break. At the values of this moment "
+                    "elements are free of the stress that it brings.", declared(one.model), of=one.model, dims=BOTH)
+    for one in kinds().values()
+}  # fmt: skip
+"""Of fields that diffuse in elements (physics/fields.py), by their names, as the next ones."""
+FIELDS_AT_NODES = {
+    one.name: Model(one.on_nodes, "", f"The {one.name} of nodes; times of tables are those of the field.",
+                    (Option(one.name, (TABLED,), one.doc, one.unit, required=True),), dims=BOTH)
+    for one in kinds().values()
+}  # fmt: skip
+FIELDS_AT_FACES = {
+    one.name: Model(
+        one.on_faces, "", f"The flow of {one.name} through surfaces, which let nothing through without it. Times of "
+        "tables are those of the field.",
+        (Option("flux", (TABLED,), "what comes in", one.flux),
+         Option("transfer", (NOT_NEGATIVE,), "what goes to the environment, over the difference to it", one.transfer,
+                "that of the elements"),
+         Option("environment", (TABLED,), "value of the environment", one.unit)), any_of=True, dims=BOTH)
+    for one in kinds().values()
+}  # fmt: skip
 
 # ---- boundary conditions of nodes and faces (tables 4 to 7, 11, 14 to 16, 18) --------------------------------------
 
@@ -616,6 +639,7 @@ RECORDED = {
         "position-x": "m", "position-y": "m", "position-z": "m", "displacement-x": "m", "displacement-y": "m",
         "displacement-z": "m", "velocity-x": "m/s", "velocity-y": "m/s", "velocity-z": "m/s", "reaction-x": "N/m",
         "reaction-y": "N/m", "reaction-z": "N/m", "temperature": "K",
+        **{one.name: one.unit for one in kinds().values()},
     },
     "element": {
         "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "stress-xz": "Pa",
@@ -624,7 +648,9 @@ RECORDED = {
         "creep-strain-yy": "1", "creep-strain-xy": "1", "kelvin-strain-xx": "1", "kelvin-strain-yy": "1",
         "kelvin-strain-xy": "1", "creep-strain-zz": "1", "creep-strain-xz": "1", "creep-strain-yz": "1",
         "kelvin-strain-zz": "1", "kelvin-strain-xz": "1", "kelvin-strain-yz": "1", "creep-work": "J/m",
-        "mean-temperature": "K", "law-state": "that of the law",
+        "mean-temperature": "K", **{f"mean-{one.name}": one.unit for one in kinds().values()},
+        **{name.replace("_", "-"): unit for one in kinds().values() for name, (unit, _) in one.derived.items()},
+        "law-state": "that of the law",
     },
     "joint": {
         "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
@@ -664,6 +690,8 @@ RECORDED = {
         "flow-time": "s", "fluid-given": "m2", "fluid-stored": "m2", "fluid-leaked": "m2",
         "proppant-came": "m2", "proppant-stored": "m2", "proppant-packed": "m2", "proppant-left": "m2",
         "heat-time": "s", "heat-given": "J/m", "heat-stored": "J/m", "heat-in-fluid": "J/m",
+        **{f"{one.name}-time": "s" for one in kinds().values()},
+        **{f"{one.name}-{part}": one.amount for one in kinds().values() for part in ("given", "stored")},
     },
 }  # fmt: skip
 """What a history can follow, and its unit."""
@@ -713,6 +741,7 @@ _OF_SOLIDS = (
     *(o for o in _properties(MOHR_COULOMB) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *(o for o in _properties(BURGERS) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *_properties(ISO_HEAT),
+    *(option for one in FIELD_MODELS.values() for option in _properties(one)),
     _PARAMETER,
 )  # fmt: skip
 
@@ -902,6 +931,17 @@ _MODEL = (
                             default="0"),
                      Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as are stable",
                             default="0")),
+            needs_option=True, dims=BOTH),
+    Command("mod{el} fi{eld}", "The clock of a field that diffuses in elements, as of moisture.",
+            ("pcdc model field moisture time-step 3600", "pcdc model field moisture flows off"),
+            (_leading("field", choice(*kinds()), "its name"),),
+            options=(Option("fl{ows}", (BOOL,), "off: values, and the stress that they bring, stay as they are",
+                            default="on"),
+                     Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "sub-step of the field, which then has a clock of its "
+                            "own; 0: those of a cycle take the time of the steps of the blocks, or without motion 0.9 "
+                            "of what is stable", "s", "0"),
+                     Option("s{ub}-s{teps}", (ZERO_OR_MORE,), "in a cycle; 0: as many as are stable", default="0"),
+                     Option("c{urrent}-t{ime}", (FLOAT,), "what its clock shows now", "s")),
             needs_option=True, dims=BOTH),
     Command("mod{el} ray{leigh}", "Rayleigh damping of elements in dynamic runs, beside that of their damp-factor: "
             "alpha times the mass, beta times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + "
@@ -1243,7 +1283,8 @@ _OBJECTS = (
              "pcdc element c-model therm-iso-h property conductivity 2.7 capacity 900 expansion-coeficient 1e-5",
              "pcdc element c-model user 'clay.py:clay' property density 2000 young 1e9 poisson-ratio 0.3 parameter "
              "'limit' 2e5"),
-            models=(ISO_ELASTIC, NULL, MOHR_COULOMB, USER, BURGERS, ISO_HEAT, POROUS, PROPPANT, FLUID_HEAT),
+            models=(ISO_ELASTIC, NULL, MOHR_COULOMB, USER, BURGERS, ISO_HEAT, POROUS, PROPPANT, FLUID_HEAT,
+                    *FIELD_MODELS.values()),
             ranged="element", manual=True,
             dims=BOTH),
     Command("e{lement} law", "Reads, checks and compiles a law of a Python file without giving it to elements: for a "
@@ -1286,12 +1327,12 @@ _OBJECTS = (
              "pcdc element-face boundary m-s-b-c quiet on incoming-x table 'wave' range boundary y 0 0",
              "pcdc element-face boundary free-field range boundary x 0 0",
              "pcdc element-face boundary therm-c-h transfer-coeficient 25 environment-temperature 10 range boundary"),
-            models=(STRESS, ABSORB, FREE_FIELD, CONST_HEAT), ranged="element-face", dims=BOTH,
-            also=("e{lement}-f{ace} b{oundary} a{pply}", "e{lement}-f{ace} a{pply}")),
+            models=(STRESS, ABSORB, FREE_FIELD, CONST_HEAT, *FIELDS_AT_FACES.values()), ranged="element-face",
+            dims=BOTH, also=("e{lement}-f{ace} b{oundary} a{pply}", "e{lement}-f{ace} a{pply}")),
     Command("e{lement}-f{ace} b{oundary} r{emove}", "Takes boundary conditions of surfaces back.",
             ("pcdc element-face boundary remove range geometry 'hole'",
              "pcdc element-face boundary remove therm-c-h range geometry 'hole'"),
-            options=_removed(STRESS, CONST_HEAT), ranged="element-face", dims=BOTH,
+            options=_removed(STRESS, CONST_HEAT, *FIELDS_AT_FACES.values()), ranged="element-face", dims=BOTH,
             also=("e{lement}-f{ace} r{emove}",)),
     _group_command("face-joint", "f{ace}-j{oint}"),
     _list_command("face-joint", "f{ace}-j{oint}"),
@@ -1316,7 +1357,8 @@ _OBJECTS = (
              "pcdc node boundary hydra-c-f-b pressure 1e6 range group 'hole'",
              "pcdc node boundary therm-s-b-c temperature table 'heating' range geometry 'hole'",
              "pcdc node boundary therm-f-b-c temperature 20 range group 'well'"),
-            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE),
+            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE,
+                    *FIELDS_AT_NODES.values()),
             ranged="node", dims=BOTH, also=("n{ode} bou{ndary} a{pply}", "n{ode} a{pply}")),
     Command("n{ode} mech{anical}-d{amp}", "Local damping of nodes: what drives one is less by this part of its size "
             "against its motion, in dynamic runs (without it there is none) and in static ones (0.8). The stable time "
@@ -1330,7 +1372,8 @@ _OBJECTS = (
     Command("n{ode} bou{ndary} r{emove}", "Takes boundary conditions of nodes back.",
             ("pcdc node boundary remove range group 'platen' set 'bc'",
              "pcdc node boundary remove mech-vel-b-c range group 'platen' set 'bc'"),
-            options=_removed(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE),
+            options=_removed(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE,
+                             *FIELDS_AT_NODES.values()),
             ranged="node", dims=BOTH, also=("n{ode} rem{ove}",)),
     Command("n{ode} init{ial}", "The velocity or temperature of nodes now.",
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
@@ -1340,7 +1383,9 @@ _OBJECTS = (
                      *(Option(f"f{{orce}}-{axis}", (FLOAT,), f"force along {axis} on each node from now on, as the "
                               "force condition", "N", dims=SPACE if axis == "z" else BOTH) for axis in "xyz"),
                      Option("temp{erature}", (FLOAT,), "temperature, of the fluid at them too; before, it is 0. "
-                            "Elements around the nodes are free of thermal stress then", "K")), ranged="node",
+                            "Elements around the nodes are free of thermal stress then", "K"),
+                     *(Option(one.name, (FLOAT,), f"{one.doc}; before, it is 0. Elements around the nodes are free of "
+                              "the stress that it brings then", one.unit) for one in kinds().values())), ranged="node",
             needs_option=True, dims=BOTH),
     Command("n{ode} therm{al}-init{ialize}", "The temperature of nodes now, as node initial temperature.",
             ("pcdc node thermal-initialize temperature 15 range x 0 1",),

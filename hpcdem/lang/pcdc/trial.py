@@ -19,6 +19,7 @@ from hpcdem.lang.pcdc.table import (
     COHESIVE,
     COMMANDS,
     CONTACT,
+    FIELD_MODELS,
     FLOW_CONDITION,
     FLUID_HEAT,
     ISO_ELASTIC,
@@ -35,6 +36,7 @@ from hpcdem.lang.pcdc.table import (
 from hpcdem.physics.bolts import layout
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
+from hpcdem.physics.fields import kinds
 from hpcdem.physics.flow.properties import POROUS as FLUID
 from hpcdem.physics.heat.properties import FLUID_HEAT as HEAT_OF_FLUID
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT
@@ -55,10 +57,12 @@ MODELS = {
         PROPPANT,
         ISO_HEAT,
         FLUID_HEAT,
+        *FIELD_MODELS.values(),
     )
     if model.of is not None
 }
 """Models of the language by their names in full."""
+OF_FIELDS = tuple(one.model for one in kinds().values())
 _OF_COMMAND = {
     "element property": properties.SOLID,
     "element-face property": properties.CONTACT_MOHR_COULOMB,
@@ -79,7 +83,10 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
             _model(arguments["model"], arguments["properties"])
         elif command.name in _OF_COMMAND:
             given, model = _given(arguments), _OF_COMMAND[command.name]
-            others = {properties.COHESIVE.name: (FLUID, HEAT_OF_FLUID, GRAINS), properties.SOLID.name: (HEAT,)}
+            others = {
+                properties.COHESIVE.name: (FLUID, HEAT_OF_FLUID, GRAINS),
+                properties.SOLID.name: (HEAT, *OF_FIELDS),
+            }
             for other in others.get(model.name, ()):
                 _changes(other, {name: v for name, v in given.items() if other.has(name)})
                 given = {name: v for name, v in given.items() if not other.has(name)}
@@ -163,7 +170,7 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
     if (
-        model in (BOLT.of, LINER.of, POROUS.of, PROPPANT.of, ISO_HEAT.of, FLUID_HEAT.of)
+        model in (BOLT.of, LINER.of, POROUS.of, PROPPANT.of, ISO_HEAT.of, FLUID_HEAT.of, *OF_FIELDS)
         and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys()
     ):
         model.complete(given)

@@ -96,6 +96,10 @@ class Model:
         """The account of heat [J/m]: given, commands, stored, fluid, removed, closing, relative."""
         return self._look(lambda: fdem.queries.heat(self._project))
 
+    def field(self, name: str) -> dict[str, float]:
+        """The account of a field of elements, as "moisture": given, commands, stored, removed, closing, relative."""
+        return self._look(lambda: fdem.fields.account(self._project, name))
+
     def node(self, number: int) -> View:
         """A node by its number: .position, .displacement, .velocity, .reaction (Vectors), .values(name)."""
         return View(self, "node", number)

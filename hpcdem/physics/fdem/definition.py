@@ -407,7 +407,8 @@ class ModelDefinition:
         return bool(softening_rows(self.element_rows)[self.element_row[self.alive]].any())
 
     def warms(self) -> tuple[np.ndarray, np.ndarray]:
-        """Elements (ne,) and joints (4 ne,) bool with a property that follows a table over temperature."""
+        """Elements (ne,) and joints (4 ne,) bool with a property that follows a table over temperature or another
+        field."""
         elements, joints = (
             np.any([rows.column(temperature_table(p.name)) > 0.0 for p in of.properties if p.warms], axis=0)
             for rows, of in ((self.element_rows, MECH_MOHR_COULOMB), (self.joint_rows, COHESIVE))
@@ -556,10 +557,10 @@ class ModelDefinition:
                 if self.followed[number - 1].times[0] < 0.0:
                     raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
                 out[name], out[softening_table(name)] = self.followed[number - 1](0.0), float(number)
-            elif isinstance(value, Over) and value.axis == TEMPERATURE:
+            elif isinstance(value, Over) and value.axis >= TEMPERATURE:
                 if not model.has(temperature_table(name)):
-                    raise CommandError(f"{name} of {model.name} cannot follow a table over temperature")
-                number = self._kept(model, name, value.table)
+                    raise CommandError(f"{name} of {model.name} cannot follow a table over {AXES[value.axis]}")
+                number = self._kept(model, name, value.table, AXES[value.axis] if value.axis > TEMPERATURE else "")
                 values = self.followed[number - 1].values
                 if name in ("gf1", "gf2") and values.min() == 0.0:
                     raise CommandError(
@@ -568,18 +569,19 @@ class ModelDefinition:
                 out[name], out[temperature_table(name)] = float(values.max()), float(number)
         return out
 
-    def _kept(self, model: Model, name: str, table: str) -> int:
-        """The number, from 1 on, of a table as it is now among those that rows follow; CommandError if a value of it is
+    def _kept(self, model: Model, name: str, table: str, over: str = "") -> int:
+        """The number, from 1 on, of a table as it is now among those that rows follow (over another field than
+        temperature: its name); CommandError if a value of it is
         none that this property can have."""
         self._value(name, table)
-        found = self.tables[table]
+        found = replace(self.tables[table], over=over)
         for one in found.values.tolist():
             model.property(name).check(one)
-        known = [one.pairs() for one in self.followed]
-        if found.pairs() not in known:
-            known.append(found.pairs())
+        known = [(one.pairs(), one.over) for one in self.followed]
+        if (found.pairs(), over) not in known:
+            known.append((found.pairs(), over))
             self.followed.append(found)
-        return 1 + known.index(found.pairs())
+        return 1 + known.index((found.pairs(), over))
 
     def _checked_softening(self, model: Model, values: np.ndarray) -> np.ndarray:
         """The complete sets of properties (n, k); CommandError if flow makes dilation larger than friction."""
@@ -1268,6 +1270,7 @@ class ModelDefinition:
             "fields": {name: _plain(asdict(field)) for name, field in self.fields.items()},
             "varied": self.varied,
             "softening": [table.pairs() for table in self.followed],
+            "softening_over": [table.over for table in self.followed],
             "element_rows": self.element_rows.state(),
             "face_rows": self.face_rows.state(),
             "joint_rows": self.joint_rows.state(),
@@ -1287,7 +1290,9 @@ class ModelDefinition:
         self.tables = {name: Table.of(pairs, name) for name, pairs in state["tables"].items()}
         self.fields = {name: RandomField(**_bounds(field)) for name, field in state.get("fields", {}).items()}
         self.varied = [list(one) for one in state.get("varied", [])]
-        self.followed = [Table.of(pairs) for pairs in state.get("softening", [])]
+        followed = [Table.of(pairs) for pairs in state.get("softening", [])]
+        over = state.get("softening_over", [""] * len(followed))
+        self.followed = [replace(table, over=name) for table, name in zip(followed, over, strict=True)]
         self.element_rows = Rows.restored(state["element_rows"])
         self.face_rows = Rows.restored(state["face_rows"])
         self.joint_rows = Rows.restored(state["joint_rows"])

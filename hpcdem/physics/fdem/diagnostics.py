@@ -22,6 +22,7 @@ from hpcdem.physics.fdem.probes import ForceProbe, Probe
 from hpcdem.physics.fdem.properties import COHESIVE, MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.state import Crack
+from hpcdem.physics.fields import FIELDS, kinds
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class Quantity:
 
 
 BOTH = (2, 3)
+DIFFUSING = ("temperature", *FIELDS)
+"""Fields of elements with values at their corners: columns of `State.cold`."""
 
 
 def unit_of(sim: Blocks, name: str) -> str:
@@ -76,6 +79,17 @@ QUANTITIES: dict[str, Quantity] = {
     "mean_temperature": Quantity(
         "element", "K", "mean temperature of its corners; NaN without a thermal model", dims=BOTH
     ),
+    **{
+        f"mean_{one.name}": Quantity(
+            "element", one.unit, f"mean of its corners: {one.doc}; NaN without a model of it", dims=BOTH
+        )
+        for one in kinds().values()
+    },
+    **{
+        name: Quantity("element", unit, f"{doc}; NaN without a model of it", dims=BOTH)
+        for one in kinds().values()
+        for name, (unit, doc) in one.derived.items()
+    },
     "area": Quantity("element", "m2", "area in the mesh"),
     "volume": Quantity("element", "m3", "volume in the mesh", dims=(3,)),
     "element_model": Quantity("element", "1", "row of the table of element models", dims=BOTH),
@@ -107,6 +121,10 @@ QUANTITIES: dict[str, Quantity] = {
     **_vector("reaction", "node", "N/m", "force by which conditions act on the node", False),
     **_vector("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included", False),
     "temperature": Quantity("node", "K", "temperature; NaN without a thermal model", dims=BOTH),
+    **{
+        one.name: Quantity("node", one.unit, f"{one.doc}; NaN without a model of it", dims=BOTH)
+        for one in kinds().values()
+    },
     "state": Quantity("joint", "1", "0 free, 1 intact, 2 behind its peak, 3 broken", dims=BOTH),
     "mode": Quantity("joint", "1", "how it broke, from 1 (opened) to 2 (slid); 0 if it is not broken", dims=BOTH),
     "break_time": Quantity("joint", "s", "model time at which it broke; NaN if it is not broken", dims=BOTH),
@@ -230,7 +248,7 @@ def owned_values(sim: Blocks, on: str, names: Sequence[str]) -> dict[str, np.nda
     sim.close_model()
     for name in names:
         belongs = quantity(sim, name).on
-        of_corners = ("position", "displacement", "velocity", "temperature")
+        of_corners = ("position", "displacement", "velocity", *DIFFUSING)
         if belongs != on and not (on == "corner" and name.startswith(of_corners)):
             raise CommandError(f"{name} belongs to a {belongs}, not to a {on}")
     made = _corner_columns(sim) if on == "corner" else columns_of(sim, on, names)
@@ -304,12 +322,16 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
         if "kinetic_energy" in wanted:
             v2 = (_corners(v, real) ** 2).sum(axis=2)
             columns["kinetic_energy"] = 0.5 * np.where(real, local.mass[own][some] * v2, 0.0).sum(axis=1)
-    if "mean_temperature" in wanted:
-        if len(mesh.hexes) and by_temperature.TEMPERATURE in sim.cold:
-            columns["mean_temperature"] = by_temperature.means(sim)[some]
+    for field in (field for field in DIFFUSING if f"mean_{field}" in wanted):
+        if len(mesh.hexes) and field in sim.cold:
+            columns[f"mean_{field}"] = by_temperature.means(sim, field)[some]
         else:
-            t, n = corner_temperatures(sim)[some], connectivity.corner_counts(mesh.cells[number])
-            columns["mean_temperature"] = _mean(t, np.arange(4) < n[:, None], n)
+            t, n = corners_of_field(sim, field)[some], connectivity.corner_counts(mesh.cells[number])
+            columns[f"mean_{field}"] = _mean(t, np.arange(4) < n[:, None], n)
+    for kind in kinds().values():
+        found = next((load for load in sim.surface_loads if load.name == kind.name), None)
+        for name in wanted & kind.derived.keys():
+            columns[name] = np.full(len(number), np.nan) if found is None else getattr(found, name)()[some]
     if any(name.startswith("plastic") for name in wanted):
         columns |= _plastic_columns(sim, some)
     if any(name.startswith(("creep", "kelvin_strain")) for name in wanted):
@@ -374,8 +396,8 @@ def _node_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = Non
             columns[name] = np.sqrt(sum(found[part] ** 2 for part in parts))
         elif name.startswith(("reaction", "unbalanced")):
             columns[name] = _whole_point(sim, name, points)
-        elif name == "temperature":
-            columns[name] = corner_temperatures(sim)[row - own.start, k]
+        elif name in DIFFUSING:
+            columns[name] = corners_of_field(sim, name)[row - own.start, k]
         elif kind == "velocity":
             columns[name] = sim.v[row, stride * k + c]
         else:
@@ -397,13 +419,14 @@ def _corner_columns(sim: Blocks) -> dict[str, np.ndarray]:
         columns[f"position_{axis}"] = place[i, k, c]
         columns[f"displacement_{axis}"] = place[i, k, c] - home[i, k, c]
         columns[f"velocity_{axis}"] = speed[i, k, c]
-    columns["temperature"] = corner_temperatures(sim)[i, k]
+    columns |= {name: corners_of_field(sim, name)[i, k] for name in DIFFUSING}
     return columns
 
 
-def corner_temperatures(sim: Blocks) -> np.ndarray:
-    """(n_own, 4) temperatures at the corners of the owned elements [K], NaN without a thermal model. Not collective."""
-    known, out = sim.cold.get("temperature"), np.full((sim.n_own, 4), np.nan)
+def corners_of_field(sim: Blocks, name: str) -> np.ndarray:
+    """(n_own, 4) temperatures, or values of another field of DIFFUSING, at the corners of the owned elements, NaN where
+    there is no model of it. Not collective."""
+    known, out = sim.cold.get(name), np.full((sim.n_own, 4), np.nan)
     if known is not None:
         out[:, : known.shape[1]] = known
     return out

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -290,7 +290,7 @@ class Local:
             self._clear_moduli()
         if sim.stress0 is not None:
             said = sim.stress0_row[sim.number[sim.owned]]
-            before = by_temperature.part_of_young(sim, said, sim.cold[by_temperature.UNSTRESSED][:, 0])
+            before = by_temperature.part_of_young(sim, said, by_temperature.unstressed(sim))
             if part is not None or before is not None:
                 ratio = np.ones(sim.n_own) if part is None else part.copy()
                 if before is not None:
@@ -298,7 +298,8 @@ class Local:
                 self.initial_part = ratio
                 self._scale_initial(ratio)
         if self.plastic and len(self.strength.of):
-            t, of = by_temperature.means(sim)[self.strength_element], self.strength.of
+            at, of = self.strength_element, self.strength.of
+            t = cache(lambda name: by_temperature.means(sim, name)[at])
             for column, name in ((strength.COHESION, "cohesion"), (strength.TENSILE, "tensile")):
                 self.strength.values[:, column] = by_temperature.values(sim, sim.element_rows, name, of, t)
             self._renew_strength()
@@ -325,10 +326,14 @@ class Local:
         """The laws of joints at their temperatures."""
         sim, slots = self.sim, self.warm_slots
         face = self.slot_face[slots]
-        t, own = sim.cold[by_temperature.TEMPERATURE], sim.where[face // 4] - sim.n_left
-        first, *others = (t[own, k] for k in (sim.the_mesh().face_corners(face) % 4).T)
-        # Both sides of a face in space begin at one corner and go round it the other way.
-        mean = 0.5 * (first + others[0]) if len(others) == 1 else (first + (others[0] + others[1])) / 3.0
+        own, corners = sim.where[face // 4] - sim.n_left, (sim.the_mesh().face_corners(face) % 4).T
+
+        @cache
+        def mean(name: str) -> np.ndarray:
+            first, *others = (sim.cold[name][own, k] for k in corners)
+            # Both sides of a face in space begin at one corner and go round it the other way.
+            return 0.5 * (first + others[0]) if len(others) == 1 else (first + (others[0] + others[1])) / 3.0
+
         rows, of = sim.joint_rows, self.warm_of
         warm = {name: by_temperature.values(sim, rows, name, of, mean) for name in _WARM_JOINT}
         self.joint_table[len(rows) :], self.joint_beyond[len(rows) :] = joint_tables(rows, warm, of)

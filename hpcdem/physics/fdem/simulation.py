@@ -53,6 +53,7 @@ from hpcdem.physics.fdem.pairs import cut_corner
 from hpcdem.physics.fdem.properties import KELVIN_STRAIN, MECH_BURGERS, temperature_table
 from hpcdem.physics.fdem.state import NARROW, WIDE, Crack, ListState, State
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.fields import kinds
 
 ROOM = 0.6
 """How far elements may go, both together, before storage and ghosts are made again; over the mean edge."""
@@ -65,8 +66,6 @@ OUTSIDE, MUCH = 1e-6, 1e-3
 that relaxation begins with."""
 LOCKS = 0.45
 """Poisson's ratio above which tetrahedra are said to lock."""
-OWN_CLOCK = ("fluid", "proppant", "heat")
-"""Physics whose conditions follow tables over a time of their own."""
 
 
 class Blocks(State):
@@ -248,7 +247,7 @@ class Blocks(State):
 
     def tables_over_time(self) -> list[str]:
         """Tables that conditions of blocks, bolts and liners follow; fluid and heat have clocks of their own."""
-        others = [load for load in self.surface_loads if load.name not in OWN_CLOCK]
+        others = [load for load in self.surface_loads if not load.own_clock]
         said = self.followed_tables()
         return [name for name in self.tables if name in said or any(load.uses_table(name) for load in others)]
 
@@ -370,10 +369,8 @@ class Blocks(State):
         o = self.options
         if self.dim == 2 and o.potential != DISTANCE:
             raise CommandError("in two dimensions there is no choice of the potential of contact")
-        flows = o.hydraulic and "fluid" in self.surface_loads
-        heated = o.thermal and "heat" in self.surface_loads
         if not o.mechanical:
-            if not (flows or heated):
+            if not any(load.keeps_time for load in self.surface_loads):
                 raise CommandError(
                     "nothing would happen: model option mechanical is off, and neither fluid nor heat flows"
                 )
@@ -381,7 +378,7 @@ class Blocks(State):
                 raise CommandError(
                     "without mechanics time passes by flow and heat: model option dynamic on comes first"
                 )
-            others = [load.name for load in self.surface_loads if load.name not in OWN_CLOCK]
+            others = [load.name for load in self.surface_loads if not load.own_clock]
             if others:
                 raise CommandError(f"{others[0].replace('_', '-')} move with the blocks: model option mechanical on")
             if self.creep.on:
@@ -715,12 +712,15 @@ class Blocks(State):
     def _check_warmth(self) -> None:
         """CommandError where properties follow temperatures that are not there, or surroundings that cannot follow."""
         elements, joints = self.warms()
-        if by_temperature.TEMPERATURE not in self.cold:
-            for what, at in (("element", elements), ("joint", joints)):
-                if at.any():
+        for what, at, rows, row in (("element", elements, self.element_rows, self.element_row),
+                                    ("joint", joints, self.joint_rows, self.joint_row)):  # fmt: skip
+            for over, which in by_temperature.followed(self, rows, row, at):
+                if over not in self.cold:
+                    lacking = "heat" if over == by_temperature.TEMPERATURE else over
+                    word = "thermal-iso-heat" if lacking == "heat" else kinds()[over].word
                     raise CommandError(
-                        f"a property of {what} {np.flatnonzero(at)[0]} follows a table over temperature, but there is "
-                        "no heat: element c-model thermal-iso-heat for all"
+                        f"a property of {what} {which} follows a table over {over}, but there is no {lacking}: element "
+                        f"c-model {word} for all"
                     )
         soft = elements & (self.element_rows.column(temperature_table("young"))[self.element_row] > 0.0)
         beside = np.flatnonzero(self.quiet_faces() & np.repeat(soft, 4))

@@ -10,8 +10,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fields import FIELDS
 
-ORDER = ("discs", "fluid", "proppant", "heat", "bolts", "liners", "free_field", "water")
+ORDER = ("discs", "fluid", "proppant", "heat", *FIELDS, "bolts", "liners", "free_field", "water")
 """In which they are added up, whoever came first: sums keep their bits."""
 SHARED_OUT = ("flow_nodes", "proppant_nodes", "fluid_heat")
 """Tables of checkpoints of which each rank has a part, see `SurfaceLoad.saved_rows`."""
@@ -26,6 +27,13 @@ class SurfaceLoad(ABC):
     """Kind of the kernels that it needs besides those of blocks, see `session.KINDS`."""
     of_both: ClassVar[bool] = False
     """They are the same in the plane and in space."""
+    own_clock: ClassVar[bool] = False
+    """Its conditions follow tables over a time of its own, which passes where blocks stand still too."""
+
+    @property
+    def keeps_time(self) -> bool:
+        """Where blocks stand still time may pass by it: that of the first load that does so. Not collective."""
+        return False
 
     @classmethod
     def there(cls, blocks: Any) -> Self | None:

@@ -9,14 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fields import FIELDS
 
 
 @dataclass(frozen=True)
 class Table:
-    """times (n,) f8 [s], strictly ascending, or coordinates [m], plastic strains, temperatures [K]; values (n,) f8."""
+    """times (n,) f8 [s], strictly ascending, or coordinates [m], plastic strains, temperatures [K], values of another
+    field; values (n,) f8. over: name of that other field."""
 
     times: np.ndarray
     values: np.ndarray
+    over: str = ""
 
     @staticmethod
     def of(pairs: Iterable[tuple[float, float]], name: str = "table") -> Table:
@@ -53,9 +56,10 @@ class Table:
         return np.column_stack([self.times, self.values]).tolist()
 
 
-AXES = ("x", "y", "z", "plastic-strain", "temperature")
+AXES = ("x", "y", "z", "plastic-strain", "temperature", *FIELDS)
 """What a property can follow a table over: from place to place, or with what an object goes through."""
 PLASTIC_STRAIN, TEMPERATURE = 3, 4
+"""From TEMPERATURE on they are fields of elements."""
 
 
 @dataclass(frozen=True)

@@ -104,6 +104,16 @@ class Diffusing(Assigned, Field):
         self._limit = math.inf
 
     @property
+    def set_step(self) -> str:
+        """The command that sets the length of its sub-steps."""
+        return f"model field {self.name} time-step"
+
+    @property
+    def switch_off(self) -> str:
+        """The command by which it stays as it is."""
+        return f"model field {self.name} flows off"
+
+    @property
     def stays(self) -> bool:
         return True
 
@@ -395,7 +405,7 @@ class Diffusing(Assigned, Field):
 
     def _sets_pace(self) -> bool:
         """The clock of the model is that of this field where blocks stand still."""
-        pace = (one for one in self.blocks.surface_loads if isinstance(one, Field) and one.keeps_time)
+        pace = (one for one in self.blocks.surface_loads if one.keeps_time)
         return next(pace, self) is self
 
     def _make_conductances(self) -> None:
@@ -628,9 +638,7 @@ class Diffusing(Assigned, Field):
             self.sub_steps, self.dt = max(1, steps), dt
         elif period == 0.0:
             if not math.isfinite(limit) and not o.mechanical:
-                raise CommandError(
-                    f"no {self.name} can flow: all nodes are held; model time-step {self.word} gives it a clock"
-                )
+                raise CommandError(f"no {self.name} can flow: all nodes are held; {self.set_step} gives it a clock")
             self.sub_steps, self.dt = max(1, steps), limit
         else:
             self.sub_steps = steps or max(1, math.ceil(period / limit))
@@ -638,7 +646,7 @@ class Diffusing(Assigned, Field):
         if not steps and self.sub_steps > MANY:
             raise CommandError(
                 f"{self.name} would need {self.sub_steps} sub-steps of {limit:.3g} s in a cycle of {period:.3g} s; "
-                f"model time-step {self.word} gives it a clock of its own"
+                f"{self.set_step} gives it a clock of its own"
             )
         self._tell_step()
 
@@ -685,8 +693,8 @@ class Diffusing(Assigned, Field):
         o = self.blocks.options
         if self.on and o.mechanical and not o.dynamic and self._given_clock()[1] == 0.0 == self._cycle_time():
             raise CommandError(
-                f"in static runs time of {self.name} passes by model time-step {self.word}, which comes first; or "
-                f"model option {self.word} off leaves {self.several} as they are"
+                f"in static runs time of {self.name} passes by {self.set_step}, which comes first; or "
+                f"{self.switch_off} leaves {self.several} as they are"
             )
         self._checked = True
 

@@ -153,12 +153,8 @@ class Field(SurfaceLoad):
     steps of the blocks since the last."""
 
     of_mesh: ClassVar[bool] = True
+    own_clock: ClassVar[bool] = True
     blocks: Blocks
-
-    @property
-    def keeps_time(self) -> bool:
-        """Where blocks stand still time may pass by it: that of the first field that does so. Not collective."""
-        return False
 
     def _start_clock(self, time: float) -> None:
         self.time, self.dt = time, 0.0

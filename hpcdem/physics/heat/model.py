@@ -61,6 +61,9 @@ class Heat(Diffusing):
         self._rubs = False
         self._power: np.ndarray | None = None
 
+    set_step: ClassVar[str] = "model time-step thermal"
+    switch_off: ClassVar[str] = "model option thermal off"
+
     # ---- what is assigned and prescribed -------------------------------------------------------------------------
 
     def of_fluid(self) -> FluidHeat:

@@ -1,0 +1,87 @@
+"""Fields that diffuse in elements (physics/fields.py), by their names: models, what is prescribed at nodes and faces,
+initial values, their clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from hpcdem.commands.fdem import assignments
+from hpcdem.commands.fdem.choices import chosen, points
+from hpcdem.commands.fdem.heat import assign
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.groups import ELEMENT, FACE, OnBoundary, Range
+from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.field.assigned import Number
+from hpcdem.physics.fields import kinds
+
+
+def of(project: Project, name: str) -> Any:
+    """The field of the model; CommandError without one."""
+    if name not in kinds():
+        raise CommandError(f"there is no field {name}; there is {', '.join(kinds())}")
+    found = kinds()[name].load_type().there(project.ready())
+    if found is None:
+        raise CommandError(f"there is no {name} yet: element c-model {kinds()[name].word} comes first")
+    return found
+
+
+def model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """The field diffuses in elements, with these properties."""
+    assign(project, kinds()[name].load_type(), name, chosen(project, ELEMENT, where), properties)
+
+
+def condition(project: Project, name: str, value: Number, where: Range | None = None) -> None:
+    """The value at nodes."""
+    found = of(project, name)
+    found.prescribe(points(project, where), **assignments.from_now(project, found.time, {"value": value}))
+
+
+def face_condition(
+    project: Project,
+    name: str,
+    flux: Number | None = None,
+    transfer: float | None = None,
+    environment: Number | None = None,
+    where: Range | None = None,
+) -> None:
+    """What comes in through faces, or goes to an environment of this value; without a coefficient with that of the
+    elements. Without a range: all faces on the surface of the model."""
+    every = {"flux": flux, "transfer": transfer, "environment": environment}
+    given: dict[str, Any] = {word: value for word, value in every.items() if value is not None}
+    if not given:
+        raise CommandError(f"{name} through faces is one of flux, transfer, environment")
+    found = of(project, name)
+    faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
+    found.expose(faces, **assignments.from_now(project, found.time, given))
+
+
+def remove(project: Project, name: str, kind: str, where: Range | None = None) -> None:
+    """Nothing is prescribed at nodes or faces any more; without the field there is nothing to do."""
+    found = kinds()[name].load_type().there(project.ready())
+    if found is not None and kind == FACE:
+        found.remove_face_conditions(chosen(project, FACE, where))
+    elif found is not None:
+        found.remove_conditions(points(project, where))
+
+
+def initial(project: Project, name: str, value: float, where: Range | None = None) -> None:
+    """The value at nodes now; elements around them are free of the stress that the field brings."""
+    of(project, name).initial(points(project, where), value)
+
+
+def clock(
+    project: Project, name: str, flows: bool | None = None, sub_steps: int | None = None,
+    time_step: float | None = None, current_time: float | None = None,
+) -> None:  # fmt: skip
+    """Whether the field flows; sub-steps of a cycle; their length [s]; what its clock shows now [s]."""
+    found = of(project, name)
+    found.clock(flows, sub_steps, time_step)
+    if current_time is not None:
+        found.set_clock(current_time)
+
+
+def account(project: Project, name: str) -> dict[str, float]:
+    """What was given, is stored and gone, see `Diffusing.account`. Collective."""
+    return dict(of(project, name).account())
