@@ -1173,7 +1173,7 @@ _MESH = (
                             "a thousandth of the shortest edge"),
                      Option("betw{een}", (STRING, STRING), "only faces between the elements of these two groups",
                             more=(SET,))), ranged="element", dims=BOTH, also=("e{lement} glue",)),
-    Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",)),
+    Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",), dims=BOTH),
 )  # fmt: skip
 
 # ---- meshes in the words of the online commands -------------------------------------------------------------------
@@ -1651,7 +1651,6 @@ INSTEAD = {
     "geometry export": "output vtk for the mesh and its faces",
     "segment-length": "geometry create polygon with the corners of the circle",
     "mesh equilateral": "mesh structured type tet or hex, and mesh create",
-    "mesh quality": "the log of mesh create, with the sizes of the tetrahedra",
     "element create geometry": "geometry create, and mesh create from-layer",
     "element create geometry-patch": "mesh create from-layer with embed and refine-layer",
     "element create geometry-boundary": "mesh create from-layer with hole",
