@@ -185,6 +185,8 @@ MODELS = {
     "moisture-flux-boundary-condition": "通过表面的水分；没有它时表面不透水。",
     "thermal-const-heat": "通过表面的热;没有它时表面绝热。",
     "classic-intrinsic-cohesive-interface": "单元之间的内聚节理:到强度为止保持,随后软化、断开,成为有摩擦的接触。",
+    "joint-mohr-coulomb": "原有节理:法向、切向弹簧加库仑摩擦,可有黏聚力、抗拉强度和剪胀;滑动、张开、闭合,从不断开。",
+    "joint-barton-bandis": "原有粗糙节理(Barton–Bandis):双曲线闭合,强度随 JRC、JCS 和滑动路径而变,有剪胀;从不断开。",
     "hydraulic-porous-medium": "节理中的流体:每条节理是其两节点间的通道。",
     "hydraulic-porous-proppant-medium": "节理中携带支撑剂的流体。",
     "thermal-fluid": "节理内流体的热:导热、对流、与两壁换热。",

@@ -56,6 +56,30 @@ def mixed(sim: Blocks) -> None:
     impact(sim, "mixed")
 
 
+COULOMB = {
+    "normal_stiffness": 5e11, "shear_stiffness": 2e11, "friction": 25.0, "cohesion": 1e5, "tensile_strength": 1e5,
+    "dilation": 5.0, "dilation_limit": 1e-5,
+}  # fmt: skip
+ROUGH = {
+    "normal_stiffness": 5e11, "shear_stiffness": 2e11, "closure_maximum": 1e-4, "residual_friction": 25.0, "jrc": 8.0,
+    "jcs": 5e7, "joint_size": 1e-4,
+}  # fmt: skip
+
+
+def slide_in_turn(sim: Blocks) -> None:
+    """Joints that slide after Coulomb, after Barton and Bandis, and such as break, in turn."""
+    joints = sim.numbers_of_joints(None)
+    joints = joints[(sim.joint_row[joints] > 0) & ~sim.open[joints]]
+    sim.joint_model(joints[::3], "joint_mohr_coulomb", COULOMB)
+    sim.joint_model(joints[1::3], "joint_barton_bandis", ROUGH)
+
+
+def sliding(sim: Blocks) -> None:
+    """The same of quads and triangles with joints that slide between those that break."""
+    impact(sim, "mixed")
+    slide_in_turn(sim)
+
+
 def flight(sim: Blocks) -> None:
     """Two blocks shatter each other while both fly to the right, through the strips of all ranks; their outer faces are
     of three kinds."""
@@ -394,6 +418,11 @@ def much_breaks(found: Found) -> None:
     assert found["energy_relative"] < 0.01
 
 
+def much_slides(found: Found) -> None:
+    assert (found["state"] == 2.0).sum() > 30 and found["energy_joints_lost"] > 0.0
+    assert found["energy_relative"] < 0.01
+
+
 def much_yields(found: Found) -> None:
     much_breaks(found)
     assert found["energy_plastic_lost"] > 0.05 * found["energy_joints_lost"] > 0.0
@@ -444,6 +473,7 @@ def the_ground_shakes(found: Found) -> None:
 MODELS = {
     "impact": Model(impact, result, much_breaks),
     "mixed": Model(mixed, result, much_breaks, slow=True),
+    "sliding": Model(sliding, result, much_slides, steps=600, middle=301, slow=True),
     "flight": Model(flight, result, much_breaks, balance=False, come=10),
     "yielding": Model(yielding, result, much_yields, yield_more, come=10),
     "obeying": Model(obeying, result, laws_act, obey_more, prepare=load_laws, steps=900, come=3),

@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import quad
 
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics
-from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA, softening
+from hpcdem.physics.fdem.kernels.joint_law import SOFTENING_AREA, softening
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks import models
 from tests.blocks.support import ROCK, jointed, model, rectangle, shaken

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 from hpcdem.numerics.lanes import CAPACITY, U
-from hpcdem.physics.fdem.kernels import elements, joints, laws, softening
+from hpcdem.physics.fdem.kernels import elements, joint_law, joints, softening
 from hpcdem.physics.fdem.local import joint_tables
 from hpcdem.physics.fdem.properties import COHESIVE, Rows
 
@@ -65,7 +65,7 @@ def pull(path: np.ndarray, **changes: float) -> tuple[np.ndarray, np.ndarray, np
     """Drive a joint of length H from (0, 0) to (H, 0) along (opening, slip) (n, 2); the normal points down, so the
     other side moves down to open. Returns mean normal stress, shear stress, state."""
     table, beyond = law(**changes)
-    history, state = np.zeros(joints.HISTORY), joints.INTACT
+    history, state = np.zeros(joint_law.HISTORY), joints.INTACT
     out = np.empty((len(path), 3))
     for i, (o, s) in enumerate(path.tolist()):
         # This side's edge runs from a = (0, 0) to b = (H, 0); p of the other side faces b, q faces a.
@@ -86,13 +86,13 @@ def area_under(y: np.ndarray, x: np.ndarray) -> float:
 def test_softening_has_the_specified_values():
     """f(1/4), f(1/2), f(3/4) as specified, f(0) = 1, f(1) = 0, and its integral."""
     for d, value in ((0.0, 1.0), (0.25, 0.587842), (0.5, 0.304138), (0.75, 0.150054), (1.0, 0.0)):
-        assert laws.softening(d) == pytest.approx(value, abs=5e-7)
-    assert quad(laws.softening, 0.0, 1.0, epsabs=1e-12)[0] == pytest.approx(laws.SOFTENING_AREA, abs=1e-10)
+        assert joint_law.softening(d) == pytest.approx(value, abs=5e-7)
+    assert quad(joint_law.softening, 0.0, 1.0, epsabs=1e-12)[0] == pytest.approx(joint_law.SOFTENING_AREA, abs=1e-10)
 
 
 def test_mode_1_area_is_the_fracture_energy():
     """Peak T at o_p = 2 h T / P = 2.6667e-8 m; area beyond it G_f1, before it (2/3) o_p T: in all 50.035556 J/m2."""
-    o_p, o_t = 2.0 * H * 2e6 / 3e11, 50.0 / (laws.SOFTENING_AREA * 2e6)
+    o_p, o_t = 2.0 * H * 2e6 / 3e11, 50.0 / (joint_law.SOFTENING_AREA * 2e6)
     assert o_p == pytest.approx(2.6667e-8, rel=1e-4) and o_t == pytest.approx(6.47153e-5, rel=1e-5)
     o = np.concatenate([np.linspace(0.0, o_p, 2001), o_p + np.linspace(0.0, o_t, 20001)[1:], [o_p + 1.001 * o_t]])
     sigma, _, state = pull(np.column_stack([o, 0.0 * o]))
@@ -108,7 +108,7 @@ def test_mode_2_area_under_pressure_is_the_fracture_energy():
     """At sigma = -5 MPa the shear stress falls from c + 5 tan(30) to 5 tan(30) MPa; what lies above that is G_f2."""
     pressed = 5e6 * H / 3e11
     tau_p = 10e6 + 5e6 * math.tan(math.radians(30.0))
-    s_p, s_t = 2.0 * H * tau_p / 3e11, 500.0 / (laws.SOFTENING_AREA * 10e6)
+    s_p, s_t = 2.0 * H * tau_p / 3e11, 500.0 / (joint_law.SOFTENING_AREA * 10e6)
     s = np.concatenate([np.linspace(0.0, s_p, 2001), s_p + np.linspace(0.0, s_t, 20001)[1:]])
     sigma, tau, state = pull(np.column_stack([0.0 * s - pressed, s]))
     assert sigma == pytest.approx(-5e6, rel=1e-9)
@@ -120,7 +120,7 @@ def test_mode_2_area_under_pressure_is_the_fracture_energy():
 
 @pytest.mark.parametrize("back", [0.0, 0.5])
 def test_unloading_follows_the_line_through_the_origin(back):
-    o_t = 50.0 / (laws.SOFTENING_AREA * 2e6)
+    o_t = 50.0 / (joint_law.SOFTENING_AREA * 2e6)
     there = np.linspace(0.0, 0.3 * o_t, 3001)
     turn = np.linspace(there[-1], back * there[-1], 50)
     again = np.concatenate([there, turn, turn[::-1]])
@@ -134,20 +134,20 @@ def test_damage_of_proportional_loading_does_not_depend_on_the_way_there():
     ends = np.array([1e-5, 2e-5])
     results = [pull(np.linspace(0.0, 1.0, n)[:, None] * ends)[0][-1] for n in (11, 1001)]
     o_p, s_p = 2.0 * H * 2e6 / 3e11, 2.0 * H * 10e6 / 3e11
-    o_t, s_t = 50.0 / (laws.SOFTENING_AREA * 2e6), 500.0 / (laws.SOFTENING_AREA * 10e6)
+    o_t, s_t = 50.0 / (joint_law.SOFTENING_AREA * 2e6), 500.0 / (joint_law.SOFTENING_AREA * 10e6)
     d = math.hypot((ends[0] - o_p) / o_t, (ends[1] - s_p) / s_t)
-    assert results == pytest.approx([2e6 * laws.softening(d)] * 2, rel=1e-9)
+    assert results == pytest.approx([2e6 * joint_law.softening(d)] * 2, rel=1e-9)
 
 
 def test_the_mode_is_that_of_the_parts_of_damage():
     for ends, mode in (((1e-4, 0.0), 1.0), ((0.0, 2e-4), 2.0)):
         table, beyond = law()
-        history = np.zeros(joints.HISTORY)
+        history = np.zeros(joint_law.HISTORY)
         state = joints.YIELDED
         for t in np.linspace(0.0, 1.0, 1000):
             o, s = t * ends[0], t * ends[1]
             *_, state = edge(0.0, 0.0, H, 0.0, H + s, -o, s, -o, table, beyond, history, state)
-        assert state == joints.BROKEN and history[joints.MODE] == mode
+        assert state == joints.BROKEN and history[joint_law.MODE] == mode
 
 
 def random_joints(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -157,11 +157,11 @@ def random_joints(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     a, b = rng.normal(size=(2, n, 2))
     widths = 10.0 ** rng.uniform(-8.0, -4.0, (2, n, 1))
     q, p = a + widths[0] * rng.normal(size=(n, 2)), b + widths[1] * rng.normal(size=(n, 2))
-    histories = np.zeros((n, joints.HISTORY))
+    histories = np.zeros((n, joint_law.HISTORY))
     histories[:, :6] = np.abs(rng.normal(size=(n, 6))) * np.repeat(widths[..., 0].T, 3, axis=1)
-    histories[rng.random((n, joints.HISTORY)) < 0.3] = 0.0
+    histories[rng.random((n, joint_law.HISTORY)) < 0.3] = 0.0
     histories[:, 6:9] = np.clip(rng.uniform(-0.3, 0.9, (n, 3)), 0.0, 1.0)
-    histories[:, joints.PEAK_STEP] = 17.0
+    histories[:, joint_law.PEAK_STEP] = 17.0
     histories[-2, :9], q[-2:], p[-2:] = 0.0, a[-2:], b[-2:]
     normal = (b[-1] - a[-1])[::-1] * (1.0, -1.0) / np.hypot(*(b[-1] - a[-1]))
     q[-1] += 1e-3 * normal
@@ -203,6 +203,6 @@ def test_the_place_in_the_lanes_changes_no_bit(n):
         *found, state = edge(*corners[i], table, beyond, single[i], joints.YIELDED)
         assert found == forces[i].tolist() and state == states[i]
         assert joints.end_forces(*joints.points_now(*corners[i], table, beyond, before[i])) == tuple(found)
-    assert (single == together).all() and (together[:, joints.PEAK_STEP] == 17.0).all()
+    assert (single == together).all() and (together[:, joint_law.PEAK_STEP] == 17.0).all()
     assert (together[:, :9] >= before[:, :9]).all() and (together[:, :9] > before[:, :9]).any()
-    assert states[-2] == joints.YIELDED and states[-1] == joints.BROKEN and together[-1, joints.MODE] == 1.0
+    assert states[-2] == joints.YIELDED and states[-1] == joints.BROKEN and together[-1, joint_law.MODE] == 1.0

@@ -11,7 +11,7 @@ import pytest
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, diagnostics
-from hpcdem.physics.fdem.kernels import laws
+from hpcdem.physics.fdem.kernels import joint_law
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.pre.mesh import geometry
@@ -66,8 +66,8 @@ def test_a_bent_joint_past_its_peak():
     change what the joint remembers."""
     turn = 0.7 / -float(AT[0])
     sim = two_squares(0.8 * O_P, 0.0, turn * O_P / H)  # r = 1.5, 0.8, 0.1
-    o_t = JOINT["gf1"] / (laws.SOFTENING_AREA * T)
-    expected = [T * laws.softening(0.5 * O_P / o_t), 0.96 * T, 0.19 * T]
+    o_t = JOINT["gf1"] / (joint_law.SOFTENING_AREA * T)
+    expected = [T * joint_law.softening(0.5 * O_P / o_t), 0.96 * T, 0.19 * T]
     before = sim.local.slot_history.copy() if sim.closed else None
     for _ in range(2):
         assert [diagnostics.values(sim, name)[0] for name in POINTS] == pytest.approx(expected, rel=2e-4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hpcdem.physics.fdem import changes, reference
-from hpcdem.physics.fdem.kernels import elements, joints, laws
+from hpcdem.physics.fdem.kernels import elements, joint_law, joints
 from hpcdem.physics.fdem.local import ALPHA, Evaluation
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, jointed, model, rectangle, shaken
@@ -84,18 +84,17 @@ def of_joints(sim: Blocks) -> tuple[np.ndarray, np.ndarray]:
             continue
         face = local.slot_face[slot]
         law, beyond = local.joint_table[local.slot_kind[slot]], local.joint_beyond[local.slot_kind[slot]]
-        history = local.slot_history[slot] if state != joints.INTACT else np.zeros(joints.HISTORY)
+        history = local.slot_history[slot] if state != joints.INTACT else np.zeros(joint_law.HISTORY)
 
         left = []
 
         def before(point, o, s, length, law=law, left=left):
-            sigma, tau, rest = laws.intact_point(o / length, s / length, *law[:6])
+            sigma, tau, rest = joint_law.intact_point(o / length, s / length, *law[:6])
             left.append(rest)
             return sigma, tau
 
         def behind(point, o, s, length, law=law, beyond=beyond, history=history):
-            known = history[[joints.OPENED + point, joints.SLIPPED + point, joints.DAMAGE + point]]
-            return laws.yielded_point(o, s, length, 1.0 / length, *law[:5], *beyond, *known)[:2]
+            return joint_law.point(o, s, length, law, beyond, history, point)[:2]
 
         (r, k, k2), (other, m, m2) = (ends(sim, f) for f in (face, sim.partner[face]))
         x = sim.x[:, :8].reshape(-1, 4, 2)

@@ -8,14 +8,14 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.connectivity import face_points
-from hpcdem.physics.fdem.kernels import laws, stiffness
+from hpcdem.physics.fdem.kernels import joint_law
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, jointed, model, rectangle
 from tests.blocks.test_equilibrium import farthest, refused
 
 
 def test_slopes_of_the_law():
-    """Against differences of laws.yielded_point, loading and unloading, in tension, shear, both and under pressure."""
+    """Against differences of the law, loading and unloading, in tension, shear, both and under pressure."""
     rng, met = np.random.default_rng(2), set()
     h, tensile, cohesion, tan_phi, penalty = 0.1, 2e6, 5e6, 0.6, 5e11
     law = (penalty / (2.0 * tensile), tensile, penalty, tan_phi, cohesion)
@@ -26,9 +26,9 @@ def test_slopes_of_the_law():
         o *= 0.01 if o < 0.0 else 1.0
         o_u, s_u, damage = rng.choice([0.0, 0.3, 1.5]) * o_t, rng.choice([0.0, 0.3]) * s_t, rng.choice([0.0, 0.3, 0.7])
         memory = o_u, s_u, damage
-        found = stiffness.yielded_slopes(o, s, h, *law, *more, *memory)
+        found = joint_law.yielded_slopes(o, s, h, *law, *more, *memory)
         step = 1e-5 * o_t * (0.01 if o < 0.0 else 1.0)
-        ends = [laws.yielded_point(*at, h, 1.0 / h, *law, *more, *memory) for at in (
+        ends = [joint_law.yielded_point(*at, h, 1.0 / h, *law, *more, *memory) for at in (
             (o + step, s), (o - step, s), (o, s + 1e-5 * s_t), (o, s - 1e-5 * s_t))]  # fmt: skip
         by_o = [(ends[0][k] - ends[1][k]) / (2.0 * step) for k in (0, 1)]
         by_s = [(ends[2][k] - ends[3][k]) / (2e-5 * s_t) for k in (0, 1)]
@@ -64,7 +64,7 @@ def test_one_joint_by_hand(mode):
     opening so far, below that on the line to the origin. In the end it breaks; what it took is G_f and the 2/3 o_p T
     before its peak, by the trapezoidal rule to 1 %."""
     strength, energy = (JOINT["tensile_strength"], JOINT["gf1"]) if mode == "opening" else (3e6, 80.0)
-    critical, peak = energy / (laws.SOFTENING_AREA * strength), 2.0 * 0.1 * strength / JOINT["penalty_normal"]
+    critical, peak = energy / (joint_law.SOFTENING_AREA * strength), 2.0 * 0.1 * strength / JOINT["penalty_normal"]
     stress_name = "normal_stress" if mode == "opening" else "shear_stress"
     sim, taken, before, largest, below = pair(mode), 0.0, (0.0, 0.0), 0.0, 0
     for step in range(200):
@@ -74,7 +74,7 @@ def test_one_joint_by_hand(mode):
         o, stress = (float(diagnostics.values(sim, name)[0]) for name in (mode, stress_name))
         largest, d = max(largest, o), (max(largest, o) - peak) / critical
         line = min(o / largest, 1.0) if d > 0.0 else o / peak * (2.0 - o / peak)
-        assert stress == pytest.approx(strength * laws.softening(d) * line, rel=1e-5, abs=1e-6 * strength)
+        assert stress == pytest.approx(strength * joint_law.softening(d) * line, rel=1e-5, abs=1e-6 * strength)
         below += d > 0.0 and o < 0.99 * largest
         taken, before = taken + 0.5 * (stress + before[1]) * (o - before[0]), (o, stress)
     assert diagnostics.joint_counts(sim) == (0, 0, 1) and below > 15 and largest > 0.95 * critical

@@ -16,6 +16,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, TEMPERATURE, Drawn, Over, Value
 from hpcdem.physics.fdem.water import Water
 from hpcdem.physics.heat.model import Heat
+from tests.blocks.models import slide_in_turn
 from tests.parallel.model import Found, Model
 from tests.space.support import ROCK, box, hexes
 
@@ -352,6 +353,12 @@ def shattering(sim: Blocks) -> None:
     diagnostics.account_energy(sim)
 
 
+def sliding(sim: Blocks) -> None:
+    """The same of tetrahedra and hexahedra, with joints that slide between those that break."""
+    shattering_hexes(sim)
+    slide_in_turn(sim)
+
+
 def dig_beam(sim: Blocks) -> None:
     """A piece of the beam is taken out, damage is forgotten at one end."""
     if sim.clock.step == 600:
@@ -532,6 +539,11 @@ def it_shatters(found: Found) -> None:
     assert len(found["contact_face"]) > 20 and (found["event_mode"] > 1.9).any() and (found["event_mode"] < 1.1).any()
 
 
+def it_slides(found: Found) -> None:
+    assert (found["state"] == 2.0).sum() > 30 and found["energy_joints_lost"] > 0.0
+    assert found["energy_relative"] < 0.01
+
+
 def in_pieces_that_creep(sim: Blocks, notes: dict[str, Any]) -> Found:
     return {**in_pieces(sim, notes), **crept(sim, notes)}
 
@@ -614,6 +626,7 @@ MODELS = {
     "hexahedra that shatter": Model(
         shattering_hexes, in_pieces_that_creep, hexes_shatter, dig_beam_of_hexes, steps=900, middle=501, come=10
     ),
+    "joints that slide": Model(sliding, in_pieces, it_slides, steps=300, middle=151, slow=True),
     "glowing": Model(glowing, hot, it_glows, glow_on, steps=900, middle=501, come=1, slow=True),
     "soil that gets warm": Model(
         warm_soil, warm_and_flowing, it_is_warm, dig_soil, steps=1000, middle=401, come=10, slow=True

@@ -7,7 +7,7 @@ import numpy as np
 from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.kernels.elements import TALLY
-from hpcdem.physics.fdem.kernels.joints import HISTORY
+from hpcdem.physics.fdem.kernels.joint_law import HISTORY
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.pre.mesh import structured_space

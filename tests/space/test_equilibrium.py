@@ -9,7 +9,7 @@ import pytest
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium, linear
-from hpcdem.physics.fdem.kernels import laws, space
+from hpcdem.physics.fdem.kernels import joint_law, space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.space.support import LAME, ROCK, SHEAR, body, box, faces_on, nodes_on
@@ -344,15 +344,15 @@ def test_joints_may_pass_their_peak():
     peak; in the end it is in two."""
     sim, t = pulled(), JOINT["tensile_strength"]
     o_p = 2.0 * math.sqrt(0.5 * 0.1**2) * t / JOINT["penalty_normal"]
-    o_t = JOINT["gf1"] / (laws.SOFTENING_AREA * t)
+    o_t = JOINT["gf1"] / (joint_law.SOFTENING_AREA * t)
     for moves in (1, 2, 3):
         equilibrium.solve_elastic(sim, softening=True)
         low, high = o_p, o_p + o_t
         for _ in range(60):
             o = 0.5 * (low + high)
-            below = t * laws.softening((o - o_p) / o_t) * 0.2 / ROCK["young"] + o < 2e-5 * moves
+            below = t * joint_law.softening((o - o_p) / o_t) * 0.2 / ROCK["young"] + o < 2e-5 * moves
             low, high = (o, high) if below else (low, o)
-        stress = t * laws.softening((o - o_p) / o_t)
+        stress = t * joint_law.softening((o - o_p) / o_t)
         assert diagnostics.values(sim, "stress_xx") == pytest.approx(stress, rel=1e-6)
     equilibrium.solve_elastic(sim, softening=True)
     assert diagnostics.joint_counts(sim) == (0, 0, 2)

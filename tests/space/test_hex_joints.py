@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.physics.fdem import convergence, diagnostics, equilibrium
-from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.physics.fdem.kernels import joint_law, joints
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.space.support import ROCK, body, box, faces_on, hexes, nodes_on
@@ -275,11 +275,9 @@ def test_forces_are_those_of_the_plain_reference(size):
                 shape = np.prod(np.where(corner == 1.0, at, 1.0 - at), axis=1)
                 jump = shape @ ways
                 slip = jump - (jump @ normal) * normal
-                more = [beyond[k] for k in (joints.PER_O_T, joints.PER_S_T, joints.PER_KOP, joints.PER_HALF_SHEAR)]
-                law = [table[k] for k in (joints.KOP, joints.TENSILE, joints.OVERLAY, joints.TAN_PHI, joints.COHESION)]
                 size_of_slip = float(np.linalg.norm(slip))
-                sigma, tau = laws.yielded_point(
-                    float(jump @ normal), size_of_slip, SIDE, 1.0 / SIDE, *law, *more, 0.0, 0.0, 0.0
+                sigma, tau = joint_law.point(
+                    float(jump @ normal), size_of_slip, SIDE, table, beyond, np.zeros(joint_law.HISTORY), 0
                 )[:2]
                 expected += area / 3.0 * np.outer(shape, sigma * normal + tau * slip / size_of_slip)
         assert np.allclose(mine, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())

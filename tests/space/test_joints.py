@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hpcdem.physics.fdem import changes, diagnostics
-from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.physics.fdem.kernels import joint_law, joints
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.reference import face_joint_forces
 from hpcdem.physics.fdem.simulation import Blocks
@@ -162,11 +162,7 @@ def test_forces_are_those_of_the_plain_reference_and_opposite_bit_for_bit(size):
         table, beyond = pair.local.joint_table[1], pair.local.joint_beyond[1]
 
         def stresses(point, o, s, law=table, more=beyond):
-            return laws.yielded_point(
-                o, s, H, 1.0 / H, law[joints.KOP], law[joints.TENSILE], law[joints.OVERLAY], law[joints.TAN_PHI],
-                law[joints.COHESION], more[joints.PER_O_T], more[joints.PER_S_T], more[joints.PER_KOP],
-                more[joints.PER_HALF_SHEAR], 0.0, 0.0, 0.0,
-            )[:2]  # fmt: skip
+            return joint_law.point(o, s, H, law, more, np.zeros(joint_law.HISTORY), 0)[:2]
 
         (e, _), (d, _) = (divmod(face, 4) for face in pair.sides)
         first, second = (pair.sim.mesh.face_corners(np.array([face]))[0] % 4 for face in pair.sides)

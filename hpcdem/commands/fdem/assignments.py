@@ -14,6 +14,7 @@ from hpcdem.numerics.random_field import RandomField
 from hpcdem.physics.fdem import changes, node_conditions, sides, user_functions, user_laws
 from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, Around, OnBoundary, Range
+from hpcdem.physics.fdem.properties import COHESIVE
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.fdem.user_laws import UserLaw
 from hpcdem.physics.fdem.water import Water
@@ -116,15 +117,15 @@ def face_property(project: Project, properties: Mapping[str, Value], where: Rang
 
 
 def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Change some properties of cohesive models."""
+    """Change some properties of models of joints."""
     project.ready().joint_property(chosen(project, JOINT, where), properties)
 
 
 def joint_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """A cohesive model of joints. Without penalty_normal it is 10 E of the softer of both elements."""
+    """A model of joints. A cohesive one without penalty_normal has 10 E of the softer of both elements."""
     blocks = project.ready()
     joints = chosen(project, JOINT, where)
-    if "penalty_normal" not in properties:
+    if "penalty_normal" not in properties and name == COHESIVE.name:
         joints = everything(project, JOINT, where)
         edges = project.edges()
         sides = edges.faces[np.isin(edges.faces[:, 0], joints)]

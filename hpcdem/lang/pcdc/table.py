@@ -472,6 +472,26 @@ COHESIVE = Model(
      Option("np", (POINTS,), "integration points", "1", "3")),
     of=properties.COHESIVE, dims=BOTH,
 )  # fmt: skip
+COULOMB_JOINT = Model(
+    "j{oint}-m{ohr}-c{oulomb}", "",
+    "Joints that were there before, as springs: sigma = normal-stiffness opening, tau = shear-stiffness slip, at most "
+    "cohesion - sigma tan friction. They slide, open and close and never break. A point that opens against its tensile "
+    "strength loses that and its cohesion.",
+    declared(properties.COULOMB_JOINT, "n{ormal}-s{tiffness}", "s{hear}-s{tiffness}", "f{riction}", "c{ohesion}",
+             "t{ensile}-s{trength}", "dil{ation}", "dil{ation}-l{imit}"),
+    of=properties.COULOMB_JOINT, dims=BOTH,
+)  # fmt: skip
+BARTON_BANDIS = Model(
+    "j{oint}-b{arton}-b{andis}", "",
+    "Rough joints that were there before: closure v under the pressure normal-stiffness v / (1 - v / closure-maximum), "
+    "from the pressure jcs on along the tangent; shear strength by the angle residual-friction + m jrc "
+    "log10(jcs / pressure), at most 70 degrees, m: roughness that is mobilised or worn, by the path over "
+    "joint-size / 500 (jrc / joint-size)^0.33; dilation by dilation-part of the part with m. They slide, open and "
+    "close and never break.",
+    declared(properties.BARTON_BANDIS, "n{ormal}-s{tiffness}", "s{hear}-s{tiffness}", "c{losure}-m{aximum}",
+             "r{esidual}-f{riction}", "jrc", "jcs", "j{oint}-s{ize}", "dil{ation}-p{art}"),
+    of=properties.BARTON_BANDIS, dims=BOTH,
+)  # fmt: skip
 _APERTURES = {
     "aperature-initial": ("a{perture}-i{nitial}",), "aperature-maximum": ("a{perture}-max{imum}",),
     "aperature-minumum": ("a{perature}-min{imum}", "a{perture}-min{imum}", "a{perture}-min{umum}"),
@@ -734,6 +754,9 @@ def _properties(model: Model) -> tuple[Option, ...]:
     )  # fmt: skip
 
 
+_OF_JOINTS = tuple(
+    {o.name: o for model in (BARTON_BANDIS, COULOMB_JOINT, COHESIVE) for o in _properties(model)}.values()
+)
 _FRICTION = next(o.values for o in MOHR_COULOMB.options if o.name == "friction")
 _OF_SOLIDS = (
     *(replace(o, doc=f"{o.doc}; the internal one of {MOHR_COULOMB.keyword.name}", values=_FRICTION)
@@ -1340,12 +1363,13 @@ _OBJECTS = (
             ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",
              "pcdc face-joint c-model hydr-p-m property fluid-density 1000 fluid-bulk 2.2e9 viscosity 1e-6 "
              "aperature-initial 1e-5 aperature-minumum 1e-6 aperature-maximum 1e-3"),
-            models=(COHESIVE, POROUS, PROPPANT, FLUID_HEAT), ranged="face-joint", dims=BOTH),
+            models=(COHESIVE, COULOMB_JOINT, BARTON_BANDIS, POROUS, PROPPANT, FLUID_HEAT), ranged="face-joint",
+            dims=BOTH),
     Command("f{ace}-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
             ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",
              "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'",
              "pcdc face-joint property aperature-initial field 'aperture' shear-dilation 5 range geometry 'fault'"),
-            options=(*_properties(COHESIVE), *_properties(POROUS), *_properties(FLUID_HEAT), *_properties(GRAINS)),
+            options=(*_OF_JOINTS, *_properties(POROUS), *_properties(FLUID_HEAT), *_properties(GRAINS)),
             ranged="face-joint", needs_option=True, dims=BOTH),
     Command("f{ace}-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
             ("pcdc face-joint reset state",), ranged="face-joint", dims=BOTH),

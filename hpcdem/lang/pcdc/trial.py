@@ -13,12 +13,14 @@ from hpcdem.commands.fdem.values import HOLE, LINE, OUTLINE, Piece
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.kinds import FunctionName, Pending, TableName
 from hpcdem.lang.pcdc.table import (
+    BARTON_BANDIS,
     BOLT,
     BOLT_VELOCITY,
     BURGERS,
     COHESIVE,
     COMMANDS,
     CONTACT,
+    COULOMB_JOINT,
     FIELD_MODELS,
     FLOW_CONDITION,
     FLUID_HEAT,
@@ -51,6 +53,8 @@ MODELS = {
         USER,
         CONTACT,
         COHESIVE,
+        COULOMB_JOINT,
+        BARTON_BANDIS,
         BOLT,
         LINER,
         POROUS,
@@ -63,10 +67,11 @@ MODELS = {
 }
 """Models of the language by their names in full."""
 OF_FIELDS = tuple(one.model for one in kinds().values())
+_OF_SLIDING = (COULOMB_JOINT.of, BARTON_BANDIS.of)
 _OF_COMMAND = {
     "element property": properties.SOLID,
     "element-face property": properties.CONTACT_MOHR_COULOMB,
-    "face-joint property": properties.COHESIVE,
+    "face-joint property": properties.OF_JOINTS,
 }
 
 
@@ -84,7 +89,7 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
         elif command.name in _OF_COMMAND:
             given, model = _given(arguments), _OF_COMMAND[command.name]
             others = {
-                properties.COHESIVE.name: (FLUID, HEAT_OF_FLUID, GRAINS),
+                properties.OF_JOINTS.name: (FLUID, HEAT_OF_FLUID, GRAINS),
                 properties.SOLID.name: (HEAT, *OF_FIELDS),
             }
             for other in others.get(model.name, ()):
@@ -170,16 +175,16 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
     if (
-        model in (BOLT.of, LINER.of, POROUS.of, PROPPANT.of, ISO_HEAT.of, FLUID_HEAT.of, *OF_FIELDS)
+        model in (BOLT.of, LINER.of, POROUS.of, PROPPANT.of, ISO_HEAT.of, FLUID_HEAT.of, *OF_FIELDS, *_OF_SLIDING)
         and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys()
     ):
         model.complete(given)
-    if model is properties.COHESIVE:
+    if model in (properties.COHESIVE, properties.OF_JOINTS):
         for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):
             pair = {name: given.get(name, 0.0) for name in (strength, energy)}
             if strength in given and energy in given:
                 others = {"tensile_strength": 0.0, "cohesion": 0.0, "gf1": 0.0, "gf2": 0.0, "penalty_normal": 1.0}
-                model.complete({**others, **pair})
+                properties.COHESIVE.complete({**others, **pair})
 
 
 # ---- commands that make something of their values alone --------------------------------------------------------------

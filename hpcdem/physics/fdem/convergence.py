@@ -9,6 +9,8 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import connectivity, diagnostics
+from hpcdem.physics.fdem.kernels import joint_law
+from hpcdem.physics.fdem.local import laws_of
 from hpcdem.physics.fdem.simulation import Blocks
 
 RATIO = 1e-5
@@ -166,8 +168,8 @@ def _crossing(sim: Blocks) -> float:
     along it; masses are those of the stiffest part, joints with the penalty P."""
     size = float(np.ptp(sim.the_mesh().points, axis=0).max())
     tied = sim.joint_row[sim.closed_faces()]
-    names = ("penalty_normal", "penalty_overlay", "penalty_shear")
-    penalty = np.max([sim.joint_rows.column(name) for name in names], axis=0)[tied].max(initial=0.0)
+    laws = laws_of(sim.joint_rows)
+    penalty = joint_law.stiffest(sim.joint_rows.column, laws, tied, lambda: np.array(sim.mean_edge)).max(initial=0.0)
     young = np.array(sim.element_rows.column("young"))[sim.element_row[sim.alive]].min()
     return 4.0 * size / sim.mean_edge * math.sqrt(1.0 + penalty / young)
 

@@ -23,7 +23,9 @@ from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.node_conditions import Contradiction, NodeCondition, Number
 from hpcdem.physics.fdem.properties import (
+    BARTON_BANDIS,
     COHESIVE,
+    COULOMB_JOINT,
     ELEMENT,
     FACE,
     JOINT,
@@ -397,6 +399,11 @@ class ModelDefinition:
     def creeping(self) -> np.ndarray:
         """(ne,) bool: elements that are there and have a model that can creep."""
         return self._has_model(MECH_BURGERS)
+
+    def slides(self) -> np.ndarray:
+        """(4 ne,) bool: faces with a joint of a model that slides and never breaks."""
+        names = [self.joint_rows.name(row) for row in range(len(self.joint_rows))]
+        return self.joint_exists() & np.isin(names, (COULOMB_JOINT.name, BARTON_BANDIS.name))[self.joint_row]
 
     def _has_model(self, model: Model) -> np.ndarray:
         names = [self.element_rows.name(row) for row in range(len(self.element_rows))]

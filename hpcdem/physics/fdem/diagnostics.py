@@ -15,11 +15,12 @@ from hpcdem.physics.fdem import by_temperature, connectivity, floors, overlaps, 
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
 from hpcdem.physics.fdem.kernels import plasticity, tets
-from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
+from hpcdem.physics.fdem.kernels.joint_law import BARTON_BANDIS, DAMAGE, PATH
+from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
-from hpcdem.physics.fdem.properties import COHESIVE, MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
+from hpcdem.physics.fdem.properties import MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, OF_JOINTS
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.state import Crack
 from hpcdem.physics.fields import FIELDS, kinds
@@ -170,10 +171,10 @@ PROPERTIES = {
         for p in m.properties
         if not p.name.startswith("kelvin_strain") and not p.internal  # that strain at a time is a quantity
     },
-    "joint": {{"friction": "joint_friction"}.get(p.name, p.name): p.name for p in COHESIVE.properties},
+    "joint": {{"friction": "joint_friction"}.get(p.name, p.name): p.name for p in OF_JOINTS.properties},
 }
 """Properties of elements and joints, by their names as quantities. In frames if they differ from object to object."""
-for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS)), ("joint", (COHESIVE,))):
+for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS)), ("joint", (OF_JOINTS,))):
     for _quantity, _name in PROPERTIES[_on].items():
         _model = next(m for m in _models if m.has(_name))
         QUANTITIES[_quantity] = Quantity(
@@ -460,12 +461,14 @@ def _joint_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = No
     slot = local.slot_of(lower)
     now = local.slot_state[slot]
     broken = sim.broken[lower] > 0
-    columns["state"] = np.where(broken, float(BROKEN), now)
+    path = local.slot_history[slot, PATH : PATH + 3].max(axis=1) if len(slot) else np.empty(0)
+    torn = local.slot_history[slot, DAMAGE : DAMAGE + 3].max(axis=1) if len(slot) else np.empty(0)
+    state = np.where(now > BROKEN, np.where(path > 0.0, YIELDED, INTACT), now)
+    columns["state"] = np.where(broken, float(BROKEN), state)
     if wanted & {"mode", "break_time", "break_energy"}:
         columns |= _last_events(sim, lower, broken | (now == BROKEN))
     if "damage" in wanted:
-        damage = local.slot_history[slot, DAMAGE : DAMAGE + 3].max(axis=1) if len(slot) else np.empty(0)
-        columns["damage"] = np.where(broken, 1.0, damage)
+        columns["damage"] = np.where(broken, 1.0, np.where(now == BROKEN + BARTON_BANDIS, 0.0, torn))
     held = np.flatnonzero(now != NONE)
     if set(_MEANS) & wanted:
         seen = np.full((len(lower), len(_MEANS)), np.nan)
@@ -654,6 +657,7 @@ def joint_counts(sim: Blocks) -> tuple[int, int, int]:
     """Joints that are intact, have passed their peak, are broken. Collective."""
     sim.close_model()
     state = sim.local.slot_state[sim.local.lower_slots]
+    state = np.where(state > BROKEN, INTACT, state)
     counts = np.bincount(state, minlength=BROKEN + 1)[[INTACT, YIELDED, BROKEN]].astype(np.int64)
     intact, yielded, broken = sim.comm.sum_into(counts).tolist()
     return intact, yielded, broken + int((sim.broken[sim.local.edges] == 1).sum())

@@ -163,7 +163,7 @@ def solve_elastic(
     nodes.least = forces_of_heat(sim)
     unknowns = unknowns_of(sim, nodes, cycles)
     refuse_loose_bodies(sim, nodes, unknowns)
-    if softening or sim.yielding().any():
+    if softening or sim.slides().any() or sim.yielding().any():
         if before is not None and sim.yielding().any():
             sim.cold[BEFORE], sim.cold[AFTER] = before, sim.cold[TEMPERATURE].copy()
         sim.before_change()  # what flows and breaks is the doing of a command
@@ -541,10 +541,10 @@ def _follow(
 ) -> tuple[np.ndarray, Balanced]:  # fmt: skip
     """Positions of the nodes in equilibrium (nn, dim), by increments: what is out of balance at the beginning grows
     smaller, prescribed movement greater, by equal parts. CommandError if the last ones find no balance."""
-    yields, step = sim.local.yields, sim.clock.step + cycles - 1
-    solver.flows = yields or softening
+    yields, step, slides = sim.local.yields, sim.clock.step + cycles - 1, bool(sim.slides().any())
+    solver.flows = yields or softening or slides
     x, iterations, factors, increments = nodes.x, 0, 0, 0
-    unit, done = 1 << FINE if softening else 1 << CUTS if yields else 1, 0
+    unit, done = 1 << FINE if softening else 1 << CUTS if yields or slides else 1, 0
     whole, size = steps * unit, unit
     missing, outside = np.zeros(x.shape), False
     try:
@@ -558,8 +558,8 @@ def _follow(
             left = 1.0 - (done + size) / whole
             _warm(sim, 1.0 - left)
             found = _balance(
-                sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step, softening, size == 1,
-                yields and (left == 0.0 or not outside),
+                sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step, softening or slides,
+                size == 1, yields and (left == 0.0 or not outside),
             )  # fmt: skip
             iterations, factors = iterations + found.iterations, factors + found.factors
             if found.error and size > 1:
@@ -828,8 +828,10 @@ def of_joints(sim: Blocks, softening: bool = False) -> tuple[list[Pieces], int]:
         local.joint_table, joints, left,
     )  # fmt: skip
     behind = left < 0.0
-    past = int((behind & ~(softening & (local.slot_state[slots] >= YIELDED))).sum())
-    if softening:
+    slides = local.slot_state[slots] > BROKEN
+    past = int((behind & ~slides & ~(softening & (local.slot_state[slots] >= YIELDED))).sum())
+    behind &= softening | slides
+    if behind.any():
         soft = np.empty((int(behind.sum()), 8, 8))
         stiffness.yielded_joints(
             slots[behind], local.slot_face, local.slot_at, local.slot_kind, local.slot_history, sim.where, cells, sim.x,

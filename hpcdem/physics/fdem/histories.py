@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from hpcdem.physics.fdem.kernels import elements, joints
+from hpcdem.physics.fdem.kernels import elements, joint_law, joints
 
 WORDS = 20
 KEY, STATE, FIRST = 0, 1, 2
@@ -94,11 +94,14 @@ def place_joints(slot, rows, of_triangles, law, state, history, head, follow):
     """Give slots their histories; triangles' slots go to the list of their block."""
     for i in range(len(slot)):
         s = slot[i]
+        was = np.uint8(rows[i, STATE])
         if state[s] == joints.NONE:  # opened meanwhile, or its partner was taken out
             continue
+        if state[s] != was and max(state[s], was) > joints.BROKEN:  # has another law now
+            continue
         law[s] = 0
-        state[s] = np.uint8(rows[i, STATE])
-        for m in range(joints.HISTORY):
+        state[s] = was
+        for m in range(joint_law.HISTORY):
             history[s, m] = rows[i, FIRST + m]
         if s < of_triangles:
             b = s // (3 * elements.BLOCK)

@@ -20,19 +20,21 @@ from hpcdem.physics.fdem.kernels import (
     creep,
     elements,
     energy,
-    joints,
-    laws,
+    joint_law,
     limits,
     plastic_quads,
     plasticity,
     strength,
 )
 from hpcdem.physics.fdem.kernels import nodes as moving
-from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
+from hpcdem.physics.fdem.kernels.joint_law import HISTORY
+from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
 from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.properties import (
+    BARTON_BANDIS,
     COHESIVE,
+    COULOMB_JOINT,
     MECH_MOHR_COULOMB,
     SOFTENS,
     Rows,
@@ -51,38 +53,23 @@ ALPHA = 0.8
 """Local damping of the static mode."""
 
 
+JOINT_LAWS = {COULOMB_JOINT.name: joint_law.COULOMB, BARTON_BANDIS.name: joint_law.BARTON_BANDIS}
 _WARM_JOINT = tuple(one.name for one in COHESIVE.properties if one.warms)
 
 
 def joint_tables(rows: Rows, warm: Mapping[str, np.ndarray] | None = None, row: Any = slice(None)) -> tuple[
     np.ndarray, np.ndarray
 ]:  # fmt: skip
-    """The tables of joint laws (n, 8) and (n, 4) of joints.py; row 0 is no joint. warm: properties (n,) that take the
-    place of those of these rows (n,)."""
-    names = (
-        "tensile_strength",
-        "cohesion",
-        "friction",
-        "penalty_normal",
-        "penalty_overlay",
-        "penalty_shear",
-        "gf1",
-        "gf2",
+    """The tables of joint laws (n, 8) and (n, 4) of joint_law.py; row 0 is no joint. warm: properties (n,) that take
+    the place of those of these rows (n,)."""
+    return joint_law.tables(
+        lambda name: warm[name] if warm and name in warm else rows.column(name)[row], laws_of(rows)[row]
     )
-    said = {name: np.array(rows.column(name)[row]) for name in names} | dict(warm or {})
-    tensile, cohesion, friction, opening, overlay, shear, gf1, gf2 = (said[name] for name in names)
-    law, beyond = np.zeros((len(tensile), 8)), np.zeros((len(tensile), 4))
-    area = laws.SOFTENING_AREA
-    with np.errstate(divide="ignore", invalid="ignore"):
-        law[:, joints.KOP] = np.where(tensile > 0.0, opening / (2.0 * tensile), 0.0)
-        beyond[:, joints.PER_KOP] = np.where(tensile > 0.0, 2.0 * tensile / opening, 0.0)
-        beyond[:, joints.PER_O_T] = np.where(tensile > 0.0, area * tensile / gf1, 0.0)
-        beyond[:, joints.PER_S_T] = np.where(cohesion > 0.0, area * cohesion / gf2, 0.0)
-        beyond[:, joints.PER_HALF_SHEAR] = np.where(shear > 0.0, 2.0 / shear, 0.0)
-    law[:, joints.TENSILE], law[:, joints.OVERLAY], law[:, joints.COHESION] = tensile, overlay, cohesion
-    law[:, joints.TAN_PHI] = np.tan(np.radians(friction))
-    law[:, joints.HALF_SHEAR] = 0.5 * shear
-    return law, beyond
+
+
+def laws_of(rows: Rows) -> np.ndarray:
+    """(rows,) Numbers of their laws in joint_law.py."""
+    return np.array([JOINT_LAWS.get(rows.name(row), 0) for row in range(len(rows))])
 
 
 def element_table(rows: Rows) -> np.ndarray:
@@ -514,6 +501,10 @@ class Local:
         self.slot_law[self.warm_slots] = self.slot_kind[self.warm_slots] = own
         every = np.concatenate([np.arange(len(rows)), self.warm_of])
         self.joint_table, self.joint_beyond = joint_tables(rows, row=every)
+        if (law := laws_of(rows)).any():
+            slides = np.flatnonzero(law[self.slot_kind[: self.slots]])
+            self.slot_law[slides], self.slot_state[slides] = 0, BROKEN + law[self.slot_kind[slides]]
+            self._relink()
         if self.warms:
             self._follow_joints()
 
@@ -536,6 +527,11 @@ class Local:
             slot, histories.rows[at], self.slots_of_triangles, self.slot_law, self.slot_state, self.slot_history,
             self.head, self.follow,
         )  # fmt: skip
+        if (self.slot_state > BROKEN).any():
+            self._relink()
+
+    def _relink(self) -> None:
+        build.relink(self.slot_state, self.slots_of_triangles, self.head, self.follow)
 
     def _make_loads(self) -> None:
         """Tractions on owned faces, and forces that die down."""
@@ -686,11 +682,12 @@ class Local:
         corners = connectivity.corner_counts(cells)
         faces = 4 * number[:, None] + np.arange(4)
         real = cells >= 0
-        names = ("penalty_normal", "penalty_overlay", "penalty_shear")
-        penalty = np.max([sim.joint_rows.column(name) for name in names], axis=0)
+        penalty = joint_law.stiffest(
+            sim.joint_rows.column, laws_of(sim.joint_rows), sim.joint_row[faces], lambda: self.shapes.length[own]
+        )
         closed = sim.closed_faces()[faces] & real
         tied = closed & (sim.joint_row[faces] > 0)
-        each, drag = np.where(tied, 0.5 * penalty[sim.joint_row[faces]], 0.0), np.zeros(faces.shape)
+        each, drag = np.where(tied, 0.5 * penalty, 0.0), np.zeros(faces.shape)
         if sim.options.collision:
             length, double_area = self.shapes.length[own], self.shapes.double_area[own]
             surfaces = Surfaces(sim, self.shapes, faces.reshape(-1), np.repeat(np.arange(own.start, own.stop), 4))
@@ -1376,7 +1373,7 @@ class Local:
         """Owned element (0 ..) and row (histories.py) of each joint behind its peak; with `transfer` without those that
         are broken."""
         state = self.slot_state
-        slots = np.flatnonzero((state == YIELDED) if transfer else ((state == YIELDED) | (state == BROKEN)))
+        slots = np.flatnonzero((state > INTACT) & ((state != BROKEN) | (not transfer)))
         rows = np.zeros((len(slots), WORDS))
         rows.view(np.int64)[:, KEY] = -1 - self.slot_face[slots] % 4
         rows[:, STATE] = state[slots]
@@ -1426,7 +1423,7 @@ class Local:
         if len(opened):
             self.slot_state[opened] = NONE
             self.slot_law[opened] = self.slot_kind[opened] = 0
-            build.relink(self.slot_state, self.slots_of_triangles, self.head, self.follow)
+            self._relink()
         low, high, values = self.pairs.known()
         owner, rows = handed_over
         if len(owner):

@@ -12,11 +12,12 @@ from hpcdem.physics.fdem.definition import TRACTIONS
 from hpcdem.physics.fdem.hexes import Hexes, place_masses
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
 from hpcdem.physics.fdem.joints_hexes import Faces, HexJoints
-from hpcdem.physics.fdem.kernels import elements, energy_space, joints_space, space, tets
+from hpcdem.physics.fdem.kernels import elements, energy_space, joint_law, joints_space, space, tets
 from hpcdem.physics.fdem.kernels import nodes as moving
-from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE
+from hpcdem.physics.fdem.kernels.joint_law import HISTORY
+from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE
 from hpcdem.physics.fdem.laws_space import LawsSpace
-from hpcdem.physics.fdem.local import ALPHA, Evaluation, element_table
+from hpcdem.physics.fdem.local import ALPHA, Evaluation, element_table, laws_of
 from hpcdem.physics.fdem.pairs import Surfaces
 from hpcdem.physics.fdem.pairs_space import ContactSpace, ShapesSpace, face_areas
 from hpcdem.physics.fdem.tetrahedra import FACES
@@ -136,7 +137,10 @@ class LocalSpace(LawsSpace):
         histories = self.sim.histories
         at = np.flatnonzero(histories.keys() < 0)
         slot = 4 * histories.owners()[at] - 1 - histories.keys()[at]
-        there = self.slot_state[slot] != NONE  # else opened meanwhile, or its partner was taken out
+        now = self.slot_state[slot]
+        there = now != NONE  # else opened meanwhile, or its partner was taken out
+        was = histories.rows[at, STATE]
+        there &= (now == was) | (np.maximum(now, was) <= BROKEN)  # else it has another law now
         slot, rows = slot[there], histories.rows[at[there]]
         self.slot_law[slot], self.slot_state[slot] = 0, rows[:, STATE]
         self.slot_history[slot] = rows[:, FIRST : FIRST + HISTORY]
@@ -210,11 +214,13 @@ class LocalSpace(LawsSpace):
             each = np.where(quiet, impedance * face_areas(sim.reference, sim.number[own]), 0.0)
             for k in range(4):
                 dashpots[:, FACES[k]] += each[:, k, None]
-        names = ("penalty_normal", "penalty_overlay", "penalty_shear")
-        penalty = np.max([sim.joint_rows.column(name) for name in names], axis=0)[sim.joint_row[faces]]
+        size = self.slot_size[: self.slots]
+        penalty = joint_law.stiffest(
+            sim.joint_rows.column, laws_of(sim.joint_rows), sim.joint_row[faces], lambda: 1.0 / size
+        )
         tied = sim.closed_faces()[faces] & (sim.joint_row[faces] > 0)
         each = np.zeros(len(faces))
-        each[tied] = penalty[tied] / self.slot_size[: self.slots][tied] / 3.0
+        each[tied] = penalty[tied] / size[tied] / 3.0
         each = np.repeat(each.reshape(-1, 4, 1), 3, axis=2)
         if self.sides is not None:
             each.reshape(-1, 3)[self.sides.slot[self.sides.quad]] *= self.sides.shares()

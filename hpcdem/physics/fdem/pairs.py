@@ -74,8 +74,7 @@ class Shapes:
 
 def smallest_overlay(sim: State, numbers: np.ndarray) -> np.ndarray:
     """(n,) smallest overlay penalty of the joints of elements [Pa], NaN without joints."""
-    overlay = np.array(sim.joint_rows.column("penalty_overlay"))
-    overlay[0] = np.inf
+    overlay = sim.joint_rows.column("penalty_overlay", np.inf)
     out = overlay[sim.joint_row[4 * numbers[:, None] + np.arange(4)]].min(axis=1)
     out[np.isinf(out)] = np.nan
     return out
@@ -131,7 +130,7 @@ class Surfaces:
             return np.where(model > 0, sim.face_rows.column(name)[model], otherwise)
 
         self.young, self.density = of_elements("young"), of_elements("density")
-        overlay = sim.joint_rows.column("penalty_overlay")
+        overlay = sim.joint_rows.column("penalty_overlay", np.nan)
         self.overlay = np.where(joint > 0, overlay[joint], shapes.overlay[rows])
         penalty = of_elements("penalty")
         penalty = np.where(penalty > 0.0, penalty, np.nan)

@@ -1,8 +1,8 @@
 """Broken joints whose faces lie opposite each other, while blocks and fluid go by implicit steps: they are joints
 without strength for so long, which press by their penalty and rub, and free faces again afterwards.
 
-What they remember of their slip (joints.SLIPPED, the line that friction unloads along) is kept in between by face, so
-that one command after another ends where both would have ended at once.
+What they remember of their slip (SLIPPED, the line that friction unloads along) is kept in between by face, so that
+one command after another ends where both would have ended at once.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import numpy as np
 
 from hpcdem.physics.fdem.definition import AGAIN, CRACK
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories
-from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, MODE, SLIPPED
+from hpcdem.physics.fdem.kernels.joint_law import DAMAGE, MODE, SLIPPED
+from hpcdem.physics.fdem.kernels.joints import BROKEN
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.equilibrium import Nodes

@@ -216,11 +216,7 @@ def _warming(*properties: Property) -> tuple[Property, ...]:
 def _strength(values: dict[str, Any]) -> None:
     """All four moduli; no more dilation than friction, or flow would give energy."""
     _elastic(values)
-    dilation, friction = np.asarray(values["dilation"]), np.asarray(values["friction"])
-    if np.any(dilation > friction):
-        wrong = dilation > friction
-        one, other = (float(np.broadcast_to(v, wrong.shape)[wrong].flat[0]) for v in (dilation, friction))
-        raise CommandError(f"dilation must not be above friction ({other:g} degrees), got {one:g}")
+    _no_more_dilation(values)
 
 
 def _agree(values: dict[str, Any]) -> bool:
@@ -416,8 +412,66 @@ def _cohesive(values: dict[str, Any]) -> None:
             raise CommandError(f"{energy} must be > 0 (N/m) where {strength} is {where:g} Pa, got 0")
 
 
+_STIFFNESS = (
+    Property("normal_stiffness", "Pa/m", "normal stiffness; of Barton and Bandis at zero stress", low_itself=False),
+    Property("shear_stiffness", "Pa/m", "shear stiffness", low_itself=False),
+)
+COULOMB_JOINT = Model(
+    "joint_mohr_coulomb",
+    JOINT,
+    "joint that was there before: springs, Coulomb friction",
+    (
+        *_STIFFNESS,
+        _friction("friction angle"),
+        Property("cohesion", "Pa", "cohesion; a point that is torn open has none any more", 0.0),
+        Property("tensile_strength", "Pa", "tensile strength; a point that is torn open has none any more", 0.0),
+        Property("dilation", "degrees", "dilation angle, at most the friction angle", 0.0, high=89.0),
+        Property("dilation_limit", "m", "path of sliding up to which it dilates", math.inf, otherwise="no end"),
+    ),
+    lambda values: _no_more_dilation(values),
+)  # fmt: skip
+BARTON_BANDIS = Model(
+    "joint_barton_bandis",
+    JOINT,
+    "rough joint that was there before, after Barton and Bandis",
+    (
+        *_STIFFNESS,
+        Property("closure_maximum", "m", "largest closure V_m", low_itself=False),
+        Property("residual_friction", "degrees", "residual friction angle", high=70.0),
+        Property("jrc", "1", "joint roughness coefficient JRC", high=20.0),
+        Property("jcs", "Pa", "strength of the walls JCS", low_itself=False),
+        Property("joint_size", "m", "length of joint that JRC and JCS belong to", 0.1, low_itself=False),
+        Property("dilation_part", "1", "part of the mobilised roughness angle that dilates; 0: it does not", 0.5,
+                 high=1.0),
+    ),
+    called={"friction": "residual_friction"},
+)  # fmt: skip
+OF_JOINTS = Model(
+    "of joints",
+    JOINT,
+    "all that a joint may have, whatever its model",
+    tuple({p.name: p for m in (BARTON_BANDIS, COULOMB_JOINT, COHESIVE) for p in m.properties}.values()),
+)
+
+
+def _no_more_dilation(values: dict[str, Any]) -> None:
+    dilation, friction = np.broadcast_arrays(values["dilation"], values["friction"])
+    if np.any(dilation > friction):
+        one, other = (float(v[dilation > friction].flat[0]) for v in (dilation, friction))
+        raise CommandError(f"dilation must not be above friction ({other:g} degrees), got {one:g}")
+
+
 MODELS = {
-    model.name: model for model in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS, CONTACT_MOHR_COULOMB, COHESIVE)
+    model.name: model
+    for model in (
+        MECH_ISO_ELASTIC,
+        MECH_MOHR_COULOMB,
+        MECH_BURGERS,
+        CONTACT_MOHR_COULOMB,
+        COHESIVE,
+        COULOMB_JOINT,
+        BARTON_BANDIS,
+    )
 }
 
 

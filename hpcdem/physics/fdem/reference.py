@@ -271,7 +271,7 @@ def joint_forces(
     """Forces (2, 2) [N/m] on the ends a and b of this side of a joint; p is opposite b, q opposite a (2,) [m].
 
     stresses: (sigma, tau) [Pa] at Gauss point 0, 1, 2 from its opening and slip and the length of the joint [m]:
-    laws.intact_point or, past the peak, laws.yielded_point.
+    joint_law.intact_point or, past the peak, joint_law.yielded_point.
     """
     along = 0.5 * ((b + p) - (a + q))
     length = float(np.linalg.norm(along))

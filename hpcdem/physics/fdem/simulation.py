@@ -41,10 +41,10 @@ from hpcdem.physics.fdem import (
 )
 from hpcdem.physics.fdem.definition import AGAIN, COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
-from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
+from hpcdem.physics.fdem.kernels import elements, joint_law, joints_space, space, tets
 from hpcdem.physics.fdem.kernels.creep_tets import IN_KELVIN
-from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
-from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
+from hpcdem.physics.fdem.kernels.joint_law import MODE
+from hpcdem.physics.fdem.kernels.joints import BROKEN
 from hpcdem.physics.fdem.kernels.strength import HISTORY as STRENGTH_HISTORY
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.local_space import LocalSpace
@@ -913,9 +913,8 @@ class Blocks(State):
             ("tensile_strength", "penalty_normal", "gf1"), ("cohesion", "penalty_shear", "gf2"),
         ):  # fmt: skip
             t, p, g = (self.joint_rows.column(name) for name in (strength, penalty, energy))
-            rows = np.flatnonzero((longest > 0.0) & (t > 0.0))
-            elastic = 2.0 * longest[rows] * t[rows] / p[rows]
-            softening = g[rows] / (SOFTENING_AREA * t[rows])
+            rows = np.flatnonzero((longest > 0.0) & (t > 0.0) & (p > 0.0))
+            elastic, softening = joint_law.ways(t[rows], p[rows], g[rows], longest[rows])
             brittle = softening < 0.1 * elastic
             if not brittle.any():
                 continue

@@ -8,7 +8,7 @@ import numpy as np
 
 from hpcdem.physics.fdem.joints_hexes import Faces
 from hpcdem.physics.fdem.kernels import plastic_hexes, tet_stiffness, tets
-from hpcdem.physics.fdem.kernels.joints import YIELDED
+from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
 from hpcdem.physics.fdem.linear import Pieces
 from hpcdem.physics.fdem.local_space import LocalSpace
 from hpcdem.physics.fdem.principal import principal
@@ -43,8 +43,10 @@ def _stiffness(local: LocalSpace, joints: Faces, softening: bool) -> tuple[np.nd
     of = face, link, size, kind
     tet_stiffness.intact_joints(slots, *of, state, where, x, local.joint_table, found, left)
     behind = left < 0.0
-    past = int((behind & ~(softening & (state[slots] >= YIELDED))).sum())
-    if softening:
+    slides = state[slots] > BROKEN
+    past = int((behind & ~slides & ~(softening & (state[slots] >= YIELDED))).sum())
+    behind &= softening | slides
+    if behind.any():
         soft = np.empty((int(behind.sum()), 18, 18))
         tet_stiffness.yielded_joints(slots[behind], *of, history, where, x, local.joint_table, local.joint_beyond, soft)
         found[behind] = soft

@@ -97,6 +97,12 @@ class Coupled:
             )
         self.sim, self.flow, self.longest, self.wanted = sim, flow, longest, solver
         self.moves = bool(sim.options.mechanical)
+        if self.moves and (slides := np.flatnonzero(sim.slides())).size:
+            raise CommandError(
+                f"face-joint {slides[0]} ({len(slides) // 2} in all) has the model "
+                f"{sim.joint_rows.name(sim.joint_row[slides[0]]).replace('_', '-')}: implicit steps of blocks with "
+                "fluid do not follow joints that slide; explicit steps do (model step, model solve time)"
+            )
         self.count = Count()
         self.front = 1
         """Joints that may pass their peak in one step: in space about those along the rim of a fracture in so many."""

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from hpcdem.cases import kgd_solutions as kgd
-from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA, softening
+from hpcdem.physics.fdem.kernels.joint_law import SOFTENING_AREA, softening
 
 YOUNG = 30e9 / (1.0 - 0.25**2)
 UNIT = 1e6**2 / YOUNG

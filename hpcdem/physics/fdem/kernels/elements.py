@@ -22,8 +22,9 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, put_four_columns, put_two_columns, two_columns
-from hpcdem.physics.fdem.kernels import joints, laws, softening
-from hpcdem.physics.fdem.kernels.joints import HISTORY, INTACT, KINETIC, NONE, PEAK_KINETIC, PEAK_STEP, STEP, YIELDED
+from hpcdem.physics.fdem.kernels import joint_law, joints, laws, softening
+from hpcdem.physics.fdem.kernels.joint_law import HISTORY, KINETIC, PEAK_KINETIC, PEAK_STEP, STEP
+from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE, YIELDED
 
 BLOCK = 64
 """Triangles worked on together: their lanes stay in the first-level cache."""
@@ -169,13 +170,13 @@ def _edge_loop(a, b, out, left_of):
             oa, sa, ob, sb = oa * inverse, sa * inverse, ob * inverse, sb * inverse
             kop, tensile, overlay = lanes[KOP + e], lanes[TENSILE + e], lanes[OVERLAY + e]
             tan_phi, cohesion, half_shear = lanes[TAN_PHI + e], lanes[COHESION + e], lanes[HALF_SHEAR + e]
-            s0, t0, left0 = laws.intact_point(
+            s0, t0, left0 = joint_law.intact_point(
                 near * oa + far * ob, near * sa + far * sb, kop, tensile, overlay, tan_phi, cohesion, half_shear
             )
-            s1, t1, left1 = laws.intact_point(
+            s1, t1, left1 = joint_law.intact_point(
                 0.5 * (oa + ob), 0.5 * (sa + sb), kop, tensile, overlay, tan_phi, cohesion, half_shear
             )
-            s2, t2, left2 = laws.intact_point(
+            s2, t2, left2 = joint_law.intact_point(
                 far * oa + near * ob, far * sa + near * sb, kop, tensile, overlay, tan_phi, cohesion, half_shear
             )
             fax, fay, fbx, fby = joints.end_forces(tx, ty, s0, s1, s2, t0, t1, t2)
@@ -294,8 +295,16 @@ def _slow_joints(
     m = 0
     slot = head[b]
     while slot >= 0:
-        slots[m], edges[m] = slot, U(rows[slot // 3]) * width + U(2 * (slot % 3))
-        m += 1
+        edge = U(rows[slot // 3]) * width + U(2 * (slot % 3))
+        if state[slot] > BROKEN:
+            to, at = (A0, A1, A2)[slot % 3] + U(slot // 3 - first), 8 * kind[slot]
+            fax, fay, fbx, fby = joints.sliding_edge(
+                x, edge, U(partner[slot]), table[at : at + 8], beyond[at // 2 : at // 2 + 4], history[slot]
+            )
+            lanes[to], lanes[to + _NEXT], lanes[to + _B], lanes[to + _B + _NEXT] = fax, fay, fbx, fby
+        else:
+            slots[m], edges[m] = slot, edge
+            m += 1
         slot = follow[slot]
     broken = softening.yielded_edges(
         m, slots, edges, x, partner, kind, state, table, beyond, history.reshape(history.size), soft
@@ -709,8 +718,15 @@ def _slow_quad_joints(
                 history[slot, PEAK_STEP] = step
                 history[slot, PEAK_KINETIC] = _quad_kinetic(c[first + e], v[rows[first + e]])
                 tally[NEW_YIELDED] += 1
-            if state[slot] > INTACT:
-                slots[m], edges[m] = slot, 12 * rows[first + e] + 2 * k
+            edge = U(12) * U(rows[first + e]) + U(2 * k)
+            if state[slot] > BROKEN:
+                to, at = (A0, A1, A2, A3)[k] + U(e), 8 * kind[slot]
+                fax, fay, fbx, fby = joints.sliding_edge(
+                    x, edge, U(partner[slot]), table[at : at + 8], beyond[at // 2 : at // 2 + 4], history[slot]
+                )
+                lanes[to], lanes[to + _NEXT], lanes[to + _B], lanes[to + _B + _NEXT] = fax, fay, fbx, fby
+            elif state[slot] > INTACT:
+                slots[m], edges[m] = slot, edge
                 m += 1
     broken = softening.yielded_edges(
         m, slots, edges, x, partner, kind, state, table, beyond, history.reshape(history.size), soft

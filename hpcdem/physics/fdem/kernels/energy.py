@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.physics.fdem.kernels import joints
 from hpcdem.physics.fdem.kernels.elements import (
     ETA,
     LAMBDA,
@@ -29,7 +29,7 @@ from hpcdem.physics.fdem.kernels.elements import (
     _rate,
     part_stretch,
 )
-from hpcdem.physics.fdem.kernels.joints import DAMAGE, FAR, NEAR, OPENED, SLIPPED
+from hpcdem.physics.fdem.kernels.joints import FAR, NEAR
 
 # Columns of the work of an element (n_own, 8) [J/m]; the last are for nodes of which it has the lowest corner.
 BY_JOINTS, BY_CONTACT, VISCOUS, GRAVITY, OUTSIDE = range(5)
@@ -143,32 +143,6 @@ def kinetic(first, n_own, cells, number, before, after, mass, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def stored_at_point(o, s, h, law, beyond, history, g):
-    """Energy per area [J/m2] that a point of a joint gives back when it is unloaded."""
-    sigma, tau, o_u, s_u, damage, _, _ = laws.yielded_point(
-        o, s, h, 1.0 / h, law[0], law[1], law[2], law[3], law[4], beyond[0], beyond[1], beyond[2], beyond[3],
-        history[OPENED + g], history[SLIPPED + g], history[DAMAGE + g],
-    )  # fmt: skip
-    size = abs(s)
-    if o < 0.0 or o_u > 0.0:
-        normal = 0.5 * sigma * o
-    elif law[0] > 0.0:
-        o_p = h / law[0]
-        r = o / o_p
-        normal = laws.softening(damage) * law[1] * o_p * (r * r - r * r * r / 3.0)
-    else:
-        normal = 0.0
-    if s_u > 0.0 or size == 0.0 or tau == 0.0:
-        return normal + 0.5 * tau * s
-    # tau = limit (2 q - q^2), q = s / s_p: int tau ds = limit s_p (q^2 - q^3 / 3)
-    peak = law[4] - (sigma * law[3] if o < 0.0 else 0.0)
-    s_p = h * peak / law[5]
-    q = size / s_p
-    limit = abs(tau) / (q * (2.0 - q))
-    return normal + limit * s_p * (q * q - q * q * q / 3.0)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def stored_in_joints(slots, face, at, kind, state, history, where, cells, x, table, beyond, first, out):
     """Half of what each joint stores, added to the element of the slot: out (n_own,) [J/m]."""
     flat = x.reshape(x.size)
@@ -184,7 +158,7 @@ def stored_in_joints(slots, face, at, kind, state, history, where, cells, x, tab
         h = math.sqrt(h2)
         oa, sa, ob, sb = oa / h, sa / h, ob / h, sb / h
         law, more = table[kind[s]], beyond[kind[s]]
-        ends = stored_at_point(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, law, more, history[s], 0)
-        ends += stored_at_point(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, law, more, history[s], 2)
-        middle = stored_at_point(0.5 * (oa + ob), 0.5 * (sa + sb), h, law, more, history[s], 1)
+        ends = joints.stored(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, law, more, history[s], 0)
+        ends += joints.stored(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, law, more, history[s], 2)
+        middle = joints.stored(0.5 * (oa + ob), 0.5 * (sa + sb), h, law, more, history[s], 1)
         out[r - first] += 0.5 * h * (5.0 / 18.0 * ends + 8.0 / 18.0 * middle)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba import njit
 
 from hpcdem.physics.fdem.kernels import joints_space
-from hpcdem.physics.fdem.kernels.energy import BY_CONTACT, BY_JOINTS, GRAVITY, OUTSIDE, VISCOUS, stored_at_point
+from hpcdem.physics.fdem.kernels.energy import BY_CONTACT, BY_JOINTS, GRAVITY, OUTSIDE, VISCOUS
 from hpcdem.physics.fdem.kernels.joints import NONE
 from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
 
@@ -89,10 +89,8 @@ def stored_in_joints(slots, face, link, sizes, kind, state, history, where, x, t
             flat[p], flat[p + 1], flat[p + 2], flat[q], flat[q + 1], flat[q + 2], flat[t], flat[t + 1], flat[t + 2],
         )  # fmt: skip
         h, law, more = 1.0 / sizes[s], table[kind[s]], beyond[kind[s]]
-        o, _, _, _, size = joints_space.parted(d0x, d0y, d0z, nx, ny, nz)
-        one = stored_at_point(o, size, h, law, more, history[s], 0)
-        o, _, _, _, size = joints_space.parted(d1x, d1y, d1z, nx, ny, nz)
-        two = stored_at_point(o, size, h, law, more, history[s], 1)
-        o, _, _, _, size = joints_space.parted(d2x, d2y, d2z, nx, ny, nz)
-        three = stored_at_point(o, size, h, law, more, history[s], 2)
+        mid = joints_space.mid_edges(flat, a, b, c, p, q, t)
+        one = joints_space.stored(d0x, d0y, d0z, nx, ny, nz, h, mid, law, more, history[s], 0)
+        two = joints_space.stored(d1x, d1y, d1z, nx, ny, nz, h, mid, law, more, history[s], 1)
+        three = joints_space.stored(d2x, d2y, d2z, nx, ny, nz, h, mid, law, more, history[s], 2)
         out[r - first] += 0.5 * area / 3.0 * (one + (two + three))

@@ -1,4 +1,4 @@
-"""A joint between two edges: where its three Gauss points are, and the loop-free part of its law.
+"""A joint between two edges: where its three Gauss points are, and what forces stresses there make.
 
 The edge of an element runs from corner a to corner b, the partner's the other way: from p, which faces b, to q, which
 faces a. Everything is written so that the partner, for which a and b, p and q, and the outer points have changed
@@ -12,7 +12,8 @@ import math
 
 from numba import njit
 
-from hpcdem.physics.fdem.kernels import laws
+from hpcdem.physics.fdem.kernels import joint_law
+from hpcdem.physics.fdem.kernels.joint_law import COHESIVE, LAW, OWN, PATH, STAYS
 
 NEAR = 0.5 * (1.0 + math.sqrt(0.6))
 """Shape function of the nearer end at an outer Gauss point; 1 - NEAR of the other."""
@@ -20,19 +21,9 @@ FAR = 0.5 * (1.0 - math.sqrt(0.6))
 AT_NEAR, AT_MIDDLE, AT_FAR = 5.0 / 18.0 * NEAR, 8.0 / 18.0 * 0.5, 5.0 / 18.0 * FAR
 """Weight of a point times shape function of an end: the nearer outer point, the middle, the farther one."""
 
-# Columns of the table of joint laws (rows, 8), for joints before their peak (laws.intact_point), and of the table
-# (rows, 4) of what else they need behind it: one over o_t, s_t, kop and half the shear penalty.
-KOP, TENSILE, OVERLAY, TAN_PHI, COHESION, HALF_SHEAR = range(6)
-PER_O_T, PER_S_T, PER_KOP, PER_HALF_SHEAR = range(4)
-
-# What a joint remembers behind its peak, per Gauss point from a to b: largest opening and slip, damage; then how it
-# broke (0: it has not), at which step, and the kinetic energy of the element at that moment; and step and kinetic
-# energy when it passed its peak.
-OPENED, SLIPPED, DAMAGE, MODE, STEP, KINETIC, PEAK_STEP, PEAK_KINETIC = 0, 3, 6, 9, 10, 11, 12, 13
-HISTORY = 14
-
 NONE, INTACT, YIELDED, BROKEN = 0, 1, 2, 3
-"""State of an edge. BROKEN: its strength is gone; it presses and rubs until contact takes over at the next rebuild."""
+"""State of an edge. BROKEN: its strength is gone; it presses and rubs until contact takes over at the next rebuild.
+Joints that slide (joint_law.slide) have a state above it, BROKEN + the number of their law, all the time."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -58,21 +49,67 @@ def points_now(ax, ay, bx, by, px, py, qx, qy, law, beyond, history):
 
     law (8,), beyond (4,): rows of the tables; history (14,): stays as it is, zero before the peak.
     """
+    if law[LAW] > COHESIVE:
+        return points_slide(ax, ay, bx, by, px, py, qx, qy, law, beyond, history, False)
     tx, ty, h2, oa, sa, ob, sb = openings(ax, ay, bx, by, px, py, qx, qy)
     h = math.sqrt(h2)
     inverse = 1.0 / h
     oa, sa, ob, sb = oa * inverse, sa * inverse, ob * inverse, sb * inverse
-    s0, t0 = _point_now(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, inverse, law, beyond, history, 0)
-    s1, t1 = _point_now(0.5 * (oa + ob), 0.5 * (sa + sb), h, inverse, law, beyond, history, 1)
-    s2, t2 = _point_now(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, inverse, law, beyond, history, 2)
+    s0, t0, _, _, _, _, _ = joint_law.point(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, law, beyond, history, 0)
+    s1, t1, _, _, _, _, _ = joint_law.point(0.5 * (oa + ob), 0.5 * (sa + sb), h, law, beyond, history, 1)
+    s2, t2, _, _, _, _, _ = joint_law.point(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, law, beyond, history, 2)
     return tx, ty, s0, s1, s2, t0, t1, t2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _point_now(o, s, h, inverse, law, beyond, history, g):
-    sigma, tau, _, _, _, _, _ = laws.yielded_point(
-        o, s, h, inverse, law[KOP], law[TENSILE], law[OVERLAY], law[TAN_PHI], law[COHESION], beyond[PER_O_T],
-        beyond[PER_S_T], beyond[PER_KOP], beyond[PER_HALF_SHEAR], history[OPENED + g], history[SLIPPED + g],
-        history[DAMAGE + g],
+def points_slide(ax, ay, bx, by, px, py, qx, qy, law, beyond, history, keep):
+    """The same of a joint that slides; keep: what it remembers moves on."""
+    tx, ty, h2, oa, sa, ob, sb = openings(ax, ay, bx, by, px, py, qx, qy)
+    inverse = 1.0 / math.sqrt(h2)
+    oa, sa, ob, sb = oa * inverse, sa * inverse, ob * inverse, sb * inverse
+    s0, t0 = _slides(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, law, beyond, history, 0, keep)
+    s1, t1 = _slides(0.5 * (oa + ob), 0.5 * (sa + sb), law, beyond, history, 1, keep)
+    s2, t2 = _slides(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, law, beyond, history, 2, keep)
+    return tx, ty, s0, s1, s2, t0, t1, t2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _slides(o, s, law, beyond, history, g, keep):
+    s -= history[STAYS + g]
+    sigma, tau, more, own, path = joint_law.slide(o, abs(s), law, beyond, history[OWN + g], history[PATH + g])
+    if keep:
+        history[STAYS + g] += math.copysign(more, s)
+        history[OWN + g], history[PATH + g] = own, path
+    return sigma, math.copysign(tau, s)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sliding_edge(x, at, over, law, beyond, history):
+    """Forces [N/m] on the ends a and b of a joint that slides; what it remembers moves on. at, over: where its own and
+    the partner's edge begin in flat x."""
+    tx, ty, s0, s1, s2, t0, t1, t2 = points_slide(
+        x[at], x[at + 1], x[at + 2], x[at + 3], x[over], x[over + 1], x[over + 2], x[over + 3], law, beyond, history,
+        True,
     )  # fmt: skip
-    return sigma, tau
+    return end_forces(tx, ty, s0, s1, s2, t0, t1, t2)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def slopes(o, s, h, law, beyond, history, g):
+    """Derivatives [Pa/m] of sigma and tau at a point by opening and slip: sigma by o, by s, tau by o, by s."""
+    if law[LAW] == COHESIVE:
+        sigma_o, sigma_s, tau_o, tau_s, _ = joint_law.slopes(o, s, h, law, beyond, history, g)
+        return sigma_o, sigma_s, tau_o, tau_s
+    s -= history[STAYS + g]
+    sigma_o, sigma_s, tau_o, tau_s, _ = joint_law.slide_slopes(
+        o, abs(s), law, beyond, history[OWN + g], history[PATH + g]
+    )
+    return sigma_o, math.copysign(1.0, s) * sigma_s, math.copysign(1.0, s) * tau_o, tau_s
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def stored(o, s, h, law, beyond, history, g):
+    """Energy per area [J/m2] that a point gives back when it is unloaded."""
+    if law[LAW] == COHESIVE:
+        return joint_law.stored(o, s, h, law, beyond, history, g)
+    return joint_law.slide_stored(o, abs(s - history[STAYS + g]), law, beyond, history[OWN + g], history[PATH + g])

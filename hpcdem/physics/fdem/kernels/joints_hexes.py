@@ -23,10 +23,11 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import U, four_columns, lane
-from hpcdem.physics.fdem.kernels import joints_space
+from hpcdem.physics.fdem.kernels import joint_law, joints_space
 from hpcdem.physics.fdem.kernels.elements import NEW_BROKEN, NEW_YIELDED
 from hpcdem.physics.fdem.kernels.hexes import H_MASS
-from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, KINETIC, PEAK_KINETIC, PEAK_STEP, STEP, YIELDED
+from hpcdem.physics.fdem.kernels.joint_law import KINETIC, PEAK_KINETIC, PEAK_STEP, STEP
+from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, YIELDED
 from hpcdem.physics.fdem.kernels.joints_space import LAW, LEFT, PER_H, J, P
 from hpcdem.physics.fdem.tetrahedra import FACES, STRIDE
 
@@ -160,7 +161,7 @@ def _slow(
         )
         for m in range(9):
             lanes[J + U(m) * _NEXT + k] = out[m]
-        if state[s] == YIELDED and joints_space.breaks(remembered, part):
+        if state[s] == YIELDED and joint_law.breaks(remembered, part[0], part[1]):
             state[s] = BROKEN
             remembered[STEP], remembered[KINETIC] = step, _kinetic(hexahedron[first + e], place, h, v)
             tally[NEW_BROKEN] += 1

@@ -18,32 +18,24 @@ import numpy as np
 from numba import njit
 
 from hpcdem.numerics.lanes import U, four_columns, lane
-from hpcdem.physics.fdem.kernels import laws
+from hpcdem.physics.fdem.kernels import joint_law, laws
 from hpcdem.physics.fdem.kernels.elements import NEW_BROKEN, NEW_YIELDED
-from hpcdem.physics.fdem.kernels.joints import (
-    BROKEN,
-    COHESION,
+from hpcdem.physics.fdem.kernels.joint_law import (
+    COHESIVE,
     DAMAGE,
     HISTORY,
-    INTACT,
     KINETIC,
-    KOP,
-    MODE,
-    NONE,
     OPENED,
-    OVERLAY,
+    OWN,
+    PATH,
     PEAK_KINETIC,
     PEAK_STEP,
-    PER_HALF_SHEAR,
-    PER_KOP,
-    PER_O_T,
-    PER_S_T,
     SLIPPED,
+    STAYS,
+    STAYS_TOO,
     STEP,
-    TAN_PHI,
-    TENSILE,
-    YIELDED,
 )
+from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
 
 SIXTH, HALF = 1.0 / 6.0, 0.5
@@ -93,7 +85,9 @@ def parted(dx, dy, dz, nx, ny, nz):
 def _intact(dx, dy, dz, nx, ny, nz, per_h, kop, tensile, overlay, tan_phi, cohesion, half_shear):
     """Traction at a point before its peak [Pa], and how much is left to it."""
     o, sx, sy, sz, size = parted(dx, dy, dz, nx, ny, nz)
-    sigma, tau, left = laws.intact_point(o * per_h, size * per_h, kop, tensile, overlay, tan_phi, cohesion, half_shear)
+    sigma, tau, left = joint_law.intact_point(
+        o * per_h, size * per_h, kop, tensile, overlay, tan_phi, cohesion, half_shear
+    )
     along = abs(tau) / (size + laws.TINY)
     return sigma * nx + along * sx, sigma * ny + along * sy, sigma * nz + along * sz, left
 
@@ -194,15 +188,55 @@ def _any_past_peak(n, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _behind(dx, dy, dz, nx, ny, nz, h, law, beyond, history, g, part):
+def mid_edges(x, a, b, c, p, q, r):
+    """Edges of the mid-surface from the corner of a to those of b and c [m], which change places from the other side;
+    corners: where they begin in flat x."""
+    return (
+        0.5 * ((x[b] + x[r]) - (x[a] + x[p])), 0.5 * ((x[b + 1] + x[r + 1]) - (x[a + 1] + x[p + 1])),
+        0.5 * ((x[b + 2] + x[r + 2]) - (x[a + 2] + x[p + 2])), 0.5 * ((x[c] + x[q]) - (x[a] + x[p])),
+        0.5 * ((x[c + 1] + x[q + 1]) - (x[a + 1] + x[p + 1])), 0.5 * ((x[c + 2] + x[q + 2]) - (x[a + 2] + x[p + 2])),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def unloaded(sx, sy, sz, size, mid, law, history, g):
+    """Slip and its size [m] at point g less the part that stays; mid: see `mid_edges`."""
+    if law[joint_law.LAW] == COHESIVE:
+        return sx, sy, sz, size
+    along, too = history[STAYS + g], history[STAYS_TOO + g]
+    sx -= along * mid[0] + too * mid[3]
+    sy -= along * mid[1] + too * mid[4]
+    sz -= along * mid[2] + too * mid[5]
+    return sx, sy, sz, math.sqrt(sx * sx + (sy * sy + sz * sz))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _slides(dx, dy, dz, nx, ny, nz, mid, law, beyond, history, g):
+    """Traction at point g of a joint that slides [Pa]; what it remembers moves on."""
+    o, sx, sy, sz, size = parted(dx, dy, dz, nx, ny, nz)
+    sx, sy, sz, size = unloaded(sx, sy, sz, size, mid, law, history, g)
+    sigma, tau, more, own, path = joint_law.slide(o, size, law, beyond, history[OWN + g], history[PATH + g])
+    along = tau / (size + laws.TINY)
+    if more > 0.0:
+        ux, uy, uz, wx, wy, wz = mid
+        uu, ww = ux * ux + (uy * uy + uz * uz), wx * wx + (wy * wy + wz * wz)
+        uw, scale = ux * wx + (uy * wy + uz * wz), more / (size + laws.TINY)
+        su, sw = sx * ux + (sy * uy + sz * uz), sx * wx + (sy * wy + sz * wz)
+        scale /= uu * ww - uw * uw
+        history[STAYS + g] += scale * (ww * su - uw * sw)
+        history[STAYS_TOO + g] += scale * (uu * sw - uw * su)
+    history[OWN + g], history[PATH + g] = own, path
+    return sigma * nx + along * sx, sigma * ny + along * sy, sigma * nz + along * sz
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _behind(dx, dy, dz, nx, ny, nz, h, mid, law, beyond, history, g, part):
     """Traction at point g behind the peak [Pa]; what it remembers moves on; part (2,): largest squares of both parts
     of the damage."""
+    if law[joint_law.LAW] > COHESIVE:
+        return _slides(dx, dy, dz, nx, ny, nz, mid, law, beyond, history, g)
     o, sx, sy, sz, size = parted(dx, dy, dz, nx, ny, nz)
-    sigma, tau, o_u, s_u, damage, first2, second2 = laws.yielded_point(
-        o, size, h, 1.0 / h, law[KOP], law[TENSILE], law[OVERLAY], law[TAN_PHI], law[COHESION], beyond[PER_O_T],
-        beyond[PER_S_T], beyond[PER_KOP], beyond[PER_HALF_SHEAR], history[OPENED + g], history[SLIPPED + g],
-        history[DAMAGE + g],
-    )  # fmt: skip
+    sigma, tau, o_u, s_u, damage, first2, second2 = joint_law.point(o, size, h, law, beyond, history, g)
     history[OPENED + g], history[SLIPPED + g], history[DAMAGE + g] = o_u, s_u, damage
     part[0], part[1] = max(part[0], first2), max(part[1], second2)
     along = tau / (size + laws.TINY)
@@ -222,10 +256,10 @@ def face_now(x, own, link, per_h, law, beyond, history, part, out):
         x[q], x[q + 1], x[q + 2], x[r], x[r + 1], x[r + 2],
     )  # fmt: skip
     part[0] = part[1] = 0.0
-    h = 1.0 / per_h
-    t0x, t0y, t0z = _behind(d0x, d0y, d0z, nx, ny, nz, h, law, beyond, history, 0, part)
-    t1x, t1y, t1z = _behind(d1x, d1y, d1z, nx, ny, nz, h, law, beyond, history, 1, part)
-    t2x, t2y, t2z = _behind(d2x, d2y, d2z, nx, ny, nz, h, law, beyond, history, 2, part)
+    h, mid = 1.0 / per_h, mid_edges(x, a, b, c, p, q, r)
+    t0x, t0y, t0z = _behind(d0x, d0y, d0z, nx, ny, nz, h, mid, law, beyond, history, 0, part)
+    t1x, t1y, t1z = _behind(d1x, d1y, d1z, nx, ny, nz, h, mid, law, beyond, history, 1, part)
+    t2x, t2y, t2z = _behind(d2x, d2y, d2z, nx, ny, nz, h, mid, law, beyond, history, 2, part)
     out[0], out[3], out[6] = _corner_forces(area, t0x, t1x, t2x)
     out[1], out[4], out[7] = _corner_forces(area, t0y, t1y, t2y)
     out[2], out[5], out[8] = _corner_forces(area, t0z, t1z, t2z)
@@ -233,21 +267,6 @@ def face_now(x, own, link, per_h, law, beyond, history, part, out):
     out[13], out[14], out[15] = t0x, t0y, t0z
     out[16], out[17], out[18] = t1x, t1y, t1z
     out[19], out[20], out[21] = t2x, t2y, t2z
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def breaks(history, part):
-    """Whether a joint has no strength left at two of its three points; then it has none, and a mode."""
-    gone = 0
-    for g in range(3):
-        gone += history[DAMAGE + g] >= 1.0
-    if gone < 2:
-        return False
-    both = part[0] + part[1]
-    history[MODE] = 1.0 + (part[1] / both if both > 0.0 else 0.0)
-    for g in range(3):
-        history[DAMAGE + g] = 1.0
-    return True
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -280,7 +299,7 @@ def _slow_joints(
         )
         for m in range(9):
             lanes[J + U(m) * _NEXT + U(e)] = out[m]
-        if state[slot] == YIELDED and breaks(remembered, part):
+        if state[slot] == YIELDED and joint_law.breaks(remembered, part[0], part[1]):
             state[slot] = BROKEN
             remembered[STEP], remembered[KINETIC] = step, _kinetic(e, kinetic, lanes)
             tally[NEW_BROKEN] += 1
@@ -454,3 +473,25 @@ def faces_now(slots, face, link, sizes, kind, state, history, where, x, table, b
         out[i, 10], out[i, 11], out[i, 12] = area * sx, area * sy, area * sz
         for m in range(9):
             out[i, 13 + m] = found[m]
+
+
+# ---- slopes and energy ---------------------------------------------------------------------------------------------
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def slopes(o, s, h, law, beyond, history, g):
+    """Derivatives [Pa/m] of sigma and tau at a point by opening and slip, less what stays of it: sigma by o, by s, tau
+    by o, by s; and tau [Pa]."""
+    if law[joint_law.LAW] == COHESIVE:
+        return joint_law.slopes(o, s, h, law, beyond, history, g)
+    return joint_law.slide_slopes(o, s, law, beyond, history[OWN + g], history[PATH + g])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def stored(dx, dy, dz, nx, ny, nz, h, mid, law, beyond, history, g):
+    """Energy per area [J/m2] that a point gives back when it is unloaded."""
+    o, sx, sy, sz, size = parted(dx, dy, dz, nx, ny, nz)
+    if law[joint_law.LAW] == COHESIVE:
+        return joint_law.stored(o, size, h, law, beyond, history, g)
+    _, _, _, size = unloaded(sx, sy, sz, size, mid, law, history, g)
+    return joint_law.slide_stored(o, size, law, beyond, history[OWN + g], history[PATH + g])

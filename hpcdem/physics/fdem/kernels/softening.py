@@ -1,4 +1,4 @@
-"""Joints behind their peak: the law `laws.yielded_point` as loops over lanes (numerics/lanes.py), and how they break.
+"""Joints behind their peak: the law of joint_law.py as loops over lanes (numerics/lanes.py), and how they break.
 
 Each loop has no jumps and no calls, so it becomes vector instructions; only the exponential of the softening curve is
 computed one by one, in a loop of its own.
@@ -12,17 +12,18 @@ import numpy as np
 from numba import njit
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, put_four_columns
-from hpcdem.physics.fdem.kernels import joints, laws
-from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, FAR, HISTORY, MODE, NEAR, YIELDED
+from hpcdem.physics.fdem.kernels import joint_law, joints
+from hpcdem.physics.fdem.kernels.joint_law import HISTORY
+from hpcdem.physics.fdem.kernels.joints import BROKEN, FAR, NEAR, YIELDED
 
 (
     AX, AY, BX, BY, PX, PY, QX, QY, KOP, TENSILE, OVERLAY, TAN_PHI, COHESION, _, _, _,
     PER_O_T, PER_S_T, PER_KOP, PER_HALF_SHEAR, OPENED0, OPENED1, OPENED2, SLIPPED0, SLIPPED1, SLIPPED2, D0, D1, D2, _,
-    _, _, TX, TY, H, PER_H, O0, O1, O2, S0, S1, S2, E0, E1, E2, FAX, FAY, FBX, FBY, GONE, OPENED, SLIPPED,
-) = (lane(k) for k in range(52))  # fmt: skip
-"""Corners, law, history in the order of joints.py; what is between; forces on a and b, points without strength, and the
-largest squares of both parts of the damage."""
-LANES = 52
+    _, _, TX, TY, H, PER_H, O0, O1, O2, S0, S1, S2, E0, E1, E2, FAX, FAY, FBX, FBY, OPENED, SLIPPED,
+) = (lane(k) for k in range(51))  # fmt: skip
+"""Corners, law, history in the order of joint_law.py; what is between; forces on a and b, and the largest squares of
+both parts of the damage."""
+LANES = 51
 _1, _2, _3, _FOUR, _EIGHT = U(1), U(2), U(3), U(4), U(8)
 _HISTORY = U(HISTORY)
 
@@ -88,15 +89,15 @@ def _damage(n, lanes):
         tan_phi, cohesion = lanes[TAN_PHI + e], lanes[COHESION + e]
         per_o_t, per_s_t = lanes[PER_O_T + e], lanes[PER_S_T + e]
         per_kop, per_half_shear = lanes[PER_KOP + e], lanes[PER_HALF_SHEAR + e]
-        o0, u0, d0, f0, g0 = laws.damaged_point(
+        o0, u0, d0, f0, g0 = joint_law.damaged_point(
             lanes[O0 + e], lanes[S0 + e], h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_o_t, per_s_t,
             per_kop, per_half_shear, lanes[OPENED0 + e], lanes[SLIPPED0 + e], lanes[D0 + e],
         )  # fmt: skip
-        o1, u1, d1, f1, g1 = laws.damaged_point(
+        o1, u1, d1, f1, g1 = joint_law.damaged_point(
             lanes[O1 + e], lanes[S1 + e], h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_o_t, per_s_t,
             per_kop, per_half_shear, lanes[OPENED1 + e], lanes[SLIPPED1 + e], lanes[D1 + e],
         )  # fmt: skip
-        o2, u2, d2, f2, g2 = laws.damaged_point(
+        o2, u2, d2, f2, g2 = joint_law.damaged_point(
             lanes[O2 + e], lanes[S2 + e], h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_o_t, per_s_t,
             per_kop, per_half_shear, lanes[OPENED2 + e], lanes[SLIPPED2 + e], lanes[D2 + e],
         )  # fmt: skip
@@ -104,16 +105,14 @@ def _damage(n, lanes):
         lanes[SLIPPED0 + e], lanes[SLIPPED1 + e], lanes[SLIPPED2 + e] = u0, u1, u2
         lanes[D0 + e], lanes[D1 + e], lanes[D2 + e] = d0, d1, d2
         lanes[OPENED + e], lanes[SLIPPED + e] = max(f0, f1, f2), max(g0, g1, g2)
-        gone0, gone1, gone2 = 1.0 if d0 >= 1.0 else 0.0, 1.0 if d1 >= 1.0 else 0.0, 1.0 if d2 >= 1.0 else 0.0
-        lanes[GONE + e] = gone0 + gone1 + gone2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _exponentials(n, lanes):
     for e in range(U(n)):
-        lanes[E0 + e] = math.exp(lanes[D0 + e] * laws.RISE / laws.FALL)
-        lanes[E1 + e] = math.exp(lanes[D1 + e] * laws.RISE / laws.FALL)
-        lanes[E2 + e] = math.exp(lanes[D2 + e] * laws.RISE / laws.FALL)
+        lanes[E0 + e] = joint_law.growth(lanes[D0 + e])
+        lanes[E1 + e] = joint_law.growth(lanes[D1 + e])
+        lanes[E2 + e] = joint_law.growth(lanes[D2 + e])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -122,17 +121,17 @@ def _forces(n, lanes):
         h, inverse = lanes[H + e], lanes[PER_H + e]
         kop, tensile, overlay = lanes[KOP + e], lanes[TENSILE + e], lanes[OVERLAY + e]
         tan_phi, cohesion, per_half_shear = lanes[TAN_PHI + e], lanes[COHESION + e], lanes[PER_HALF_SHEAR + e]
-        s0, t0 = laws.softened_point(
+        s0, t0 = joint_law.softened_point(
             lanes[O0 + e], lanes[S0 + e], h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_half_shear,
-            lanes[OPENED0 + e], lanes[SLIPPED0 + e], laws.softening_curve(lanes[D0 + e], lanes[E0 + e]),
+            lanes[OPENED0 + e], lanes[SLIPPED0 + e], joint_law.softening_curve(lanes[D0 + e], lanes[E0 + e]),
         )  # fmt: skip
-        s1, t1 = laws.softened_point(
+        s1, t1 = joint_law.softened_point(
             lanes[O1 + e], lanes[S1 + e], h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_half_shear,
-            lanes[OPENED1 + e], lanes[SLIPPED1 + e], laws.softening_curve(lanes[D1 + e], lanes[E1 + e]),
+            lanes[OPENED1 + e], lanes[SLIPPED1 + e], joint_law.softening_curve(lanes[D1 + e], lanes[E1 + e]),
         )  # fmt: skip
-        s2, t2 = laws.softened_point(
+        s2, t2 = joint_law.softened_point(
             lanes[O2 + e], lanes[S2 + e], h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_half_shear,
-            lanes[OPENED2 + e], lanes[SLIPPED2 + e], laws.softening_curve(lanes[D2 + e], lanes[E2 + e]),
+            lanes[OPENED2 + e], lanes[SLIPPED2 + e], joint_law.softening_curve(lanes[D2 + e], lanes[E2 + e]),
         )  # fmt: skip
         fax, fay, fbx, fby = joints.end_forces(lanes[TX + e], lanes[TY + e], s0, s1, s2, t0, t1, t2)
         lanes[FAX + e], lanes[FAY + e], lanes[FBX + e], lanes[FBY + e] = fax, fay, fbx, fby
@@ -159,12 +158,10 @@ def yielded_edges(n, slot, edge, x, partner, kind, state, table, beyond, history
     _put_histories(whole, slot, history, lanes)
     broken = 0
     for m in range(n):
-        if lanes[GONE + U(m)] >= 2.0 and state[slot[m]] == YIELDED:
-            at = slot[m] * HISTORY
-            opened2, slid2 = lanes[OPENED + U(m)], lanes[SLIPPED + U(m)]
-            history[at + MODE] = 1.0 + (slid2 / (opened2 + slid2) if opened2 + slid2 > 0.0 else 0.0)
-            for g in range(3):
-                history[at + DAMAGE + g] = 1.0
+        at = slot[m] * HISTORY
+        if state[slot[m]] == YIELDED and joint_law.breaks(
+            history[at : at + HISTORY], lanes[OPENED + U(m)], lanes[SLIPPED + U(m)]
+        ):
             state[slot[m]] = BROKEN
             edge[broken] = slot[m]
             broken += 1

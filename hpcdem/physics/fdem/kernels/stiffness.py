@@ -13,7 +13,7 @@ gradients and areas are the present ones, and K the derivative up to terms of th
 
 A joint: K = sum over its three points of W [o; s]^T C [o; s], C: derivative of (sigma, tau) by opening and slip over
 the length. Friction makes tau depend on the opening, so C is not symmetric; that the mid-line turns is left out. Behind
-the peak C is the derivative of `laws.yielded_point` from what the point remembers of the last balance: along the curve,
+the peak C is the derivative of `joint_law.point` from what the point remembers of the last balance: along the curve,
 which falls, where damage grows, else along the line through the origin.
 """
 
@@ -24,7 +24,7 @@ import math
 import numpy as np
 from numba import njit
 
-from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.physics.fdem.kernels import joint_law, joints
 from hpcdem.physics.fdem.kernels.elements import (
     LAMBDA,
     PARTS,
@@ -36,11 +36,6 @@ from hpcdem.physics.fdem.kernels.elements import (
     triangle_stress,
 )
 from hpcdem.physics.fdem.kernels.joints import INTACT
-
-LEAST = 1e-3
-"""Part of the slope at the origin that a joint point keeps in the tangent near and beyond its peak."""
-FLAT = 1e-12
-"""Opening and slip over the length of a joint that are rounding."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -132,26 +127,6 @@ def quads(rows, x, c, s0, small, out):
                     k[p, q] += bulk * mean[p] * mean[q]
 
 
-@njit(cache=True, error_model="numpy")
-def slopes(o, s, kop, tensile, overlay, tan_phi, cohesion, half_shear):
-    """Derivatives of laws.intact_point: sigma by o, tau by o, tau by s, and how much is left to the peak. What has no
-    strength and lies flat is closed and sticks: which way it moves rounding would say."""
-    sigma, _, left = laws.intact_point(o, s, kop, tensile, overlay, tan_phi, cohesion, half_shear)
-    r = o * kop
-    flat = abs(o) <= FLAT and abs(s) <= FLAT
-    normal = overlay if o < 0.0 or (flat and tensile == 0.0) else 2.0 * tensile * kop * max(1.0 - r, LEAST)
-    if flat and cohesion == 0.0:
-        return normal, 0.0, 2.0 * half_shear if tan_phi > 0.0 else 0.0, 1.0
-    limit = max(cohesion - sigma * tan_phi, 0.0)
-    peak = max(limit if sigma < 0.0 else cohesion, laws.TINY)
-    q = abs(s) * half_shear / peak
-    shear = limit * half_shear / peak * 2.0 * max(1.0 - q, LEAST)
-    rub = 0.0
-    if q < 1.0 and limit > 0.0:
-        rub = -tan_phi * (q * q if sigma < 0.0 else q * (2.0 - q)) * (1.0 if s > 0.0 else -1.0)
-    return normal, rub * normal, shear, left
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def intact_joints(slots, face, at, kind, state, where, cells, x, table, out, left):
     """K (n, 8, 8) [N/m per m] of the joints in these slots, for the ends a, b of this side, then p, q of the other (p
@@ -178,10 +153,7 @@ def intact_joints(slots, face, at, kind, state, where, cells, x, table, out, lef
             near = joints.NEAR if point == 0 else (0.5 if point == 1 else joints.FAR)
             far = 1.0 - near
             weight = 8.0 / 18.0 if point == 1 else 5.0 / 18.0
-            normal, rub, shear, here = slopes(
-                near * oa + far * ob, near * sa + far * sb, law[joints.KOP], law[joints.TENSILE], law[joints.OVERLAY],
-                law[joints.TAN_PHI], law[joints.COHESION], law[joints.HALF_SHEAR],
-            )  # fmt: skip
+            normal, rub, shear, here, _ = joint_law.intact_slopes(near * oa + far * ob, near * sa + far * sb, law)
             left[i] = min(left[i], here)
             for end, share in enumerate((-near, -far, far, near)):
                 row[0, 2 * end], row[0, 2 * end + 1] = share * ty, -share * tx
@@ -191,63 +163,6 @@ def intact_joints(slots, face, at, kind, state, where, cells, x, table, out, lef
                     out[i, m, n] += weight * (
                         row[0, m] * normal * row[0, n] + row[1, m] * (rub * row[0, n] + shear * row[1, n])
                     )
-
-
-@njit(cache=True, error_model="numpy")
-def softening_slope(d):
-    """Derivative of laws.softening by the damage d, 0 beyond its ends."""
-    if d <= 0.0 or d >= 1.0:
-        return 0.0
-    k, power, rest = (laws.A + laws.B - 1.0) / (laws.A + laws.B), laws.RISE / laws.FALL, 1.0 - d
-    e = math.exp(d * power)
-    fifth = rest**5
-    return -k * power * e * (laws.A * rest + laws.B * fifth * rest) - (1.0 - k * e) * (laws.A + 6.0 * laws.B * fifth)
-
-
-@njit(cache=True, error_model="numpy")
-def yielded_slopes(
-    o, s, h, kop, tensile, overlay, tan_phi, cohesion, per_o_t, per_s_t, per_kop, per_half_shear, o_u, s_u, damage
-):
-    """Derivatives [Pa/m] of sigma and tau of laws.yielded_point by o and s: sigma by o, by s, tau by o, by s."""
-    per_h, size, sign = 1.0 / h, abs(s), 1.0 if s >= 0.0 else -1.0
-    now_o, now_s, now_d, _, _ = laws.damaged_point(
-        o, s, h, per_h, kop, tensile, overlay, tan_phi, cohesion, per_o_t, per_s_t, per_kop, per_half_shear, o_u, s_u,
-        damage,
-    )  # fmt: skip
-    s_p = laws.slip_at_peak(o, h, per_h, overlay, tan_phi, cohesion, per_half_shear)
-    rise = -overlay * tan_phi * per_half_shear if o < 0.0 else 0.0  # of s_p by o
-    d_o = d_s = 0.0
-    if now_d > damage and now_d < 1.0:
-        first = max(o - h * per_kop, 0.0) * per_o_t if tensile > 0.0 else 0.0
-        second = max(size - s_p, 0.0) * per_s_t
-        d_o = (first * per_o_t - second * per_s_t * rise) / now_d
-        d_s = second * per_s_t * sign / now_d
-    f, fall = laws.softening(now_d), softening_slope(now_d)
-    r = o * per_h * kop
-    sigma, _ = laws.softened_point(
-        o, s, h, per_h, kop, tensile, overlay, tan_phi, cohesion, per_half_shear, now_o, now_s, f
-    )
-    if o < 0.0:
-        sigma_o, sigma_s = overlay * per_h, 0.0
-    else:
-        if now_o > 0.0:
-            share, slope = (o / now_o, 1.0 / now_o) if o < now_o else (1.0, 0.0)
-        else:
-            share, slope = r * (2.0 - r), 2.0 * (1.0 - r) * kop * per_h
-        sigma_o, sigma_s = tensile * (fall * d_o * share + f * slope), tensile * fall * d_s * share
-    limit = f * cohesion - sigma * tan_phi
-    limit_o, limit_s = cohesion * fall * d_o - tan_phi * sigma_o, cohesion * fall * d_s - tan_phi * sigma_s
-    if limit <= 0.0:
-        limit = limit_o = limit_s = 0.0
-    share_o = 0.0
-    if now_s > 0.0:
-        share, share_s = (size / now_s, 1.0 / now_s) if size < now_s else (1.0, 0.0)
-    else:
-        q, per = size / max(s_p, laws.TINY), 1.0 / max(s_p, laws.TINY)
-        share, share_s, share_o = q * (2.0 - q), 2.0 * (1.0 - q) * per, -2.0 * (1.0 - q) * q * per * rise
-    return (
-        sigma_o, sigma_s, sign * (limit_o * share + limit * share_o), sign * limit_s * share + limit * share_s,
-    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -274,12 +189,9 @@ def yielded_joints(slots, face, at, kind, history, where, cells, x, table, beyon
             near = joints.NEAR if point == 0 else (0.5 if point == 1 else joints.FAR)
             far = 1.0 - near
             weight = h * (8.0 / 18.0 if point == 1 else 5.0 / 18.0)
-            sigma_o, sigma_s, tau_o, tau_s = yielded_slopes(
-                near * oa + far * ob, near * sa + far * sb, h, law[joints.KOP], law[joints.TENSILE],
-                law[joints.OVERLAY], law[joints.TAN_PHI], law[joints.COHESION], more[joints.PER_O_T],
-                more[joints.PER_S_T], more[joints.PER_KOP], more[joints.PER_HALF_SHEAR], past[joints.OPENED + point],
-                past[joints.SLIPPED + point], past[joints.DAMAGE + point],
-            )  # fmt: skip
+            sigma_o, sigma_s, tau_o, tau_s = joints.slopes(
+                near * oa + far * ob, near * sa + far * sb, h, law, more, past, point
+            )
             for end, share in enumerate((-near, -far, far, near)):
                 row[0, 2 * end], row[0, 2 * end + 1] = share * ty, -share * tx
                 row[1, 2 * end], row[1, 2 * end + 1] = share * tx, share * ty

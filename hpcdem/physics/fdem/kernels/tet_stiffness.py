@@ -21,12 +21,11 @@ import numpy as np
 from numba import njit
 
 from hpcdem.numerics.lanes import CAPACITY, U, lane
-from hpcdem.physics.fdem.kernels import joints, laws, tets
+from hpcdem.physics.fdem.kernels import joint_law, laws, tets
 from hpcdem.physics.fdem.kernels.joints import INTACT
-from hpcdem.physics.fdem.kernels.joints_space import opened, parted
+from hpcdem.physics.fdem.kernels.joints_space import mid_edges, opened, parted, slopes, unloaded
 from hpcdem.physics.fdem.kernels.plastic_stiffness import KEPT, principal_slopes
 from hpcdem.physics.fdem.kernels.plasticity import N_PHI, N_PSI, STRENGTH, TENSILE
-from hpcdem.physics.fdem.kernels.stiffness import slopes, yielded_slopes
 from hpcdem.physics.fdem.kernels.tets import LAMBDA, TWO_MU
 from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
 
@@ -239,14 +238,7 @@ def intact_joints(slots, face, link, sizes, kind, state, where, x, table, out, l
         left[i] = 1.0 if state[slot] == INTACT else -1.0
         for g in range(POINTS):
             o, sx, sy, sz, size = parted(d[g, 0], d[g, 1], d[g, 2], nx, ny, nz)
-            normal, rub, shear, here = slopes(
-                o * per_h, size * per_h, law[joints.KOP], law[joints.TENSILE], law[joints.OVERLAY],
-                law[joints.TAN_PHI], law[joints.COHESION], law[joints.HALF_SHEAR],
-            )  # fmt: skip
-            _, tau, _ = laws.intact_point(
-                o * per_h, size * per_h, law[joints.KOP], law[joints.TENSILE], law[joints.OVERLAY],
-                law[joints.TAN_PHI], law[joints.COHESION], law[joints.HALF_SHEAR],
-            )  # fmt: skip
+            normal, rub, shear, here, tau = joint_law.intact_slopes(o * per_h, size * per_h, law)
             left[i] = min(left[i], here)
             aside = abs(tau) / size if size > laws.TINY else shear * per_h
             per = 1.0 / (size + laws.TINY)
@@ -266,20 +258,13 @@ def yielded_joints(slots, face, link, sizes, kind, history, where, x, table, bey
         f, h = face[slot], 1.0 / sizes[slot]
         law, more, past = table[kind[slot]], beyond[kind[slot]], history[slot]
         nx, ny, nz, area = _face(flat, where[f // 4], f % 4, link[slot], d)
+        own, over = ROW * where[f // 4] + STRIDE * FACES[f % 4], link[slot]
+        mid = mid_edges(flat, own[0], own[1], own[2], over[0], over[1], over[2])
         out[i] = 0.0
         for g in range(POINTS):
             o, sx, sy, sz, size = parted(d[g, 0], d[g, 1], d[g, 2], nx, ny, nz)
-            opened_u, slipped_u, damage = past[joints.OPENED + g], past[joints.SLIPPED + g], past[joints.DAMAGE + g]
-            sigma_o, sigma_s, tau_o, tau_s = yielded_slopes(
-                o, size, h, law[joints.KOP], law[joints.TENSILE], law[joints.OVERLAY], law[joints.TAN_PHI],
-                law[joints.COHESION], more[joints.PER_O_T], more[joints.PER_S_T], more[joints.PER_KOP],
-                more[joints.PER_HALF_SHEAR], opened_u, slipped_u, damage,
-            )  # fmt: skip
-            _, tau, _, _, _, _, _ = laws.yielded_point(
-                o, size, h, 1.0 / h, law[joints.KOP], law[joints.TENSILE], law[joints.OVERLAY], law[joints.TAN_PHI],
-                law[joints.COHESION], more[joints.PER_O_T], more[joints.PER_S_T], more[joints.PER_KOP],
-                more[joints.PER_HALF_SHEAR], opened_u, slipped_u, damage,
-            )  # fmt: skip
+            sx, sy, sz, size = unloaded(sx, sy, sz, size, mid, law, past, g)
+            sigma_o, sigma_s, tau_o, tau_s, tau = slopes(o, size, h, law, more, past, g)
             aside = tau / size if size > laws.TINY else tau_s
             per = 1.0 / (size + laws.TINY)
             _add(area, g, nx, ny, nz, sx * per, sy * per, sz * per, sigma_o, sigma_s, tau_o, tau_s, aside, c, out[i])

@@ -1,0 +1,252 @@
+"""Joints that slide, after Coulomb or Barton and Bandis: closed forms, the same in the plane and in space."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem.kernels import joint_law
+from hpcdem.physics.fdem.local import joint_tables
+from hpcdem.physics.fdem.properties import BARTON_BANDIS, COULOMB_JOINT, Model, Rows
+from hpcdem.physics.fdem.simulation import Blocks
+from tests.blocks.support import ROCK, rectangle
+from tests.space.support import box, hexes
+
+EDGE = 0.1
+KINDS = ("cross", "quad", "box", "hexes")
+COULOMB = {
+    "normal_stiffness": 1e10, "shear_stiffness": 4e9, "friction": 30.0, "cohesion": 1e5, "tensile_strength": 2e4,
+    "dilation": 5.0, "dilation_limit": 2e-4,
+}  # fmt: skip
+ROUGH = {
+    "normal_stiffness": 1e10, "shear_stiffness": 4e10, "closure_maximum": 2e-4, "residual_friction": 28.0, "jrc": 10.0,
+    "jcs": 5e7,
+}  # fmt: skip
+PEAK = 0.1 / 500.0 * (10.0 / 0.1) ** 0.33
+"""Path at the peak of ROUGH [m], Barton et al. 1985."""
+SEEN = ("opening", "slip", "normal_stress", "shear_stress")
+
+
+def law_of(model: Model, **values: float) -> tuple[np.ndarray, np.ndarray]:
+    """Its rows of the tables."""
+    rows = Rows()
+    row = rows.row(model, model.complete(values))
+    table, beyond = joint_tables(rows)
+    return table[row], beyond[row]
+
+
+def stack(kind: str, name: str, values: dict[str, float], young: float = 1e15, dynamic: bool = False) -> Blocks:
+    """Two blocks with a joint between them, the lower one held from below; rigid beside the joint, if not said."""
+    if kind in ("cross", "quad"):
+        mesh = rectangle(1, 2, EDGE, 2.0 * EDGE, kind=kind)
+    else:
+        mesh = (box if kind == "box" else hexes)((1, 1, 2), (EDGE, EDGE, 2.0 * EDGE))
+    sim = Blocks()
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": young, "poisson_ratio": 0.0})
+    joints = sim.numbers_of_joints(None)
+    between = (np.abs(mesh.points[mesh.face_points(joints)][:, :, -1] - EDGE) < 1e-9).all(axis=1)
+    sim.joint_model(joints[between], name, values)
+    sim.option(dynamic=dynamic, collision=False)
+    sim.velocity_condition(np.flatnonzero(mesh.points[:, -1] < 1e-9), **{f"v{axis}": 0.0 for axis in "xyz"[: sim.dim]})
+    return sim
+
+
+def of_joints(sim: Blocks, name: str) -> np.ndarray:
+    """A quantity of the joints that have a model."""
+    found = diagnostics.values(sim, name)
+    return found[~np.isnan(diagnostics.values(sim, "state"))]
+
+
+def move_top(sim: Blocks, along: float, across: float) -> np.ndarray:
+    """Balance when the top has moved by these ways [m]; what `SEEN` is of the joint, slip and shear as sizes."""
+    mesh = sim.the_mesh()
+    ways = {"vx": along, "vy": across} if sim.dim == 2 else {"vx": along, "vy": 0.0, "vz": across}
+    sim.velocity_condition(np.flatnonzero(mesh.points[:, -1] > 2.0 * EDGE - 1e-9), **ways)
+    equilibrium.solve_elastic(sim)
+    found = np.array([of_joints(sim, name) for name in SEEN])
+    found[[1, 3]] = np.abs(found[[1, 3]])
+    assert np.ptp(found, axis=1) == pytest.approx(0.0, abs=1e-3 * np.abs(found).max())
+    return found.mean(axis=1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_closure(kind):
+    """sigma_n = k_ni v / (1 - v / V_m), loading and unloading: 666 667 Pa at a quarter of V_m, 2 MPa at half of it."""
+    sim = stack(kind, BARTON_BANDIS.name, ROUGH)
+    for step, expected in ((-5e-5, -666666.67), (-5e-5, -2e6), (5e-5, -666666.67), (6e-5, 0.0), (-6e-5, -666666.67)):
+        assert move_top(sim, 0.0, step)[2] == pytest.approx(expected, rel=1e-4, abs=1.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_shear_with_friction_and_dilation(kind):
+    """Held across at k_n 8e-5 m = 0.8 MPa: sticks up to c + sigma tan(phi), then sliding by dp lifts it by
+    tan(psi) dp up to the limit, and back it sticks again. Torn open it has neither strength nor cohesion."""
+    sim = stack(kind, COULOMB_JOINT.name, COULOMB)
+    assert move_top(sim, 0.0, -8e-5)[2] == pytest.approx(-8e5, rel=1e-4)
+    assert move_top(sim, 1e-4, 0.0)[2:] == pytest.approx([-8e5, 4e5], rel=1e-4)
+    tan, rise = math.tan(math.radians(30.0)), 1e10 * math.tan(math.radians(5.0))
+    path = (4e9 * 2e-4 - 1e5 - 8e5 * tan) / (4e9 + rise * tan)
+    pressure = 8e5 + rise * path
+    assert move_top(sim, 1e-4, 0.0)[2:] == pytest.approx([-pressure, 1e5 + pressure * tan], rel=1e-4)
+    pressure = 8e5 + rise * 2e-4
+    assert move_top(sim, 4e-4, 0.0)[2:] == pytest.approx([-pressure, 1e5 + pressure * tan], rel=1e-4)
+    assert set(of_joints(sim, "state")) == {2.0}
+    assert move_top(sim, -5e-5, 0.0)[3] == pytest.approx(1e5 + pressure * tan - 2e5, rel=1e-4)
+    assert move_top(sim, 0.0, 1e-3)[2:] == pytest.approx([0.0, 0.0], abs=1.0)
+    assert of_joints(sim, "damage").min() == 1.0
+    closed = move_top(sim, 0.0, -1e-3)
+    assert closed[2:] == pytest.approx([-pressure, 0.0], rel=1e-4, abs=20.0)
+    assert move_top(sim, 1e-3, 0.0)[3] == pytest.approx(pressure * tan, rel=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["quad", "hexes"])
+def test_a_rough_joint_sheared(kind):
+    """On every point of the way tau = sigma_n tan(phi_r + m JRC log10(JCS / sigma_n)) at the path, slip - tau / k_s."""
+    sim = stack(kind, BARTON_BANDIS.name, ROUGH)
+    move_top(sim, 0.0, -5e-5)
+    before = -5e-5
+    for _ in range(12):
+        opening, slip, sigma, tau = move_top(sim, 2e-4, 0.0)
+        way = (slip - tau / 4e10) / PEAK
+        rough = 10.0 * math.log10(5e7 / -sigma)
+        m = np.interp(way, [0.3, 0.6, 1.0, 2.0, 4.0], [0.0, 0.75, 1.0, 0.85, 0.7])
+        angle = 28.0 + m * rough if way > 0.3 else 28.0 * way / 0.3
+        assert tau == pytest.approx(-sigma * math.tan(math.radians(angle)), rel=1e-3)
+        assert opening == pytest.approx(before, abs=1e-8)  # held across: dilation shows in the pressure
+    assert way > 2.0 and -sigma > 2.0 * 666667.0
+
+
+def driven(law: np.ndarray, beyond: np.ndarray, pressure: float, slips: np.ndarray) -> np.ndarray:
+    """Shear stress and opening by dilation (n, 2) under a constant pressure, the opening found for each slip."""
+    stays = own = path = 0.0
+    out = []
+    for slip in slips:
+        low, high = -2e-4, 1e-3
+        for _ in range(60):
+            o = 0.5 * (low + high)
+            sigma, tau, more, new, way = joint_law.slide(o, slip - stays, law, beyond, own, path)
+            low, high = (o, high) if -sigma > pressure else (low, o)
+        stays, own, path = stays + more, new, way
+        out.append((tau, own))
+    return np.array(out)
+
+
+def test_peak_and_dilation():
+    """Under 1 MPa the peak is tan(28 + 10 log10(50)) = 1.026 at the path of the peak, 0.914 mm; dilation adds
+    tan(m i / 2) over the path. Numbers from the formulas by hand."""
+    law, beyond = law_of(BARTON_BANDIS, **ROUGH)
+    slips = np.linspace(0.0, 4e-3, 1601)
+    tau, opened = driven(law, beyond, 1e6, slips).T
+    peak = int(tau.argmax())
+    assert tau[peak] == pytest.approx(1e6 * math.tan(math.radians(28.0 + 10.0 * math.log10(50.0))), rel=2e-3)
+    assert slips[peak] - tau[peak] / 4e10 == pytest.approx(PEAK, rel=0.01)
+    assert PEAK == pytest.approx(9.14e-4, rel=1e-3)
+    path = np.linspace(0.0, slips[-1] - tau[-1] / 4e10, 20001)
+    m = np.interp(path / PEAK, [0.3, 0.6, 1.0, 2.0, 4.0, 10.0], [0.0, 0.75, 1.0, 0.85, 0.7, 0.5])
+    slope = np.tan(np.radians(0.5 * m * 10.0 * math.log10(50.0)))
+    expected = float((0.5 * (slope[1:] + slope[:-1]) * np.diff(path)).sum())
+    assert opened[-1] == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize("model, values", [(COULOMB_JOINT, COULOMB), (BARTON_BANDIS, ROUGH)], ids=["coulomb", "rough"])
+def test_slopes_and_energy(model, values):
+    """Slopes against differences; what is stored is the work of an elastic way."""
+    law, beyond = law_of(model, **values)
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        o, s, path = rng.uniform(-1.5e-4, 0.0), rng.uniform(0.0, 3e-4), float(rng.choice([0.0, 4e-4, 9e-4, 3e-3]))
+        own = float(rng.choice([0.0, 1.0])) if model is COULOMB_JOINT else rng.uniform(0.0, 2e-5)
+        found = np.array(joint_law.slide_slopes(o, s, law, beyond, own, path)[:4])
+        found[3] -= joint_law.LEAST * law[joint_law.K_S]
+        ends = [
+            np.array(joint_law.slide(o + a, s + b, law, beyond, own, path)[:2])
+            for a, b in ((1e-10, 0.0), (-1e-10, 0.0), (0.0, 1e-10), (0.0, -1e-10))
+        ]
+        by_o, by_s = (ends[0] - ends[1]) / 2e-10, (ends[2] - ends[3]) / 2e-10
+        assert found == pytest.approx([by_o[0], by_s[0], by_o[1], by_s[1]], rel=1e-3, abs=2e-5 * law[joint_law.K_S])
+    closing = np.linspace(0.0, -1.2e-4, 4001)
+    sigma = np.array([joint_law.slide(o, 0.0, law, beyond, 0.0, 0.0)[0] for o in closing])
+    done = float((0.5 * (sigma[1:] + sigma[:-1]) * np.diff(closing)).sum())
+    assert joint_law.slide_stored(closing[-1], 0.0, law, beyond, 0.0, 0.0) == pytest.approx(done, rel=1e-5)
+
+
+def test_past_the_strength_of_its_walls_the_closure_is_a_line():
+    """Also far beyond the largest closure the stress is finite; its slope is the one the time step is found by."""
+    law, beyond = law_of(BARTON_BANDIS, **ROUGH)
+    slope = 1e10 * (1.0 + 5e7 / (1e10 * 2e-4)) ** 2
+    at = 5e7 * 2e-4 / (1e10 * 2e-4 + 5e7)
+    for v in (at, 1.5 * at, 1e-3):
+        sigma = joint_law.slide(-v, 0.0, law, beyond, 0.0, 0.0)[0]
+        assert -sigma == pytest.approx(5e7 + slope * (v - at), rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["quad", "hexes"])
+def test_a_block_on_an_incline(kind):
+    """It rests below the friction angle; above it slides down with g (sin - cos tan(phi)), and the energy closes."""
+    values = {**COULOMB, "cohesion": 0.0, "tensile_strength": 0.0, "dilation": 0.0}
+    speeds = []
+    for angle in (29.0, 35.0):
+        sim = stack(kind, COULOMB_JOINT.name, values, young=1e8, dynamic=True)
+        pull = 9.81 * math.sin(math.radians(angle)), -9.81 * math.cos(math.radians(angle))
+        sim.gravity(*(pull if sim.dim == 2 else (pull[0], 0.0, pull[1])))
+        sim.element_property(None, {"damp_factor": 1.0})
+        diagnostics.account_energy(sim)
+        sim.close_model()
+        top = sim.the_mesh().points[:, -1] > EDGE + 1e-9
+        found = []
+        for _ in range(2):
+            convergence.advance(sim, 3000)
+            found.append(diagnostics.values(sim, "velocity_x")[top].mean())
+        speeds.append((found[1] - found[0]) / (3000.0 * sim.clock.dt))
+        assert diagnostics.energies(sim)["relative"] < 1e-3
+    assert abs(speeds[0]) < 0.05
+    expected = 9.81 * (math.sin(math.radians(35.0)) - math.cos(math.radians(35.0)) * math.tan(math.radians(30.0)))
+    assert speeds[1] == pytest.approx(expected, rel=0.02)
+    assert diagnostics.energies(sim)["joints_lost"] > 0.0
+
+
+@pytest.mark.parametrize("kind", ["cross", "box"])
+def test_a_run_that_goes_on_in_mid_slip(kind, tmp_path):
+    """The same bits, with dilation under way; and static solves go on from what a dynamic run has left."""
+
+    def begin() -> Blocks:
+        sim = stack(kind, BARTON_BANDIS.name, ROUGH, young=1e9, dynamic=True)
+        points = sim.the_mesh().points
+        sim.velocity_condition(np.flatnonzero(points[:, -1] > 2.0 * EDGE - 1e-9), vx=2.0)
+        sim.gravity(*((0.0, -1e4) if sim.dim == 2 else (0.0, 0.0, -1e4)))
+        sim.close_model()
+        convergence.advance(sim, 300)
+        return sim
+
+    straight, other = begin(), Blocks()
+    saved_state.save(straight, tmp_path / "middle.sav")
+    saved_state.restore(other, tmp_path / "middle.sav")
+    for sim in (straight, other):
+        convergence.advance(sim, 200)
+    assert of_joints(straight, "state").max() == 2.0 and of_joints(straight, "slip").any()
+    for name in (*SEEN, "velocity_x", "displacement_x"):
+        assert np.array_equal(diagnostics.values(straight, name), diagnostics.values(other, name), equal_nan=True), name
+
+
+def test_another_law_forgets_what_the_first_remembered():
+    """What stays of the slip belongs to the law."""
+    sim = stack("quad", COULOMB_JOINT.name, COULOMB)
+    move_top(sim, 0.0, -8e-5)
+    move_top(sim, 4e-4, 0.0)
+    joints = np.flatnonzero(sim.slides())
+    sim.joint_model(joints[:1], BARTON_BANDIS.name, ROUGH)
+    move_top(sim, 0.0, 0.0)
+    assert diagnostics.values(sim, "state").tolist() == [2.0]
+    assert diagnostics.values(sim, "normal_stress")[0] == pytest.approx(-8e5 / (1.0 - 0.4), rel=1e-3)
+
+
+def test_what_makes_no_sense_is_refused():
+    with pytest.raises(CommandError, match="dilation must not be above friction"):
+        COULOMB_JOINT.complete({**COULOMB, "dilation": 31.0})
+    with pytest.raises(CommandError, match="joint_barton_bandis needs jcs"):
+        BARTON_BANDIS.complete({name: value for name, value in ROUGH.items() if name != "jcs"})
