@@ -74,12 +74,6 @@ def slide_in_turn(sim: Blocks) -> None:
     sim.joint_model(joints[1::3], "joint_barton_bandis", ROUGH)
 
 
-def sliding(sim: Blocks) -> None:
-    """The same of quads and triangles with joints that slide between those that break."""
-    impact(sim, "mixed")
-    slide_in_turn(sim)
-
-
 def flight(sim: Blocks) -> None:
     """Two blocks shatter each other while both fly to the right, through the strips of all ranks; their outer faces are
     of three kinds."""
@@ -418,11 +412,6 @@ def much_breaks(found: Found) -> None:
     assert found["energy_relative"] < 0.01
 
 
-def much_slides(found: Found) -> None:
-    assert (found["state"] == 2.0).sum() > 30 and found["energy_joints_lost"] > 0.0
-    assert found["energy_relative"] < 0.01
-
-
 def much_yields(found: Found) -> None:
     much_breaks(found)
     assert found["energy_plastic_lost"] > 0.05 * found["energy_joints_lost"] > 0.0
@@ -473,7 +462,6 @@ def the_ground_shakes(found: Found) -> None:
 MODELS = {
     "impact": Model(impact, result, much_breaks),
     "mixed": Model(mixed, result, much_breaks, slow=True),
-    "sliding": Model(sliding, result, much_slides, steps=600, middle=301, slow=True),
     "flight": Model(flight, result, much_breaks, balance=False, come=10),
     "yielding": Model(yielding, result, much_yields, yield_more, come=10),
     "obeying": Model(obeying, result, laws_act, obey_more, prepare=load_laws, steps=900, come=3),
