@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem.kernels import detect, laws, limits, strength
+from hpcdem.physics.fdem.kernels import contact, detect, laws, limits, space, strength, tets
 
 RNG = np.random.default_rng(7)
 
@@ -95,3 +95,34 @@ def test_boxes_of_triangles_and_of_their_free_edges() -> None:
     for i in range(1, 4):
         corners = x[i, edges[i]]
         assert around[i] == pytest.approx([*corners.min(axis=0) - 0.1, *corners.max(axis=0) + 0.1])
+
+
+def test_how_deep_edges_are_in_triangles() -> None:
+    """The lower left corner of the second triangle is in the first one, whose hypotenuse is nearest; all of its edges
+    count, or that opposite the corner, which is outside, or none."""
+    x = np.array([[0.0, 0.0, 4.0, 0.0, 0.0, 4.0], [1.5, 1.5, 9.0, 1.5, 1.5, 9.0]])
+    depth = np.empty((1, 3))
+
+    def deepest(free: int) -> float:
+        contact.depths(np.array([0]), np.array([1]), np.array([0, free]), np.array([0, 6]), x, depth)
+        return depth[0, 0]
+
+    assert deepest(0b111) == pytest.approx(1.0 / math.sqrt(2.0)) and depth[0, 1:] == pytest.approx([1.5, 1.5])
+    assert deepest(0b010) == 0.0 and deepest(0b000) == 0.0
+    x[1] = [1.0, 3.5, 1.0, -1.0, 3.5, -1.0]  # its first edge stands in the first triangle, a quarter from the left side
+    assert deepest(0b001) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_one_over_the_volume_of_a_tetrahedron() -> None:
+    sides = RNG.normal(size=(3, 3))
+    assert tets.per_volume(*np.linalg.inv(sides).ravel()) == pytest.approx(6.0 / np.linalg.det(sides), rel=1e-12)
+
+
+def test_middles_of_tetrahedra() -> None:
+    """Of four corners in rows of four numbers; how far the farthest corner is from its middle."""
+    x = RNG.normal(size=(5, 16))
+    corners = x.reshape(5, 4, 4)[:, :, :3]
+    out = np.empty((5, 3))
+    far = space.middles(x, out)
+    assert out == pytest.approx(corners.mean(axis=1), rel=1e-13)
+    assert far == pytest.approx(np.linalg.norm(corners - out[:, None], axis=2).max(), rel=1e-13)

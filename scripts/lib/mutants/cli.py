@@ -57,8 +57,8 @@ def main(
 
     PLACES restrict what is tried to files or folders of the package; the mutants are chosen from physics, lang, halo,
     io, decomp and numerics. Tests run in one process, with kernels as plain functions, in a copy of the tree: which
-    functions each of them calls is measured first, and a mutant meets those that call its function, the quickest first.
-    Results are appended to a file as they come: the same command resumes.
+    functions each of them calls is measured first, and a mutant meets those that call its function, the most specific
+    ones first. Results are appended to a file as they come: the same command resumes.
     """
     file = Path(record)
     done = read(file)

@@ -66,15 +66,19 @@ def measure(session: Session, known: list[dict[str, Any]], keep: Callable[[dict[
             print(f"measured {time.monotonic() - began:6.1f} s  {file}: {counts}", flush=True)
 
 
-def choice(reaching: list[tuple[float, str]], seconds: float) -> list[tuple[str, float]]:
-    """(test, seconds) in the order in which they are run: the quickest of each file, then the next of each, as many as
-    the time allows."""
-    files: dict[str, list[tuple[float, str]]] = defaultdict(list)
-    for spent, test in sorted(reaching):
-        files[test.partition("::")[0]].append((spent, test))
-    turns = [(turn, spent, test) for found in files.values() for turn, (spent, test) in enumerate(found)]
+Reaching = tuple[int, float, str]
+"""Functions that a test calls, its seconds, its name."""
+
+
+def choice(reaching: list[Reaching], seconds: float) -> list[tuple[str, float]]:
+    """(test, seconds) in the order in which they are run: of each file the one that calls least besides, then the next
+    of each, as many as the time allows."""
+    files: dict[str, list[Reaching]] = defaultdict(list)
+    for one in sorted(reaching):
+        files[one[2].partition("::")[0]].append(one)
+    turns = [(turn, *one) for found in files.values() for turn, one in enumerate(found)]
     taken: list[tuple[str, float]] = []
-    for _, spent, test in sorted(turns):
+    for _, _, spent, test in sorted(turns):
         if not taken or spent <= seconds:
             taken.append((test, spent))
             seconds -= spent
@@ -84,13 +88,13 @@ def choice(reaching: list[tuple[float, str]], seconds: float) -> list[tuple[str,
 def try_all(session: Session, known: list[dict[str, Any]], imported: set[str], job: dict[str, Any]) -> None:
     """Each mutant of the job. imported: functions that were called while tests were collected."""
     root, record = Path(job["root"]), Path(job["record"])
-    calls: dict[str, list[tuple[float, str]]] = defaultdict(list)
-    passed_tests: list[tuple[float, str]] = []
+    calls: dict[str, list[Reaching]] = defaultdict(list)
+    passed_tests: list[Reaching] = []
     for said in known:
         if said.get("outcome") == "passed" and said["test"] in session.items:
-            passed_tests.append((said["seconds"], said["test"]))
+            passed_tests.append((len(said["reach"]), said["seconds"], said["test"]))
             for function in said["reach"]:
-                calls[function].append((said["seconds"], said["test"]))
+                calls[function].append(passed_tests[-1])
     copy = Copy(root, root.parent)
     for mutant in (Mutant(**given) for given in job["mutants"]):
         began = time.monotonic()
@@ -101,7 +105,7 @@ def try_all(session: Session, known: list[dict[str, Any]], imported: set[str], j
             callers = {
                 test.partition("::")[0] for f in calls if f.startswith(f"{mutant.file}::") for _, test in calls[f]
             }
-            reaching = [one for one in passed_tests if one[1].partition("::")[0] in callers]
+            reaching = [one for one in passed_tests if one[2].partition("::")[0] in callers]
         tests = choice(reaching, job["seconds"])
         entry: dict[str, Any] = {"mutant": mutant.name, "file": mutant.file, "kind": mutant.kind}
         by, passed = "", 0

@@ -1,7 +1,7 @@
 """Many mutants in one process: as a plugin of pytest, which collects tests once and never runs them itself.
 
 Kernels are plain functions here (plain.py), so a mutant is the byte code of one function: a fork puts it into the
-function and runs the tests that call it, the quickest of each file first, up to the first that fails.
+function and runs the tests that call it, the most specific of each file first, up to the first that fails.
 """
 
 from __future__ import annotations
