@@ -92,8 +92,12 @@ def test_what_breaks_a_contact_bond_is_the_force_that_was_given(tmp_path: Path) 
 
 
 def test_the_highest_frequency_of_a_pair(tmp_path: Path) -> None:
-    """Shear and turning of both: k_s (1 / m + a^2 / I) of each, two springs in series."""
+    """Shear and turning of both: k_s (1 / m + a^2 / I) of each, two springs in series. A third one is far away."""
     sim = pair(tmp_path)
+    particles.ball(sim, 2, 9.0, 9.0, 0.5)
+    properties.prop(sim, only(2), density=1000.0, kn=KN, ks=KS)
+    cycles.prepare(sim)
+    sim.step()
     arms = [1.0 - 0.05, 0.5 - 0.05]
     freedom = sum(1.0 / m + a * a / i for a, (m, i) in zip(arms, (body(sim, 0), body(sim, 1)), strict=True))
     assert diagnostics.highest_frequency(sim) == pytest.approx(math.sqrt(0.5 * KS * freedom), rel=1e-3)
@@ -130,13 +134,14 @@ def test_no_memory_has_a_beginning_for_each_particle_and_an_end() -> None:
     assert Histories.empty(3).ptr.tolist() == [0, 0, 0, 0] and len(Histories.empty(3).rows) == 0
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.5])
-def test_the_highest_frequency_of_a_disc_on_a_wall(tmp_path: Path, mu: float) -> None:
-    """Along the normal k_n / m, along the wall k_s (1 / m + a^2 / I) with friction; two springs in series each."""
+@pytest.mark.parametrize(("mu", "turn"), [(0.0, 0.0), (0.0, 0.7), (0.5, 0.7), (0.5, 0.0)])
+def test_the_highest_frequency_of_a_disc_on_a_wall(tmp_path: Path, mu: float, turn: float) -> None:
+    """The wall lies, or is turned by 40 degrees. Along the normal k_n / m, along the wall k_s (1 / m + a^2 / I) with friction; two springs in series each."""
     sim = model(tmp_path, disk="on")
-    particles.ball(sim, 0, 0.3, 0.48, 0.5)
+    c, s = math.cos(turn), math.sin(turn)
+    particles.ball(sim, 0, -0.48 * s, 0.48 * c, 0.5)
     properties.prop(sim, density=1000.0, kn=KN, ks=KS, fric=mu)
-    walls.wall(sim, 1, ((-3.0, 0.0), (3.0, 0.0)), kn=KN, ks=KS, fric=mu)
+    walls.wall(sim, 1, ((-3.0 * c, -3.0 * s), (3.0 * c, 3.0 * s)), kn=KN, ks=KS, fric=mu)
     settings.set_option(sim, "dt", 1e-9)
     cycles.prepare(sim)
     sim.step()
