@@ -13,7 +13,10 @@ from hpcdem.physics.fdem.kernels import joint_law
 from hpcdem.physics.fdem.local import joint_tables
 from hpcdem.physics.fdem.properties import BARTON_BANDIS, COULOMB_JOINT, Model, Rows
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow.coupled import Coupled
+from hpcdem.physics.flow.model import Flow
 from tests.blocks.support import ROCK, rectangle
+from tests.flow.support import WATER
 from tests.space.support import box, hexes
 
 EDGE = 0.1
@@ -250,3 +253,10 @@ def test_what_makes_no_sense_is_refused():
         COULOMB_JOINT.complete({**COULOMB, "dilation": 31.0})
     with pytest.raises(CommandError, match="joint_barton_bandis needs jcs"):
         BARTON_BANDIS.complete({name: value for name, value in ROUGH.items() if name != "jcs"})
+
+
+def test_implicit_steps_with_fluid_are_refused():
+    sim = stack("quad", COULOMB_JOINT.name, COULOMB, young=1e9, dynamic=True)
+    Flow.of(sim).assign(np.flatnonzero(sim.slides()), {**WATER, "aperature_initial": 1e-4})
+    with pytest.raises(CommandError, match=r"\(1 in all\) has the model joint-mohr-coulomb: implicit steps of blocks"):
+        Coupled(sim, 1.0)

@@ -401,7 +401,7 @@ class ModelDefinition:
         return self._has_model(MECH_BURGERS)
 
     def slides(self) -> np.ndarray:
-        """(4 ne,) bool: faces with a joint of a model that slides and never breaks."""
+        """(4 ne,) bool: joints, by their lower faces, with a model that slides and never breaks."""
         names = [self.joint_rows.name(row) for row in range(len(self.joint_rows))]
         return self.joint_exists() & np.isin(names, (COULOMB_JOINT.name, BARTON_BANDIS.name))[self.joint_row]
 

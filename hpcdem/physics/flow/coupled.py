@@ -99,7 +99,7 @@ class Coupled:
         self.moves = bool(sim.options.mechanical)
         if self.moves and (slides := np.flatnonzero(sim.slides())).size:
             raise CommandError(
-                f"face-joint {slides[0]} ({len(slides) // 2} in all) has the model "
+                f"face-joint {slides[0]} ({len(slides)} in all) has the model "
                 f"{sim.joint_rows.name(sim.joint_row[slides[0]]).replace('_', '-')}: implicit steps of blocks with "
                 "fluid do not follow joints that slide; explicit steps do (model step, model solve time)"
             )
