@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem.kernels import contact, detect, laws, limits, space, strength, tets
+from hpcdem.physics.fdem.kernels import contact, detect, joint_law, limits, space, strength, tets
 
 RNG = np.random.default_rng(7)
 
@@ -70,11 +70,11 @@ def test_what_is_left_of_a_joint_beyond_its_peak(side: float) -> None:
     h, tensile, cohesion, overlay, tan_phi, half_shear = 2.0, 3e6, 4e6, 1e9, 0.5, 1.0 / 2e9
 
     def point(o: float, s: float, s_u: float, o_u: float = 0.0) -> tuple[float, float]:
-        return laws.softened_point(
+        return joint_law.softened_point(
             o, side * s, h, 1.0 / h, 0.0, tensile, overlay, tan_phi, cohesion, half_shear, o_u, s_u, 0.5
         )
 
-    peak = laws.slip_at_peak(0.0, h, 1.0 / h, overlay, tan_phi, cohesion, half_shear)
+    peak = joint_law.slip_at_peak(0.0, h, 1.0 / h, overlay, tan_phi, cohesion, half_shear)
     assert point(0.0, 0.0025, 0.01)[1] == pytest.approx(side * 0.25 * 0.5 * cohesion)
     assert point(0.0, 0.02, 0.01)[1] == pytest.approx(side * 0.5 * cohesion)
     assert point(0.0, 0.25 * peak, 0.0)[1] == pytest.approx(side * (0.25 * 1.75) * 0.5 * cohesion)

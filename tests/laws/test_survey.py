@@ -136,7 +136,8 @@ def test_no_memory_has_a_beginning_for_each_particle_and_an_end() -> None:
 
 @pytest.mark.parametrize(("mu", "turn"), [(0.0, 0.0), (0.0, 0.7), (0.5, 0.7), (0.5, 0.0)])
 def test_the_highest_frequency_of_a_disc_on_a_wall(tmp_path: Path, mu: float, turn: float) -> None:
-    """The wall lies, or is turned by 40 degrees. Along the normal k_n / m, along the wall k_s (1 / m + a^2 / I) with friction; two springs in series each."""
+    """The wall lies, or is turned by 40 degrees. Along the normal k_n / m, along the wall k_s (1 / m + a^2 / I) with
+    friction; two springs in series each."""
     sim = model(tmp_path, disk="on")
     c, s = math.cos(turn), math.sin(turn)
     particles.ball(sim, 0, -0.48 * s, 0.48 * c, 0.5)
