@@ -585,8 +585,8 @@ class Elements(_Modelled):
         where: Where = None,
     ) -> None:
         """Stress [Pa] from the beginning, tension positive, 0 where it is left out; in the plane zz is then that of
-        plane strain, Poisson's ratio times xx + yy. gradient: by component, per metre in x and y (and z) [Pa/m],
-        ``{"yy": (0.0, 25e3)}``."""
+        plane strain, Poisson's ratio times xx + yy, in plane stress 0. gradient: by component, per metre in x and y
+        (and z) [Pa/m], ``{"yy": (0.0, 25e3)}``."""
         stress = {"xx": xx, "yy": yy, "xy": xy, "zz": zz, "xz": xz, "yz": yz}
         slopes = dict(gradient or {})
         for name in slopes:
@@ -1449,6 +1449,15 @@ class BlockCommands:
     def heat(self) -> dict[str, float]:
         """The account of heat [J/m]: given, commands, stored, fluid, removed; what does not add up. Collective."""
         return fdem.queries.heat(self._blocks.project())
+
+    def plane_stress(self) -> None:
+        """The model of the plane is a plate of a metre of thickness whose two faces bear nothing: no stress across the
+        plane. Said before initial stress and before the first step."""
+        self._blocks("model plane-stress", {})
+
+    def plane_strain(self) -> None:
+        """Nothing moves across the plane, as is so from the beginning; takes `plane_stress` back."""
+        self._blocks("model plane-strain", {})
 
     def rayleigh(self, ratio: float, *, frequency: float | None = None, part: str | None = None) -> None:
         """Rayleigh damping of elements in dynamic runs: ratio of the critical one at a frequency [Hz]; part: both

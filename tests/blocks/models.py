@@ -274,6 +274,22 @@ def creep_more(sim: Blocks) -> None:
         changes.element_model(sim, np.arange(10), "mech_iso_elastic", ROCK)
 
 
+def plate(sim: Blocks) -> None:
+    """A plate in plane stress, of rock that yields beside rock that creeps, is thrown against its support."""
+    mesh = shaken(rectangle(12, 6, 1.2, 0.6, kind="mixed"), 0.2)
+    sim.option(plane_stress=True, collision=False)
+    sim.take_mesh(mesh)
+    weak = {**ROCK, "damp_factor": 0.05, "cohesion": 1e6, "tensile": 5e5, "friction": 25.0, "dilation": 10.0}
+    changes.element_model(sim, None, "mech_mohr_coulomb", weak)
+    slow = {**ROCK, "maxwell_viscosity": 4e7, "kelvin_shear": 1e10, "kelvin_viscosity": 1e7}
+    changes.element_model(sim, np.flatnonzero(mesh.centroids()[:, 0] > 0.6), "mech_burgers", slow)
+    sim.initial_stress(None, xx=-1e4, yy=-2e4)
+    sim.velocity_condition(np.flatnonzero(mesh.points[:, 0] < 1e-9), vx=0.0, vy=0.0)
+    changes.set_velocity(sim, np.flatnonzero(mesh.points[:, 0] > 0.1), vx=-1.0, vy=0.5)
+    creep.switch(sim, True)
+    diagnostics.account_energy(sim)
+
+
 def shaking(sim: Blocks) -> None:
     """Soft ground with joints on rock between free-field sides, an earthquake comes in from below."""
     mesh = shaken(rectangle(26, 10, 2.6, 1.0, kind="mixed"), 0.15)
@@ -394,10 +410,10 @@ def result(sim: Blocks, notes: dict[str, Any]) -> Found:
 
 
 NAMES = (
-    "position_x", "position_y", "velocity_x", "velocity_y", "stress_xx", "stress_yy", "stress_xy", "state", "damage",
-    "mode", "reaction_y", "displacement_x", "normal_stress_largest", "normal_stress_last", "shear_stress_largest",
-    "shear_stress_first", "plastic_state", "plastic_shear_strain", "plastic_volume_strain", "plastic_work",
-    "creep_strain_xx", "creep_strain_xy", "kelvin_strain_yy", "creep_work",
+    "position_x", "position_y", "velocity_x", "velocity_y", "stress_xx", "stress_yy", "stress_xy", "stress_zz", "state",
+    "damage", "mode", "reaction_y", "displacement_x", "normal_stress_largest", "normal_stress_last",
+    "shear_stress_largest", "shear_stress_first", "plastic_state", "plastic_shear_strain", "plastic_volume_strain",
+    "plastic_work", "creep_strain_xx", "creep_strain_xy", "kelvin_strain_yy", "creep_work",
 )  # fmt: skip
 
 # ---- what must have happened -----------------------------------------------------------------------------------------
@@ -435,6 +451,11 @@ def the_fill_carries(found: Found) -> None:
     assert found["energy_commands"] != 0.0 and np.nanmax(np.abs(stress)) > 1e5
 
 
+def a_plate_flows(found: Found) -> None:
+    assert found["energy_plastic_lost"] > 0.0 and found["energy_creep_lost"] > 0.0 and found["energy_relative"] < 0.01
+    assert (found["stress_zz"] == 0.0).all() and (found["plastic_state"] > 0).sum() > 10
+
+
 def much_creeps(found: Found) -> None:
     intact, _, broken = found["counts"]
     assert broken > 10 and intact > 10
@@ -468,6 +489,7 @@ MODELS = {
     "opening": Model(opening, result, a_hole_is_made, open_up, slow=True),
     "backfill": Model(backfill, result, the_fill_carries, fill_up, steps=1100),
     "creeping": Model(creeping, result, much_creeps, creep_more, steps=1400),
+    "plate": Model(plate, result, a_plate_flows, steps=300, middle=131),
     "parting": Model(parting, parted, sides_part, part_more, steps=600, middle=300),
     "weir": Model(weir, result, the_weir_gives_way, steps=700, middle=401),
     "shaking": Model(shaking, result, the_ground_shakes, shake_more, steps=700, middle=401),

@@ -70,13 +70,14 @@ def test_slopes_of_the_return():
 
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 @pytest.mark.parametrize("large, within", [(False, 2e-5), (True, 2e-2)])
-def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within):
+@pytest.mark.parametrize("plate", [False, True], ids=["plane strain", "plane stress"])
+def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within, plate):
     """By central differences along random ways where most elements flow, in shear and in tension, from an unequal
     initial stress; with large strains terms of the order of the strain (some 1e-3) are left out."""
     rng = np.random.default_rng(3)
     sim = soil(kind, tensile=0.5e6)
-    sim.initial_stress(None, xx=-1e6, yy=-7e6, xy=1e6, zz=-3e6)
-    sim.option(large_strain=large)
+    sim.option(large_strain=large, plane_stress=plate)
+    sim.initial_stress(None, xx=-1e6, yy=-7e6, xy=1e6, zz=0.0 if plate else -3e6)
     sim.close_model()
     nodes = equilibrium.all_nodes(sim)
     x = nodes.x + rng.uniform(-4e-4, 4e-4, nodes.x.shape)

@@ -26,7 +26,7 @@ LAWS = {
 }  # fmt: skip
 
 
-def heated(law: str, held_x: bool, warmer: float = 50.0, dynamic: bool = False, **options: float) -> Blocks:
+def heated(law: str, held_x: bool, warmer: float = 50.0, dynamic: bool = False, plate: bool = False) -> Blocks:
     """A block on rollers, all of it warmed; held_x: at both ends."""
     name, values, kind = LAWS[law]
     sim = Blocks()
@@ -35,7 +35,7 @@ def heated(law: str, held_x: bool, warmer: float = 50.0, dynamic: bool = False, 
     heat = Heat.of(sim)
     heat.assign(None, {**GRANITE, "expansion_coeficient": ALPHA})
     heat.initial(None, 15.0)
-    sim.option(dynamic=dynamic, collision=False)
+    sim.option(dynamic=dynamic, collision=False, plane_stress=plate)
     sim.velocity_condition(at(sim, x=0.0), vx=0.0)
     sim.velocity_condition(at(sim, y=0.0), vy=0.0)
     if held_x:
@@ -83,6 +83,28 @@ def test_a_block_between_walls_is_pressed(law: str) -> None:
         for name, share in (("xx", 1.0), ("yy", 0.0), ("zz", 1.0)):
             found = diagnostics.values(one, f"stress_{name}")
             assert found == pytest.approx(-share * E * ALPHA * 50.0 / (1.0 - NU), rel=3e-3, abs=1e-3 * E * ALPHA * 50.0)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("held", [0, 1, 2], ids=["free", "held along x", "held"])
+def test_a_plate_in_plane_stress(law: str, held: int) -> None:
+    """Free: alpha T each way, without any stress. Held along x: -E alpha T there alone; held along y too
+    -E alpha T / (1 - nu) in both. What is stored is that of these stresses."""
+    sim, t = heated(law, held_x=held > 0, plate=True), ALPHA * 50.0
+    sim.option(large_strain=False)
+    if held == 2:
+        sim.velocity_condition(at(sim, y=0.8), vy=0.0)
+    warm(sim)
+    equilibrium.solve_elastic(sim)
+    stress = (0.0, E * t, E * t / (1.0 - NU))[held]
+    for name, pressed in (("xx", held > 0), ("yy", held == 2), ("zz", False)):
+        found = diagnostics.values(sim, f"stress_{name}")
+        assert found == pytest.approx(np.full(len(found), -stress * pressed), rel=1e-6, abs=1e-6 * E * t)
+    if held < 2:
+        move = diagnostics.values(sim, "displacement_y")[at(sim, y=0.8)]
+        assert move == pytest.approx(np.full(len(move), 0.8 * t * (1.0 + NU * held)), rel=1e-6)
+    density = (0.0, 0.5 * stress**2 / E, stress**2 / E * (1.0 - NU))[held]
+    assert diagnostics.total(sim, "strain_energy") == pytest.approx(1.2 * 0.8 * density, rel=1e-6, abs=1e-6 * E * t * t)
 
 
 def test_a_block_between_walls_yields() -> None:

@@ -57,6 +57,8 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model rayleigh 0.05 frequency 12 part stiffness",
      "sim.rayleigh(0.05, frequency=12, part='stiffness')"),
     ("pcdc model creep off", "sim.creep(False)"),
+    ("pcdc model plane-stress", "sim.plane_stress()"),
+    ("pcdc model plane-strain", "sim.plane_strain()"),
     ("pcdc model step 100", "sim.step(100)"),
     ("pcdc model solve ratio 1e-6 window 10 limit 0 on-failure continue",
      "sim.solve(ratio=1e-6, window=10, limit=0, on_failure='continue')"),

@@ -48,10 +48,11 @@ def option(
     one_way: bool | None = None,
     thermal: bool | None = None,
     proppant: bool | None = None,
+    plane_stress: bool | None = None,
 ) -> None:
     """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, deep_overlap: later,
-    potential: of contact in space, see `Blocks.option`; energy: keep the energy budget from here on; mechanical,
-    hydraulic, one_way, thermal, proppant: `Blocks.parts`."""
+    potential: of contact in space, plane_stress, see `Blocks.option`; energy: keep the energy budget from here on;
+    mechanical, hydraulic, one_way, thermal, proppant: `Blocks.parts`."""
     if mechanical is False:
         coupling.refuse(project, "model option mechanical off")
     parts = {
@@ -63,7 +64,7 @@ def option(
         project.dynamic = dynamic
     of_blocks: dict[str, Any] = {
         "dynamic": dynamic, "collision": collision, "large_strain": large_strain, "overlap": overlap,
-        "deep_overlap": deep_overlap, "potential": potential,
+        "deep_overlap": deep_overlap, "potential": potential, "plane_stress": plane_stress,
     }  # fmt: skip
     given = {name: value for name, value in of_blocks.items() if value is not None}
     if given:

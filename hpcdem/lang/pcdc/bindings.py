@@ -566,6 +566,8 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "model solve-check": lambda c: fdem.clocks.solve_check(c.project, c["steps"]),
     "model cycle-option": lambda c: fdem.clocks.cycle_option(c.project, **_parts(c)),
     "model reset": lambda c: fdem.clocks.reset(c.project, **_parts(c)),
+    "model plane-strain": lambda c: fdem.settings.option(c.project, plane_stress=False),
+    "model plane-stress": lambda c: fdem.settings.option(c.project, plane_stress=True),
     "model query": lambda c: fdem.clocks.query(c.project, *_parts(c)),
     "device list": lambda c: fdem.clocks.devices(c.project),
     "node thermal-initialize": lambda c: fdem.heat.initial(c.project, c["temperature"], c.where),

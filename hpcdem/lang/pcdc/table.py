@@ -923,12 +923,12 @@ _MODEL = (
             options=tuple(Option(word, (), f"of {what}", more=(Option("t{ime}", (), "its clock", required=True),))
                           for word, what in _PARTS),
             needs_option=True, dims=BOTH),
-    Command("mod{el} pl{ane}-strain", "What models of the plane are in.", ("pcdc model plane-strain",),
-            idle="models of the plane are in plane strain", dims=BOTH),
-    Command("mod{el} pl{ane}-stress", "Stress in the plane.", ("pcdc model plane-stress",),
-            dims=BOTH, refused="models of the plane are in plane strain. For an elastic plate in plane stress give "
-            "element c-model young E (1 + 2 nu) / (1 + nu)^2 and poisson-ratio nu / (1 + nu): displacements and "
-            "stresses in the plane are those of the plate"),
+    Command("mod{el} pl{ane}-strain", "Nothing moves across the plane. Models of the plane are in plane strain unless "
+            "model plane-stress says otherwise; it takes that back.", ("pcdc model plane-strain",)),
+    Command("mod{el} pl{ane}-stress", "The model is a plate of a metre of thickness whose two faces bear nothing: the "
+            "stress across the plane is 0, in elements that are elastic, yield or creep, and with heat. It comes "
+            "before element initial and before the first step. A law of the user must give 0 for that stress itself.",
+            ("pcdc model plane-stress",)),
     Command("mod{el} p{lot}-f{requency}", "Steps between two pictures of the window.", ("pcdc model p-f 10",),
             (_leading("steps", COUNT, "steps"),), dims=BOTH, idle=_WINDOW),
     Command("mod{el} r{ender}-i{nterval}", "The same.", ("pcdc model render-interval 10",),
@@ -1319,9 +1319,9 @@ _OBJECTS = (
              "pcdc element property young table 'E_of_depth' over y density field 'density'"),
             options=_OF_SOLIDS, ranged="element", needs_option=True, dims=BOTH),
     Command("e{lement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
-            "not given are zero; in the plane stress-zz is then that of plane strain, Poisson's ratio times xx + yy. "
-            "It is that of a strain, by the moduli of this moment: where these are lowered later, it goes down with "
-            "them. A stress beyond the strength of the element is said in the log.",
+            "not given are zero; in the plane stress-zz is then that of plane strain, Poisson's ratio times xx + yy, "
+            "in plane stress 0. It is that of a strain, by the moduli of this moment: where these are lowered later, "
+            "it goes down with them. A stress beyond the strength of the element is said in the log.",
             ("pcdc element initial stress-xx -5e6 stress-yy -10e6",
              "pcdc element initial stress-yy 0 gradient (0,25e3)"),
             options=tuple(

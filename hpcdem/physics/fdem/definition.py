@@ -21,6 +21,7 @@ from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.moduli import moduli
 from hpcdem.physics.fdem.node_conditions import Contradiction, NodeCondition, Number
 from hpcdem.physics.fdem.properties import (
     BARTON_BANDIS,
@@ -98,7 +99,8 @@ class Options:
     of flow, of flow_steps sub-steps (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable
     one); thermal: heat flows, in cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise.
     mass_damping [1/s], stiffness_damping [s]: Rayleigh damping, of dynamic runs. static_since: step at which static
-    mode was switched on."""
+    mode was switched on. plane_stress: a model of the plane is a plate whose faces bear nothing, else in plane strain,
+    see moduli.py."""
 
     gx: float = 0.0
     gy: float = 0.0
@@ -127,6 +129,7 @@ class Options:
     heat_dt: float = 0.0
     mass_damping: float = 0.0
     stiffness_damping: float = 0.0
+    plane_stress: bool = False
 
 
 @dataclass(frozen=True)
@@ -424,12 +427,13 @@ class ModelDefinition:
 
     def _note_moduli(self, at: np.ndarray) -> None:
         """Initial stresses of elements that had no model belong to the moduli of the one that they have now; where
-        nothing was said of the stress across the plane, it is that of plane strain."""
+        nothing was said of the stress across the plane, it is that of plane strain, in plane stress 0."""
         new = at[self.stress0_row[at] == 0]
         self.stress0_row[new] = self.element_row[new]
         if self.stress0 is not None:
             new = at[np.isnan(self.stress0[at, ACROSS]) & (self.element_row[at] > 0)]
             nu = np.nan_to_num(self.element_rows.column("poisson_ratio"))[self.element_row[new]]
+            nu = 0.0 * nu if self.options.plane_stress else nu
             self.stress0[new, ACROSS] = nu * (self.stress0[new, 0] + self.stress0[new, 1])
 
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
@@ -645,7 +649,7 @@ class ModelDefinition:
         """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y, in space in z)
         at the centroid as it lies in the mesh. It is the stress of a strain by the moduli of this moment, and changes
         with them, see `initial_stresses`. In the plane zz, if nothing is said of it, is that of plane strain, Poisson's
-        ratio times xx + yy, and in space 0."""
+        ratio times xx + yy, and in space and in plane stress 0."""
         at = self.numbers_of_elements(elements)
         mesh = self._mesh()
         names = COMPONENTS[mesh.dim]
@@ -657,6 +661,11 @@ class ModelDefinition:
             if name not in names:
                 raise CommandError(f"a stress gradient is one of {', '.join(names)}, got {name}")
             values[:, names.index(name)] += mesh.centroids(at) @ self._vector(f"gradient of {name}", slope)
+        if self.options.plane_stress and (values[:, ACROSS] != 0.0).any():
+            raise CommandError(
+                f"an initial stress zz of {values[values[:, ACROSS] != 0.0, ACROSS][0]:g} Pa cannot be in plane "
+                "stress, where the stress across the plane is 0: leave stress-zz out, or say model plane-strain"
+            )
         if mesh.dim == 2 and zz is None and "zz" not in (gradient or {}):
             values[:, ACROSS] = math.nan  # until there are moduli
         self.before_change()
@@ -671,17 +680,18 @@ class ModelDefinition:
         """Stress [Pa] (n, 4), in space (n, 6), of elements (n,) at zero strain, by their present moduli.
 
         What was said fixes a strain: mean stress over 3 K and deviator over 2 G with the moduli of that moment. So the
-        mean follows the bulk modulus and the deviator the shear modulus."""
+        mean follows the bulk modulus and the deviator the shear modulus. (In plane stress both are of the plane, and
+        the bulk modulus K_2, see moduli.py.)"""
         assert self.stress0 is not None
         out = self.stress0[elements]
         said, now = self.stress0_row[elements], self.element_row[elements]
         ratio = np.ones((len(out), 2))
-        for c, name in enumerate(("bulk", "shear")):
-            modulus = np.array(self.element_rows.column(name))
+        of = moduli(self)
+        for c, modulus in enumerate((of.bulk, of.shear)):
             other = (said > 0) & (modulus[said] != modulus[now])
             ratio[other, c] = modulus[now[other]] / modulus[said[other]]
         other = (ratio != 1.0).any(axis=1)  # the rest keeps every bit
-        normal = [0, 1, 3]
+        normal = of.normal
         mean = out[other][:, normal].mean(axis=1, keepdims=True)
         scaled = ratio[other, 1:] * (out[other] - np.where(np.isin(np.arange(out.shape[1]), normal), mean, 0.0))
         scaled[:, normal] += ratio[other, :1] * mean
@@ -1070,8 +1080,10 @@ class ModelDefinition:
         overlap: str | None = None,
         potential: str | None = None,
         deep_overlap: str | None = None,
+        plane_stress: bool | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. collision (on): contact.
+        plane_stress (off): a model of the plane is a plate; off: in plane strain; said before stress is.
         large_strain (on): rotations of any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap
         before the first step: refuse it; "relax": a static stage moves them apart; "keep": they start as they are.
         deep_overlap ("warn"): of bodies that come to overlap by more than a tenth of an altitude: say where; "stop":
@@ -1091,7 +1103,18 @@ class ModelDefinition:
             if potential not in POTENTIAL:
                 raise CommandError(f"the potential of contact is one of {', '.join(POTENTIAL)}, got {potential}")
             changes["potential"] = potential
+        if plane_stress is not None and plane_stress != self.options.plane_stress:
+            self._check_plane(plane_stress)
+            changes["plane_stress"] = plane_stress
         self._set(**changes)
+
+    def _check_plane(self, stress: bool) -> None:
+        """CommandError where it is too late for plane stress or plane strain, or in space."""
+        word = "model plane-stress" if stress else "model plane-strain"
+        if self.mesh is not None and self.mesh.dim == 3:
+            raise CommandError(f"{word} is for models of the plane")
+        if self.stress0 is not None:
+            raise CommandError(f"{word} comes before element initial: the stress across the plane depends on it")
 
     def parts(
         self,

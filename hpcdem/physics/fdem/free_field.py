@@ -21,6 +21,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import connectivity, user_laws
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.elements import ETA, Q_ETA
+from hpcdem.physics.fdem.moduli import moduli
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.user_functions import Placed
 
@@ -165,8 +166,8 @@ class FreeField(SurfaceLoad):
         """lambda, mu [Pa] and density [kg/m3] of the elements at the sides."""
         blocks = self.blocks
         row = blocks.element_row[self.faces["face"][:, 0] // 4]
-        bulk, shear, rho = (np.array(blocks.element_rows.column(name))[row] for name in ("bulk", "shear", "density"))
-        return bulk - 2.0 / 3.0 * shear, shear, rho
+        of = moduli(blocks)
+        return of.lame[row], of.shear[row], np.array(blocks.element_rows.column("density"))[row]
 
     def storage_rebuilt(self) -> None:
         """Elements have other rows or owners, or other properties; conditions may be others."""

@@ -76,7 +76,7 @@ class Hexes:
     def _make_constants(self, model: np.ndarray, mass: np.ndarray) -> None:
         """parts (blocks, 10, 10, 32), h (count + 3, 20): see `hexes.forces`."""
         sim, mesh, n = self.sim, self.sim.reference, self.count
-        models = element_table(sim.element_rows)
+        models = element_table(sim)
         volume = hexahedra.volumes(mesh.points, np.column_stack([self.nodes, self.number]))
         blocks, every = -(-n // hexes.BLOCK), np.arange(n)
         found = np.zeros((blocks * hexes.BLOCK, hexes.PARTS, hexes.WORDS))

@@ -100,7 +100,7 @@ class LawsSpace(Local):
         if not self.lawful:
             return
         self.law_row = sim.element_row[sim.number[sim.owned]].astype(np.int64)
-        models, bound = element_table(rows), np.array(rows.column(user_laws.BOUND))
+        models, bound = element_table(sim), np.array(rows.column(user_laws.BOUND))
         modulus = models[:, space.LAME] + models[:, space.MU2]
         ratio = np.divide(bound, modulus, out=np.ones(len(rows)), where=bound > 0.0)
         at, part = np.flatnonzero(number), np.zeros(sim.n_own, bool)

@@ -29,6 +29,7 @@ from hpcdem.physics.fdem.kernels import (
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joint_law import HISTORY
 from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE
+from hpcdem.physics.fdem.moduli import moduli
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
 from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.properties import (
@@ -72,13 +73,10 @@ def laws_of(rows: Rows) -> np.ndarray:
     return np.array([JOINT_LAWS.get(rows.name(row), 0) for row in range(len(rows))])
 
 
-def element_table(rows: Rows) -> np.ndarray:
+def element_table(sim: State) -> np.ndarray:
     """The table of element models (rows, 5) of build.py."""
-    names = ("density", "bulk", "shear", "young", "damp_factor")
-    models = np.ascontiguousarray(np.array([rows.column(name) for name in names]).T)
-    bulk, shear = models[:, 1].copy(), models[:, 2].copy()
-    models[:, build.LAME], models[:, build.MU2] = bulk - 2.0 / 3.0 * shear, 2.0 * shear
-    return models
+    of, (density, young, damp) = moduli(sim), map(sim.element_rows.column, ("density", "young", "damp_factor"))
+    return np.column_stack([density, of.lame, 2.0 * of.shear, young, damp])
 
 
 def yield_table(rows: Rows) -> np.ndarray:
@@ -213,13 +211,13 @@ class Local:
     def corner_masses(sim: State, number: np.ndarray) -> np.ndarray:
         """True masses (n, 4) [kg/m], in space [kg], of the corners of these elements."""
         mesh, mass = sim.reference, np.zeros((len(number), 4))
-        build.masses(number, mesh.points, mesh.cells, sim.element_row, element_table(sim.element_rows), mass)
+        build.masses(number, mesh.points, mesh.cells, sim.element_row, element_table(sim), mass)
         return mass
 
     def _make_constants(self) -> None:
         """Reference geometry, moduli, true masses, initial stress."""
         sim, mesh, count = self.sim, self.sim.reference, self.count
-        models = element_table(sim.element_rows)
+        models = element_table(sim)
         self._true_mass = self.corner_masses(sim, sim.number)
         self.c = np.zeros((count + 3, elements.TRIANGLE))
         self.q = np.zeros((len(self.quad_rows), elements.QUAD))
@@ -227,6 +225,7 @@ class Local:
             sim.number, mesh.points, mesh.cells, sim.element_row, models, sim.options.dynamic,
             self.triangle_rows[:count], self.quad_rows, self.true_mass, self.c, self.q,
         )  # fmt: skip
+        self.c[:count, elements.FREE] = self.q[:, elements.Q_FREE] = float(sim.options.plane_stress)
         self.c[count:] = self.c[count - 1] if count else 1.0
         self.warms = any(bool(one.any()) for one in sim.warms())
         self.stiff, self.stiff_q = (self.c.copy(), self.q.copy()) if self.warms else (self.c, self.q)
@@ -334,6 +333,8 @@ class Local:
             rows, self.quad_rows, sim.n_left, *self._of_initial, np.zeros(0) if heat is None else heat, self.s0,
             self.quad_s0,
         )  # fmt: skip
+        if sim.options.plane_stress:
+            self.s0[:, 3] = self.quad_s0[:, 3::4] = 0.0
         self._relieve()
         return heat is not None
 
@@ -417,7 +418,7 @@ class Local:
             self.law_base[: self.count] = sim.initial_stresses(sim.number[owned[0]])
             self.quad_law_base[:] = np.tile(sim.initial_stresses(sim.number[owned[1]]), 4)
         self.stiff, self.stiff_q = self.stiff.copy(), self.stiff_q.copy()
-        models, bound = element_table(rows), np.array(rows.column(user_laws.BOUND))
+        models, bound = element_table(sim), np.array(rows.column(user_laws.BOUND))
         modulus = models[:, build.LAME] + models[:, build.MU2]
         for table, stiff, number, row, columns, s0, base in (
             (
@@ -601,11 +602,9 @@ class Local:
 
     def _impedances(self, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """rho c_p and rho c_s of elements (n,) [Pa s/m]."""
-        rho, bulk, shear = (
-            np.array(self.sim.element_rows.column(name))[self.sim.element_row[number]]
-            for name in ("density", "bulk", "shear")
-        )
-        return np.sqrt(rho * (bulk + 4.0 / 3.0 * shear)), np.sqrt(rho * shear)
+        row, of = self.sim.element_row[number], moduli(self.sim)
+        rho = np.array(self.sim.element_rows.column("density"))[row]
+        return np.sqrt(rho * of.wave[row]), np.sqrt(rho * of.shear[row])
 
     def _make_nodes(self) -> None:
         """Nodes that do not move by themselves: of several corners, with conditions or loads, of quads."""
@@ -1276,16 +1275,17 @@ class Local:
 
     def _energy_of_heat(self) -> np.ndarray:
         """Elastic energy (n_own,) [J/m] that thermal stress p means where there is no strain, beside the mean m of the
-        initial stress: (p^2 + 2 p m) A / (2 K)."""
+        initial stress: (p^2 + 2 p m) A / (2 K), see moduli.py."""
         sim, number = self.sim, self.sim.number[self.sim.owned]
         stress = np.asarray(sim.surface_loads.eigenstress(sim))
-        bulk = np.array(sim.element_rows.column("bulk"))[sim.element_row[number]]
+        of = moduli(sim)
+        bulk = of.bulk[sim.element_row[number]]
         said = sim.initial_stresses(number) if sim.stress0 is not None else np.zeros((sim.n_own, 4))
         if (part := by_temperature.part_of_young(sim)) is not None:
             bulk = bulk * part
         if self.initial_part is not None:
             said = said * self.initial_part[:, None]
-        mean = said[:, [0, 1, 3]].sum(axis=1) / 3.0
+        mean = said[:, of.normal].sum(axis=1) / len(of.normal)
         return stress * (0.5 * stress + mean) / bulk * sim.areas[number]
 
     def stored_in_joints(self) -> np.ndarray:

@@ -77,7 +77,7 @@ class LocalSpace(LawsSpace):
 
     def _make_constants(self) -> None:
         sim, mesh = self.sim, self.sim.reference
-        models = element_table(sim.element_rows)
+        models = element_table(sim)
         self.c = np.zeros((self.count + 3, tets.TET))
         space.constants(
             sim.number, mesh.points, mesh.cells, sim.element_row, models, sim.options.dynamic, self.rows[: self.count],
@@ -572,5 +572,5 @@ class LocalSpace(LawsSpace):
 def _quarters(sim: State, number: np.ndarray) -> np.ndarray:
     """Of the mass of each of these tetrahedra (n, 4) [kg], also where six of them store a hexahedron."""
     mesh, mass = sim.reference, np.zeros((len(number), 4))
-    space.masses(number, mesh.points, mesh.cells, sim.element_row, element_table(sim.element_rows), mass)
+    space.masses(number, mesh.points, mesh.cells, sim.element_row, element_table(sim), mass)
     return mass

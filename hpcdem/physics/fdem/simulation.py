@@ -227,19 +227,23 @@ class Blocks(State):
         overlap: str | None = None,
         potential: str | None = None,
         deep_overlap: str | None = None,
+        plane_stress: bool | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. Velocities become zero when it is
         changed, as those of the static mode are ways per step. collision (on): contact. large_strain (on): rotations of
         any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap before the first step: refuse
         it; "relax": a static stage moves them apart; "keep": they start as they are. deep_overlap ("warn"): of bodies
         that come to overlap by more than a tenth of an altitude: say where; "stop": end the run. potential
-        ("distance"): of contact in space, see `definition.POTENTIAL`."""
+        ("distance"): of contact in space, see `definition.POTENTIAL`. plane_stress (off): a model of the plane is a
+        plate whose faces bear nothing; off: in plane strain. Said before stress and steps are."""
         before = self.options.dynamic
+        if plane_stress not in (None, self.options.plane_stress) and self.clock.step > 0:
+            raise CommandError(f"model plane-{'stress' if plane_stress else 'strain'} comes before the first step")
         if dynamic is not None and dynamic != before:
             self.drop_creep_step()
             if dynamic:
                 self._tell_of_tables()
-        super().option(dynamic, collision, large_strain, overlap, potential, deep_overlap)
+        super().option(dynamic, collision, large_strain, overlap, potential, deep_overlap, plane_stress)
         if self.options.dynamic != before:
             self.v[:] = 0.0
             if before:
@@ -703,6 +707,8 @@ class Blocks(State):
         if not self.alive.any():
             raise CommandError("there are no elements left")
         self._check_warmth()
+        if self.options.plane_stress:
+            user_laws.check_plane_stress(self)
         if self.options.stiffness_damping and user_laws.in_use(self):
             raise CommandError(
                 f"the stiffness of {user_laws.some(self)}, which has a law of the user, is not known: Rayleigh damping "

@@ -81,6 +81,8 @@ those of each of their four triangles, triangles have the first; where there are
 tetrahedra, see plastic_hexes.py."""
 OWN = "own"
 """Of the tables of properties, see kernels/user_laws.py."""
+ACROSS = 1e-9
+"""Stress across the plane over that in it that is rounding."""
 STEP_OF_STRAIN = 1e-9
 """For the slope of a law at zero strain."""
 _FOR_QUADS: set[tuple[str, int]] = set()
@@ -98,13 +100,14 @@ class _Declared(Declared):
 
 @dataclass(frozen=True)
 class UserLaw(Model):
-    """A law of a file. title: FILE:FUNCTION; columns: of the table of properties; loops: compiled, see
-    kernels/user_laws.py, in space kernels/user_laws_space.py."""
+    """A law of a file. title: FILE:FUNCTION; columns: of the table of properties; loops, evaluate: compiled,
+    see kernels/user_laws.py, in space kernels/user_laws_space.py."""
 
     title: str = ""
     states: tuple[StateVariable, ...] = ()
     columns: tuple[str, ...] = ()
     loops: Any = None
+    evaluate: Any = None
 
     def table(self, rows: Rows) -> np.ndarray:
         """The table of properties of the kernels, flat; elements with other models have rows of zeros."""
@@ -191,6 +194,7 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     return UserLaw(
         name, ELEMENT, f"the law of {title}", (*USER.properties, *declared.properties, bound), derive, title=title,
         dims=(declared.dim,), states=declared.state, columns=tuple(columns), loops=loops,
+        evaluate=evaluate,
     )  # fmt: skip
 
 
@@ -271,6 +275,23 @@ def in_use(sim: State) -> list[UserLaw]:
     """Those that elements have that are there."""
     found = np.unique(numbers(sim)[sim.alive])
     return [law for k, law in enumerate(of_rows(sim.element_rows)) if 1 + k in found]
+
+
+def check_plane_stress(sim: State) -> None:
+    """CommandError for a law in use that gives a stress across the plane of a model in plane stress: it has no strain
+    there by which that could be made 0."""
+    for law in in_use(sim):
+        table = law.table(sim.element_rows).reshape(-1, len(law.columns))
+        table = table[table[:, law.columns.index(OWN)] == 1.0]
+        out = np.empty((len(table), len(STRESS[2]) + len(law.states)))
+        for strain in ((1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0), (-1e-3, -2e-3, 1e-3)):
+            law.evaluate(table, np.array(strain), np.array([state.initial for state in law.states]), out)
+            across = np.abs(out[:, 3])
+            if (across > ACROSS * np.abs(out[:, :3]).max(axis=1)).any():
+                raise CommandError(
+                    f"law {law.title} gives a stress s33 of {across.max():g} Pa at the strain e11, e22, e12 {strain}: "
+                    "in plane stress it must be 0, and s11, s22 those that belong to it"
+                )
 
 
 def some(sim: State) -> str:

@@ -28,6 +28,7 @@ from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, by_temperature, hexahedra, user_laws
 from hpcdem.physics.fdem.kernels.elements import FORCE
 from hpcdem.physics.fdem.mesh import sizes as sizes_of
+from hpcdem.physics.fdem.moduli import moduli
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.field import assigned, kernels, kernels_space
 from hpcdem.physics.field.assigned import Number
@@ -324,8 +325,9 @@ class Diffusing(Assigned, Field):
             return None
         if self._stiffness_of is not blocks.number:  # whatever changes it makes storage of its own
             number = blocks.number[blocks.owned]
-            bulk = np.array(blocks.element_rows.column("bulk"))[blocks.element_row[number]]
-            self._stiffness = 3.0 * bulk * self.column(self.expansion)[self.row[number]]
+            of = moduli(blocks)
+            bulk = of.bulk[blocks.element_row[number]]
+            self._stiffness = len(of.normal) * bulk * self.column(self.expansion)[self.row[number]]
             self._quad, self._stiffness_of = blocks.the_mesh().cells[number, 3] >= 0, blocks.number
         out = np.empty(blocks.n_own)
         kernels.thermal_stress(

@@ -349,7 +349,8 @@ class Liners(Structure):
         self._total, self._on_rock = np.zeros((n, 3)), np.zeros((2 * m, 2))
         self._step, self._rock = np.zeros((n, 2)), np.zeros((2 * m, 2))
         length, poisson = beams["length"], self._column("poisson_ratio")
-        young = np.where(there, self._column("young") / (1.0 - poisson**2), 0.0)
+        held = 0.0 if self.blocks.options.plane_stress else poisson**2
+        young = np.where(there, self._column("young") / (1.0 - held), 0.0)
         area, inertia, rho = self._column("area"), self._column("inertia"), self._column("density")
         table = np.zeros((m, 5))
         table[:, kernels.AXIAL], table[:, kernels.BENDING] = young * area / length, young * inertia / length

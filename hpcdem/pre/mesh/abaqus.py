@@ -462,7 +462,8 @@ class _Reader:
         for begins, what in (("CPS", "plane stress"), ("CAX", "rotational symmetry"), ("CGAX", "rotational symmetry")):
             labels = dict.fromkeys(block.label for block in self.made.blocks if block.label.startswith(begins))
             if labels and all(DIMENSIONS.get(block.kind) == 2 for block in self.made.blocks):
-                notes.append(f"the {what} of {', '.join(labels)}: blocks of the plane are in plane strain")
+                also = "unless model plane-stress is said" if begins == "CPS" else "or in plane stress"
+                notes.append(f"the {what} of {', '.join(labels)}: blocks of the plane are in plane strain {also}")
         for label, numbers in self.kinds.items():
             notes.append(f"{len(numbers)} elements of type {label} ({listed(numbers)})")
         notes += dict.fromkeys(self.notes)

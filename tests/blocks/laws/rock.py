@@ -47,3 +47,11 @@ def lift(y):
 def beat(x, y, t):
     """Stress [Pa] of a wave that runs along y."""
     return -2e6 * math.sin(3e4 * (t - 1e-4 * y) + x)
+
+
+@element_law()
+def flat(e11, e22, e12, evol, bulk, shear):
+    """Elasticity in plane stress."""
+    lame, two_mu = bulk - 2.0 / 3.0 * shear, 2.0 * shear
+    p = lame * two_mu / (lame + two_mu) * evol
+    return p + two_mu * e11, p + two_mu * e22, two_mu * e12, 0.0

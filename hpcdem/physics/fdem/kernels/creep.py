@@ -19,6 +19,11 @@ Strains are those of the frame that turns with the element, sigma = sigma_0 + D 
 (plasticity.py): -D e_c is added to the initial stress, so the loop over triangles is the elastic one. Within a creep
 step S+ depends on the strain as in an elastic element with 2 G = 1 / X.
 
+In plane stress the strain across the plane is such that the stress there is 0 at the end of the step: with K the bulk
+modulus, p_0 the mean of the initial stress and h33 the deviator S+ that there is without strain, z = e33 follows from
+p_0 + K (e11 + e22 + z) + h33 + (2 z - e11 - e22) / (3 X) = 0, as S+ is linear in the strain. Creep strains are
+deviators there too; sigma = sigma_0 + D' (U - 1 - e_c) in the plane, D' with lambda' (moduli.py).
+
 What is lost in a step is (S + S+) / 2 : de_M + 2 eta_K de_K : de_K / dt, never negative, de_M that of the dashpot of
 the Maxwell unit; the spring of the Kelvin unit stores G_K e_K : e_K.
 """
@@ -29,8 +34,10 @@ from numba import njit, prange
 
 from hpcdem.physics.fdem.kernels import laws
 from hpcdem.physics.fdem.kernels.elements import (
+    FREE,
     LAMBDA,
     Q_AREA,
+    Q_FREE,
     Q_LAMBDA,
     Q_TWO_MU,
     QUAD,
@@ -78,12 +85,24 @@ def stress_then(e, start, creep, kelvin, s, two_mu, back, of_both, x):
 
 
 @njit(cache=True, error_model="numpy")
-def relieve(i, o, two_mu, base, e11, e22, e12, s0):
-    """Into row i of s0, from column o on, the stress [Pa] of a triangle without strain: base there less 2 G_M e_c."""
-    s0[i, o] = base[i, o] - two_mu * e11
-    s0[i, o + 1] = base[i, o + 1] - two_mu * e22
-    s0[i, o + 2] = base[i, o + 2] - two_mu * e12
-    s0[i, o + 3] = base[i, o + 3] + two_mu * (e11 + e22)
+def relieve(i, o, lame, two_mu, free, base, e11, e22, e12, s0):
+    """Into row i of s0, from column o on, the stress [Pa] of a triangle without strain: base there less D e_c, which is
+    2 G_M e_c unless the strain across the plane is free."""
+    s11, s22, s12, s33 = laws.hooke(e11, e22, e12, -(e11 + e22), lame, two_mu, free)
+    s0[i, o], s0[i, o + 1] = base[i, o] - s11, base[i, o + 1] - s22
+    s0[i, o + 2], s0[i, o + 3] = base[i, o + 2] - s12, base[i, o + 3] - s33
+
+
+@njit(cache=True, error_model="numpy")
+def _bulk(lame, two_mu):
+    """K of lambda' and 2 G."""
+    return lame * two_mu / (two_mu - lame) + two_mu / 3.0
+
+
+@njit(cache=True, error_model="numpy")
+def _across(trace, mean, h11, h22, weight, bulk):
+    """z of the formulas above; h11, h22: S+ without strain, weight: 1 / X."""
+    return -((mean - (h11 + h22)) + (bulk - weight / 3.0) * trace) / (bulk + 2.0 / 3.0 * weight)
 
 
 @njit(cache=True, error_model="numpy")
@@ -101,24 +120,16 @@ def _share(i, o, one, two, s0):
 
 
 @njit(cache=True, error_model="numpy")
-def _deviator(e11, e22):
-    """11, 22 of a strain in the plane."""
-    third = (e11 + e22) / 3.0
+def _deviator(e11, e22, e33):
+    """11, 22 of a strain."""
+    third = (e11 + e22 + e33) / 3.0
     return e11 - third, e22 - third
 
 
 @njit(cache=True, error_model="numpy")
-def _strain(xy, c, small):
-    """Deviator of the strain (11, 22, 12) of a triangle with the corners xy (6,)."""
-    _, _, e11, e22, e12 = triangle_stretch(xy, c, small)
-    e11, e22 = _deviator(e11, e22)
-    return e11, e22, e12
-
-
-@njit(cache=True, error_model="numpy")
-def _part(i, j, p, e11, e22, e12, two_mu, base, row, table, dt, keep, memory):
-    """Creep strain (11, 22, 12) of triangle p of an element (of a triangle: 0) after dt, and what it loses [J/m3]; e:
-    deviator of its strain. i, j, row: rows of base, memory and table; it remembers this if it keeps it."""
+def _part(i, j, p, x11, x22, e12, lame, two_mu, free, base, row, table, dt, keep, memory):
+    """Creep strain (11, 22, 12) of triangle p of an element (of a triangle: 0) after dt, and what it loses [J/m3]; x11,
+    x22, e12: its strain. i, j, row: rows of base, memory and table; it remembers this if it keeps it."""
     g, per_kelvin, per_maxwell = table[row, KELVIN], table[row, PER_KELVIN], table[row, PER_MAXWELL]
     back, kelvin, maxwell, div, ratio = factors(dt, two_mu, g, per_kelvin, per_maxwell)
     both, o, b = kelvin + maxwell, p * MEMORY, 4 * p
@@ -126,6 +137,12 @@ def _part(i, j, p, e11, e22, e12, two_mu, base, row, table, dt, keep, memory):
     b11, b22, b12 = base[i, b] - mean, base[i, b + 1] - mean, base[i, b + 2]
     k11, k22, k12 = memory[j, o + K11], memory[j, o + K22], memory[j, o + K12]
     s11, s22, s12 = memory[j, o + S11], memory[j, o + S22], memory[j, o + S12]
+    z = 0.0
+    if free != 0.0:
+        h11 = stress_then(0.0, b11, memory[j, o + C11], k11, s11, two_mu, back, both, div)
+        h22 = stress_then(0.0, b22, memory[j, o + C22], k22, s22, two_mu, back, both, div)
+        z = _across(x11 + x22, mean, h11, h22, 1.0 / div, _bulk(lame, two_mu))
+    e11, e22 = _deviator(x11, x22, z)
     t11 = stress_then(e11, b11, memory[j, o + C11], k11, s11, two_mu, back, both, div)
     t22 = stress_then(e22, b22, memory[j, o + C22], k22, s22, two_mu, back, both, div)
     t12 = stress_then(e12, b12, memory[j, o + C12], k12, s12, two_mu, back, both, div)
@@ -140,6 +157,10 @@ def _part(i, j, p, e11, e22, e12, two_mu, base, row, table, dt, keep, memory):
     memory[j, o + C11], memory[j, o + C22], memory[j, o + C12] = c11, c22, c12
     memory[j, o + K11], memory[j, o + K22], memory[j, o + K12] = n11, n22, n12
     # By its spring, so that asking again at these positions (dt = 0) finds the same bits.
+    if free != 0.0:
+        h11 = stress_then(0.0, b11, c11, 0.0, 0.0, two_mu, 0.0, 0.0, 1.0 / two_mu)
+        h22 = stress_then(0.0, b22, c22, 0.0, 0.0, two_mu, 0.0, 0.0, 1.0 / two_mu)
+        e11, e22 = _deviator(x11, x22, _across(x11 + x22, mean, h11, h22, 1.0 / (1.0 / two_mu), _bulk(lame, two_mu)))
     memory[j, o + S11], memory[j, o + S22] = b11 + two_mu * (e11 - c11), b22 + two_mu * (e22 - c22)
     memory[j, o + S12] = b12 + two_mu * (e12 - c12)
     if dt == 0.0:
@@ -156,10 +177,12 @@ def _creep(t, threads, who, rows, first_row, x, c, base, law, table, small, dt, 
     for k in range(n * t // threads, n * (t + 1) // threads):
         i = who[k]
         j = rows[i] - first_row
-        e11, e22, e12 = _strain(x[rows[i]], c[i], small)
-        two_mu = c[i, TWO_MU]
-        c11, c22, c12, lost = _part(i, j, 0, e11, e22, e12, two_mu, base, law[i], table, dt, keep, memory)
-        relieve(i, 0, two_mu, base, c11, c22, c12, s0)
+        _, _, e11, e22, e12 = triangle_stretch(x[rows[i]], c[i], small)
+        lame, two_mu, free = c[i, LAMBDA], c[i, TWO_MU], c[i, FREE]
+        c11, c22, c12, lost = _part(
+            i, j, 0, e11, e22, e12, lame, two_mu, free, base, law[i], table, dt, keep, memory
+        )  # fmt: skip
+        relieve(i, 0, lame, two_mu, free, base, c11, c22, c12, s0)
         if keep:
             memory[j, LOST] += lost * 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2])
 
@@ -169,15 +192,16 @@ def _creep_quads(t, threads, who, rows, first_row, x, q, base, law, table, small
     n = len(who)
     for k in range(n * t // threads, n * (t + 1) // threads):
         i = who[k]
-        j, xy, two_mu = rows[i] - first_row, x[rows[i]], q[i, Q_TWO_MU]
+        j, xy, lame, two_mu, free = rows[i] - first_row, x[rows[i]], q[i, Q_LAMBDA], q[i, Q_TWO_MU], q[i, Q_FREE]
         for overlay in range(2):
             mean = mean_trace(overlay, xy, q[i], small)
             for p in (2 * overlay, 2 * overlay + 1):
                 _, _, _, _, _, _, e11, e22, e12 = part_stretch(p, xy, q[i], small)
                 shift = 0.5 * (mean - (e11 + e22))
-                e11, e22 = _deviator(e11 + shift, e22 + shift)
-                c11, c22, c12, lost = _part(i, j, p, e11, e22, e12, two_mu, base, law[i], table, dt, keep, memory)
-                relieve(i, 4 * p, two_mu, base, c11, c22, c12, s0)
+                c11, c22, c12, lost = _part(
+                    i, j, p, e11 + shift, e22 + shift, e12, lame, two_mu, free, base, law[i], table, dt, keep, memory
+                )
+                relieve(i, 4 * p, lame, two_mu, free, base, c11, c22, c12, s0)
                 if keep:
                     memory[j, p * MEMORY + LOST] += lost * 0.5 * q[i, Q_AREA + p]
             _share(i, 8 * overlay, q[i, Q_AREA + 2 * overlay], q[i, Q_AREA + 2 * overlay + 1], s0)
@@ -226,7 +250,8 @@ def relieve_all(who, rows, first, c, base, memory, s0):
     for k in range(len(who)):
         i = who[k]
         j = rows[i] - first
-        relieve(i, 0, c[i, TWO_MU], base, memory[j, C11], memory[j, C22], memory[j, C12], s0)
+        c11, c22, c12 = memory[j, C11], memory[j, C22], memory[j, C12]
+        relieve(i, 0, c[i, LAMBDA], c[i, TWO_MU], c[i, FREE], base, c11, c22, c12, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -237,14 +262,16 @@ def relieve_quads(who, rows, first, q, base, memory, s0):
         j = rows[i] - first
         for p in range(4):
             o = p * MEMORY
-            relieve(i, 4 * p, q[i, Q_TWO_MU], base, memory[j, o + C11], memory[j, o + C22], memory[j, o + C12], s0)
+            c11, c22, c12 = memory[j, o + C11], memory[j, o + C22], memory[j, o + C12]
+            relieve(i, 4 * p, q[i, Q_LAMBDA], q[i, Q_TWO_MU], q[i, Q_FREE], base, c11, c22, c12, s0)
         for overlay in range(2):
             _share(i, 8 * overlay, q[i, Q_AREA + 2 * overlay], q[i, Q_AREA + 2 * overlay + 1], s0)
 
 
 @njit(cache=True, error_model="numpy")
-def _elastic(i, j, p, two_mu, base, row, table, dt, memory, s0):
-    """Stress [Pa] without strain of triangle p of an element within this creep step, into row i of s0, and its 2 G."""
+def _elastic(i, j, p, lame, two_mu, free, base, row, table, dt, memory, s0):
+    """Stress [Pa] without strain of triangle p of an element within this creep step, into row i of s0, and its lambda
+    and 2 G."""
     back, kelvin, maxwell, div, _ = factors(
         dt, two_mu, table[row, KELVIN], table[row, PER_KELVIN], table[row, PER_MAXWELL]
     )
@@ -255,10 +282,17 @@ def _elastic(i, j, p, two_mu, base, row, table, dt, memory, s0):
         s0[i, b + k] = stress_then(
             0.0, start, memory[j, o + C11 + k], memory[j, o + K11 + k], memory[j, o + S11 + k], two_mu, back, both, div
         )
-    s0[i, b + 3] = mean - (s0[i, b] + s0[i, b + 1])
+    weight = 1.0 / div
+    if free != 0.0:
+        bulk = _bulk(lame, two_mu)
+        z = _across(0.0, mean, s0[i, b], s0[i, b + 1], weight, bulk)
+        mean, own = mean + (bulk - weight / 3.0) * z, bulk - weight / 3.0
+        s0[i, b + 3], lame = 0.0, own * weight / (own + weight)
+    else:
+        s0[i, b + 3], lame = mean - (s0[i, b] + s0[i, b + 1]), lame + (two_mu - weight) / 3.0
     s0[i, b] += mean
     s0[i, b + 1] += mean
-    return 1.0 / div
+    return lame, weight
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -267,11 +301,11 @@ def as_elastic(who, rows, first, c, base, law, table, dt, memory, like, s0):
     (count + 3, 4) [Pa] its stress without strain; other arguments as for `creep`."""
     for k in range(len(who)):
         i = who[k]
-        two_mu = c[i, TWO_MU]
         for m in range(TRIANGLE):
             like[i, m] = c[i, m]
-        like[i, TWO_MU] = _elastic(i, rows[i] - first, 0, two_mu, base, law[i], table, dt, memory, s0)
-        like[i, LAMBDA] = c[i, LAMBDA] + (two_mu - like[i, TWO_MU]) / 3.0
+        like[i, LAMBDA], like[i, TWO_MU] = _elastic(
+            i, rows[i] - first, 0, c[i, LAMBDA], c[i, TWO_MU], c[i, FREE], base, law[i], table, dt, memory, s0
+        )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -279,22 +313,24 @@ def quads_as_elastic(who, rows, first, q, base, law, table, dt, memory, like, s0
     """The same of quads: like (count, 32), s0 (count, 16) [Pa]; other arguments as for `creep_quads`."""
     for k in range(len(who)):
         i = who[k]
-        two_mu = q[i, Q_TWO_MU]
         for m in range(QUAD):
             like[i, m] = q[i, m]
         for p in range(4):
-            like[i, Q_TWO_MU] = _elastic(i, rows[i] - first, p, two_mu, base, law[i], table, dt, memory, s0)
-        like[i, Q_LAMBDA] = q[i, Q_LAMBDA] + (two_mu - like[i, Q_TWO_MU]) / 3.0
+            like[i, Q_LAMBDA], like[i, Q_TWO_MU] = _elastic(
+                i, rows[i] - first, p, q[i, Q_LAMBDA], q[i, Q_TWO_MU], q[i, Q_FREE], base, law[i], table, dt, memory, s0
+            )
         for overlay in range(2):
             _share(i, 8 * overlay, q[i, Q_AREA + 2 * overlay], q[i, Q_AREA + 2 * overlay + 1], s0)
 
 
 @njit(cache=True, error_model="numpy")
-def _stored(i, j, p, two_mu, base, row, table, memory):
+def _stored(i, j, p, lame, two_mu, free, base, row, table, memory):
     """Of triangle p of an element, see `stored` [J/m3]."""
     o, b = p * MEMORY, 4 * p
     e11, e22, e12 = memory[j, o + C11], memory[j, o + C22], memory[j, o + C12]
     density = 0.5 * two_mu * squares(e11, e22, e12)
+    if free != 0.0:  # the strain across the plane stores nothing
+        density += 0.5 * (lame - two_mu) * (e11 + e22) * (e11 + e22)
     density -= base[i, b] * e11 + base[i, b + 1] * e22 + 2.0 * base[i, b + 2] * e12 - base[i, b + 3] * (e11 + e22)
     if table[row, PER_KELVIN] > 0.0:
         density += table[row, KELVIN] * squares(memory[j, o + K11], memory[j, o + K22], memory[j, o + K12])
@@ -308,7 +344,7 @@ def stored(rows, first, c, base, law, table, memory, out):
     [Pa]: initial stress."""
     for i in range(len(rows)):
         j = rows[i] - first
-        density = _stored(i, j, 0, c[i, TWO_MU], base, law[i], table, memory)
+        density = _stored(i, j, 0, c[i, LAMBDA], c[i, TWO_MU], c[i, FREE], base, law[i], table, memory)
         out[j] += density * 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2])
 
 
@@ -318,7 +354,8 @@ def stored_in_quads(rows, first, q, base, law, table, memory, out):
     for i in range(len(rows)):
         j = rows[i] - first
         for p in range(4):
-            out[j] += 0.5 * q[i, Q_AREA + p] * _stored(i, j, p, q[i, Q_TWO_MU], base, law[i], table, memory)
+            density = _stored(i, j, p, q[i, Q_LAMBDA], q[i, Q_TWO_MU], q[i, Q_FREE], base, law[i], table, memory)
+            out[j] += 0.5 * q[i, Q_AREA + p] * density
 
 
 @njit(cache=True, error_model="numpy")

@@ -30,12 +30,13 @@ BLOCK = 64
 """Triangles worked on together: their lanes stay in the first-level cache."""
 
 # Columns of the table of triangles (n, 12): inverse of the reference matrix [X2 - X1, X3 - X1], Lame's lambda, 2 mu,
-# viscosity [Pa s], mass of a corner [kg/m] (for gravity), and dt / m of the three corners, 0 where nodes.py moves it.
-INVERSE, LAMBDA, TWO_MU, ETA, WEIGHT, KICK = 0, 4, 5, 6, 7, 8
+# viscosity [Pa s], mass of a corner [kg/m] (for gravity), dt / m of the three corners, 0 where nodes.py moves it, and
+# whether the strain across the plane is free: 1 in plane stress, where lambda is that of the plane (moduli.py), else 0.
+INVERSE, LAMBDA, TWO_MU, ETA, WEIGHT, KICK, FREE = 0, 4, 5, 6, 7, 8, 11
 TRIANGLE = 12
 # Columns of the table of quads (n, 32): the inverses of their four triangles (`PARTS`), areas of these, lambda, 2 mu,
-# viscosity, masses of the four corners.
-Q_INVERSE, Q_AREA, Q_LAMBDA, Q_TWO_MU, Q_ETA, Q_WEIGHT = 0, 16, 20, 21, 22, 23
+# viscosity, masses of the four corners, whether the strain across the plane is free.
+Q_INVERSE, Q_AREA, Q_LAMBDA, Q_TWO_MU, Q_ETA, Q_WEIGHT, Q_FREE = 0, 16, 20, 21, 22, 23, 27
 QUAD = 32
 PARTS = np.array([[0, 1, 2], [0, 2, 3], [1, 2, 3], [1, 3, 0]])
 """Two overlays of two triangles each."""
@@ -48,7 +49,7 @@ TALLY = 8
 
 (
     X1, Y1, X2, Y2, X3, Y3, _, _, VX1, VY1, VX2, VY2, VX3, VY3, _, _, CA, CB, CC, CD, LAM, MU2, VISC, MASS,
-    K1, K2, K3, _, PX, PY, QX, QY, KOP, TENSILE, OVERLAY, TAN_PHI, COHESION, HALF_SHEAR, _, _,
+    K1, K2, K3, FREED, PX, PY, QX, QY, KOP, TENSILE, OVERLAY, TAN_PHI, COHESION, HALF_SHEAR, _, _,
     FX1, FY1, FX2, FY2, FX3, FY3, S11, S22, S12, S33,
 ) = (lane(k) for k in range(50))  # fmt: skip
 EDGE_FORCE = 50
@@ -101,7 +102,7 @@ def _gather_edge(n, first, k, x, partner, law, table, lanes):
 def elastic(e, e11, e22, e12, trace, dt, lanes):
     """Stress 11, 22, 12, 33 [Pa] of a strain, without the initial one; trace: e11 + e22."""
     p, m = lanes[LAM + e] * trace, lanes[MU2 + e]
-    return p + m * e11, p + m * e22, m * e12, p
+    return p + m * e11, p + m * e22, m * e12, p - lanes[FREED + e] * p
 
 
 def stress_loop(law, keep=None):
@@ -435,7 +436,7 @@ def triangles_threaded(
 X4, Y4, VX4, VY4, FX4, FY4 = lane(6), lane(7), lane(14), lane(15), lane(46), lane(47)
 QUAD_ROW = 66
 """First lane of the row of the table of quads, of which seven times four columns are needed."""
-Q_C, Q_LAM, Q_MU2, Q_VISC = (lane(QUAD_ROW + k) for k in (Q_INVERSE, Q_LAMBDA, Q_TWO_MU, Q_ETA))
+Q_C, Q_LAM, Q_MU2, Q_VISC, Q_FREED = (lane(QUAD_ROW + k) for k in (Q_INVERSE, Q_LAMBDA, Q_TWO_MU, Q_ETA, Q_FREE))
 Q_M1, Q_M2, Q_M3, Q_M4 = (lane(QUAD_ROW + Q_WEIGHT + k) for k in range(4))
 Q_LEFT0, Q_LEFT1, Q_LEFT2, Q_LEFT3 = (lane(QUAD_ROW + 28 + k) for k in range(4))
 B1, B2, B3, B4 = (lane(QUAD_ROW + 32 + 2 * k) for k in range(4))
@@ -505,9 +506,10 @@ def elastic_pair(e, a11, a22, a12, b11, b22, b12, mean, one, two, dt, lanes):
     """Stress 11, 22, 12, 33 [Pa] of the two triangles of an overlay, a and b, without the initial one. mean: e11 + e22
     of both; one, two: their areas in the mesh."""
     pressure, two_mu = lanes[Q_LAM + e] * mean, lanes[Q_MU2 + e]
+    across = pressure - lanes[Q_FREED + e] * pressure
     return (
-        pressure + two_mu * a11, pressure + two_mu * a22, two_mu * a12, pressure,
-        pressure + two_mu * b11, pressure + two_mu * b22, two_mu * b12, pressure,
+        pressure + two_mu * a11, pressure + two_mu * a22, two_mu * a12, across,
+        pressure + two_mu * b11, pressure + two_mu * b22, two_mu * b12, across,
     )  # fmt: skip
 
 
@@ -622,7 +624,7 @@ def quad_stress(xy, c, s0, small, stress):
             stress[0] += share * xx
             stress[1] += share * yy
             stress[2] += share * xy_
-            stress[3] += share * (s0[4 * p + 3] + c[Q_LAMBDA] * mean)
+            stress[3] += share * (s0[4 * p + 3] + (1.0 - c[Q_FREE]) * (c[Q_LAMBDA] * mean))
     for q in range(4):
         stress[q] /= areas
 
@@ -944,7 +946,7 @@ def triangle_stress(xy, c, s0, small, stress):
     cs, sn, e11, e22, e12 = triangle_stretch(xy, c, small)
     p, m = c[LAMBDA] * (e11 + e22), c[TWO_MU]
     stress[0], stress[1], stress[2] = laws.turned(s0[0] + (p + m * e11), s0[1] + (p + m * e22), s0[2] + m * e12, cs, sn)
-    stress[3] = s0[3] + p
+    stress[3] = s0[3] + (1.0 - c[FREE]) * p
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -43,6 +43,14 @@ def turned(s11, s22, s12, cs, sn):
     )
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def hooke(e11, e22, e12, e33, lame, two_mu, free):
+    """Stress 11, 22, 12, 33 [Pa] of a strain; free: 1 where the strain 33 is free (plane stress: 33 is 0), else 0."""
+    e33 = e33 - free * e33
+    p = lame * (e11 + e22 + e33)
+    return p + two_mu * e11, p + two_mu * e22, two_mu * e12, (p - free * p) + two_mu * e33
+
+
 @njit(cache=True, error_model="numpy")
 def damped(f, v, alpha):
     """Force with local damping: F - alpha |F| sgn(v)."""

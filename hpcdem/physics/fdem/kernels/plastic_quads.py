@@ -28,6 +28,8 @@ from hpcdem.physics.fdem.kernels.elements import (
     PARTS,
     Q_AREA,
     Q_C,
+    Q_FREE,
+    Q_FREED,
     Q_LAM,
     Q_LAMBDA,
     Q_MU2,
@@ -83,9 +85,9 @@ LANES = plasticity.LANES + 16 + 4 * MEMORY
 
 
 @njit(cache=True, error_model="numpy")
-def _pressure(e11, e22, e33, lame, two_mu):
-    """(s11 + s22) / 2 [Pa] of a strain."""
-    return lame * (e11 + e22 + e33) + 0.5 * two_mu * (e11 + e22)
+def _pressure(e11, e22, e33, lame, two_mu, free):
+    """(s11 + s22) / 2 [Pa] of a strain; free: as of `laws.hooke`."""
+    return lame * (e11 + e22 + (e33 - free * e33)) + 0.5 * two_mu * (e11 + e22)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -94,12 +96,9 @@ def _relieve(i, j, p, q, base, memory, s0):
     memory."""
     o, to = p * MEMORY, 4 * p
     e11, e22, e12, e33 = memory[j, o + E11], memory[j, o + E22], memory[j, o + E12], memory[j, o + E33]
-    two_mu = q[i, Q_TWO_MU]
-    pressure = q[i, Q_LAMBDA] * (e11 + e22 + e33)
-    s0[i, to] = base[i, to] - (pressure + two_mu * e11)
-    s0[i, to + 1] = base[i, to + 1] - (pressure + two_mu * e22)
-    s0[i, to + 2] = base[i, to + 2] - two_mu * e12
-    s0[i, to + 3] = base[i, to + 3] - (pressure + two_mu * e33)
+    s11, s22, s12, s33 = laws.hooke(e11, e22, e12, e33, q[i, Q_LAMBDA], q[i, Q_TWO_MU], q[i, Q_FREE])
+    s0[i, to], s0[i, to + 1] = base[i, to] - s11, base[i, to + 1] - s22
+    s0[i, to + 2], s0[i, to + 3] = base[i, to + 2] - s12, base[i, to + 3] - s33
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -188,18 +187,19 @@ def _try_overlay(overlay):
             lame, two_mu = block[Q_LAM + e], block[Q_MU2 + e]
             mean = (block[one + e] * (a11 + a22) + block[two + e] * (b11 + b22)) / (block[one + e] + block[two + e])
             pressure = lame * mean
+            across = pressure - block[Q_FREED + e] * pressure
             shift = 0.5 * (mean - (a11 + a22))
             s11, s22 = (
                 block[z1 + e] + (pressure + two_mu * (a11 + shift)),
                 block[z1 + _NEXT + e] + (pressure + two_mu * (a22 + shift)),
             )
-            s12, s33 = block[z1 + _SECOND + e] + two_mu * a12, block[z1 + _THIRD + e] + pressure
+            s12, s33 = block[z1 + _SECOND + e] + two_mu * a12, block[z1 + _THIRD + e] + across
             shift = 0.5 * (mean - (b11 + b22))
             t11, t22 = (
                 block[z2 + e] + (pressure + two_mu * (b11 + shift)),
                 block[z2 + _NEXT + e] + (pressure + two_mu * (b22 + shift)),
             )
-            t12, t33 = block[z2 + _SECOND + e] + two_mu * b12, block[z2 + _THIRD + e] + pressure
+            t12, t33 = block[z2 + _SECOND + e] + two_mu * b12, block[z2 + _THIRD + e] + across
             lanes[T11 + f], lanes[T22 + f], lanes[T12 + f], lanes[T33 + f] = s11, s22, s12, s33
             lanes[T11 + g], lanes[T22 + g], lanes[T12 + g], lanes[T33 + g] = t11, t22, t12, t33
             lanes[P_LAM + f], lanes[P_MU2 + f], lanes[P_LAM + g], lanes[P_MU2 + g] = lame, two_mu, lame, two_mu
@@ -258,8 +258,8 @@ def _share_overlay(overlay):
             f, g = first + e, second + e
             lame, two_mu, area, other = block[Q_LAM + e], block[Q_MU2 + e], block[one + e], block[two + e]
             a11, a22, b11, b22 = lanes[m11 + e], lanes[m22 + e], lanes[n11 + e], lanes[n22 + e]
-            p = _pressure(a11, a22, lanes[m33 + e], lame, two_mu)
-            q = _pressure(b11, b22, lanes[n33 + e], lame, two_mu)
+            p = _pressure(a11, a22, lanes[m33 + e], lame, two_mu, block[Q_FREED + e])
+            q = _pressure(b11, b22, lanes[n33 + e], lame, two_mu, block[Q_FREED + e])
             mean = (area * p + other * q) / (area + other)
             per = 1.0 / (2.0 * lame + two_mu)
             flows = lanes[HOW + f] + lanes[HOW + g] > 0.0
@@ -279,13 +279,13 @@ def _relieve_part(p):
     @njit(cache=True, nogil=True, error_model="numpy")
     def loop(n, block, lanes):
         for e in range(U(n)):
-            lame, two_mu = block[Q_LAM + e], block[Q_MU2 + e]
-            e11, e22, e12, e33 = lanes[m11 + e], lanes[m22 + e], lanes[m12 + e], lanes[m33 + e]
-            pressure = lame * (e11 + e22 + e33)
-            block[z + e] = lanes[base + e] - (pressure + two_mu * e11)
-            block[z + _NEXT + e] = lanes[base + _NEXT + e] - (pressure + two_mu * e22)
-            block[z + _SECOND + e] = lanes[base + _SECOND + e] - two_mu * e12
-            block[z + _THIRD + e] = lanes[base + _THIRD + e] - (pressure + two_mu * e33)
+            s11, s22, s12, s33 = laws.hooke(
+                lanes[m11 + e], lanes[m22 + e], lanes[m12 + e], lanes[m33 + e], block[Q_LAM + e], block[Q_MU2 + e],
+                block[Q_FREED + e],
+            )  # fmt: skip
+            block[z + e], block[z + _NEXT + e] = lanes[base + e] - s11, lanes[base + _NEXT + e] - s22
+            block[z + _SECOND + e] = lanes[base + _SECOND + e] - s12
+            block[z + _THIRD + e] = lanes[base + _THIRD + e] - s33
 
     return loop
 
@@ -341,8 +341,8 @@ def _flow_block(
     _try_overlay_1(whole, small, block, lanes)
     if _none_outside(n, lanes) < 0:
         return 0, filled
-    plasticity.return_all(4 * BLOCK, lanes)
-    plasticity.measure(4 * BLOCK, lanes)
+    plasticity.return_all(4 * BLOCK, block[Q_FREED], lanes)
+    plasticity.measure(4 * BLOCK, block[Q_FREED], lanes)
     _add_0(whole, step, lanes)
     _add_1(whole, step, lanes)
     _add_2(whole, step, lanes)
@@ -506,11 +506,10 @@ def locked_in(rows, first, q, base, memory, out):
     for i in range(len(rows)):
         j = rows[i] - first
         for p in range(4):
-            o = p * MEMORY
-            e11, e22, e12, e33 = memory[j, o + E11], memory[j, o + E22], memory[j, o + E12], memory[j, o + E33]
-            trace = e11 + e22 + e33
-            squares = e11 * e11 + e22 * e22 + 2.0 * e12 * e12 + e33 * e33
-            b = 4 * p
-            own = base[i, b] * e11 + base[i, b + 1] * e22 + 2.0 * base[i, b + 2] * e12 + base[i, b + 3] * e33
-            density = 0.5 * (q[i, Q_LAMBDA] * trace * trace + q[i, Q_TWO_MU] * squares) - own
-            out[j] += 0.5 * q[i, Q_AREA + p] * density
+            out[j] += (
+                0.5
+                * q[i, Q_AREA + p]
+                * plasticity.kept_energy(
+                    j, p * MEMORY, base[i], 4 * p, q[i, Q_LAMBDA], q[i, Q_TWO_MU], q[i, Q_FREE], memory
+                )
+            )

@@ -21,9 +21,11 @@ import numpy as np
 from numba import njit
 
 from hpcdem.physics.fdem.kernels.elements import (
+    FREE,
     LAMBDA,
     PARTS,
     Q_AREA,
+    Q_FREE,
     Q_LAMBDA,
     Q_TWO_MU,
     TWO_MU,
@@ -31,7 +33,17 @@ from hpcdem.physics.fdem.kernels.elements import (
     part_stretch,
     triangle_stretch,
 )
-from hpcdem.physics.fdem.kernels.plasticity import N_PHI, N_PSI, STRENGTH, TENSILE, principal_return
+from hpcdem.physics.fdem.kernels.plasticity import (
+    HIGH,
+    LOW,
+    N_PHI,
+    N_PSI,
+    SIDE,
+    STRENGTH,
+    TENSILE,
+    plane_stress_return,
+    principal_return,
+)
 from hpcdem.physics.fdem.kernels.stiffness import gradients
 from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW, TENSION_NOW
 
@@ -76,7 +88,26 @@ def principal_slopes(s1, s2, s3, n, m, k, t, a, b, slopes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _lost(s11, s22, s12, s33, law, lame, two_mu, slopes, lost):
+def _plane_slopes(low, high, n, m, k, t, a, b, slopes):
+    """The same in plane stress, of the high stress in row and column 2 and of the low one in 0, and where they go."""
+    t = min(t, k / n)
+    r_low, r_high, where = plane_stress_return(low, high, n, m, k, t, a, b)
+    slopes[:] = 0.0
+    p, along, back = a - b * m - b * n + a * n * m, a - b * m, a * m - b
+    if where == SIDE:
+        slopes[2, 2], slopes[2, 0] = 1.0 - n * back / p, back / p
+        slopes[0, 2], slopes[0, 0] = n * along / p, 1.0 - along / p
+    elif where == HIGH and r_low < t:
+        slopes[0, 0], slopes[0, 2] = 1.0, -b / a
+    elif where == LOW and r_high > -k:
+        slopes[2, 2], slopes[2, 0] = 1.0, -b / a
+    elif where == 0.0:
+        slopes[0, 0] = slopes[2, 2] = 1.0
+    return r_low, r_high, where
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _lost(s11, s22, s12, s33, law, lame, two_mu, free, slopes, lost):
     """By how much the stiffness of a stress [Pa] is below the elastic one: lost (2, 2) of the high and the low stress
     in the plane by their strains, and of the shear between them, which is returned; then cosine and sine of twice the
     angle of the high one. False at the end: it does not flow."""
@@ -85,7 +116,10 @@ def _lost(s11, s22, s12, s33, law, lame, two_mu, slopes, lost):
     high, low = mean + radius, mean - radius
     a, b = lame + two_mu, lame
     n, m, k, t = law[N_PHI], law[N_PSI], law[STRENGTH], law[TENSILE]
-    if s33 > high:
+    if free != 0.0:
+        h, g = 2, 0
+        r_low, r_high, bits = _plane_slopes(low, high, n, m, k, t, a, b, slopes)
+    elif s33 > high:
         h, g = 1, 0
         r1, r2, r3, bits = principal_slopes(low, high, s33, n, m, k, t, a, b, slopes)
         r_high, r_low = r2, r1
@@ -140,8 +174,9 @@ def triangles(rows, x, c, s0, law, table, small, out):
         pressure, two_mu = c[i, LAMBDA] * (e11 + e22), c[i, TWO_MU]
         s11, s22 = s0[i, 0] + (pressure + two_mu * e11), s0[i, 1] + (pressure + two_mu * e22)
         shear, c2, s2, flows = _lost(
-            s11, s22, s0[i, 2] + two_mu * e12, s0[i, 3] + pressure, table[law[i]], c[i, LAMBDA], two_mu, slopes, lost
-        )
+            s11, s22, s0[i, 2] + two_mu * e12, s0[i, 3] + pressure, table[law[i]], c[i, LAMBDA], two_mu, c[i, FREE],
+            slopes, lost,
+        )  # fmt: skip
         if not flows:
             continue
         flowing += 1
@@ -179,7 +214,7 @@ def quads(rows, x, c, s0, law, table, small, out):
                 s22 = s0[i, o + 1] + (pressure + two_mu * (e22 + shift))
                 shear, c2, s2, flows = _lost(
                     s11, s22, s0[i, o + 2] + two_mu * e12, s0[i, o + 3] + pressure, table[law[i, p]], lame, two_mu,
-                    slopes, lost,
+                    c[i, Q_FREE], slopes, lost,
                 )  # fmt: skip
                 if not flows:
                     continue

@@ -21,6 +21,18 @@ planes: a^2 - b^2), so that there is one answer (Cottle, Pang & Stone 1992, theo
 negative as long as psi <= phi. Formulas of the planes: Itasca, FLAC; of edges and corners: Clausen, Damkilde & Andersen
 2007 (Computers & Structures 85, 1795).
 
+In plane stress the third principal stress is held at 0 and the strain across the plane is what it takes. Of the two in
+the plane, l <= h, the six planes leave a polygon; their parts in the plane of D dg/ds have a' = lambda' + 2 G and b' =
+lambda' (moduli.py) in the place of a and b:
+
+    h, l > 0    h <= t = min(T, 2 c sqrt(N_phi) / N_phi)  (tension, or shear with the stress 0 as the low one)
+    l < 0 < h   N_phi h - l <= 2 c sqrt(N_phi)
+    h, l < 0    -l <= 2 c sqrt(N_phi)                      (shear with the stress 0 as the high one)
+
+The end lies on the side of one of them, or at a corner: h = l = t, h = l = -2 c sqrt(N_phi), (h, l) = (t, N_phi t -
+2 c sqrt(N_phi)) or (0, -2 c sqrt(N_phi)), where two flow (principal minors: a'^2 - b'^2, N_phi N_psi (a'^2 - b'^2), so
+one answer again). The strain across the plane has no stiffness: only what flows in the plane is taken from the stress.
+
 Strains are split in the frame that turns with the element: sigma = sigma_0 + D (U - 1 - e_p), where e_p is the plastic
 strain. This is incremental (e_p depends on the way), objective for rotations of any size (the rate is that of Green and
 Naghdi), and as long as nothing yields the very formula of an elastic element. -D e_p is added to the initial stress,
@@ -36,7 +48,7 @@ from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
 from hpcdem.physics.fdem.kernels import laws, strength
-from hpcdem.physics.fdem.kernels.elements import BLOCK, LAMBDA, TWO_MU
+from hpcdem.physics.fdem.kernels.elements import BLOCK, FREE, LAMBDA, TWO_MU
 from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW, TENSION_NOW
 
 SHEAR_PAST, TENSION_PAST = 4, 8
@@ -126,17 +138,65 @@ def plastic_strain(s11, s22, s12, s33, n, m, k, t, lame, two_mu):
     return e11 if flows else 0.0, e22 if flows else 0.0, e12 if flows else 0.0, e33 if flows else 0.0, how
 
 
+SIDE, HIGH, LOW, HIGH_CORNER, LOW_CORNER = 1.0, 2.0, 3.0, 4.0, 5.0
+"""Where a stress returns to in plane stress: the side between the stresses of either sign, those of the high and of the
+low one (with the corner of equal stresses), and the corners between them."""
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def plane_stress_return(low, high, n, m, k, t, a, b):
+    """Where the principal stresses of the plane low <= high [Pa] return to in plane stress, low and high, and to which
+    part (0: they are inside); t: at most k / n; a = lambda' + 2 G, b = lambda'; others see `principal_return`."""
+    shear, p = n * high - low - k, a - b * m - b * n + a * n * m
+    one, end = shear / p, n * t - k
+    r_low, r_high = low + one * (a - b * m), high - one * (a * m - b)
+    under, over = low - b * ((high - t) / a), high + b * ((-k - low) / a)
+    of_high, of_low = (high > t) & (under >= end), (low < -k) & (over <= 0.0)
+    side = (shear > 0.0) & (r_high >= 0.0) & (r_high <= t)
+    corner = HIGH_CORNER if r_high > t else LOW_CORNER
+    where = HIGH if of_high else (LOW if of_low else (SIDE if side else corner))
+    outside = (shear > 0.0) | (high > t) | (low < -k)
+    c_low, c_high = (end if r_high > t else -k), (t if r_high > t else 0.0)
+    r_low = min(under, t) if of_high else (-k if of_low else (r_low if side else c_low))
+    r_high = t if of_high else (max(over, -k) if of_low else (r_high if side else c_high))
+    return r_low if outside else low, r_high if outside else high, where if outside else 0.0
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def plane_stress_strain(s11, s22, s12, s33, n, m, k, t, lame, two_mu):
+    """`plastic_strain` in plane stress; lame: lambda'. The strain 33 is that of the flow."""
+    mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
+    radius = math.sqrt(half * half + s12 * s12)
+    high, low = mean + radius, mean - radius
+    sheared = k / n < t
+    r_low, r_high, where = plane_stress_return(low, high, n, m, k, k / n if sheared else t, lame + two_mu, lame)
+    d_high, d_low, per = high - r_high, low - r_low, 1.0 / two_mu
+    common = lame / (2.0 * lame + two_mu) * (d_high + d_low)
+    e_mean, e_half = (0.5 * (d_high + d_low) - common) * per, 0.5 * (d_high - d_low) * per
+    along = e_half / radius if radius > 0.0 else 0.0
+    # Of h and l what is not of the side between them, with m e33 = -that of h in shear, e33 = -m that of l.
+    e_high, e_low = e_mean + e_half, e_mean - e_half
+    of_high = e_high + e_low if where == HIGH else e_high + m * e_low
+    of_low = e_high + e_low if where == LOW else e_low + e_high / m
+    e33 = -of_high / m if sheared & ((where == HIGH) | (where == HIGH_CORNER)) else 0.0
+    e33 = -m * of_low if (where == LOW) | (where == LOW_CORNER) else e33
+    in_tension = (where == HIGH) & (not sheared)
+    how = 2.0 if in_tension else (3.0 if (where == HIGH_CORNER) & (not sheared) else 1.0)
+    flows = where > 0.0
+    return (
+        e_mean + along * half if flows else 0.0, e_mean - along * half if flows else 0.0, along * s12 if flows else 0.0,
+        e33 if flows else 0.0, how if flows else 0.0,
+    )  # fmt: skip
+
+
 @njit(cache=True, error_model="numpy")
 def relieve(i, j, c, base, memory, s0):
     """Into row i of s0 the stress [Pa] of a triangle without strain: its initial stress less D e_p; j: its row of
     memory."""
     e11, e22, e12, e33 = memory[j, E11], memory[j, E22], memory[j, E12], memory[j, E33]
-    two_mu = c[i, TWO_MU]
-    pressure = c[i, LAMBDA] * (e11 + e22 + e33)
-    s0[i, 0] = base[i, 0] - (pressure + two_mu * e11)
-    s0[i, 1] = base[i, 1] - (pressure + two_mu * e22)
-    s0[i, 2] = base[i, 2] - two_mu * e12
-    s0[i, 3] = base[i, 3] - (pressure + two_mu * e33)
+    s11, s22, s12, s33 = laws.hooke(e11, e22, e12, e33, c[i, LAMBDA], c[i, TWO_MU], c[i, FREE])
+    s0[i, 0], s0[i, 1] = base[i, 0] - s11, base[i, 1] - s22
+    s0[i, 2], s0[i, 3] = base[i, 2] - s12, base[i, 3] - s33
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -161,7 +221,7 @@ def _gather(n, first, rows, wide, x, c, s0, law, table, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _try(n, small, lanes):
+def _try(n, small, free, lanes):
     """Trial stresses, in the place of those without strain, and by how much they are outside."""
     for e in range(U(n)):
         x1, y1 = lanes[X1 + e], lanes[Y1 + e]
@@ -173,7 +233,7 @@ def _try(n, small, lanes):
         e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
         p, m = lanes[LAM + e] * (e11 + e22), lanes[MU2 + e]
         s11, s22 = lanes[S11 + e] + (p + m * e11), lanes[S22 + e] + (p + m * e22)
-        s12, s33 = lanes[S12 + e] + m * e12, lanes[S33 + e] + p
+        s12, s33 = lanes[S12 + e] + m * e12, lanes[S33 + e] + (p - free * p)
         lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e] = s11, s22, s12, s33
         lanes[OUTSIDE + e] = laws.outside(
             s11, s22, s12, s33, lanes[L_PHI + e], lanes[L_STRENGTH + e], lanes[L_TENSILE + e]
@@ -206,27 +266,44 @@ def _choose(n, lanes, who):
     return m
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def return_all(n, lanes):
-    """Plastic strains of n trial stresses, and how they flow."""
-    for e in range(U(n)):
-        e11, e22, e12, e33, how = plastic_strain(
-            lanes[T11 + e], lanes[T22 + e], lanes[T12 + e], lanes[T33 + e], lanes[P_PHI + e], lanes[P_PSI + e],
-            lanes[P_STRENGTH + e], lanes[P_TENSILE + e], lanes[P_LAM + e], lanes[P_MU2 + e],
-        )  # fmt: skip
-        lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e], lanes[HOW + e] = e11, e22, e12, e33, how
+def _return_loop(strain):
+    """The loop that finds plastic strains of n trial stresses, and how they flow."""
+
+    @njit(nogil=True, error_model="numpy")
+    def loop(n, lanes):
+        for e in range(U(n)):
+            e11, e22, e12, e33, how = strain(
+                lanes[T11 + e], lanes[T22 + e], lanes[T12 + e], lanes[T33 + e], lanes[P_PHI + e], lanes[P_PSI + e],
+                lanes[P_STRENGTH + e], lanes[P_TENSILE + e], lanes[P_LAM + e], lanes[P_MU2 + e],
+            )  # fmt: skip
+            lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e], lanes[HOW + e] = e11, e22, e12, e33, how
+
+    return loop
+
+
+_return_all, _return_in_plane_stress = _return_loop(plastic_strain), _return_loop(plane_stress_strain)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def measure(m, lanes):
+def return_all(n, free, lanes):
+    """Plastic strains of n trial stresses, and how they flow; free: as of `laws.hooke`."""
+    if free == 0.0:
+        _return_all(n, lanes)
+    else:
+        _return_in_plane_stress(n, lanes)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def measure(m, free, lanes):
     """Shear, volume and work of the m plastic strains."""
     for e in range(U(m)):
         e11, e22, e12, e33 = lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e]
-        volume, two_mu = e11 + e22 + e33, lanes[P_MU2 + e]
-        third, pressure = volume / 3.0, lanes[P_LAM + e] * volume
+        s11, s22, s12, s33 = laws.hooke(e11, e22, e12, e33, lanes[P_LAM + e], lanes[P_MU2 + e], free)
+        volume = e11 + e22 + e33
+        third = volume / 3.0
         d11, d22, d33 = e11 - third, e22 - third, e33 - third
-        work = (lanes[T11 + e] - (pressure + two_mu * e11)) * e11 + (lanes[T22 + e] - (pressure + two_mu * e22)) * e22
-        work += 2.0 * (lanes[T12 + e] - two_mu * e12) * e12 + (lanes[T33 + e] - (pressure + two_mu * e33)) * e33
+        work = (lanes[T11 + e] - s11) * e11 + (lanes[T22 + e] - s22) * e22
+        work += 2.0 * (lanes[T12 + e] - s12) * e12 + (lanes[T33 + e] - s33) * e33
         lanes[P_SHEAR + e] = math.sqrt(0.5 * (d11 * d11 + d22 * d22 + d33 * d33 + 2.0 * e12 * e12))
         lanes[P_VOLUME + e] = volume
         lanes[P_WORK + e] = work / lanes[P_PER_AREA + e]
@@ -262,19 +339,19 @@ def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, soft, small
     lanes = np.zeros(LANES * CAPACITY)
     who = np.zeros(BLOCK, np.int64)
     flat_x, flat_c, flat_s0 = x.reshape(x.size), c.reshape(c.size), s0.reshape(s0.size)
-    flat_table = table.reshape(table.size)
+    flat_table, free = table.reshape(table.size), c[0, FREE]
     blocks = -(-count // BLOCK)
     for b in range(blocks * t // threads, blocks * (t + 1) // threads):
         first = b * BLOCK
         n = min(BLOCK, count - first)
         _gather(n, first, rows, wide, flat_x, flat_c, flat_s0, law, flat_table, lanes)
-        _try(n, small, lanes)
+        _try(n, small, free, lanes)
         if _all_inside(n, lanes) < 0:
             continue
         m = _choose(n, lanes, who)
         if m > 0:
-            return_all(m, lanes)
-            measure(m, lanes)
+            return_all(m, free, lanes)
+            measure(m, free, lanes)
             _remember(m, first, first_row, rows, who, lanes, c, base, law, table, soft, step, memory, s0)
 
 
@@ -306,6 +383,17 @@ def relieve_all(rows, first, c, base, memory, s0):
         relieve(i, rows[i] - first, c, base, memory, s0)
 
 
+@njit(cache=True, error_model="numpy")
+def kept_energy(j, o, base, b, lame, two_mu, free, memory):
+    """Of `locked_in` per volume [J/m3]; o, b: first columns of memory (row j) and of base (a row)."""
+    e11, e22, e12, e33 = memory[j, o + E11], memory[j, o + E22], memory[j, o + E12], memory[j, o + E33]
+    e33 = e33 - free * e33
+    trace = e11 + e22 + e33
+    squares = e11 * e11 + e22 * e22 + 2.0 * e12 * e12 + e33 * e33
+    own = base[b] * e11 + base[b + 1] * e22 + 2.0 * base[b + 2] * e12 + base[b + 3] * e33
+    return 0.5 * (lame * trace * trace + two_mu * squares) - own
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def locked_in(rows, first, c, base, memory, out):
     """Add to out (n_own,) what the elastic energy [J/m] differs by from that of an element with the initial stress s0:
@@ -313,9 +401,5 @@ def locked_in(rows, first, c, base, memory, out):
     A [e_p : D e_p / 2 - base : e_p], s0 = base - D e_p."""
     for i in range(len(rows)):
         j = rows[i] - first
-        e11, e22, e12, e33 = memory[j, E11], memory[j, E22], memory[j, E12], memory[j, E33]
-        trace = e11 + e22 + e33
-        squares = e11 * e11 + e22 * e22 + 2.0 * e12 * e12 + e33 * e33
-        own = base[i, 0] * e11 + base[i, 1] * e22 + 2.0 * base[i, 2] * e12 + base[i, 3] * e33
         area = 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2])
-        out[j] += area * (0.5 * (c[i, LAMBDA] * trace * trace + c[i, TWO_MU] * squares) - own)
+        out[j] += area * kept_energy(j, 0, base[i], 0, c[i, LAMBDA], c[i, TWO_MU], c[i, FREE], memory)
