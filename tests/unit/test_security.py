@@ -53,6 +53,7 @@ KNOWN = {
     ("commands/dem/__init__.py", "importlib.import_module"),
     ("commands/fdem/__init__.py", "importlib.import_module"),
     ("session.py", "importlib.import_module"),
+    ("physics/fields.py", "importlib.import_module"),
     # The packages that hpcdem needs, for the doctor.
     ("runtime/doctor/software.py", "importlib.import_module"),
     # libgomp.so.1, by that name, where the system finds it.

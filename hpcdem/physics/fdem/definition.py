@@ -686,7 +686,7 @@ class ModelDefinition:
         out = self.stress0[elements]
         said, now = self.stress0_row[elements], self.element_row[elements]
         ratio = np.ones((len(out), 2))
-        of = moduli(self)
+        of = moduli(self.element_rows, self.options.plane_stress)
         for c, modulus in enumerate((of.bulk, of.shear)):
             other = (said > 0) & (modulus[said] != modulus[now])
             ratio[other, c] = modulus[now[other]] / modulus[said[other]]

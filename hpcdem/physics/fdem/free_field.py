@@ -166,7 +166,7 @@ class FreeField(SurfaceLoad):
         """lambda, mu [Pa] and density [kg/m3] of the elements at the sides."""
         blocks = self.blocks
         row = blocks.element_row[self.faces["face"][:, 0] // 4]
-        of = moduli(blocks)
+        of = moduli(blocks.element_rows, blocks.options.plane_stress)
         return of.lame[row], of.shear[row], np.array(blocks.element_rows.column("density"))[row]
 
     def storage_rebuilt(self) -> None:

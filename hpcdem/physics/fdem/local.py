@@ -75,7 +75,8 @@ def laws_of(rows: Rows) -> np.ndarray:
 
 def element_table(sim: State) -> np.ndarray:
     """The table of element models (rows, 5) of build.py."""
-    of, (density, young, damp) = moduli(sim), map(sim.element_rows.column, ("density", "young", "damp_factor"))
+    of = moduli(sim.element_rows, sim.options.plane_stress)
+    density, young, damp = map(sim.element_rows.column, ("density", "young", "damp_factor"))
     return np.column_stack([density, of.lame, 2.0 * of.shear, young, damp])
 
 
@@ -602,7 +603,7 @@ class Local:
 
     def _impedances(self, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """rho c_p and rho c_s of elements (n,) [Pa s/m]."""
-        row, of = self.sim.element_row[number], moduli(self.sim)
+        row, of = self.sim.element_row[number], moduli(self.sim.element_rows, self.sim.options.plane_stress)
         rho = np.array(self.sim.element_rows.column("density"))[row]
         return np.sqrt(rho * of.wave[row]), np.sqrt(rho * of.shear[row])
 
@@ -1278,7 +1279,7 @@ class Local:
         initial stress: (p^2 + 2 p m) A / (2 K), see moduli.py."""
         sim, number = self.sim, self.sim.number[self.sim.owned]
         stress = np.asarray(sim.surface_loads.eigenstress(sim))
-        of = moduli(sim)
+        of = moduli(sim.element_rows, sim.options.plane_stress)
         bulk = of.bulk[sim.element_row[number]]
         said = sim.initial_stresses(number) if sim.stress0 is not None else np.zeros((sim.n_own, 4))
         if (part := by_temperature.part_of_young(sim)) is not None:

@@ -13,12 +13,11 @@ fastest wave. The laws of elements take lambda and 2 G of here and are told by a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from hpcdem.physics.fdem.definition import ModelDefinition
+from hpcdem.physics.fdem.properties import Rows
 
 
 class Moduli(NamedTuple):
@@ -31,10 +30,10 @@ class Moduli(NamedTuple):
     normal: list[int]
 
 
-def moduli(sim: ModelDefinition) -> Moduli:
+def moduli(rows: Rows, plane_stress: bool) -> Moduli:
     """Those of the models of elements that were given; zero where there is none."""
-    bulk, shear = (np.array(sim.element_rows.column(name)) for name in ("bulk", "shear"))
-    if not sim.options.plane_stress:
+    bulk, shear = (np.array(rows.column(name)) for name in ("bulk", "shear"))
+    if not plane_stress:
         return Moduli(bulk, shear, bulk - 2.0 / 3.0 * shear, bulk + 4.0 / 3.0 * shear, [0, 1, 3])
     stiff = 3.0 * bulk + 4.0 * shear
     plane = np.divide(9.0 * bulk * shear, stiff, out=np.zeros_like(bulk), where=stiff > 0.0)

@@ -325,7 +325,7 @@ class Diffusing(Assigned, Field):
             return None
         if self._stiffness_of is not blocks.number:  # whatever changes it makes storage of its own
             number = blocks.number[blocks.owned]
-            of = moduli(blocks)
+            of = moduli(blocks.element_rows, blocks.options.plane_stress)
             bulk = of.bulk[blocks.element_row[number]]
             self._stiffness = len(of.normal) * bulk * self.column(self.expansion)[self.row[number]]
             self._quad, self._stiffness_of = blocks.the_mesh().cells[number, 3] >= 0, blocks.number
