@@ -143,7 +143,8 @@ class Blocks(State):
             self.log.info(text)
 
     def before_change(self) -> None:
-        if self.budget is not None and self.closed:
+        if self.budget is not None and (self.closed or self.budget.running):
+            self.close_model()  # a step may have left it open, to be sorted anew
             if self.comm.any(bool(self.local.tally[:, elements.NEW_BROKEN].any())):
                 self._renew_lists()  # what broken joints lose is not the doing of commands
             self.budget.pause(self)
