@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 
-from hpcdem.core.errors import CommandError
+from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.kernels import joint_law
 from hpcdem.physics.fdem.local import joint_tables
@@ -32,6 +33,17 @@ ROUGH = {
 PEAK = 0.1 / 500.0 * (10.0 / 0.1) ** 0.33
 """Path at the peak of ROUGH [m], Barton et al. 1985."""
 SEEN = ("opening", "slip", "normal_stress", "shear_stress")
+
+
+class Log(list[str]):
+    """What is said once."""
+
+    def warn_once(self, key: str, text: str) -> None:
+        if not self:
+            self.append(text)
+
+    def info(self, text: str) -> None:
+        pass
 
 
 def law_of(model: Model, **values: float) -> tuple[np.ndarray, np.ndarray]:
@@ -246,6 +258,41 @@ def test_another_law_forgets_what_the_first_remembered():
     move_top(sim, 0.0, 0.0)
     assert diagnostics.values(sim, "state").tolist() == [2.0]
     assert diagnostics.values(sim, "normal_stress")[0] == pytest.approx(-8e5 / (1.0 - 0.4), rel=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["quad", "hexes"])
+def test_sides_that_have_left_each_other(kind):
+    """From a tenth of the edge the log says it, where and how far; beyond the whole of it there is no balance and no
+    step any more, and the model of the static solve is as it was."""
+    sim, said = stack(kind, COULOMB_JOINT.name, {**COULOMB, "dilation": 0.0}), Log()
+    sim.log = said
+    move_top(sim, 0.0, -8e-5)
+    move_top(sim, 9e-3, 0.0)
+    assert not said
+    move_top(sim, 2e-3, 0.0)
+    place = r"\(0.05, 0.1\)" if kind == "quad" else r"\(0.0\d+, 0.0\d+, 0.1\)"
+    assert len(said) == 1
+    assert re.search(rf"face-joint \d+ \(joint-mohr-coulomb\) at {place} are 0.011 m apart, 0.11 of its size", said[0])
+    with pytest.raises(CommandError, match=r"0\.111 m apart, 1\.1 of its size.*the run ends where"):
+        move_top(sim, 0.1, 0.0)
+    assert of_joints(sim, "slip") == pytest.approx(np.copysign(0.011, of_joints(sim, "slip")), rel=1e-3)
+    other = stack(kind, COULOMB_JOINT.name, COULOMB, young=1e9, dynamic=True)
+    top = np.flatnonzero(other.the_mesh().points[:, -1] > EDGE + 1e-9)
+    other.velocity_condition(top, **{f"v{'xyz'[other.dim - 1]}": 100.0})
+    with pytest.raises(PhysicsError, match=r"the sides of face-joint .* m apart"):
+        convergence.advance(other, 20000)
+
+
+@pytest.mark.parametrize("model, values", [(COULOMB_JOINT, COULOMB), (BARTON_BANDIS, ROUGH)], ids=["coulomb", "rough"])
+def test_cracks_cannot_slide_by_such_a_law(model, values):
+    """Their sides are free: the law would be silent."""
+    sim = Blocks()
+    sim.take_mesh(rectangle(1, 2, EDGE, 2.0 * EDGE, kind="quad"))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    joint = sim.numbers_of_joints(None)
+    sim.open_faces(joint)
+    with pytest.raises(CommandError, match=rf"face-joint {joint[0]} at \(0.05, 0.1\) is a crack \(1 in all\).*embed"):
+        sim.joint_model(None, model.name, values)
 
 
 def test_what_makes_no_sense_is_refused():

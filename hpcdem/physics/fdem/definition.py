@@ -53,6 +53,8 @@ DEEP_OVERLAP = WARN, STOP = "warn", "stop"
 POTENTIAL = DISTANCE, MUNJIZA = "distance", "munjiza"
 """What contact in space presses with: the distance to the nearest side of an element, over a length of its body, or
 four times the smallest of its barycentric coordinates (Munjiza 2004)."""
+SLIDING = (COULOMB_JOINT.name, BARTON_BANDIS.name)
+"""Models of joints that slide and never break."""
 AGAIN, CRACK = 2, 3
 """In `broken`: a joint that broke before, or never was whole, and is a joint again for so long (pressed.py)."""
 RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
@@ -406,7 +408,7 @@ class ModelDefinition:
     def slides(self) -> np.ndarray:
         """(4 ne,) bool: joints, by their lower faces, with a model that slides and never breaks."""
         names = [self.joint_rows.name(row) for row in range(len(self.joint_rows))]
-        return self.joint_exists() & np.isin(names, (COULOMB_JOINT.name, BARTON_BANDIS.name))[self.joint_row]
+        return self.joint_exists() & np.isin(names, SLIDING)[self.joint_row]
 
     def _has_model(self, model: Model) -> np.ndarray:
         names = [self.element_rows.name(row) for row in range(len(self.element_rows))]
@@ -456,9 +458,23 @@ class ModelDefinition:
     def joint_model(self, joints: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a cohesive model to inner edges: elements on both sides get nodes of their own, tied by tractions.
 
-        Joints that are broken stay broken. None: all inner edges."""
+        Joints that are broken stay broken: a model that slides, which would never act there, is refused. None: all
+        inner edges."""
         at = self.numbers_of_joints(joints)
+        if name in SLIDING:
+            self._refuse_cracks(at, name)
         self._assign(self.joint_rows, self._both_sides(at), at, JOINT, name, properties, True)
+
+    def _refuse_cracks(self, joints: np.ndarray, name: str) -> None:
+        """CommandError if some of these joints are cracks."""
+        self.before_change()  # those that broke just now are known from here on
+        if len(cracks := joints[self.open[joints]]):
+            at = ", ".join(f"{c:g}" for c in self._mesh().points[self._mesh().face_points(cracks)][0].mean(axis=0))
+            raise CommandError(
+                f"face-joint {cracks[0]} at ({at}) is a crack ({len(cracks)} in all): its sides are free and meet by "
+                f"contact, so {name.replace('_', '-')} would not act there. mesh create embed, in the place of crack, "
+                "makes edges along a line that are whole; a range leaves out what broke"
+            )
 
     def joint_property(self, joints: Numbers, properties: Mapping[str, Value]) -> None:
         """Change some properties of joints that have a model; None: of all that have one."""

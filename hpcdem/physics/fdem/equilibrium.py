@@ -21,7 +21,16 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import changes, connectivity, diagnostics, floors, tangent_space, user_functions, user_laws
+from hpcdem.physics.fdem import (
+    apart,
+    changes,
+    connectivity,
+    diagnostics,
+    floors,
+    tangent_space,
+    user_functions,
+    user_laws,
+)
 from hpcdem.physics.fdem.by_temperature import TEMPERATURE
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import nodes as moving
@@ -180,6 +189,7 @@ def solve_elastic(
         refuse_touching(sim, touching(sim), "touch in the equilibrium that was found")
         if sim.comm.any(inverted(sim)):
             raise CommandError("an element is turned inside out in the equilibrium that was found: loads are too large")
+        apart.check(sim, sim.local, CommandError)
     except CommandError:
         sim.relaxations = relaxations
         sim.before_change()

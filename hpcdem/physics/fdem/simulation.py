@@ -30,6 +30,7 @@ from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
 from hpcdem.physics.fdem import (
+    apart,
     build,
     by_temperature,
     connectivity,
@@ -432,7 +433,7 @@ class Blocks(State):
         ranks get the same answers.
         """
         rebuild_state = self.rebuild_state
-        found, more = np.zeros(9), np.zeros(4)
+        found, more = np.zeros(10), np.zeros(4)
         for places, out in ((self.listed, found), (self.origin, more)):
             self._survey(places, out)
         found[4] = float(self.local.tally[:, elements.NEW_BROKEN].sum())
@@ -442,8 +443,9 @@ class Blocks(State):
         if due := self.options.collision and self.clock.step - rebuild_state.watched >= LONGEST_WAIT:
             rebuild_state.watched = self.clock.step
             found[8] = overlaps.part(self, self.local)
+        found[9] = apart.part(self, self.local)
         self.comm.max_into(found)
-        path2, speed2, broken, inverted, breaks, yields, request, way2, deep = found.tolist()
+        path2, speed2, broken, inverted, breaks, yields, request, way2, deep, slid = found.tolist()
         dt = self.clock.dt
         stride = math.sqrt(speed2) * dt
         if broken or inverted or stride > 0.5 * self.mean_edge:
@@ -451,6 +453,8 @@ class Blocks(State):
         if due and deep > max(overlaps.DEEP, overlaps.AGAIN * rebuild_state.deep):
             rebuild_state.deep = deep
             overlaps.tell(self, self.local)
+        if slid > apart.FAR:
+            apart.check(self, self.local, PhysicsError)
         self.local.tally[:, elements.NEW_YIELDED] = 0
         stale, outdated = breaks > 0.0, rebuild_state.stored >= OLDEST
         wait = float(LONGEST_WAIT // 4 if yields > 0.0 else LONGEST_WAIT)  # a joint may be about to break
