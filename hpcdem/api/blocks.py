@@ -691,7 +691,7 @@ class Joints(_Modelled):
     _word, kind, pcdc = "joints", g.JOINT, "face-joint"
 
     def reset_state(self, *, where: Where = None) -> None:
-        """Damage of joints that are not broken is forgotten."""
+        """Damage of joints that are not broken is forgotten; of those that slide, that they are torn, not what slid."""
         self._carry_out("reset state", {}, where)
 
 

@@ -128,7 +128,7 @@ PCDC = {
     "face-joint group": "把节理放入组。",
     "face-joint c-model": "单元之间节理的模型;没有模型的节理永不断开。",
     "face-joint property": "修改已有模型的节理参数,其余不变。",
-    "face-joint reset state": "清除未断节理的损伤。",
+    "face-joint reset state": "清除未断节理的损伤;滑动节理只清除拉裂,已滑动的量保留。",
     "node group": "把节点放入组。",
     "node boundary": "节点的边界条件。",
     "node mechanical-damp": "节点的局部阻尼(0 到 1),代替模型的局部阻尼。",

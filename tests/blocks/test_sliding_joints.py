@@ -8,16 +8,19 @@ import re
 import numpy as np
 import pytest
 
-from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.core.errors import CommandError, PhysicsError, ScriptError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.kernels import joint_law
 from hpcdem.physics.fdem.local import joint_tables
+from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import BARTON_BANDIS, COULOMB_JOINT, Model, Rows
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow.coupled import Coupled
+from hpcdem.physics.flow.kernels import PRESSURE
 from hpcdem.physics.flow.model import Flow
-from tests.blocks.support import ROCK, rectangle
+from tests.blocks.support import ROCK, near, rectangle
 from tests.flow.support import WATER
+from tests.pcdc.fake import Bench
 from tests.space.support import box, hexes
 
 EDGE = 0.1
@@ -258,6 +261,112 @@ def test_another_law_forgets_what_the_first_remembered():
     move_top(sim, 0.0, 0.0)
     assert diagnostics.values(sim, "state").tolist() == [2.0]
     assert diagnostics.values(sim, "normal_stress")[0] == pytest.approx(-8e5 / (1.0 - 0.4), rel=1e-3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_forgetting_damage_leaves_stress_as_it_is(kind):
+    """What has slid stays so, without a jump of the shear stress; what was torn holds again."""
+    for name, values in ((COULOMB_JOINT.name, COULOMB), (BARTON_BANDIS.name, ROUGH)):
+        sim = stack(kind, name, values)
+        move_top(sim, 0.0, -8e-5)
+        tau = move_top(sim, 8e-4, 0.0)[3]
+        before = move_top(sim, -0.9 * tau / values["shear_stiffness"], 0.0)
+        assert before[3] == pytest.approx(0.1 * tau, rel=0.05)
+        changes.reset_joint_state(sim)
+        assert move_top(sim, 0.0, 0.0) == pytest.approx(before, rel=1e-6)
+    sim = stack(kind, COULOMB_JOINT.name, COULOMB)
+    move_top(sim, 0.0, 1e-4)
+    assert of_joints(sim, "damage").max() == 1.0
+    changes.reset_joint_state(sim)
+    assert of_joints(sim, "damage").max() == 0.0
+    assert move_top(sim, 0.0, -1e-4 + 1e-6)[2] == pytest.approx(1e4, rel=1e-3)  # k_n 1e-6 m, below 2e4
+
+
+def wedge(name: str, values: dict[str, float]) -> Blocks:
+    """A triangle of a square metre in a notch of 45 degrees, pressed into it by its weight."""
+    points = [(-1, 0), (0, -1), (0, 0), (1, 0), (-1, -1.5), (0, -1.5), (1, -1.5)]
+    mesh = Mesh.of(np.array(points, float), [(0, 1, 2, -1), (2, 1, 3, -1), (4, 5, 1, 0), (5, 6, 3, 1)])
+    sim = Blocks()
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e13, "poisson_ratio": 0.0})
+    joints = sim.numbers_of_joints(None)
+    x, y = np.moveaxis(mesh.points[mesh.face_points(joints)], -1, 0)
+    sim.joint_model(joints[(np.abs(np.abs(x) - (y + 1.0)) < 1e-9).all(axis=1)], name, values)
+    sim.option(dynamic=False, collision=False)
+    sim.velocity_condition([4, 5, 6], vx=0.0, vy=0.0)
+    sim.gravity(0.0, -1000.0)
+    return sim
+
+
+@pytest.mark.parametrize("friction", [15.0, 25.0])
+def test_a_wedge_on_two_joints(friction):
+    """W = 2 (N + T) cos(45): T = N tan(phi) where it slides, else N k_s / k_n, as it goes straight down."""
+    values = {**COULOMB, "friction": friction, "cohesion": 0.0, "tensile_strength": 0.0, "dilation": 0.0}
+    weight, tan = 1000.0 * ROCK["density"], math.tan(math.radians(friction))
+    normal = weight / math.sqrt(2.0) / (1.0 + min(tan, 0.4))
+    for at_rest in (True, False):
+        sim = wedge(COULOMB_JOINT.name, values)
+        if at_rest:
+            equilibrium.solve_elastic(sim)
+        else:
+            assert convergence.solve(sim, ratio=1e-7, cycles=20000).reason == "ratio"
+        sigma, tau = of_joints(sim, "normal_stress"), np.abs(of_joints(sim, "shear_stress"))
+        # relaxation comes to rest from below, where it has slid too far
+        assert -math.sqrt(2.0) * sigma == pytest.approx([normal] * 2, rel=1e-3 if at_rest else 5e-3)
+        assert (tau - sigma).sum() == pytest.approx(weight, rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["cross", "quad"])
+def test_fluid_takes_from_the_strength(kind):
+    """Explicit steps: tau = (sigma - p) tan(phi) under a load of 1 MPa and 0.4 MPa in the channel, whose aperture is
+    what the joint is opened, beside the initial one."""
+    values = {**COULOMB, "friction": 15.0, "cohesion": 0.0, "tensile_strength": 0.0, "dilation": 3.0}
+    sim = stack(kind, COULOMB_JOINT.name, values, young=1e9, dynamic=True)
+    mesh, flow = sim.the_mesh(), Flow.of(sim)
+    flow.assign(np.flatnonzero(sim.slides()), {**WATER, "fluid_bulk": 1e6, "aperature_initial": 1e-4})
+    flow.prescribe(np.flatnonzero(np.abs(mesh.points[:, 1] - EDGE) < 1e-9), PRESSURE, 4e5)
+    sim.stress_condition(near(mesh, 1, 2.0 * EDGE), yy=-1e6)
+    sim.velocity_condition(np.flatnonzero(mesh.points[:, 1] > 2.0 * EDGE - 1e-9), vx=0.05)
+    sim.element_property(None, {"damp_factor": 0.8})
+    convergence.advance(sim, 3000)
+    tau, sigma = np.abs(of_joints(sim, "shear_stress")).mean(), -of_joints(sim, "normal_stress").mean()
+    assert tau == pytest.approx(6e5 * math.tan(math.radians(15.0)), rel=5e-3)
+    assert sigma == pytest.approx(6e5, rel=5e-3)
+    opening = of_joints(sim, "opening")
+    assert opening[0] > -sigma / 1e10 + 1e-5  # it has dilated
+    assert flow.apertures() == pytest.approx(1e-4 + opening, rel=1e-6)
+
+
+def test_words_of_scripts(tmp_path):
+    """Under 1 MPa closure is sigma / k_n = 0.1 mm, then, as a rough joint, sigma / (k_n + sigma / V_m) = 0.0667 mm."""
+    bench = Bench(tmp_path, blocks=Blocks(outdir=tmp_path / "data"))
+    bench("""\
+pcdc mesh structured (0,0) (1,1) cells 2 2
+pcdc element c-model mech-iso-e property density 2650 young 30e9 poisson-r 0
+pcdc face-joint c-model j-m-c property normal-stiffness 1e10 s-s 4e9 friction 30 range y 0.5 0.5
+pcdc face-joint property dilation 5 dilation-limit 1e-3 cohesion 1e5 tensile-strength 1e4 range y 0.5 0.5
+pcdc node boundary mech-vel-b-c velocity-x 0 velocity-y 0 range y 0 0
+pcdc element-face boundary mech-stress-b-c stress-yy -1e6 range y 1 1
+pcdc history create 'closed' joint value opening mean every 1 range y 0.5 0.5
+pcdc model option dynamic off large-strain off
+pcdc model solve elastic
+first = pcdc.values('joint', 'opening', y=(0.5, 0.5))
+pcdc face-joint c-model j-b-b property n-s 1e10 s-s 4e9 closure-maximum 2e-4 r-f 28 jrc 10 jcs 5e7 range y 0.5 0.5
+pcdc face-joint property jrc 8 joint-size 0.5 dilation-part 0.4 range y 0.5 0.5
+pcdc model solve elastic
+second = pcdc.values('joint', 'opening', y=(0.5, 0.5))
+jrc = pcdc.values('joint', 'jrc', y=(0.5, 0.5))
+""")
+    assert bench["first"] == pytest.approx(np.full(2, -1e-4), rel=1e-4)
+    assert bench["second"] == pytest.approx(np.full(2, -1e6 / 1.5e10), rel=1e-4)
+    assert bench["jrc"].tolist() == [8.0, 8.0]
+    for words, why in (
+        ("gf1 10", "joint-barton-bandis has no property gf1"),
+        ("jrc 25", "a number from 0 to 20 for 'jrc'"),
+        ("jcs table 't' over temperature", "read 'temperature', expected one of x, y"),
+    ):
+        with pytest.raises(ScriptError, match=why):
+            bench(f"pcdc table create 't' values (0,1) (1,1)\npcdc face-joint property {words} range y 0.5 0.5\n")
 
 
 @pytest.mark.parametrize("kind", ["quad", "hexes"])

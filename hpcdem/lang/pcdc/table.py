@@ -508,8 +508,8 @@ _POROUS = tuple(
 POROUS = Model(
     "hydr{aulic}-p{orous}-m{edium}", "10",
     "Fluid in joints: each is a channel between its two nodes, broken or not, of the aperture aperature-initial plus "
-    "its mean opening, within the limits. It acts beside the cohesive model of the joint. Given again, fluid that has "
-    "no room any more is gone, and new room is dry. In space channels are the triangles of the joints.",
+    "its mean opening, within the limits. It acts beside the mechanical model of the joint. Given again, fluid that "
+    "has no room any more is gone, and new room is dry. In space channels are the triangles of the joints.",
     _POROUS, of=POROUS_PROPERTIES, dims=BOTH,
 )  # fmt: skip
 FLUID_HEAT = Model(
@@ -1371,7 +1371,8 @@ _OBJECTS = (
              "pcdc face-joint property aperature-initial field 'aperture' shear-dilation 5 range geometry 'fault'"),
             options=(*_OF_JOINTS, *_properties(POROUS), *_properties(FLUID_HEAT), *_properties(GRAINS)),
             ranged="face-joint", needs_option=True, dims=BOTH),
-    Command("f{ace}-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
+    Command("f{ace}-j{oint} res{et} state", "Damage of joints that are not broken is forgotten. Those "
+            "that slide forget that they are torn, not what has slid.",
             ("pcdc face-joint reset state",), ranged="face-joint", dims=BOTH),
     _group_command("node", "n{ode}"),
     Command("n{ode} bou{ndary}", "A boundary condition of nodes.",

@@ -332,7 +332,8 @@ def reset_kelvin_strain(sim: Blocks, elements: Numbers = None) -> None:
 
 
 def reset_joint_state(sim: Blocks, joints: Numbers = None) -> None:
-    """Damage of joints that hold is forgotten, and their largest opening and slip. Broken ones stay broken."""
+    """Damage of joints that hold is forgotten, and their largest opening and slip. Broken ones stay broken; those that
+    slide keep what stays of their slip, path and dilation, and their stress with it."""
     at = sim.numbers_of_joints(joints)
     sim.before_change()  # those that broke just now are known from here on
     at = at[(sim.joint_row[at] > 0) & ~sim.open[at]]

@@ -83,10 +83,14 @@ class Histories:
         return self.keep((key < 0) | ~gone[other])
 
     def without_joints(self, number: np.ndarray, forget: np.ndarray) -> Histories:
-        """Without the joints on faces flagged in `forget` (4 ne,); number (n,): the elements."""
+        """Without the joints on faces flagged in `forget` (4 ne,); number (n,): the elements. Those that slide forget
+        that they are torn: stresses depend on the rest."""
         key = self.keys()
         face = 4 * number[self.owners()] + np.where(key < 0, -1 - key, 0)
-        return self.keep((key >= 0) | ~forget[face])
+        chosen, state = (key < 0) & forget[face], self.rows[:, STATE]
+        torn = np.flatnonzero(chosen & (state == joints.BROKEN + joint_law.COULOMB))
+        self.rows[torn, FIRST + joint_law.OWN : FIRST + joint_law.OWN + 3] = 0.0
+        return self.keep(~chosen | (state > joints.BROKEN))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
