@@ -158,8 +158,9 @@ def test_strength_of_a_plate(kind):
 
 @pytest.mark.parametrize("kind", ["cross", "quad"])
 def test_a_footing_at_rest_is_that_of_relaxation(kind):
-    """On half of the top of a plate, in small stages, as what flows depends on the way: static solve and steps."""
-    rock = {**SOIL, "cohesion": 1e6, "friction": 25.0, "dilation": 25.0, "tensile": 1e6}
+    """On half of the top of a plate, in small stages: static solve and steps. (A load put on at once swings beyond its
+    end in relaxation, and what flows then stays: 5 % of the stress.)"""
+    rock = {**SOIL, "cohesion": 1e6, "friction": 25.0, "dilation": 5.0, "tensile": 1e6}
     found = []
     for at_once in (True, False):
         sim = plate(kind, "mech_mohr_coulomb", **rock)
@@ -175,7 +176,7 @@ def test_a_footing_at_rest_is_that_of_relaxation(kind):
                 assert convergence.solve(sim, ratio=1e-7, cycles=20000).reason == "ratio"
         found.append(stresses(sim))
         assert diagnostics.values(sim, "plastic_shear_strain").max() > 1e-5
-    assert np.abs(found[0] - found[1]).max() < 0.02 * np.abs(found[1]).max()
+    assert np.abs(found[0] - found[1]).max() < 1e-3 * np.abs(found[1]).max()
 
 
 @every_kind
