@@ -249,6 +249,11 @@ SAME: list[tuple[str, str]] = [
     ("pcdc face-joint group 'a' set 's'", "sim.joints.group('a', 's')"),
     ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200 np 3",
      "sim.joints.model('c-i-c-i', friction=30, cohesion=10e6, tensile_strength=2e6, gf1=20, gf2=200, np=3)"),
+    ("pcdc face-joint c-model j-m-c property n-s 1e10 s-s 4e9 friction 30 dilation 5 range crack",
+     "sim.joints.model('j-m-c', normal_stiffness=1e10, shear_stiffness=4e9, friction=30, dilation=5, where='crack')"),
+    ("pcdc face-joint c-model j-b-b property normal-stiffness 1e10 s-s 4e9 c-m 2e-4 r-f 28 jrc 8 jcs 5e7",
+     "sim.joints.model('joint-barton-bandis', normal_stiffness=1e10, shear_stiffness=4e9, closure_maximum=2e-4, "
+     "residual_friction=28, jrc=8, jcs=5e7)"),
     ("pcdc face-joint property tensile-strength 1e6 penalty-overlap 1e12 range between 'a' 'b' set 'd'",
      "sim.joints.property(tensile_strength=1e6, penalty_overlap=1e12, where=\"between 'a' 'b' set 'd'\")"),
     ("pcdc face-joint reset state range crack", "sim.joints.reset_state(where=g.OnCrack())"),
