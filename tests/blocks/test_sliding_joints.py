@@ -394,14 +394,30 @@ def test_sides_that_have_left_each_other(kind):
 
 @pytest.mark.parametrize("model, values", [(COULOMB_JOINT, COULOMB), (BARTON_BANDIS, ROUGH)], ids=["coulomb", "rough"])
 def test_cracks_cannot_slide_by_such_a_law(model, values):
-    """Their sides are free: the law would be silent."""
+    """Their sides are free: the law would be silent. Nor do such joints become cracks."""
     sim = Blocks()
     sim.take_mesh(rectangle(1, 2, EDGE, 2.0 * EDGE, kind="quad"))
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     joint = sim.numbers_of_joints(None)
+    sim.joint_model(None, model.name, values)
+    with pytest.raises(CommandError, match=rf"face-joint {joint[0]} \(1 in all\) has the model joint-.*never break"):
+        changes.crack(sim, joint)
     sim.open_faces(joint)
     with pytest.raises(CommandError, match=rf"face-joint {joint[0]} at \(0.05, 0.1\) is a crack \(1 in all\).*embed"):
         sim.joint_model(None, model.name, values)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_side_is_taken_out_and_put_back(kind):
+    """The joint is gone with it, without a word of NumPy, and what comes back hangs together without it."""
+    sim = stack(kind, COULOMB_JOINT.name, COULOMB, young=1e9, dynamic=True)
+    convergence.advance(sim, 20)
+    top = np.flatnonzero(sim.the_mesh().centroids()[:, -1] > EDGE)
+    for change in (lambda: changes.null(sim, top), lambda: changes.element_model(sim, top, "mech_iso_elastic", ROCK)):
+        change()
+        convergence.advance(sim, 20)
+        assert not sim.slides().any() and np.isnan(diagnostics.values(sim, "normal_stress")).all()
 
 
 def test_what_makes_no_sense_is_refused():

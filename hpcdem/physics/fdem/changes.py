@@ -24,8 +24,15 @@ elements that come back do not hang together with it. Others may reach into them
 
 
 def crack(sim: Blocks, joints: Numbers) -> None:
-    """Open inner edges without an event: a crack that is there from the beginning. Faces meet by contact."""
+    """Open inner edges without an event: a crack that is there from the beginning. Faces meet by contact. CommandError
+    for joints that slide, whose model says that they never part."""
     at = sim.numbers_of_joints(joints)
+    if len(slides := at[sim.slides()[at]]):
+        raise CommandError(
+            f"face-joint {slides[0]} ({len(slides)} in all) has the model "
+            f"{sim.joint_rows.name(sim.joint_row[slides[0]]).replace('_', '-')}, whose joints slide and never "
+            "break: as a crack it would follow contact instead. Leave it out, or give it a cohesive model before"
+        )
     sim.before_change()
     sim.open_faces(at)
     sim.changed(topology=True)

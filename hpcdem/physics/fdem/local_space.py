@@ -216,8 +216,9 @@ class LocalSpace(LawsSpace):
                 dashpots[:, FACES[k]] += each[:, k, None]
         size = self.slot_size[: self.slots]
         penalty = joint_law.stiffest(
-            sim.joint_rows.column, laws_of(sim.joint_rows), sim.joint_row[faces], lambda: 1.0 / size
-        )
+            sim.joint_rows.column, laws_of(sim.joint_rows), sim.joint_row[faces],
+            lambda: np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0),
+        )  # fmt: skip
         tied = sim.closed_faces()[faces] & (sim.joint_row[faces] > 0)
         each = np.zeros(len(faces))
         each[tied] = penalty[tied] / size[tied] / 3.0
