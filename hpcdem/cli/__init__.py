@@ -19,7 +19,6 @@ from hpcdem.cli.programs import BY_NAME, FIRST
 from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
 from hpcdem.core.chinese import wanted as wants_chinese
-from hpcdem.core.comm import Comm
 from hpcdem.core.errors import EXIT_OK, EXIT_USAGE
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import launch, shutdown

@@ -7,11 +7,12 @@ operations over MPI are in `halo/comm.py`.
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Protocol
 
 from hpcdem.core.errors import HpcdemError
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 class Comm(Protocol):
@@ -68,6 +69,8 @@ class Comm(Protocol):
         Returns the rank (m,) i8 that each row that came is from, then the columns; in the order of ranks, those of one
         rank in the order in which it had them. Types and shapes of rows are equal on all ranks. One `exchange`.
         """
+        import numpy as np
+
         small = target.astype(np.uint16) if self.size <= 1 << 16 else target  # which numpy sorts in linear time
         order = np.argsort(small, kind="stable")
         cuts = np.flatnonzero(np.diff(target[order])) + 1
@@ -155,12 +158,16 @@ class SerialComm(Comm):
 
 def _packed(columns: list[np.ndarray]) -> np.ndarray:
     """(words,) i8: number of rows, then one column after the other, each filled up to whole words."""
+    import numpy as np
+
     whole = [np.frombuffer(c.tobytes() + bytes(-c.nbytes % 8), np.int64) for c in columns]
     return np.concatenate([np.array([len(columns[0])]), *whole])
 
 
 def _unpacked(parcel: np.ndarray, like: tuple[np.ndarray, ...]) -> list[np.ndarray]:
     """The columns of a parcel; like: arrays with rows of the same type and shape."""
+    import numpy as np
+
     n, at, found = int(parcel[0]), 8, []
     flat = parcel.view(np.uint8)
     for column in like:

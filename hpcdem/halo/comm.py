@@ -15,8 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.core.comm import Comm
+from hpcdem.core.comm import Comm, SerialComm
 from hpcdem.core.errors import HpcdemError
+
+__all__ = ["MpiComm", "SerialComm"]
 
 PARCELS = 21
 """Tag of messages of `exchange`; every other call uses the next one."""

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io import checkpoint
 from hpcdem.io.agreed import on_first
 from hpcdem.runtime import run_folder
+
+if TYPE_CHECKING:
+    from hpcdem.core.comm import Comm
 
 
 def newest_first(folders: list[Path], before: float = math.inf) -> tuple[list[Path], list[str]]:

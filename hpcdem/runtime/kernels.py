@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 
 import filelock
 
-from hpcdem.core.comm import Comm
 from hpcdem.runtime import cgroups, kept, launch
 from hpcdem.runtime.compilers import compile_in_processes
 from hpcdem.runtime.kept import late

@@ -19,13 +19,16 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
-from hpcdem.core.comm import Comm
 from hpcdem.core.timers import Summary, Timers
 from hpcdem.core.units import counted, in_one_unit, with_prefix
 from hpcdem.io.run_record import PROGRESS
 from hpcdem.runtime.notebook import NotebookBar, in_notebook
+
+if TYPE_CHECKING:
+    from hpcdem.core.comm import Comm
+
 
 QUIET_SECONDS = 10.0
 """A log file gets at most one progress line in this time, unless the script sets the interval itself."""

@@ -19,14 +19,17 @@ from datetime import UTC, datetime
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.lock import FolderLock, Taken, holder_of
 from hpcdem.io.run_record import PROGRESS, RECORD, Record, is_older, left_behind, read, step_of_frame
+
+if TYPE_CHECKING:
+    from hpcdem.core.comm import Comm
+
 
 PRESENT = "now"
 """Folder below the results: the present state of a model to which commands are typed (commands/present.py)."""

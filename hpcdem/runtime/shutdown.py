@@ -16,11 +16,14 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from hpcdem.core.chinese import beside
-from hpcdem.core.comm import Comm
 from hpcdem.core.errors import EXIT_ERROR, EXIT_OK, HpcdemError, StoppedWithCheckpoint
+
+if TYPE_CHECKING:
+    from hpcdem.core.comm import Comm
+
 
 EXIT_INTERRUPTED, EXIT_TERMINATED = 130, 143
 """Ended by a second Ctrl-C or SIGTERM: 128 and the number of the signal, as shells have it."""

@@ -35,11 +35,14 @@ import time
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from types import FrameType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from hpcdem.core.comm import Comm
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.runtime.watchdog import SAME_SIGNAL, Watchdog
+
+if TYPE_CHECKING:
+    from hpcdem.core.comm import Comm
+
 
 NONE, AUTO, SAVE, STOP = 0, 1, 2, 3
 """Codes of a request; the largest one wins. AUTO: the last checkpoint was long ago."""

@@ -379,8 +379,9 @@ assert abs(frame.tables["particles"].columns["activity"] - 0.99**5).max() < 1e-1
         [
             (
                 "physics/fdem/surface_loads.py",
-                'ORDER = ("discs", "fluid", "proppant", "heat", "bolts", "liners", "free_field", "water")',
-                '=ORDER = ("discs", "fluid", "proppant", "heat", "bolts", "liners", "free_field", "water", "wind")',
+                'ORDER = ("discs", "fluid", "proppant", "heat", *FIELDS, "bolts", "liners", "free_field", "water")',
+                '=ORDER = ("discs", "fluid", "proppant", "heat", *FIELDS, "bolts", "liners", "free_field", "water", '
+                '"wind")',
             )
         ],
         """

@@ -187,7 +187,7 @@ def test_commands_are_told_what_the_line_says(bench):
     (on_top, traction), (around, pressure) = told("stress_condition")
     assert traction == {
         "xx": 1.0, "yy": 2.0, "zz": None, "normal": "v", "quiet": True, "incoming_x": "v", "incoming_y": 0.5,
-        "incoming_z": None,
+        "incoming_z": None, "xy": None, "xz": None, "yz": None, "dip": None,
     }  # fmt: skip
     assert len(on_top[0]) == 4 and len(around[0]) == 12  # the outline of 4 x 2
     assert {name: value for name, value in pressure.items() if value is not None} == {"normal": -1.0}

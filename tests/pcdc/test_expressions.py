@@ -14,10 +14,10 @@ from tests.tables import each
 
 SAMPLES: dict[str, tuple[str, object]] = {
     "<f>": ("0.25", 0.25), "<f>|table <s>|function <s>": ("0.25", 0.25),
-    "<f>|table <s> over x|y|field <s>": ("0.25", 0.25),
-    "<f>|table <s> over x|y|temperature|field <s>": ("0.25", 0.25),
-    "<f>|table <s> over x|y|plastic-strain|field <s>": ("0.25", 0.25),
-    "<f>|table <s> over x|y|plastic-strain|temperature|field <s>": ("0.25", 0.25),
+    "<f>|table <s> over x|y|z|field <s>": ("0.25", 0.25),
+    "<f>|table <s> over x|y|z|temperature|moisture|field <s>": ("0.25", 0.25),
+    "<f>|table <s> over x|y|z|plastic-strain|field <s>": ("0.25", 0.25),
+    "<f>|table <s> over x|y|z|plastic-strain|temperature|moisture|field <s>": ("0.25", 0.25),
     "<i>": ("2", 2), "[<i>]": ("3", 3), "3": ("3", 3),
     "0|1": ("1", 1), "0|1|2": ("2", 2), "5|6|12": ("6", 6), "2|3": ("2", 2), "<s>": ("'a'", "a"),
     "on|off": ("on", True), "<v>": ("(1,2)", (1, 2)), "(<f>,<f>)": ("(1,2)", (1, 2)), "[<v>]": ("(1,2)", (1, 2)),

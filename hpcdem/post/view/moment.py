@@ -32,7 +32,7 @@ OF_CHANNELS = (
 )  # fmt: skip
 """Columns of joints that channels have."""
 UNITS = {
-    "Pa": ("stress", "pressure", "ebmod", "gbmod", "tstrength", "sstrength"),
+    "Pa": ("stress", "pressure", "suction", "ebmod", "gbmod", "tstrength", "sstrength"),
     "m": ("x", "y", "radius", "displacement", "opening", "slip", "length", "aperture", "overlap", "position",
           "distance"),
     "m/s": ("velocity", "vx", "vy", "incoming"), "m/s2": ("acceleration",), "N/m": ("contact_force", "nodal_force"),

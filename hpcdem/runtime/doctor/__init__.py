@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
-from hpcdem.core.comm import Comm
 from hpcdem.runtime.doctor import host, software, storage
 from hpcdem.runtime.doctor.machine import Finding, Findings, Level, Machine, warning
 from hpcdem.runtime.launch import patient_barrier
