@@ -60,6 +60,8 @@ PEAK, V_C, SLOPE_C = range(3)
 path at the peak, closure [m] and slope [Pa/m] at JCS. OWN: opening by dilation [m]."""
 MOBILISED = ((0.3, 0.0), (0.6, 0.75), (1.0, 1.0), (2.0, 0.85), (4.0, 0.7), (10.0, 0.5), (25.0, 0.4), (100.0, 0.0))
 STEEPEST = 70.0
+PIECE, MOST = 1.0 / 64.0, 4096
+"""Of the path to the peak that slides at once at most; into how many parts slip is cut at most."""
 DEGREE = math.pi / 180.0
 
 A, B, C = 0.63, 1.8, 6.0
@@ -399,7 +401,7 @@ def slide_slopes(o, s, law, beyond, own, path):
     if law[LAW] == COULOMB:
         a, b, c, d = _coulomb_slopes(o, more, law, now, path)
     else:
-        a, b, c, d = _barton_bandis_slopes(o, more, law, beyond, own, path)
+        a, b, c, d = _barton_bandis_slopes(o, s, law, beyond, own, path)
     return a, b, c, d + LEAST * law[K_S], tau
 
 
@@ -493,49 +495,66 @@ def _excess(x, o, s, law, beyond, opened, path, tan_dilation):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _pieces(o, s, law, beyond, opened, path):
+    """Into how many parts, a power of two, what slides beyond the strength is cut, none of which is much of the path to
+    the peak: dilation is that at the beginning of a part. And slip beyond the strength [m]."""
+    over, _ = _excess(0.0, o, s, law, beyond, opened, path, 0.0)
+    n, beyond_strength = 1, over / law[K_S]
+    while law[JRC] > 0.0 and n < MOST and beyond_strength > n * PIECE * beyond[PEAK]:
+        n *= 2
+    return n, beyond_strength
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _barton_bandis(o, s, law, beyond, opened, path):
     pressure, _ = _pressure(opened - o, law, beyond)
     if pressure <= 0.0:
         return 0.0, 0.0, s, opened, path
-    low, high = 0.0, s
-    over, _ = _excess(0.0, o, s, law, beyond, opened, path, 0.0)
-    if over <= 0.0:
+    n, far = _pieces(o, s, law, beyond, opened, path)
+    if far <= 0.0:
         return -pressure, law[K_S] * s, 0.0, opened, path
-    tan_dilation = math.tan(DEGREE * law[PART] * _mobilised(path, pressure, law, beyond)[1])
-    for _ in range(60):  # more slides than is too little, less than all
-        x = 0.5 * (low + high)
-        over, _ = _excess(x, o, s, law, beyond, opened, path, tan_dilation)
-        if over > 0.0:
-            low = x
-        else:
-            high = x
-    opened += tan_dilation * high
-    pressure, _ = _pressure(opened - o, law, beyond)
-    return -pressure, law[K_S] * (s - high), high, opened, path + high
+    return _slid(o, s, law, beyond, opened, path, n, far)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _barton_bandis_slopes(o, more, law, beyond, opened, path):
-    """By what it slides now, from what it remembered before."""
+def _slid(o, s, law, beyond, opened, path, n, far):
+    """`_barton_bandis` of a point that slides; n, far: `_pieces`."""
+    more = 0.0
+    for k in range(1, n + 1):
+        slip = s - far * (1.0 - k / n) - more
+        pressure, _ = _pressure(opened - o, law, beyond)
+        tan_dilation = math.tan(DEGREE * law[PART] * _mobilised(path, pressure, law, beyond)[1])
+        over, _ = _excess(0.0, o, slip, law, beyond, opened, path, 0.0)
+        if over <= 0.0:
+            continue
+        low, high = 0.0, slip
+        for _ in range(60):  # more slides than is too little, less than all
+            x = 0.5 * (low + high)
+            over, _ = _excess(x, o, slip, law, beyond, opened, path, tan_dilation)
+            if over > 0.0:
+                low = x
+            else:
+                high = x
+        opened, path, more = opened + tan_dilation * high, path + high, more + high
+    pressure, _ = _pressure(opened - o, law, beyond)
+    return -pressure, law[K_S] * (s - more), more, opened, path
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _barton_bandis_slopes(o, s, law, beyond, opened, path):
+    """From what it remembered before; where it slides by differences, with the same parts."""
     pressure, slope = _pressure(opened - o, law, beyond)
     if pressure <= 0.0:
         return LEAST * LEAST * law[K_N], 0.0, 0.0, 0.0
-    if more == 0.0:
+    n, far = _pieces(o, s, law, beyond, opened, path)
+    if far <= 0.0:
         return slope, 0.0, 0.0, law[K_S]
-    tan_dilation = math.tan(DEGREE * law[PART] * _mobilised(path, pressure, law, beyond)[1])
-    press = 1e-6 * pressure
-    other = math.tan(DEGREE * law[PART] * _mobilised(path, pressure + press, law, beyond)[1])
-    lever = 1.0 + (other - tan_dilation) / press * slope * more
-    pressure, slope = _pressure(opened + tan_dilation * more - o, law, beyond)
-    path += more
-    limit = pressure * math.tan(DEGREE * _mobilised(path, pressure, law, beyond)[0])
-    step, press = 1e-6 * beyond[PEAK] + TINY, 1e-6 * pressure
-    by_path = (pressure * math.tan(DEGREE * _mobilised(path + step, pressure, law, beyond)[0]) - limit) / step
-    further = pressure + press
-    by_pressure = (further * math.tan(DEGREE * _mobilised(path, further, law, beyond)[0]) - limit) / press
-    # k_s (s - more) = limit(path + more, pressure(opened + tan_dilation more - o)); lever: of the last one by -o
-    whole = max(law[K_S] + by_path + by_pressure * slope * tan_dilation, LEAST * law[K_S])
-    by_o, by_s = by_pressure * slope * lever / whole, law[K_S] / whole
+    d, ends = 1e-6 * beyond[V_C], np.empty((4, 2))
+    for k, (by_o, by_s) in enumerate(((d, 0.0), (-d, 0.0), (0.0, d), (0.0, -d))):
+        _, far = _pieces(o + by_o, s + by_s, law, beyond, opened, path)
+        ends[k, 0], ends[k, 1], _, _, _ = _slid(o + by_o, s + by_s, law, beyond, opened, path, n, max(far, 0.0))
+    per = 0.5 / d
     return (
-        slope * (lever - tan_dilation * by_o), -slope * tan_dilation * by_s, -law[K_S] * by_o, law[K_S] * (1.0 - by_s)
+        (ends[0, 0] - ends[1, 0]) * per, (ends[2, 0] - ends[3, 0]) * per,
+        (ends[0, 1] - ends[1, 1]) * per, (ends[2, 1] - ends[3, 1]) * per,
     )  # fmt: skip
