@@ -13,7 +13,6 @@ from tests.tables import each
 
 HEAD = """\
 import hpcdem
-from tests.tables import each
 
 sim = hpcdem.Simulation()
 sim.set(dt=1e-3, gravity=(0.0, -9.8))
@@ -76,7 +75,7 @@ def test_a_mistake_stops_all_ranks_with_one_message(launch: Launcher, tmp_path: 
     start = launch if how == "hpcdem" else launch.python
     done = start(3, "study.py", cwd=tmp_path, timeout=120)
     assert done.returncode == 2
-    assert done.stderr.count("study.py:9: prop: ") == 1 and "Traceback" not in done.stderr
+    assert done.stderr.count(f"study.py:{len(HEAD.splitlines()) + 1}: prop: ") == 1 and "Traceback" not in done.stderr
     assert not (tmp_path / "data").exists()
 
 

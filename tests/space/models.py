@@ -498,7 +498,7 @@ def it_flows(found: Found) -> None:
     assert np.nanmax(found["displacement_x"]) > 1.5
     assert (found["plastic_shear_strain"] > 1e-3).sum() > 40
     assert len({int(state) for state in found["plastic_state"] if not np.isnan(state)}) > 4
-    assert np.isnan(found["stress_xx"]).sum() == 10  # dug out
+    assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
 
 
 def crept(sim: Blocks, notes: dict[str, Any]) -> Found:
@@ -601,7 +601,7 @@ def it_is_warm(found: Found) -> None:
 def it_crowds(found: Found) -> None:
     assert len(found["contact_face"]) > 50
     assert np.nanmax(found["displacement_x"]) > 0.3
-    assert np.isnan(found["stress_xx"]).sum() == 10  # dug out
+    assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
     assert found["about"][0] > 10
 
 
