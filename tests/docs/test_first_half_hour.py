@@ -61,8 +61,9 @@ class Terminal:
         self.keys(f"clear; {line}; echo DONE{self.count}=$?", "Enter")
 
     def waits(self, words: str, scrolled: bool = False) -> str:
-        """The screen once it shows these words, or has shown them."""
+        """The screen once it shows these words, or has shown them; lines may be broken at any space."""
         seen = [""]
+        words = words.replace(" ", r"\s+")
 
         def there() -> object:
             seen[0] = self.scrolled() if scrolled else self.screen()
@@ -85,6 +86,7 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
     one("kill-server")
 
 
+@pytest.mark.nightly
 def test_the_first_commands_in_a_terminal(terminal: Terminal, tmp_path: Path) -> None:
     """Nothing scrolls away, mistakes are met with what was meant, a run that is stopped goes on to its end."""
     (tmp_path / "push.py").write_text(LONG)
