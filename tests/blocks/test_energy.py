@@ -180,8 +180,8 @@ def test_small_strains_close_to_rounding(kind, damping):
 
 
 def test_what_is_taken_out_while_storage_waits_to_be_sorted():
-    """A step that ends with the model open, as one does now and then in flight: what the elements had is the doing of
-    the command, as it is a step earlier, and the account changes no bit."""
+    """Elements are removed right after a step that scheduled a rebuild: their energy is booked under commands, as it is
+    one step earlier, and the account changes no bit."""
 
     def run(opened: bool, account: bool = True) -> tuple[float, np.ndarray]:
         sim = jointed(model(rectangle(6, 6, 0.06, 0.06)), gf1=50.0, gf2=500.0, tensile_strength=2e8)

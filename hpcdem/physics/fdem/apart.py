@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 FAR, GONE = 0.1, 1.0
-"""Slip or opening over the size of a joint that is said in the log, and at which the run ends."""
+"""Slip or opening, relative to the size of a joint, that is reported in the log, and at which the run ends."""
 
 
 def part(sim: State, local: Local) -> float:

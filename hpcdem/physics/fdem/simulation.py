@@ -145,7 +145,7 @@ class Blocks(State):
 
     def before_change(self) -> None:
         if self.budget is not None and (self.closed or self.budget.running):
-            self.close_model()  # a step may have left it open, to be sorted anew
+            self.close_model()  # the last step may have scheduled a rebuild
             if self.comm.any(bool(self.local.tally[:, elements.NEW_BROKEN].any())):
                 self._renew_lists()  # what broken joints lose is not the doing of commands
             self.budget.pause(self)

@@ -13,6 +13,7 @@ moisture (physics/moisture) are two.
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial, reduce
@@ -120,13 +121,13 @@ class Diffusing(Assigned, Field):
 
     # ---- what a field says of itself -----------------------------------------------------------------------------
 
+    @abstractmethod
     def _capacities(self) -> np.ndarray:
         """By rows (rows + 1,), per mass of the elements."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _conductivities(self, elements: np.ndarray) -> np.ndarray:
         """Of elements (n,): xx, yy, xy (n, 3), in space xx, yy, xy, zz, xz, yz (n, 6)."""
-        raise NotImplementedError
 
     @property
     def _transfers(self) -> np.ndarray:
