@@ -1321,7 +1321,7 @@ _OBJECTS = (
     Command("e{lement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
             "not given are zero; in the plane stress-zz is then that of plane strain, Poisson's ratio times xx + yy, "
             "in plane stress 0. It is that of a strain, by the moduli of this moment: where these are lowered later, "
-            "it goes down with them. A stress beyond the strength of the element is said in the log.",
+            "it goes down with them. A stress beyond the strength of the element is reported in the log.",
             ("pcdc element initial stress-xx -5e6 stress-yy -10e6",
              "pcdc element initial stress-yy 0 gradient (0,25e3)"),
             options=tuple(

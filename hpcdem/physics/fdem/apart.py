@@ -41,7 +41,7 @@ def check(sim: State, local: Local, error: type[Exception]) -> None:
         f"the sides of face-joint {face} ({name}) at ({at}) are {way:.3g} m apart, {share:.2g} of its size: they stay "
         "partners, and press and rub on all of it as if they still lay on each other"
     )
-    advice = "longer edges along the joint, or classic-intrinsic-cohesive-interface, whose broken joints touch anew"
+    advice = "longer edges along the joint, or classic-intrinsic-cohesive-interface, whose broken faces meet as contact"
     if share > GONE:
         raise error(f"{said}; the run ends where that is more than its size. What follows: {advice}")
     if sim.log is not None:
