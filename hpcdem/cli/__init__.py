@@ -18,6 +18,7 @@ from hpcdem.cli.common import HELP, messages_only, read_command_line, run_progra
 from hpcdem.cli.programs import BY_NAME, FIRST
 from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
+from hpcdem.core.chinese import known
 from hpcdem.core.chinese import wanted as wants_chinese
 from hpcdem.core.errors import EXIT_OK, EXIT_USAGE
 from hpcdem.physics.particle_physics import PHYSICS
@@ -55,12 +56,8 @@ def main() -> NoReturn:
     words, cores_before = sys.argv[1:], launch.cores()
     if not words:
         with launch.one_voice():
-            if wants_chinese(encoding=getattr(sys.stdout, "encoding", None)):
-                from hpcdem.cli.chinese import FIRST as IN_CHINESE
-
-                click.echo(IN_CHINESE, err=True)
-            else:
-                click.echo(FIRST, err=True)
+            in_chinese = wants_chinese(encoding=getattr(sys.stdout, "encoding", None))
+            click.echo((in_chinese and known("help", FIRST)) or FIRST, err=True)
         sys.exit(EXIT_USAGE)
     program = BY_NAME.get(words[0]) if words else None
     if program is not None and program.looks:

@@ -55,13 +55,12 @@ def _known(context: click.Context, argument: click.Parameter, value: str | None)
 def show(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """The list of cases, in the language of the user."""
     from hpcdem.cases import CASES, find
-    from hpcdem.cli.case_chinese import TITLES
 
     if comm.rank == 0:
-        said = TITLES if chinese.wanted(encoding=getattr(sys.stdout, "encoding", None)) else {}
+        in_chinese = chinese.wanted(encoding=getattr(sys.stdout, "encoding", None))
         for name in CASES:
             title = find(name).title
-            click.echo(f"{name:12s} {said.get(title, title)}")
+            click.echo(f"{name:12s} {(in_chinese and chinese.known('case', title)) or title}")
 
 
 def command(kind: type[Case]) -> click.Command:

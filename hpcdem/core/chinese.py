@@ -2,14 +2,21 @@
 
 HPCDEM_LANG (zh, en) decides, else the first of LC_ALL, LC_MESSAGES, LANG that is set. The English message always stays:
 it is what can be looked up; below it stands what it means in general, for the messages that are known here.
+
+Helps and reference pages have their Chinese from the catalogue `hpcdem/locale/zh` (gettext); scripts/catalogue compiles it.
 """
 
 from __future__ import annotations
 
+import gettext
 import os
 import re
 import sys
 from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+LOCALE = Path(__file__).resolve().parent.parent / "locale"
 
 MESSAGES: tuple[tuple[str, str], ...] = (
     (r"read (.+?)(?: at column \d+)?, expected a command(?:.*did you mean (\S+)\?)?", "{1} 不是命令{2:;是否想写 {}?}"),
@@ -84,6 +91,26 @@ def beside(message: str) -> str:
     """A message with its meaning on a line below, where that is wanted and known."""
     text = meaning(message) if wanted() else ""
     return f"{message}\n        {text}" if text else message
+
+
+@cache
+def _catalogue() -> gettext.NullTranslations:
+    return gettext.translation("hpcdem", LOCALE, ["zh"])
+
+
+def known(context: str, text: str) -> str | None:
+    """A text in Chinese, None where nobody has written it yet.
+
+    Parameters
+    ----------
+    context : str
+        Where it stands: "help", "program", "case", "zdem command", "zdem keyword", "pcdc command", "pcdc model",
+        "pcdc keyword", "pcdc default".
+    text : str
+        Its English; of commands, models and programs their name.
+    """
+    meant = _catalogue().pgettext(context, text)
+    return None if meant == text else meant
 
 
 def _filled(text: str, found: re.Match[str]) -> str:

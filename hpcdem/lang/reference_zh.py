@@ -1,7 +1,7 @@
 """The Chinese reference pages of both languages: ``python -m hpcdem.lang.reference_zh zdem|pcdc``.
 
-Words, values, units and defaults are those of the tables, as on the English pages; what a command does comes from
-`chinese`.
+Words, values, units and defaults are those of the tables, as on the English pages; what a command does comes from the
+catalogue `hpcdem/locale/zh`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import dataclasses
 import sys
 from collections.abc import Callable, Sequence
 
-from hpcdem.lang import chinese
+from hpcdem.core.chinese import known
 from hpcdem.lang.pages import escaped
 from hpcdem.lang.pcdc import reference as pcdc
 from hpcdem.lang.pcdc.table import PCDC
@@ -20,7 +20,7 @@ from hpcdem.lang.zdem.table import COLORS, ZDEM, Option
 _HEAD = """\
 # {name} 命令
 
-本页由 `hpcdem/lang/{package}/table.py` 和 `hpcdem/lang/chinese.py` 生成,请勿直接修改
+本页由 `hpcdem/lang/{package}/table.py` 和 `hpcdem/locale/zh` 生成,请勿直接修改
 (`python -m hpcdem.lang.reference_zh {package} > docs/{package}_reference.zh.md`)。
 命令和关键字的说明是中文;完整的英文说明见 [{name} commands]({package}_reference.md)。
 """
@@ -64,7 +64,7 @@ def zdem_page() -> str:
     parts = [
         _HEAD.format(name="ZDEM", package="zdem"),
         _ZDEM,
-        _overview({c.name: _said(chinese.ZDEM, c.name, c.doc) for c in ZDEM.commands}),
+        _overview({c.name: _said("zdem command", c.name, c.doc) for c in ZDEM.commands}),
     ]
     for command in ZDEM.commands:
         lines = [
@@ -72,7 +72,7 @@ def zdem_page() -> str:
             "",
             f"`{zdem._shortened(command)}`",
             "",
-            _said(chinese.ZDEM, command.name, command.doc),
+            _said("zdem command", command.name, command.doc),
             "",
             "```",
         ]
@@ -98,7 +98,7 @@ def pcdc_page() -> str:
     parts = [
         _HEAD.format(name="PCDC", package="pcdc"),
         _PCDC,
-        _overview({c.name: _said(chinese.PCDC, c.name, c.doc) for c in PCDC.commands}),
+        _overview({c.name: _said("pcdc command", c.name, c.doc) for c in PCDC.commands}),
     ]
     for command in PCDC.commands:
         lines = [
@@ -106,7 +106,8 @@ def pcdc_page() -> str:
             "",
             f"`pcdc {command.notation}`",
             "",
-            _said(chinese.PCDC, command.name, command.doc) + "".join(f"也可写作 `{words}`。" for words in command.also),
+            _said("pcdc command", command.name, command.doc)
+            + "".join(f"也可写作 `{words}`。" for words in command.also),
             "",
             "```",
         ]
@@ -122,7 +123,7 @@ def pcdc_page() -> str:
     for command in PCDC.commands:
         for model in command.models:
             lines = [f"### {model.keyword.name}", "", f"`{model.notation}`(`pcdc {command.name}`)", ""]
-            lines += [_said(chinese.MODELS, model.keyword.name, model.doc), ""]
+            lines += [_said("pcdc model", model.keyword.name, model.doc), ""]
             if model.one_of:
                 lines[-2] += "必需:" + ",或 ".join(" 和 ".join(names) for names in model.one_of) + "。"
             if model.options:
@@ -138,9 +139,9 @@ def pcdc_page() -> str:
     return "\n".join(parts).rstrip("\n") + "\n"
 
 
-def _said(of: dict[str, str], name: str, doc: str) -> str:
+def _said(context: str, name: str, doc: str) -> str:
     """In Chinese; the first sentence in English where nobody has written it yet."""
-    return of.get(name) or doc.split(". ")[0].rstrip(".") + "."
+    return known(context, name) or doc.split(". ")[0].rstrip(".") + "."
 
 
 def _overview(texts: dict[str, str]) -> str:
@@ -151,7 +152,7 @@ def _overview(texts: dict[str, str]) -> str:
 
 def _meant(options: Sequence[Option]) -> list[Option]:
     """Keywords of ZDEM with their meanings in Chinese."""
-    return [dataclasses.replace(option, doc=chinese.ZDEM_KEYWORDS.get(option.doc, option.doc)) for option in options]
+    return [dataclasses.replace(option, doc=known("zdem keyword", option.doc) or option.doc) for option in options]
 
 
 def _meant_pcdc(options: Sequence[pcdc.Option]) -> list[pcdc.Option]:
@@ -159,8 +160,8 @@ def _meant_pcdc(options: Sequence[pcdc.Option]) -> list[pcdc.Option]:
     return [
         dataclasses.replace(
             option,
-            doc=chinese.PCDC_KEYWORDS.get(option.doc, option.doc),
-            default=chinese.PCDC_DEFAULTS.get(option.default, option.default),
+            doc=known("pcdc keyword", option.doc) or option.doc,
+            default=known("pcdc default", option.default) or option.default,
             more=tuple(_meant_pcdc(option.more)),
         )
         for option in options

@@ -16,9 +16,11 @@ import click
 import pytest
 
 from hpcdem.cli import python_reference, reference
-from hpcdem.lang import chinese, fields_reference, reference_zh
+from hpcdem.core.chinese import known
+from hpcdem.lang import fields_reference, reference_zh
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.lang.zdem.table import ZDEM
+from tests import catalogue
 from tests.docs.pages import DOCS, PAGES, ROOT, anchors, blocks, links, prose, without_blocks
 from tests.tables import each
 
@@ -134,28 +136,28 @@ def test_generated_pages_are_current(name: str, made: Callable[[], str]) -> None
 def test_commands_have_their_line_in_chinese() -> None:
     """Of commands that are there; a new one may wait for its line, and is told in English on the page."""
     models = {model.keyword.name for command in PCDC.commands for model in command.models}
-    assert set(chinese.ZDEM) == {command.name for command in ZDEM.commands}
-    for texts, names in ((chinese.PCDC, {command.name for command in PCDC.commands}), (chinese.MODELS, models)):
-        assert set(texts) <= names and len(texts) > 0.9 * len(names)
+    assert set(catalogue.of("zdem command")) == {command.name for command in ZDEM.commands}
     options = {o.doc for c in ZDEM.commands for o in (*c.leading, *c.options)} | {o.doc for o in ZDEM.range_terms}
-    assert set(chinese.ZDEM_KEYWORDS) <= options and len(chinese.ZDEM_KEYWORDS) > 0.9 * len(options)
     shown = [*PCDC.range_terms]
     for command in PCDC.commands:
         shown += [*command.leading, *command.options, *(option for model in command.models for option in model.options)]
     shown += [inner for option in shown for inner in option.more]
-    meanings = {option.doc for option in shown}
-    assert set(chinese.PCDC_KEYWORDS) <= meanings and len(chinese.PCDC_KEYWORDS) >= 0.9 * len(meanings)
-    assert set(chinese.PCDC_DEFAULTS) <= {option.default for option in shown}
+    expected = {
+        "pcdc command": {command.name for command in PCDC.commands}, "pcdc model": models, "zdem keyword": options,
+        "pcdc keyword": {option.doc for option in shown},
+    }  # fmt: skip
+    for context, there in expected.items():
+        texts = catalogue.of(context)
+        assert set(texts) <= there and len(texts) >= 0.9 * len(there), context
+        assert all(re.search("[\u4e00-\u9fff]", text) for text in texts.values())
+    assert set(catalogue.of("pcdc default")) <= {option.default for option in shown}
 
 
 def test_a_meaning_that_nobody_wrote_in_chinese_is_told_in_english(monkeypatch: pytest.MonkeyPatch) -> None:
     english = "tensile strength; 0: none"
     assert english not in reference_zh.pcdc_page()
-    monkeypatch.delitem(chinese.PCDC_KEYWORDS, english)
+    monkeypatch.setattr(reference_zh, "known", lambda *of: None if of[1] == english else known(*of))
     assert reference_zh.pcdc_page().count(english) == 2  # of joints, by c-model and property
-    for table in (chinese.ZDEM, chinese.ZDEM_KEYWORDS, chinese.PCDC, chinese.MODELS):
-        for text in table.values():
-            assert re.search("[\u4e00-\u9fff]", text)
 
 
 def test_pages_of_both_languages_say_the_same_code() -> None:
