@@ -131,7 +131,7 @@ def blocks_of_hexes(sim: Blocks) -> None:
     flier = hexes((2, 2, 1), (0.4, 0.5, 0.2), 0.1)
     mesh = bar
     for other, away in ((rod, (0.0, 0.35, 0.0)), (flier, (-0.3, 0.0, 0.32))):
-        mesh = joined(mesh, Mesh.of(other.points + np.array(away), other.cells, layers={}, hexes=other.hexes))
+        mesh = joined(mesh, Mesh.of(other.points + np.array(away), other.cells, layers={}, macros=other.hexes))
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e8, "damp_factor": 0.02})
     sim.initial_stress(None, xx=1e4, yz=-3e3, gradient={"zz": (1e3, 0.0, -2e3)})
@@ -212,7 +212,7 @@ def hexes_that_obey(sim: Blocks) -> None:
     sim.rayleigh(0.02, 60.0, part="mass")
     mesh = sim.mesh
     mises = user_laws.load(sim, LAWS, "rock.py:mises").name
-    x, of_hexes = mesh.centroids()[:, 0], mesh.hex_of() >= 0
+    x, of_hexes = mesh.centroids()[:, 0], mesh.macro_of() >= 0
     soft = {**ROCK, "young": 1e8, "damp_factor": 0.02}
     changes.element_model(sim, np.flatnonzero((x > 0.8) & (x < 2.1) | ~of_hexes), mises, {**soft, "limit": 1.5e4})
     sim.random_field("rho", RandomField.of(LOGNORMAL, 2700.0, 100.0, 5, 0.4))
@@ -268,7 +268,7 @@ def they_flow_and_creep(found: Found) -> None:
 def dig_hexes(sim: Blocks) -> None:
     """Whole hexahedra are taken out in the middle of the run."""
     if sim.clock.step == 500:
-        changes.null(sim, np.flatnonzero((sim.mesh.centroids()[:, 0] > 2.1) & (sim.mesh.hex_of() >= 0)))
+        changes.null(sim, np.flatnonzero((sim.mesh.centroids()[:, 0] > 2.1) & (sim.mesh.macro_of() >= 0)))
 
 
 def dig_hexes_and_fill(sim: Blocks) -> None:
@@ -378,7 +378,7 @@ def shattering_hexes(sim: Blocks) -> None:
     stones = hexes((2, 2, 1), (0.24, 0.22, 0.14), 0.1), hexes((2, 1, 2), (0.2, 0.13, 0.2))
     for k in range(5):
         stone, away = stones[k % 2], (0.13 + 0.5 * k, 0.05 + 0.03 * (k % 4), 0.205 + 0.005 * k)
-        mesh = joined(mesh, Mesh.of(stone.points + np.array(away), stone.cells, layers={}, hexes=stone.hexes))
+        mesh = joined(mesh, Mesh.of(stone.points + np.array(away), stone.cells, layers={}, macros=stone.hexes))
     sim.take_mesh(mesh)
     n = len(beam.points)
     rock = {**ROCK, "young": 2e8, "damp_factor": 0.05, "friction": 25.0}

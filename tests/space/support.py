@@ -37,7 +37,7 @@ def hexes(cells: tuple[int, int, int], size: tuple[float, float, float], shaken:
     points, step = made.points.copy(), np.array(size) / cells
     inner = ((points > 0.0) & (points < np.array(size))).all(axis=1)
     points[inner] += np.random.default_rng(7).uniform(-shaken, shaken, (int(inner.sum()), 3)) * step
-    return Mesh.of(points, made.cells, made.groups, made.layers, hexes=made.hexes)
+    return Mesh.of(points, made.cells, made.groups, made.layers, macros=made.hexes)
 
 
 def body(mesh: Mesh, dynamic: bool = True, **properties: float) -> Blocks:

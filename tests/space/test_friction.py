@@ -24,7 +24,7 @@ def sliding(of: Any, upper: float = 1.0, lower: float = 1.0) -> Blocks:
     """A block, pressed from above, slides at constant speed on another one that is held; parts of the work of friction
     that both take as heat."""
     block, base = of((4, 3, 2), SIZE), of((5, 4, 2), (0.5, 0.4, 0.2))
-    mesh = joined(block, Mesh.of(base.points - (0.05, 0.05, 0.2 + 1e-8), base.cells, hexes=base.hexes))
+    mesh = joined(block, Mesh.of(base.points - (0.05, 0.05, 0.2 + 1e-8), base.cells, macros=base.hexes))
     sim = Blocks()
     sim.take_mesh(mesh)
     rock = {**ROCK, "young": 1e9, "friction": math.degrees(math.atan(MU)), "damp_factor": 0.2}

@@ -79,7 +79,7 @@ def test_conduction_in_hexahedra_is_the_mean_of_that_in_both_overlays() -> None:
     put(heat, start)
     heat.prescribe(np.array([3, 9]), 50.0)
     parts = mesh.hexes[:, :8][:, OVERLAYS].reshape(-1, 4)
-    every = np.concatenate([parts, mesh.cells[mesh.hex_of() < 0]])
+    every = np.concatenate([parts, mesh.cells[mesh.macro_of() < 0]])
     half = np.append(np.full(len(parts), 0.5), np.ones(len(every) - len(parts)))
     strike, dip = math.radians(35.0), math.radians(50.0)
     normal = np.array([-math.sin(strike) * math.sin(dip), math.cos(strike) * math.sin(dip), math.cos(dip)])
@@ -118,7 +118,7 @@ def partly_hexes(cells: tuple[int, int, int], size: tuple[float, float, float], 
     """Hexahedra below, tetrahedra on them."""
     made = hexes(cells, size, shaken)
     low = hexes(cells, size).points[made.hexes[:, :8]].mean(axis=1)[:, 2] < 0.5 * size[2]
-    return Mesh.of(made.points, made.cells, layers=made.layers, hexes=made.hexes[low])
+    return Mesh.of(made.points, made.cells, layers=made.layers, macros=made.hexes[low])
 
 
 def test_hexahedra_beside_tetrahedra() -> None:

@@ -67,7 +67,7 @@ def part_of_a_shell(kind: str, across: int, along: int, inner: float = 0.1, oute
     r, a, b = made.points.T
     way = np.column_stack([np.ones(len(r)), np.tan(0.25 * math.pi * a), np.tan(0.25 * math.pi * b)])
     points = r[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
-    return Mesh.of(points, made.cells, made.groups, made.layers, hexes=made.hexes)
+    return Mesh.of(points, made.cells, made.groups, made.layers, macros=made.hexes)
 
 
 def hold_by_symmetry(sim: Blocks) -> None:

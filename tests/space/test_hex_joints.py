@@ -122,7 +122,7 @@ def lattice(cells: tuple[int, int, int], side: float, penalty: float, skew: floa
     """Cubes with a joint on every side, on rollers; skew: sheared and stretched to parallelepipeds."""
     made = hexes(cells, tuple(side * n for n in cells))
     points = made.points @ (np.eye(3) + skew * np.array([[0.0, 0.3, 0.2], [0.0, 0.4, 0.1], [0.0, 0.0, -0.2]])).T
-    mesh = Mesh.of(points, made.cells, made.groups, made.layers, hexes=made.hexes)
+    mesh = Mesh.of(points, made.cells, made.groups, made.layers, macros=made.hexes)
     sim = body(mesh, dynamic=False)
     sim.joint_model(None, INTERFACE, {**STRONG, "penalty_normal": penalty})
     sim.option(large_strain=False)

@@ -294,7 +294,7 @@ def test_what_hexes_cannot_do_is_refused():
         sim.joint_model(inside[:1], "classic_intrinsic_cohesive_interface", {"tensile_strength": 1e6})
     with pytest.raises(HpcdemError, match="a crack through a hexahedron"):
         cracked = sim.mesh.face_points(inside[:1])
-        meshes.check(Mesh.of(sim.mesh.points, sim.mesh.cells, cracks=cracked, hexes=sim.mesh.hexes))
+        meshes.check(Mesh.of(sim.mesh.points, sim.mesh.cells, cracks=cracked, macros=sim.mesh.hexes))
     alone = body(hexes((1, 1, 1), (1.0, 1.0, 1.0)))
     with pytest.raises(CommandError, match="no joint here that could be a channel"):
         Flow.of(alone).assign(None, WATER)
@@ -308,7 +308,7 @@ def test_a_cube_of_hexes_falls_onto_a_plate():
     mesh = Mesh.of(
         np.concatenate([plate.points, cube.points + [0.2, 0.2, 0.2005]]),
         np.concatenate([plate.cells, cube.cells + len(plate.points)]),
-        hexes=np.concatenate([plate.hexes, cube.hexes + np.append(np.full(8, len(plate.points)), len(plate.cells))]),
+        macros=np.concatenate([plate.hexes, cube.hexes + np.append(np.full(8, len(plate.points)), len(plate.cells))]),
     )
     sim = body(mesh, young=1e9, damp_factor=0.0)
     sim.option(collision=True)

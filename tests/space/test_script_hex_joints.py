@@ -68,7 +68,7 @@ def test_what_is_inside_a_hexahedron_is_no_joint(tmp_path: Path) -> None:
         run(tmp_path, SCRIPT.replace("type hex", "type hex split 5"))
     model = run(tmp_path, SCRIPT[: SCRIPT.index("pcdc geometry")])
     sim = model.project.whole_mesh()
-    inside = np.flatnonzero(sim.inside_hexes(np.arange(4 * len(sim.cells))))
+    inside = np.flatnonzero(sim.inside_macros(np.arange(4 * len(sim.cells))))
     assert len(inside) == 12 * 16
     with pytest.raises(HpcdemError, match="there is no face-joint"):
         run(tmp_path, SCRIPT.replace("range x 0.1 0.1", f"range id {inside[0]}"))
@@ -82,6 +82,6 @@ def test_a_disc_is_followed_by_whole_sides(tmp_path: Path) -> None:
     edges = mesh.edges()
     faces = edges.faces[mesh.find_edges(edges, mesh.cracks)]
     _, fourth, *_ = mesh.on_sides(faces[:, 0])
-    assert len(faces) > 20 and len(fourth) == len(faces) and not mesh.inside_hexes(faces[:, 0]).any()
+    assert len(faces) > 20 and len(fourth) == len(faces) and not mesh.inside_macros(faces[:, 0]).any()
     sides = {tuple(sorted({*row, p})) for row, p in zip(mesh.cracks.tolist(), mesh.cells.reshape(-1)[fourth].tolist())}
     assert 2 * len(sides) == len(faces)

@@ -115,7 +115,7 @@ class _Objects:
             self.edges = edges = project.edges()
             if kind == g.JOINT:
                 sides = edges.faces[edges.inner]
-                sides = sides[~mesh.inside_hexes(sides[:, 0])]
+                sides = sides[~mesh.inside_macros(sides[:, 0])]
                 self.sides = sides[there[sides // 4].all(axis=1)]
                 if some is not None:
                     self.sides = self.sides[np.isin(self.sides[:, 0], some)]

@@ -112,7 +112,7 @@ def _nearest(project: Project, kind: str, at: tuple[float, ...]) -> int:
         return mesh.nearest_element(xy, mesh.cells, at, np.flatnonzero(project.alive))
     edges = project.edges()
     inner = np.flatnonzero(edges.inner)
-    inner = inner[~mesh.inside_hexes(edges.faces[inner, 0])]
+    inner = inner[~mesh.inside_macros(edges.faces[inner, 0])]
     middles = xy[edges.points[inner]].mean(axis=1)
     there = np.flatnonzero(~np.isnan(middles[:, 0]))
     if not len(there):

@@ -13,7 +13,7 @@ from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.geometry import shape
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes, hexahedra
+from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.connectivity import areas
 from hpcdem.physics.fdem.connectivity import bodies as bodies_of
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, NODE, Range
@@ -456,13 +456,14 @@ def disc_network(project: Project, layer: str, inside: str, *, seed: int, **stat
 def _add(project: Project, mesh: Mesh) -> None:
     check(mesh)
     project.add_mesh(mesh)
+    macro = mesh.macro
+    kinds = {f"{macro.plural} of {macro.parts} elements each": len(mesh.macros)}
+    alone = mesh.cells[mesh.macro_of() < 0]
     if mesh.dim == 3:
-        of_hexes = hexahedra.PARTS * len(mesh.hexes)
-        kinds = {f"hexahedra of {hexahedra.PARTS} elements each": len(mesh.hexes)}
-        kinds["tetrahedra"] = len(mesh.cells) - of_hexes
+        kinds["tetrahedra"] = len(alone)
     else:
-        triangles = int((mesh.cells[:, 3] < 0).sum())
-        kinds = {"triangles": triangles, "quads": len(mesh.cells) - triangles}
+        triangles = int((alone[:, 3] < 0).sum())
+        kinds |= {"triangles": triangles, "quads": len(alone) - triangles}
     parts = [f"{count} {kind}" for kind, count in kinds.items() if count]
     _say(project, f"mesh: {', '.join([*parts, f'{len(mesh.points)} points'])}")
 

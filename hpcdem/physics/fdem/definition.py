@@ -16,8 +16,8 @@ import numpy as np
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.core.memory import sparse_zeros
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import hexahedra, node_conditions, properties, sides, user_functions
 from hpcdem.physics.fdem import mesh as meshes
+from hpcdem.physics.fdem import node_conditions, properties, sides, user_functions
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
@@ -236,15 +236,16 @@ class ModelDefinition:
         return at
 
     def refuse_parts(self, at: np.ndarray) -> None:
-        """CommandError if these elements (n,) are some parts of a hexahedron, and not the others."""
-        if len(self._mesh().hexes):
-            of = self._mesh().hex_of()[at]
-            count = np.bincount(of[of >= 0], minlength=len(self._mesh().hexes))
-            part = np.flatnonzero((count > 0) & (count < hexahedra.PARTS))
+        """CommandError if these elements (n,) are some parts of a macro-element, and not the others."""
+        mesh = self._mesh()
+        if len(mesh.macros):
+            of, macro = mesh.macro_of()[at], mesh.macro
+            count = np.bincount(of[of >= 0], minlength=len(mesh.macros))
+            part = np.flatnonzero((count > 0) & (count < macro.parts))
             if len(part):
-                first = self._mesh().hexes[part[0], 8]
+                first = mesh.macros[part[0], -1]
                 raise CommandError(
-                    f"elements {first} to {first + hexahedra.PARTS - 1} are one hexahedron: they go together, only "
+                    f"elements {first} to {first + macro.parts - 1} are one {macro.name}: they go together, only "
                     f"{count[part[0]]} of them were given"
                 )
 
@@ -307,7 +308,7 @@ class ModelDefinition:
         face = np.arange(len(self.partner))
         inner = (self.partner > face) & self.alive[face // 4]
         inner[inner] &= self.alive[self.partner[inner] // 4]
-        inner[inner] = ~self._mesh().inside_hexes(face[inner])
+        inner[inner] = ~self._mesh().inside_macros(face[inner])
         return inner
 
     def face_exists(self) -> np.ndarray:
@@ -368,7 +369,7 @@ class ModelDefinition:
     @property
     def reference(self) -> Mesh:
         """Where elements are free of strain: the mesh, and for those that came back where they did, with points of
-        their own there (hexahedra share those of their parts)."""
+        their own there (macro-elements share those of their parts)."""
         mesh = self._mesh()
         if self._reference is None:
             self._reference = mesh.with_own_points(self.born, self.birthplace) if len(self.born) else mesh

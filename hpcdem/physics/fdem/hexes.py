@@ -21,7 +21,7 @@ def place_masses(sim: State, number: np.ndarray, mass: np.ndarray) -> None:
     """True masses (n, 4) [kg] of the corners of all hexahedra among these elements (n,): at the first corner of each
     point, nothing at the others."""
     mesh = sim.reference
-    of = mesh.hex_of()
+    of = mesh.macro_of()
     held = np.unique(of[number[of[number] >= 0]])
     if not len(held):
         return

@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 from hpcdem.core.errors import HpcdemError
 from hpcdem.physics.fdem import connectivity, hexahedra, tetrahedra
 from hpcdem.physics.fdem.connectivity import Edges, areas, centroids, edges_of, find_edges
+from hpcdem.physics.fdem.macros import OF_DIMENSION, SIX_INSIDE, Macro
 
 FLAT = 1e-9
 """A corner spans less than this much of the square of the longest edge: the element is flat."""
@@ -52,8 +53,19 @@ class Mesh:
     """(k, 2) i8 end points of the inner edges that carry a crack from the beginning."""
     crack_sets: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     """(k,) i8 number of the fracture set of each crack edge."""
-    hexes: np.ndarray = field(default_factory=_no_hexes)
-    """(nh, 9) i8 of hexahedra (hexahedra.py): their points, and the first of their six elements."""
+    macros: np.ndarray = field(default_factory=_no_hexes)
+    """(n, nodes + 1) i8 of macro-elements (macros.py), in space hexahedra, in the plane six-node triangles: their
+    points, and the first of the elements that store each."""
+
+    @property
+    def macro(self) -> Macro:
+        """The kind of macro-element that there can be."""
+        return OF_DIMENSION[self.dim]
+
+    @property
+    def hexes(self) -> np.ndarray:
+        """(nh, 9) i8 of hexahedra: their points, and the first of their six elements."""
+        return self.macros if self.dim == 3 else _no_hexes()
 
     @staticmethod
     def of_hexes(points: Any, hexes: Any, layers: Any = None, more: Any = None) -> Mesh:
@@ -63,12 +75,12 @@ class Mesh:
         if more is not None:
             cells = np.concatenate([cells, np.array(more, np.int64).reshape(-1, 4)])
         table = np.column_stack([hexes, hexahedra.PARTS * np.arange(len(hexes))])
-        return Mesh.of(points, cells, layers=layers, hexes=table)
+        return Mesh.of(points, cells, layers=layers, macros=table)
 
     @staticmethod
     def of(
         points: Any, cells: Any, groups: Any = None, layers: Any = None, cracks: Any = None, crack_sets: Any = None,
-        hexes: Any = None,
+        macros: Any = None,
     ) -> Mesh:  # fmt: skip
         """A mesh from anything array-like, in the form the fields are documented in.
 
@@ -96,19 +108,21 @@ class Mesh:
             {name: _sorted_pairs(given, dim) for name, given in (layers or {}).items()},
             pairs,
             sets,
-            _no_hexes() if hexes is None else np.ascontiguousarray(hexes, np.int64).reshape(-1, 9),
+            _no_hexes()
+            if macros is None
+            else np.ascontiguousarray(macros, np.int64).reshape(-1, OF_DIMENSION[dim].nodes + 1),
         )
 
-    def hex_of(self) -> np.ndarray:
-        """(ne,) i8 hexahedron of which each element is a part, -1: none."""
+    def macro_of(self) -> np.ndarray:
+        """(ne,) i8 macro-element of which each element is a part, -1: none."""
         out = np.full(len(self.cells), -1, np.int64)
-        out[self.hexes[:, 8, None] + np.arange(hexahedra.PARTS)] = np.arange(len(self.hexes))[:, None]
+        out[self.macro.elements(self.macros)] = np.arange(len(self.macros))[:, None]
         return out
 
     def of_one(self, elements: np.ndarray) -> np.ndarray:
-        """(n,) these elements; of parts of a hexahedron its first one."""
-        of = self.hex_of()[elements]
-        return np.where(of >= 0, np.append(self.hexes[:, 8], -1)[of], elements)
+        """(n,) these elements; of parts of a macro-element its first one."""
+        of = self.macro_of()[elements]
+        return np.where(of >= 0, np.append(self.macros[:, -1], -1)[of], elements)
 
     def of_one_side(self, faces: np.ndarray) -> np.ndarray:
         """(n,) these faces; of the two halves of a side of a hexahedron the lower one."""
@@ -128,27 +142,32 @@ class Mesh:
 
     def with_own_points(self, elements: np.ndarray, places: np.ndarray) -> Mesh:
         """The same with these elements (n,) at places (n, 4, dim) [m], by points of their own that parts of a
-        hexahedron share."""
-        cells, hexes = self.cells.copy(), self.hexes.copy()
+        macro-element share."""
+        cells, macros = self.cells.copy(), self.macros.copy()
         own = cells[elements]
         real = own >= 0
         key = (self.of_one(elements)[:, None] * len(self.points) + own)[real]
         _, first, number = np.unique(key, return_index=True, return_inverse=True)
         own[real] = len(self.points) + number.reshape(-1)
         cells[elements] = own
-        at = np.flatnonzero(np.isin(hexes[:, 8], elements))
+        at = np.flatnonzero(np.isin(macros[:, -1], elements))
         if len(at):
-            corner, _ = hexahedra.places(self.cells, hexes[at])
-            parts = cells[hexes[at, 8, None] + np.arange(hexahedra.PARTS)].reshape(len(at), -1)
-            hexes[at, :8] = np.take_along_axis(parts, corner, axis=1)
-        return replace(self, points=np.concatenate([self.points, places[real][first]]), cells=cells, hexes=hexes)
+            corner, _ = self.macro.places(self.cells, macros[at])
+            parts = cells[self.macro.elements(macros[at])].reshape(len(at), -1)
+            macros[at, :-1] = np.take_along_axis(parts, corner, axis=1)
+        return replace(self, points=np.concatenate([self.points, places[real][first]]), cells=cells, macros=macros)
 
-    def inside_hexes(self, faces: np.ndarray) -> np.ndarray:
-        """(n,) bool: of these faces (n,) those within a hexahedron, between two of its six elements."""
-        if not len(self.hexes):
+    def inside_macros(self, faces: np.ndarray) -> np.ndarray:
+        """(n,) bool: of these faces (n,) those within a macro-element, between two of its parts."""
+        if not len(self.macros):
             return np.zeros(len(faces), bool)
-        of = self.hex_of()[faces // 4]
-        return (of >= 0) & (self._other_half[faces] < 0)
+        of = self.macro_of()
+        number = of[faces // 4]
+        if self.dim == 3:
+            return (number >= 0) & (self._other_half[faces] < 0)
+        inside = SIX_INSIDE[faces // 4 - np.append(self.macros[:, -1], 0)[number], faces % 4]
+        found: np.ndarray = (number >= 0) & inside
+        return found
 
     @cached_property
     def _other_half(self) -> np.ndarray:
@@ -249,11 +268,11 @@ class Mesh:
         return (tetrahedra.volumes if self.dim == 3 else areas)(self.points, self.cells)
 
     def centroids(self, elements: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """(n, 2) [m], in space (n, 3), of these elements; parts of a hexahedron have that of its corners."""
+        """(n, 2) [m], in space (n, 3), of these elements; parts of a macro-element have that of its corners."""
         out = centres(self.points, self.cells[elements])
-        if len(self.hexes):
-            of = self.hex_of()[elements]
-            out[of >= 0] = self.points[self.hexes[of[of >= 0], :8]].mean(axis=1)
+        if len(self.macros):
+            of = self.macro_of()[elements]
+            out[of >= 0] = self.points[self.macros[of[of >= 0], : self.macro.corners]].mean(axis=1)
         return out
 
     def nearest_element(self, points: np.ndarray, cells: np.ndarray, at: tuple[float, ...], among: np.ndarray) -> int:
@@ -494,10 +513,11 @@ def _bad_names(mesh: Mesh, names: Names) -> str | None:
         return f"there are {len(mesh.cracks)} crack edges, but {len(mesh.crack_sets)} numbers of fracture sets"
     rows = mesh.find_edges(edges, mesh.cracks)
     outside = np.flatnonzero((rows < 0) | ~edges.inner[rows])
-    if len(mesh.hexes) and len(rows):
-        bad = np.flatnonzero((rows >= 0) & mesh.inside_hexes(edges.faces[rows, 0]))
+    if len(mesh.macros) and len(rows):
+        bad = np.flatnonzero((rows >= 0) & mesh.inside_macros(edges.faces[rows, 0]))
         if len(bad):
-            return f"a crack through a hexahedron at {_at(mesh, int(mesh.cracks[bad[0], 0]))}: only its sides crack"
+            at = _at(mesh, int(mesh.cracks[bad[0], 0]))
+            return f"a crack through a {mesh.macro.name} at {at}: only its sides crack"
     if len(outside):
         points = mesh.cracks[outside[0]].tolist()
         return (

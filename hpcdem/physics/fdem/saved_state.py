@@ -79,8 +79,8 @@ def tables(sim: Blocks) -> dict[str, Table]:
         "mesh_points": _whole(dict(zip("xyz", sim.mesh.points.T)), root),
         "mesh_cells": _whole({f"corner_{k}": sim.mesh.cells[:, k] for k in range(4)}, root),
     }
-    if len(sim.mesh.hexes):
-        tables["mesh_hexes"] = _whole({f"p{k}": sim.mesh.hexes[:, k] for k in range(9)}, root)
+    if len(sim.mesh.macros):
+        tables["mesh_hexes"] = _whole({f"p{k}": rows for k, rows in enumerate(sim.mesh.macros.T)}, root)
     for kind, names in ARRAYS.items():
         tables[kind] = _whole({name: getattr(sim, name).astype(np.int64) for name in names}, root)
     if sim.stress0 is not None:
@@ -178,7 +178,7 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
             {name: np.array(rows, np.int64).reshape(-1, points.shape[1]) for name, rows in about["layers"].items()},
             np.array(about["cracks"], np.int64).reshape(-1, points.shape[1]),
             np.array(about["crack_sets"], np.int64),
-            np.column_stack([tables["mesh_hexes"][f"p{k}"] for k in range(9)]).astype(np.int64)
+            np.column_stack([tables["mesh_hexes"][f"p{k}"] for k in range(len(tables["mesh_hexes"]))]).astype(np.int64)
             if "mesh_hexes" in tables
             else np.empty((0, 9), np.int64),
         )

@@ -34,7 +34,6 @@ from hpcdem.physics.fdem import (
     build,
     by_temperature,
     connectivity,
-    hexahedra,
     overlaps,
     tetrahedra,
     user_functions,
@@ -763,27 +762,30 @@ class Blocks(State):
         """Means of the corners of the elements held here (n, 2), in space (n, 3) [m], and the largest distance of a
         corner from it."""
         middle = np.empty((len(self.number), self.dim))
+        mesh = self.the_mesh()
         if self.dim == 3:
             radius = space.middles(self.x, middle)
-            return middle, max(radius, self._gather_hexes(middle)) if len(self.the_mesh().hexes) else radius
-        return middle, build.middles(self.x, self.the_mesh().cells, self.number, middle)
+        else:
+            radius = build.middles(self.x, mesh.cells, self.number, middle)
+        return middle, max(radius, self._gather_macros(middle)) if len(mesh.macros) else radius
 
-    def _gather_hexes(self, middle: np.ndarray) -> float:
-        """Parts of a hexahedron get one middle (n, 3), the mean of theirs, so that they go together. Returns the
+    def _gather_macros(self, middle: np.ndarray) -> float:
+        """Parts of a macro-element get one middle (n, dim), the mean of theirs, so that they go together. Returns the
         largest distance of their corners from it. Collective."""
         mesh = self.the_mesh()
-        of = mesh.hex_of()[self.number]
+        of, parts_of_one, dim = mesh.macro_of()[self.number], mesh.macro.parts, self.dim
         mine = np.flatnonzero(of >= 0)
         parts = [(self.number[mine], middle[mine])]
         if self.comm.size > 1:
-            whole = np.bincount(of[mine], minlength=len(mesh.hexes))[of[mine]] == hexahedra.PARTS
+            whole = np.bincount(of[mine], minlength=len(mesh.macros))[of[mine]] == parts_of_one
             if self.comm.any(not whole.all()):
                 parts = self.comm.allgather((self.number[mine], middle[mine]))
         number, middles = (np.concatenate([part[k] for part in parts]) for k in range(2))
         number, first = np.unique(number, return_index=True)
-        means = middles[first].reshape(-1, hexahedra.PARTS, 3).mean(axis=1)
-        middle[mine] = means[np.searchsorted(number[:: hexahedra.PARTS], mesh.hexes[of[mine], 8])]
-        way = self.x[mine].reshape(-1, 4, 4)[:, :, :3] - middle[mine][:, None]
+        means = middles[first].reshape(-1, parts_of_one, dim).mean(axis=1)
+        middle[mine] = means[np.searchsorted(number[::parts_of_one], mesh.macros[of[mine], -1])]
+        corners = self.x[mine].reshape(-1, self.x.shape[1] // self.stride, self.stride)[:, : dim + 1, :dim]
+        way = corners - middle[mine][:, None]
         return math.sqrt(float((way * way).sum(axis=2).max(initial=0.0)))
 
     def _keys(self, middle: np.ndarray) -> np.ndarray:
@@ -904,7 +906,7 @@ class Blocks(State):
         bulk, shear = (np.array(self.element_rows.column(name)) for name in ("bulk", "shear"))
         with np.errstate(divide="ignore", invalid="ignore"):
             nu = (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
-        of = np.where(self.alive & (self.the_mesh().hex_of() < 0), nu[self.element_row], 0.0)
+        of = np.where(self.alive & (self.the_mesh().macro_of() < 0), nu[self.element_row], 0.0)
         if (of > LOCKS).any():
             self.log.warn_once(
                 "locking",

@@ -55,8 +55,7 @@ class Water(SurfaceLoad):
         chosen = np.zeros(len(mesh.cells), bool)
         chosen[slice(None) if elements is None else np.asarray(elements, np.int64)] = True
         faces = np.flatnonzero(np.repeat(chosen, 4) & (mesh.cells.reshape(-1) >= 0))
-        if mesh.dim == 3:
-            faces = faces[~mesh.inside_hexes(faces)] if len(mesh.hexes) else faces
+        faces = faces[~mesh.inside_macros(faces)]
         at = mesh.points[mesh.face_points(faces)]
         slack = SLACK * float(np.ptp(mesh.points, axis=0).max())
         known = Water.there(blocks)
@@ -109,7 +108,7 @@ class Water(SurfaceLoad):
         out[rows - blocks.n_left, local] = True
         mesh = blocks.the_mesh()
         if len(mesh.hexes) and len(rows):  # the force on a side goes to both ways to cut it
-            of = mesh.hex_of()
+            of = mesh.macro_of()
             wet = np.unique(of[blocks.number[rows[:, 0]]])
             out[np.isin(of[blocks.number[blocks.owned]], wet[wet >= 0])] = True
         return out

@@ -185,7 +185,7 @@ class Diffusing(Assigned, Field):
         found = by_temperature.of_corners(mesh, number, t)
         chosen = np.isin(number, elements)
         if len(mesh.hexes):
-            of = mesh.hex_of()
+            of = mesh.macro_of()
             some = np.zeros(len(mesh.hexes) + 1, bool)  # the last one: of no hexahedron
             some[of[elements]] = True
             some[-1] = False
@@ -198,7 +198,7 @@ class Diffusing(Assigned, Field):
         """Means (n,) of the hexahedra that these elements are parts of, which may be shared out among ranks, as
         `hexahedra.Rows` has them; t (n, 4): temperatures of their corners. Collective."""
         mesh, comm = self.blocks.the_mesh(), self.blocks.comm
-        which, at = np.unique(mesh.hex_of()[number], return_inverse=True)
+        which, at = np.unique(mesh.macro_of()[number], return_inverse=True)
         hexes = mesh.hexes[which]
         _, parts = hexahedra.corner_parts(mesh.points, mesh.cells, hexes)
         own = (parts[at, number - hexes[at, 8]] * t).sum(axis=1)
@@ -432,7 +432,7 @@ class Diffusing(Assigned, Field):
         self._told_obtuse = True
         mesh = blocks.the_mesh()
         heated = blocks.alive & (self.row > 0)
-        every = np.flatnonzero(heated & (mesh.hex_of() < 0))
+        every = np.flatnonzero(heated & (mesh.macro_of() < 0))
         g = np.empty((len(every), 6))
         kernels_space.conductances(every, mesh.points, mesh.cells, self._conductivities(every), g)
         hexes = mesh.hexes[heated[mesh.hexes[:, 8]]]

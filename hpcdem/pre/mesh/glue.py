@@ -75,7 +75,7 @@ def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray,
         {name: {group: made.with_pieces(rows) for group, rows in of.items()} for name, of in mesh.groups.items()},
         {name: moved.faces(rows)[0] for name, rows in mesh.layers.items()},
         *_cracks(mesh, moved),
-        hexes=made.mesh.hexes,
+        macros=made.mesh.macros,
     )
     return Glued(whole, number, made.parent, moved, faces + made.faces, tolerance, made.cut)
 
@@ -175,7 +175,7 @@ def _merged(
     table = np.column_stack([number[mesh.hexes[:, :8]], mesh.hexes[:, 8]])
     cells = number[mesh.cells]
     cells[table[:, 8, None] + np.arange(hexahedra.PARTS)] = hexahedra.split(table[:, :8])
-    made = Mesh.of(points, cells, hexes=table)
+    made = Mesh.of(points, cells, macros=table)
     before = np.sort(number[mesh.face_points(hexahedra.halves(mesh.cells, mesh.hexes).ravel())], axis=1).reshape(
         -1, 2, 3
     )
@@ -233,7 +233,7 @@ def _wanted_cuts(mesh: Mesh, free: fit.Free, number: np.ndarray) -> tuple[np.nda
     both = number[mesh.face_points(halves.ravel())].reshape(-1, 6)
     sides = np.array([np.unique(row) for row in both]).reshape(-1, 4)
     partner = mesh.face_partners()
-    outside = mesh.hex_of() < 0
+    outside = mesh.macro_of() < 0
     over = partner[halves]
     tets = (over >= 0).all(axis=1) & outside[np.maximum(over, 0) // 4].all(axis=1)
     found = {}

@@ -175,7 +175,7 @@ def _with_names(data: FileMesh, own: _Own, place: np.ndarray, between: np.ndarra
         rows = mesh.find_edges(edges, given)
         lost = (given < 0).any(axis=1) | (rows < 0)
         if len(mesh.hexes):  # a surface through a hexahedron is none of its sides
-            lost |= mesh.inside_hexes(edges.faces[rows, 0])
+            lost |= mesh.inside_macros(edges.faces[rows, 0])
         if lost.any():
             what = "lines" if dim == 2 else "surfaces"
             said = f"{what} of the group '{name}' are not {'edges' if dim == 2 else 'faces'} of the elements"
@@ -196,7 +196,7 @@ def _with_names(data: FileMesh, own: _Own, place: np.ndarray, between: np.ndarra
     if whole:
         groups[INSTANCES] = {**groups.get(INSTANCES, {}), **{name: rows for name, rows in whole.items() if len(rows)}}
     return Imported(
-        Mesh.of(mesh.points, mesh.cells, groups, layers, hexes=mesh.hexes),
+        Mesh.of(mesh.points, mesh.cells, groups, layers, macros=mesh.macros),
         _in_sets(at_nodes, len(mesh.points)),
         _in_sets(faces, 4 * len(mesh.cells)),
         notes,

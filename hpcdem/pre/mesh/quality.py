@@ -136,10 +136,10 @@ def altitudes(mesh: Mesh) -> np.ndarray:
 def quality(mesh: Mesh) -> Quality:
     """Measure a mesh that `check` accepts."""
     edges = mesh.edges()
-    inner = edges.inner & ~mesh.inside_hexes(edges.faces[:, 0])
+    inner = edges.inner & ~mesh.inside_macros(edges.faces[:, 0])
     ends = edges.points
     if mesh.dim == 3:
-        tets = mesh.cells[mesh.hex_of() < 0]
+        tets = mesh.cells[mesh.macro_of() < 0]
         both = [np.stack(np.broadcast_arrays(of[:, :, None], of[:, _BESIDE[of.shape[1]]]), axis=3)
                 for of in (tets, mesh.hexes[:, :8])]  # fmt: skip
         ends = np.unique(np.sort(np.concatenate([of.reshape(-1, 2) for of in both]), axis=1), axis=0)
@@ -157,7 +157,7 @@ def quality(mesh: Mesh) -> Quality:
         quads=len(mesh.cells) - triangles if plane else 0,
         tetrahedra=0 if plane else len(mesh.cells) - PARTS * len(mesh.hexes),
         hexahedra=len(mesh.hexes),
-        edges=len(edges) - int(mesh.inside_hexes(edges.faces[:, 0]).sum()),
+        edges=len(edges) - int(mesh.inside_macros(edges.faces[:, 0]).sum()),
         inner_edges=int(inner.sum()),
         crack_edges=len(crack),
         crack_length=float(crack.sum()),
@@ -182,7 +182,7 @@ def _by_kind(mesh: Mesh) -> list[tuple[np.ndarray, np.ndarray]]:
     """Rows of triangles and of quads, each with their corners (m, 3 or 4, 2); of tetrahedra and of hexahedra, these by
     their first element, (m, 4 or 8, 3)."""
     if mesh.dim == 3:
-        tets, first = np.flatnonzero(mesh.hex_of() < 0), mesh.hexes[:, 8]
+        tets, first = np.flatnonzero(mesh.macro_of() < 0), mesh.hexes[:, 8]
         both = [(tets, mesh.points[mesh.cells[tets]]), (first, mesh.points[mesh.hexes[:, :8]])]
         return [one for one in both if len(one[0])]
     counts = corner_counts(mesh.cells)

@@ -254,7 +254,7 @@ class _Cut:
                 touched |= np.isin(ends[:, 0] * n + ends[:, 1], split)
         whole = {int(face): made for face, made in self.sides.items() if len(made) > 1}
         touched[np.array(sorted(whole), np.int64) // 4] = True
-        hex_of = mesh.hex_of()
+        hex_of = mesh.macro_of()
         hexes = np.unique(hex_of[touched & (hex_of >= 0)])
         self.pieces: dict[Face, list[Face]] = {}
         self.middles: list[np.ndarray] = []
@@ -279,7 +279,7 @@ class _Cut:
             cells.append(made[len(rows) :])
             parent.append(np.full(len(made) - len(rows), rows[0]))
         left = np.delete(mesh.hexes, hexes, axis=0)
-        result = Mesh.of(points, np.concatenate(cells), hexes=left)
+        result = Mesh.of(points, np.concatenate(cells), macros=left)
         return Refined(result, self.count, np.concatenate(parent), self.pieces, len(new))
 
     def _tets(self, faces: list[int], corners: list[int], about_corner: bool = True) -> list[Face]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.mesh import Mesh
 
 
@@ -50,10 +49,15 @@ class Moved:
 
 
 def named(
-    mesh: Mesh, points: np.ndarray, cells: np.ndarray, parent: np.ndarray, moved: Moved, hexes: np.ndarray | None = None
+    mesh: Mesh,
+    points: np.ndarray,
+    cells: np.ndarray,
+    parent: np.ndarray,
+    moved: Moved,
+    macros: np.ndarray | None = None,
 ) -> Mesh:
     """Points and elements with the groups, layers and cracks of the mesh before, as far as they are still there."""
-    bare = Mesh.of(points, cells, hexes=hexes)
+    bare = Mesh.of(points, cells, macros=macros)
     edges = bare.edges()
 
     def there(rows: np.ndarray, inner: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -68,18 +72,18 @@ def named(
         {name: {group: np.flatnonzero(np.isin(parent, rows)) for group, rows in groups.items()}
          for name, groups in mesh.groups.items()},
         {name: there(rows, inner=False)[0] for name, rows in mesh.layers.items()}, cracks, mesh.crack_sets[of],
-        hexes=hexes,
+        macros=macros,
     )  # fmt: skip
 
 
 def without(mesh: Mesh, elements: np.ndarray) -> Remade:
-    """The mesh without these elements, and without hexahedra of which one is a part. CommandError if nothing is
+    """The mesh without these elements, and without macro-elements of which one is a part. CommandError if nothing is
     left."""
     gone = np.zeros(len(mesh.cells), bool)
     gone[elements] = True
-    table = mesh.hexes
+    table = mesh.macros
     if len(table):
-        parts = table[:, 8, None] + np.arange(hexahedra.PARTS)
+        parts = mesh.macro.elements(table)
         lost = gone[parts].any(axis=1)
         gone[parts[lost]] = True
         table = table[~lost]
@@ -92,6 +96,6 @@ def without(mesh: Mesh, elements: np.ndarray) -> Remade:
     number = np.where(used, np.cumsum(used) - 1, -1)
     cells = np.where(left >= 0, number[left], -1)
     row = np.cumsum(~gone) - 1
-    hexes = np.column_stack([number[table[:, :8]], row[table[:, 8]]]) if len(mesh.hexes) else None
+    macros = np.column_stack([number[table[:, :-1]], row[table[:, -1]]]) if len(table) else None
     moved = Moved(number)
-    return Remade(named(mesh, mesh.points[used], cells, parent, moved, hexes), number, parent, moved)
+    return Remade(named(mesh, mesh.points[used], cells, parent, moved, macros), number, parent, moved)

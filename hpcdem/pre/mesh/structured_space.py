@@ -88,7 +88,7 @@ def hexes_of_grid(grid: np.ndarray, group: tuple[str, str] | None = None) -> Mes
     found = Mesh.of_hexes(made.points, points)
     layers = {name: _triangles_on(found.cells, _side(number, axis, end)) for name, axis, end in SIDES}
     groups = {group[0]: {group[1]: np.arange(len(found.cells))}} if group else {}
-    return Mesh.of(found.points, found.cells, groups, layers, hexes=found.hexes)
+    return Mesh.of(found.points, found.cells, groups, layers, macros=found.macros)
 
 
 def _step(at: tuple[int, int, int], axis: int) -> tuple[int, ...]:

@@ -89,7 +89,7 @@ def octant(inner: int, cells: int, radii: np.ndarray, of_hexes: bool = False) ->
     far = np.linalg.norm(made.points, axis=1)[free]
     layers["inside"] = free[(far < radii[0] * (1 + 1e-9)).all(axis=1)]
     layers["outside"] = free[(far > radii[-1] * (1 - 1e-9)).all(axis=1)]
-    return Mesh.of(made.points, made.cells, layers=layers, hexes=made.hexes)
+    return Mesh.of(made.points, made.cells, layers=layers, macros=made.hexes)
 
 
 def eighth(mesh: Mesh, **properties: float) -> Blocks:
