@@ -153,6 +153,15 @@ def test_files_of_a_body(page: Tab, folder: Path, tmp_path: Path):
     assert text.count("3DFACE") > 100 and "\n1.5\n" in text  # the plane in space
 
 
+def test_what_is_typed_is_there_however_long_it_takes(page: Tab):
+    """The page looks at the folder meanwhile, and shows anew what holds."""
+    first = page.pixels()
+    section = page.tab.locator("#section")
+    section.press_sequentially("x<2.3", delay=400)
+    assert page.tab.input_value("#section") == "x<2.3"
+    assert not same(first, page.after(lambda: section.press("Enter")))
+
+
 def test_frames_follow_each_other(page: Tab):
     before = page.pixels()
     assert page.text("#moment") == "step 10, 10 ms"

@@ -136,10 +136,10 @@ class Window {
       $("pictures").textContent = say("picture", { ms: Math.round(performance.now() - began) });
       document.body.dataset.pictures = ++drawn;
       document.body.dataset.fine = fine;
-      if (this.failed) { told(""); this.failed = false; }
+      if (this.failed) { told(""); this.failed = this.lost = false; }
     } catch (error) {
       if (error.status === 503) { this.wish ??= { fine }; await new Promise((done) => { setTimeout(done, LOOK); }); }  // busy
-      else { this.failed = true; complain(error); }
+      else { this.failed = true; this.lost = !(error instanceof Refusal); complain(error); }
     }
     this.busy = false;
     if (this.wish) this.fetch();
@@ -257,7 +257,7 @@ function eyes() {
   if (!about.box) return;
   const names = Object.keys(about.eyes), { eye } = current.view;
   options($("eye"), [...names, ...(names.includes(eye) ? [] : [eye])].map((name) => [name, name]), eye);
-  $("section").value = current.view.section;
+  filled("section", current.view.section);
   cutter();
 }
 
@@ -543,8 +543,15 @@ function counts() {
 }
 
 function options(select, pairs, value) {
-  select.replaceChildren(...pairs.map(([key, text]) => new Option(text, key)));
-  select.value = value;
+  const same = select.options.length === pairs.length && pairs.every(([key, text], k) =>
+    select.options[k].value === `${key}` && select.options[k].text === text);
+  if (!same) select.replaceChildren(...pairs.map(([key, text]) => new Option(text, key)));
+  if (select.value !== `${value}`) select.value = value;
+}
+
+/** Show what holds, but leave a field in which somebody is typing: what was typed is taken when it is left. */
+function filled(id, value) {
+  if (document.activeElement !== $(id)) $(id).value = value;
 }
 
 let asked = 0;
@@ -743,9 +750,9 @@ function controls() {
   $("slider").value = current.frame;
   $("slider").setAttribute("aria-valuetext", `${frames()[current.frame]?.[0] ?? ""}`);
   $("source").value = current.source;
-  $("deformed").value = current.view.deformed;
+  filled("deformed", current.view.deformed);
   $("deformed").disabled = !about.displaced;
-  $("title").value = current.view.title;
+  filled("title", current.view.title);
   eyes();
 }
 
@@ -800,6 +807,7 @@ async function look() {
       try { await begin(); } finally { beginning = false; }
     }
     if (about) {
+      for (const one of windows) if (one.lost && !one.busy) one.redraw();  // the server is there again
       let rewritten = false, grown = false;
       windows.forEach((one) => {
         const old = before[one.source];
