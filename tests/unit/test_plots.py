@@ -11,7 +11,6 @@ import pytest
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io import colours
-from hpcdem.post import raster
 from hpcdem.post.layers import LAYERS
 from hpcdem.post.plots import Style, frame_figure, plot_frame
 from tests.unit.io_synthetic import make_frame
@@ -92,79 +91,6 @@ def test_errors_are_explained(tmp_path: Path) -> None:
 def test_a_picture_too_large_for_its_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(HpcdemError, match=r"\d+ x \d+ pixels, at most 65535 along a side and 250 million in all"):
         plot_frame(make_frame(1), tmp_path / "a.jpg", dpi=20000)
-
-
-# --- discs as pixels ---------------------------------------------------------------------------------------------
-
-
-def painted(x, y, radius, kind=None, width: int = 60, height: int = 40, line: float = 0.0) -> np.ndarray:
-    """Red and blue discs as fractions (height, width, 4), row 0 at the bottom."""
-    x, y, radius = (np.atleast_1d(np.asarray(v, float)) for v in (x, y, radius))
-    kind = np.zeros(len(x), int) if kind is None else np.asarray(kind)
-    shades = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    return raster.discs(x, y, radius, shades, kind, width, height, line) / 255.0
-
-
-@pytest.mark.parametrize("radius", [0.3, 0.5, 0.7, 1.0, 1.7, 4.0, 15.0])
-def test_a_disc_covers_its_area_about_its_centre(radius: float) -> None:
-    random = np.random.default_rng(1)
-    parts = []
-    for x, y in zip(29.0 + random.random(50), 20.0 + random.random(50)):
-        cover = painted(x, y, radius)[..., 3]
-        parts.append(cover.sum() / (np.pi * radius**2))
-        middle = np.array([(cover.sum(0) * (np.arange(60) + 0.5)).sum(), (cover.sum(1) * (np.arange(40) + 0.5)).sum()])
-        np.testing.assert_allclose(middle / cover.sum(), [x, y], atol=0.1)
-    assert np.mean(parts) == pytest.approx(1.0, abs=0.02)
-    assert np.std(parts) < 0.08
-
-
-def test_a_disc_is_sharp_and_round() -> None:
-    picture = painted(30.2, 20.4, 12.0)
-    v, u = np.mgrid[:40, :60] + 0.5
-    distance = np.hypot(u - 30.2, v - 20.4)
-    assert (picture[distance < 11.2] == [1.0, 0.0, 0.0, 1.0]).all()
-    assert (picture[distance > 12.8, 3] == 0.0).all()
-    edge = (distance > 11.9) & (distance < 12.1)
-    assert np.abs(picture[edge, 3] - 0.5).max() < 0.15
-
-
-def test_discs_that_touch_leave_no_seam_and_overlap_in_equal_parts() -> None:
-    picture = painted([20.5, 40.5], [20.0, 20.0], [10.0, 10.0], [0, 1])
-    row = picture[19:21].mean(axis=0)
-    assert row[28:33, 3].min() > 0.96  # where they touch, in the middle of a pixel
-    both = painted([30.0, 30.0], [20.0, 20.0], [10.0, 10.0], [0, 1])[20, 30]
-    np.testing.assert_allclose(both, [0.5, 0.0, 0.5, 1.0], atol=0.01)
-
-
-def test_what_is_off_the_picture_changes_nothing_inside() -> None:
-    inside = painted(30.0, 20.0, 5.0)
-    around = np.linspace(0.0, 2.0 * np.pi, 12)
-    x, y = 30.0 + 90.0 * np.cos(around), 20.0 + 90.0 * np.sin(around)
-    np.testing.assert_array_equal(painted([30.0, *x], [20.0, *y], [5.0] + 12 * [8.0]), inside)
-    cut = painted([0.0, 30.0], [20.0, 40.0], [6.0, 6.0])[..., 3]
-    assert cut.sum() == pytest.approx(np.pi * 36.0, rel=0.02)  # two halves
-    huge = painted(30.0, -1000.0, 1020.0)[..., 3]
-    assert huge[:19, 25:35].min() == 1.0 and huge[21:, 25:35].max() == 0.0
-
-
-def test_circles_have_their_line_and_are_empty() -> None:
-    picture = painted(30.0, 20.0, 10.0, line=2.0)[..., 3]
-    assert picture[20, 30] == 0.0 and picture[20, 39:41].mean() > 0.9
-    assert picture.sum() == pytest.approx(2.0 * np.pi * 10.0 * 2.0, rel=0.03)
-
-
-def test_bitmaps_and_curves_look_alike(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    image = pytest.importorskip("PIL.Image")
-    from hpcdem.post import discs
-
-    frame = make_frame(400)
-    plot_frame(frame, tmp_path / "a.png", dpi=200)
-    monkeypatch.setattr(discs, "RendererAgg", type(None))  # nothing is a bitmap: draw curves
-    plot_frame(frame, tmp_path / "b.png", dpi=200)
-    a, b = (np.asarray(image.open(tmp_path / f"{k}.png").convert("RGB")) / 255.0 for k in "ab")
-    assert a.shape == b.shape
-    assert np.abs(a - b).mean() < 0.01 and 0.0 < np.abs(a - b).max()
-    assert abs(a.mean() - b.mean()) < 0.002
 
 
 # --- the surface -------------------------------------------------------------------------------------------------

@@ -15,9 +15,8 @@ from scipy import ndimage
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.fields import sides_of_box
-from hpcdem.io import colours
 from hpcdem.io.frame import Frame, Table
-from hpcdem.post import layers, raster
+from hpcdem.post import layers
 from hpcdem.post.cpt import ColourTable
 from hpcdem.post.section import Section
 
@@ -86,19 +85,21 @@ def draw(section: Section, kind: Kind, ax: Any, table: ColourTable | None) -> No
 
 def draw_particles(section: Section, ax: Any) -> None:
     """Discs of true size in the manual's colours; very many as a bitmap, also in a vector picture."""
-    p = section.particles
-    if len(p["x"]) <= VECTOR_DISCS:
-        layers.balls(Frame(section.step, section.time, 0.0, {}, {}, {"particles": Table(p)}), ax)
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    frame = Frame(section.step, section.time, 0.0, {}, {}, {"particles": Table(section.particles)})
+    if len(section.particles["x"]) <= VECTOR_DISCS:
+        layers.balls(frame, ax)
         return
-    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    fine = DISC_PIXELS / (right - left)
-    size = DISC_PIXELS, round(fine * (top - bottom))
-    picture = raster.discs(
-        fine * (p["x"] - left), fine * (p["y"] - bottom), fine * p["radius"], colours.RGB,
-        colours.numbers(p["color"]), *size,
-    )  # fmt: skip
-    cover = picture[..., 3:] / 255.0
-    _paint(ax, cover * picture[..., :3] / 255.0 + 1.0 - cover, (left, right, bottom, top))
+    (left, right), (bottom, top) = limits = ax.get_xlim(), ax.get_ylim()
+    size = DISC_PIXELS, round(DISC_PIXELS * (top - bottom) / (right - left))
+    canvas = FigureCanvasAgg(Figure(figsize=size, dpi=1))
+    inner = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=limits[0], ylim=limits[1], frame_on=False)
+    layers.balls(frame, inner)
+    inner.set_axis_off()
+    canvas.draw()
+    _paint(ax, np.asarray(canvas.buffer_rgba())[::-1, :, :3] / 255.0, (left, right, bottom, top))
 
 
 def _paint(ax: Any, picture: np.ndarray, extent: tuple[float, float, float, float]) -> None:
