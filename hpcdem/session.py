@@ -118,11 +118,11 @@ class Session:
         if sim in self.unfinished:
             self.unfinished.remove(sim)
         if sim.plots and self.job.language != "zdem":  # a script of that says STOP
-            from hpcdem.engine import output
+            from hpcdem.commands.dem import output
 
             output.finish(sim)
         if self.ends_with_frame and sim.timers.steps and (sim.last_frame or (-1,))[0] != sim.clock.step:
-            from hpcdem.engine import output
+            from hpcdem.commands.dem import output
 
             sim.close()
             output.Snapshot(sim).write_print()
@@ -282,7 +282,7 @@ def watch_states(sim: Simulation, reproduction: Reproduction) -> None:
 def report_end(sim: Simulation) -> None:
     """Collective: what became of the energy, and of particles that got lost; the last line of histories, as a program
     need not say STOP."""
-    from hpcdem.engine import output
+    from hpcdem.commands.dem import output
 
     output.close_histories(sim)
     output.tell_energy(sim)
@@ -300,7 +300,7 @@ def draw_last_state(sim: Simulation, log: Log) -> None:
         return
     path, frame = sim.outdir / frame_name(sim.clock.step, ".jpg"), None
     if sim.last_frame is None or sim.last_frame[0] != sim.clock.step:
-        from hpcdem.engine import output
+        from hpcdem.commands.dem import output
         from hpcdem.physics.dem import diagnostics
 
         sim.close()

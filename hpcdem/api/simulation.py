@@ -738,7 +738,7 @@ class Simulation(BlockCommands):
     @_look
     def write_frame(self) -> None:
         """Write ``all_<step>.vtkhdf`` and ``.dat`` now."""
-        from hpcdem.engine import output
+        from hpcdem.commands.dem import output
 
         self._ready()
         output.Snapshot(self.engine).write_print()
@@ -947,7 +947,7 @@ class Simulation(BlockCommands):
     @_look
     def unbalanced(self) -> float:
         """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
-        from hpcdem.engine import output
+        from hpcdem.commands.dem import output
 
         self._ready()
         return output.unbalanced(self.engine)

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from hpcdem.commands.dem import output
 from hpcdem.commands.fdem import Project
 from hpcdem.commands.fdem import frames as mesh_frames
 from hpcdem.core.errors import CommandError
-from hpcdem.engine import output
 from hpcdem.io.frames import frame_name
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.io.vtkhdf_mesh import write_mesh_frame

@@ -1,7 +1,7 @@
 """Files that a run of particles writes at intervals: what the language, its checks and the loop know of each kind.
 
 A new kind is a row here, a field of its name in `physics.dem.settings.Settings`, and a method `write_NAME` of
-`engine.output.Snapshot`.
+`commands.dem.output.Snapshot`.
 """
 
 from __future__ import annotations

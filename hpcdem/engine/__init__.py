@@ -1,1 +1,1 @@
-"""What runs a model, whatever its physics: what is due between steps, output."""
+"""What every model has, whatever its physics: the step, when lists are rebuilt, storage, accounts of energy."""

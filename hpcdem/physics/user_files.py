@@ -32,7 +32,7 @@ from hpcdem.runtime.launch import patient_barrier
 
 if TYPE_CHECKING:
     from hpcdem.core.comm import Comm
-    from hpcdem.physics.model import Model
+    from hpcdem.engine.model import Model
 
 TOLD = 0.1
 """Seconds of compiling that the log tells."""

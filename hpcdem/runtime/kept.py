@@ -228,7 +228,7 @@ def _parts(name: str) -> list[str]:
 
 @cache
 def _files() -> frozenset[str]:
-    """The modules of hpcdem, as `physics/model.py`."""
+    """The modules of hpcdem, as `engine/model.py`."""
     found = []
     for folder, _, names in os.walk(_PACKAGE):
         inner = os.path.relpath(folder, _PACKAGE).replace(os.sep, "/")

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.core import rebuild
+from hpcdem.engine import rebuild
 from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.kernels import detect
 from hpcdem.physics.fdem.simulation import Blocks

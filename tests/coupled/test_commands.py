@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hpcdem.cli import info
-from hpcdem.commands.dem import cycles, properties, settings, walls
+from hpcdem.commands.dem import cycles, output, properties, settings, walls
 from hpcdem.commands.fdem import assignments, checkpoints, coupling, meshes
 from hpcdem.commands.fdem import settings as settings_
 from hpcdem.commands.fdem import steps as stepping
@@ -18,7 +18,6 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
 from hpcdem.core.timers import Timers
-from hpcdem.engine import output
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.physics.fdem import diagnostics

@@ -290,7 +290,7 @@ else:
             ),
             ("physics/dem/settings.py", "    vtk: int = 0", "    list: int = 0"),
             (
-                "engine/output.py",
+                "commands/dem/output.py",
                 '        """`all_<step>.ps`."""',
                 '        with self.sim.timers("output"):\n'
                 '            self._write(write_ps, ".ps")\n            _under_way.go()\n\n'
@@ -311,7 +311,7 @@ assert len(list(Path("data").glob("*.txt"))) == 3  # at step 20 as well
     "a history": Recipe(
         [
             (
-                "engine/output.py",
+                "commands/dem/output.py",
                 '    "kinetic": ("J", diagnostics.kinetic_energy),',
                 '    "discs": ("1", lambda sim: float(sim.count(len(sim.particles)))),',
             ),

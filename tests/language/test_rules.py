@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcdem.commands.dem import output
 from hpcdem.commands.dem.bonds import _slots
 from hpcdem.core.errors import ScriptError
-from hpcdem.engine import output
 from hpcdem.physics.dem.simulation import Simulation
 from tests.support import at_wall, body, force, pair, position, value, velocity
 from tests.tables import each

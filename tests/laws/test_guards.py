@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.dem import cycles, particles, properties, settings, walls
-from hpcdem.core import rebuild
 from hpcdem.core.errors import PhysicsError
+from hpcdem.engine import rebuild
 from hpcdem.physics.dem import diagnostics, simulation
 from hpcdem.runtime.progress import Log
 from hpcdem.session import report_end

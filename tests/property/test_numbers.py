@@ -9,9 +9,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem.commands.dem import cycles, particles, walls
+from hpcdem.commands.dem import cycles, output, particles, walls
 from hpcdem.core.comm import SerialComm
-from hpcdem.engine import output
 from hpcdem.io.dat import read_dat, write_dat
 from hpcdem.io.textnum import format_floats
 from tests.support import model

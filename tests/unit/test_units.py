@@ -9,11 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from hpcdem.commands.dem import particles, properties, settings
+from hpcdem.commands.dem import output, particles, properties, settings
 from hpcdem.commands.fdem import charts, checkpoints, coupling, histories
 from hpcdem.core import units
 from hpcdem.core.errors import CommandError
-from hpcdem.engine import output
 from hpcdem.lang.zdem.execute import Interpreter
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.physics.dem.settings import Settings

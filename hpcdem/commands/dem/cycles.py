@@ -10,12 +10,12 @@ from functools import partial
 
 import numpy as np
 
+from hpcdem.commands.dem import output
 from hpcdem.commands.dem.bonds import warn_of_two_stiffnesses
 from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.outputs import OUTPUTS
 from hpcdem.core.units import with_prefix
-from hpcdem.engine import output
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.guards import NAMED

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hpcdem.commands.dem.output import followed
 from hpcdem.core.errors import CommandError
-from hpcdem.engine.output import followed
 from hpcdem.physics.dem.platens import OF_PARTS
 from hpcdem.physics.dem.simulation import Simulation
 

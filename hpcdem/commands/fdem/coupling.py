@@ -126,8 +126,7 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
     if both is None:
         yield
         return
-    from hpcdem.commands.dem import cycles
-    from hpcdem.engine import output
+    from hpcdem.commands.dem import cycles, output
 
     sim = both.particles
     both.heed_time_step(partial(_by_frac, both))
@@ -237,7 +236,7 @@ def release(project: Project) -> None:
 def save(project: Project, path: Path, extra: dict[str, Any]) -> None:
     """Write all that is stepped together. Collective."""
     if project.coupled is not None:
-        from hpcdem.engine import output
+        from hpcdem.commands.dem import output
         from hpcdem.physics.coupling import saved_state
 
         take_up(project)

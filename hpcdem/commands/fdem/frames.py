@@ -1,7 +1,7 @@
 """output vtk: frames of the model for ParaView.
 
 Those that are due while the model is stepped are written asynchronously, as those of particles are
-(hpcdem/engine/output.py): the next step with frames, a checkpoint and the end of the command wait for them; errors of
+(commands/dem/output.py): the next step with frames, a checkpoint and the end of the command wait for them; errors of
 the disk stop all ranks there, or at the next line of the log.
 """
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from hpcdem.commands.dem import output
 from hpcdem.commands.fdem import frames, histories
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.core.units import with_prefix
-from hpcdem.engine import output
 from hpcdem.io.agreed import on_first
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics

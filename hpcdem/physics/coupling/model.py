@@ -19,7 +19,7 @@ import numpy as np
 from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import GID, X, Y
-from hpcdem.core.rebuild import CheckInterval
+from hpcdem.engine.rebuild import CheckInterval
 from hpcdem.halo.migrate import Trail
 from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, exact_sum, from_integer
 from hpcdem.physics.coupling.kernels import disc_faces

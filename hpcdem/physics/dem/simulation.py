@@ -22,8 +22,9 @@ from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import CLUMP, FIELDS, FX, GID, RADIUS, TORQUE, WIDTH, X, Y
 from hpcdem.core.memory import aligned, take_rows
-from hpcdem.core.rebuild import LONGEST_WAIT, RebuildState
 from hpcdem.decomp import strips
+from hpcdem.engine.model import Model
+from hpcdem.engine.rebuild import LONGEST_WAIT, RebuildState
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration, Trail
 from hpcdem.physics.dem import guards, missed
@@ -37,7 +38,6 @@ from hpcdem.physics.dem.particles import Particles
 from hpcdem.physics.dem.settings import Settings
 from hpcdem.physics.dem.user_laws import ModelLaws
 from hpcdem.physics.dem.walls import Walls
-from hpcdem.physics.model import Model
 from hpcdem.runtime.run_folder import Retention
 
 NARROW, WIDE = 0.3, 0.6

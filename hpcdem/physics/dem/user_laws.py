@@ -59,8 +59,8 @@ from hpcdem.physics.user_files import (
 from hpcdem.runtime import kept
 
 if TYPE_CHECKING:
+    from hpcdem.engine.model import Model
     from hpcdem.physics.dem.kernels import user_pairs
-    from hpcdem.physics.model import Model
 
 FORCES = ("fn", "fs")
 STORES = ("normal", "shear")

@@ -24,8 +24,8 @@ from hpcdem.core.cells import columns, keys
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.core.heap import give_back
 from hpcdem.core.memory import aligned
-from hpcdem.core.rebuild import LONGEST_WAIT
 from hpcdem.decomp import strips
+from hpcdem.engine.rebuild import LONGEST_WAIT
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership

@@ -14,15 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcdem.core.comm import Comm
-from hpcdem.core.rebuild import RebuildState
 from hpcdem.core.units import with_prefix
+from hpcdem.engine.model import Model
+from hpcdem.engine.rebuild import RebuildState
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.definition import ModelDefinition, Relaxation
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep, creep_tets, plastic_tets, plasticity
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.surface_loads import SurfaceLoads
-from hpcdem.physics.model import Model
 
 NARROW, WIDE = 0.1, 0.3
 """Buffer of the contact search over the mean edge, at rest and in fast motion."""

@@ -25,7 +25,7 @@ from hpcdem.physics.user_files import MARK, UnknownLaw, Wrong, agreed, compiled,
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-    from hpcdem.physics.model import Model
+    from hpcdem.engine.model import Model
 
 ARGUMENTS = "x", "y", "z", "t"
 

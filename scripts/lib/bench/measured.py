@@ -19,7 +19,7 @@ def no_first_frame(sim: hpcdem.Simulation) -> None:
 
 def contacts(sim: hpcdem.Simulation) -> int:
     """Touching pairs of the whole model."""
-    from hpcdem.engine import output
+    from hpcdem.commands.dem import output
 
     return int(output.HISTORIES["contacts"][1](sim.engine))
 
