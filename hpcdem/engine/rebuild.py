@@ -8,6 +8,7 @@ LONGEST_WAIT = 64
 """Most steps between two checks of how far anyone has gone."""
 GLANCE = 10
 """Steps between two glances: looks that change nothing unless somebody has sped up since the last check."""
+UNSEEN, AT_A_GLANCE, CHECK = 0, 1, 2
 
 
 @dataclass
@@ -17,14 +18,10 @@ class CheckInterval:
     countdown: int = 1
     pace: int = 1
 
-    def passed(self) -> bool:
-        """One step more; whether a check is due."""
-        self.countdown -= 1
-        return self.countdown <= 0
-
-    def glances(self) -> bool:
-        """Whether somebody glances at this step, which is none of a check."""
-        return self.countdown % GLANCE == 0
+    def passed(self) -> int:
+        """One step more; what is due at it: UNSEEN, AT_A_GLANCE or CHECK."""
+        self.countdown = left = self.countdown - 1
+        return CHECK if left <= 0 else UNSEEN if left % GLANCE else AT_A_GLANCE
 
     def is_too_late(self, room: float, stride: float) -> bool:
         """Whether so much room [m] is used up at this stride [m] per step before the next glance or check."""

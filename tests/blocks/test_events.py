@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem import breaks, changes, convergence, diagnostics, saved_state
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import rectangle
@@ -126,7 +126,7 @@ def test_events_do_not_depend_on_who_looks_when(tmp_path):
         now = diagnostics.crack_rows(looked)
         assert now[: len(told)] == told  # what was told once stays as it was
         told = now
-        if looked.waiting_events() and len(told) > 5 and not (tmp_path / "a.sav").exists():
+        if breaks.waiting(looked) and len(told) > 5 and not (tmp_path / "a.sav").exists():
             saved_state.save(looked, tmp_path / "a.sav")
             looked = Blocks()
             saved_state.restore(looked, tmp_path / "a.sav")

@@ -10,7 +10,7 @@ import pytest
 from hpcdem.commands.dem import cycles, particles, properties, settings, walls
 from hpcdem.core.errors import PhysicsError
 from hpcdem.engine import rebuild
-from hpcdem.physics.dem import diagnostics, simulation
+from hpcdem.physics.dem import diagnostics, reach
 from hpcdem.runtime.progress import Log
 from hpcdem.session import report_end
 from tests.support import model, only
@@ -116,7 +116,7 @@ def meeting(folder, monkeypatch, glance: int, speed: float, walled: bool = False
     """Two discs 0.9 skins apart, or one and a wall as far away; they are set in motion between two looks, unseen."""
     monkeypatch.setattr(rebuild, "GLANCE", glance)
     sim, _ = crowd(folder, [], dt=1e-3)
-    gap = 0.9 * simulation.NARROW
+    gap = 0.9 * reach.NARROW
     particles.ball(sim, 0, 0.0, 0.0, 1.0)
     if walled:
         walls.wall(sim, 3, ((1.0 + 1.5 * gap, -9.0), (1.0 + 1.5 * gap, 9.0)), kn=2.0)

@@ -80,7 +80,7 @@ def test_motion(tmp_path: Path, eta: float) -> None:
         place, velocity, sim.lists.owned_forces(), sim.body[:, [MASS, MASS, INERTIA]], fixed, sim.body[:, ALPHA],
         (s.gx, s.gy), eta, s.dt,
     )  # fmt: skip
-    sim._move(sim.lists.n_blocks, 0, len(p), *sim._move_args)
+    sim._mover(sim.lists.n_blocks, 0, len(p), *sim._move_args)
     hot = p.hot[p.owned]
     assert fixed.any(axis=0).all() and not fixed.all()
     assert np.column_stack([hot[:, [X, Y]], p.cold[:, ANGLE]]) == pytest.approx(place, rel=1e-14, abs=1e-14)

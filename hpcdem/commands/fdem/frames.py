@@ -22,7 +22,7 @@ from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
 from hpcdem.physics import supports
-from hpcdem.physics.fdem import diagnostics, user_laws
+from hpcdem.physics.fdem import diagnostics, readiness, user_laws
 from hpcdem.physics.fdem.diagnostics import JOINT_SIZE, PROPERTIES, QUANTITIES
 from hpcdem.physics.fdem.groups import CHANNEL, ELEMENT, JOINT
 from hpcdem.physics.fdem.simulation import Blocks
@@ -235,7 +235,7 @@ def frame(project: Project, sound: bool = True) -> MeshFrame:
     """What is written at this moment; sound: with what elements do to each other and what acts on them; before all
     elements have a model the mesh alone. Collective."""
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
-    if len(blocks.bare()):
+    if len(readiness.bare(blocks)):
         return _of_mesh(project)
     with blocks.one_moment():
         corners = _corners(blocks)

@@ -17,7 +17,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.core.units import counted, with_prefix
 from hpcdem.io.behind import under_way
-from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium, overlaps
+from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium, notices, overlaps
 from hpcdem.physics.fdem.convergence import RATIO, Watch
 from hpcdem.physics.flow import costs
 from hpcdem.physics.flow.coupled import Coupled
@@ -480,7 +480,7 @@ def _run(
             project.progress["creep"] = project.blocks.creep.time + time
         elif ratio is not None:
             ends = steps is not None or time is not None
-            project.blocks.warn_of_flow()
+            notices.warn_of_flow(project.blocks)
             project.progress["watch"] = asdict(convergence.watch(project.blocks, window, limit, ends))
     first, end = project.progress["first"], project.progress["end"]  # from before a checkpoint, if it goes on from one
     alone = steps if ratio is None and time is None else None  # the number of steps, if it is known

@@ -19,7 +19,7 @@ import numpy as np
 from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import GID, X, Y
-from hpcdem.engine.rebuild import CheckInterval
+from hpcdem.engine.rebuild import AT_A_GLANCE, CheckInterval
 from hpcdem.halo.migrate import Trail
 from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, exact_sum, from_integer
 from hpcdem.physics.coupling.kernels import disc_faces
@@ -113,7 +113,7 @@ class Coupled(SurfaceLoad):
         due = self._check_interval.passed()
         if not self._link_holds():
             self._connect()
-        elif (due or self._check_interval.glances()) and self._check_rebuild(glance=not due):
+        elif due and self._check_rebuild(due == AT_A_GLANCE):
             self._connect()
         self._interact()
         if books:

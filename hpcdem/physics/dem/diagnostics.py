@@ -17,6 +17,7 @@ from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.numerics.exact_sum import BINS_SHAPE, exact_sum, rounded_sums
 from hpcdem.numerics.fingerprint import as_text, of_rows
+from hpcdem.physics.dem import loops
 from hpcdem.physics.dem.kernels import contacts, laws, mass, modes, rigid, totals
 from hpcdem.physics.dem.kernels import walls as wall_kernels
 from hpcdem.physics.dem.kernels.motion import CLUMPED, INERTIA, MASS
@@ -448,7 +449,7 @@ def frame(sim: Simulation) -> Frame:
     for name in (name for name, one in PROPERTIES.items() if one.in_frames):
         columns[name] = rows[name][p["material"]]
     if rows["xp"].any() or rows["yp"].any():
-        columns["push_x"], columns["push_y"] = sim.pressed().T
+        columns["push_x"], columns["push_y"] = loops.pressed(sim).T
     columns["hertz"] = rows["hertz"][p["material"]].astype(np.int8)
     columns["fix"] = p["fix"].astype(np.uint8)
     if sim.clumps:

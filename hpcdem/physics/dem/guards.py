@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from hpcdem.core.comm import Comm
 from hpcdem.core.errors import PhysicsError
-from hpcdem.core.fields import RADIUS
+from hpcdem.core.fields import GID, RADIUS, X, Y
+from hpcdem.physics.dem.kernels import motion, slips
+from hpcdem.physics.dem.kernels.neighbours import NO_ROWS
 from hpcdem.physics.dem.particles import Particles
 
 LARGEST_STRIDE = 0.5
@@ -66,3 +70,74 @@ def stop_on_runaway(
         f"  particle {g} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g}), rank {rank}" for g, x, y, vx, vy, rank in rows
     )
     raise PhysicsError(f"step {step}: {what} ({total} particles); {guess}\n{named}")
+
+
+def name_slipped(sim: Any) -> None:
+    """A line in the log for particles that have slipped through a row of GLINE or a wall, each once. Collective."""
+    p, walls = sim.particles, sim.walls
+    mine = walls.side == 0
+    if not sim.rows and not mine.any():
+        return
+    origin = np.empty((len(p.hot), 2))
+    origin[p.owned] = sim.origin
+    chain = None
+    if sim.rows:
+        sim.halo.fill(origin)
+        chain = slips.neighbours_in_rows(p.ihot[:, GID], p.hot[:, [X, Y]], origin, sim.rows, sim.rebuild_state.side)
+        sim.halo.fill(chain)
+    ways = np.where(mine[:, None], walls.travel, np.nan)
+    kinds = slips.found(sim.lists, p.hot, origin, chain, np.hstack([walls.p1, walls.p2]), ways)
+    if not sim.comm.any(bool(kinds.any())):
+        return
+    for kind, what in ((slips.ROW, "a row of GLINE"), (slips.WALL, "a wall")):
+        which = kinds == kind
+        which[which] = ~np.isin(p["gid"][which], list(sim._named))
+        gids = np.concatenate(sim.comm.allgather(p["gid"][which].copy())).tolist()
+        if gids:
+            sim._named.update(gids)
+            names = places(p, which, sim.comm)
+            more = f"; and {len(gids) - NAMED} more" if len(gids) > NAMED else ""
+            if sim.log is not None:
+                sim.log.warn(f"step {sim.clock.step}: {len(gids)} particles slipped through {what}: {names}{more}")
+
+
+def drop_outside(sim: Any, box: tuple[float, float, float, float]) -> None:
+    """Particles whose centre, or that of their clump, has left the BOX are deleted, with a line in the log;
+    PhysicsError if they ran away, which the next look would no longer see. Collective."""
+    x, y = sim.clumps.centres(sim.particles)
+    gone = outside(x, y, box)
+    _refuse_runaways(sim, gone)
+    names = places(sim.particles, gone, sim.comm)
+    number = sim.remove(gone)
+    sim.lost += number
+    if sim.log is not None:
+        more = f"; and {number - NAMED} more" if number > NAMED else ""
+        sim.log.info(f"step {sim.clock.step}: {number} particles left the BOX and were deleted: {names}{more}")
+
+
+def _refuse_runaways(sim: Any, which: np.ndarray) -> None:
+    """PhysicsError if one of the flagged owned particles (n_own,) bool of an open model is not finite, or goes too
+    far in a step. Collective."""
+    p, found = sim.particles, np.zeros(4)
+    places, hot = p.positions()[which], p.hot[p.owned][which]
+    motion.survey(hot, 0, len(hot), places, sim.clock.dt, NO_ROWS, found)
+    sim.comm.max_into(found)
+    if found[motion.BROKEN] or found[motion.STRIDE] > LARGEST_STRIDE:
+        broken = bool(found[motion.BROKEN])
+        mixed = sim.own_laws.mixed(sim.materials.rows)
+        stop_on_runaway(p, p.positions(), sim.clock.dt, sim.clock.step, broken, mixed, sim.comm, NO_ROWS)
+
+
+def refuse_lost_bonds(sim: Any, hist: Any) -> None:
+    """Every bond must have found its place in the new lists (a bond is remembered by both its ends)."""
+    if sim.bonds == 0:
+        return
+    found = np.array([hist.bonded(), sim.lists.bonds_placed], np.int64)
+    sim.comm.sum_into(found)
+    if found[0] != 2 * found[1]:
+        raise PhysicsError(
+            f"step {sim.clock.step}: {found[0] // 2 - found[1]} bonds were lost when the lists were rebuilt; "
+            f"longest bond {sim.rebuild_state.bond_reach:g} m, column {sim.rebuild_state.side:g} m. Particles "
+            "move too far in a step: the time step is probably too large"
+        )
+    sim.bonds = int(found[1])

@@ -17,7 +17,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.core.selection import Group
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.dem import diagnostics
+from hpcdem.physics.dem import diagnostics, loops
 from hpcdem.physics.dem.simulation import Simulation
 
 AXES = "xy"
@@ -79,7 +79,7 @@ def group_stress(sim: Simulation, what: str, _: int) -> float:
     sim.comm.max_into(ends)
     span = ends.sum(axis=0)
     axis = 1 if span[0] >= span[1] else 0
-    force = (sim.lists.owned_forces()[:, :2] - sim.pressed())[which, axis]
+    force = (sim.lists.owned_forces()[:, :2] - loops.pressed(sim))[which, axis]
     away = _mean_place(sim, which)[axis] - _mean_place(sim, ~which)[axis]
     total = exact_sum(np.ascontiguousarray(force), sim.comm)
     if not np.isfinite(span).all():

@@ -43,8 +43,9 @@ from hpcdem.physics.dem.kernels.contacts import LONGEST2
 from hpcdem.physics.dem.kernels.fast import Fast
 from hpcdem.physics.dem.kernels.neighbours import Histories
 from hpcdem.physics.dem.particles import free_rows
+from hpcdem.physics.dem.reach import ListState
 from hpcdem.physics.dem.settings import Settings
-from hpcdem.physics.dem.simulation import ListState, Simulation
+from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.dem.walls import Walls
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.physics.user_files import UnknownLaw
@@ -332,7 +333,7 @@ def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray)
     gid, moving = p["gid"].copy(), np.hstack([p.positions(), p.cold[:, FX : TORQUE + 1]])
     p["x"][:], p["y"][:] = origin.T
     walls.p1, walls.p2 = walls.p1 - travel, walls.p2 - travel
-    sim._close(frozen=True)
+    sim.close_as_saved()
     walls.p1, walls.p2, walls.travel = now[0], now[1], travel
     sim.rebuild_state = saved_lattice
     gid, moving = sim.trail.follow(sim.comm, p["gid"], gid, moving)

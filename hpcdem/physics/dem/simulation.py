@@ -1,9 +1,5 @@
-"""The simulation: state, one step, and the rebuild of the contact lists. The page on which the method can be read.
-
-State is either *closed* (sorted, ghosts in place, lists built: ready to step) or *open* (owned particles and their
-contact histories only: free to be added to or thinned out). Commands that change who is there open it; the next cycle
-closes it again. Everything that decides the order of arithmetic comes from global values and is part of the state:
-see `ListState`.
+"""The simulation of particles: its state, and the phases of the step and of a rebuild, whose order is in
+`engine/model.py`: particles move with the forces of the step before, then forces are those at the new positions.
 """
 
 from __future__ import annotations
@@ -17,43 +13,25 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from hpcdem.core.cells import columns, keys
+from hpcdem.core.cells import keys
 from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, PhysicsError
-from hpcdem.core.fields import CLUMP, FIELDS, FX, GID, RADIUS, TORQUE, WIDTH, X, Y
+from hpcdem.core.fields import CLUMP, FIELDS, FX, TORQUE, WIDTH
 from hpcdem.core.memory import aligned, take_rows
-from hpcdem.decomp import strips
-from hpcdem.engine.model import Model
-from hpcdem.engine.rebuild import LONGEST_WAIT, RebuildState
-from hpcdem.halo.exchange import connect
-from hpcdem.halo.migrate import Migration, Trail
-from hpcdem.physics.dem import guards, missed
+from hpcdem.engine.model import FRESH, STORAGE, Model
+from hpcdem.halo.migrate import Trail
+from hpcdem.physics.dem import guards, loops, missed, reach
 from hpcdem.physics.dem.clumps import Clumps
-from hpcdem.physics.dem.kernels import contacts, fast, mass, motion, neighbours, pair_forces, slips
-from hpcdem.physics.dem.kernels import walls as wall_kernels
+from hpcdem.physics.dem.kernels import contacts, fast, motion, neighbours
 from hpcdem.physics.dem.kernels.fast import Fast
 from hpcdem.physics.dem.kernels.neighbours import NO_ROWS, Histories
 from hpcdem.physics.dem.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.physics.dem.particles import Particles
+from hpcdem.physics.dem.reach import ListState
 from hpcdem.physics.dem.settings import Settings
 from hpcdem.physics.dem.user_laws import ModelLaws
 from hpcdem.physics.dem.walls import Walls
 from hpcdem.runtime.run_folder import Retention
-
-NARROW, WIDE = 0.3, 0.6
-"""Skin over the largest radius, at rest and in fast motion."""
-SHORT_LIVED, LONG_LIVED = 60, 200
-"""Lists that lasted fewer steps call for the wide skin, more steps for the narrow one."""
-EVERYWHERE = (-math.inf, math.inf, -math.inf, math.inf)
-
-
-@dataclass
-class ListState(RebuildState):
-    """Skin over the largest radius; longest bond [m] as last seen; columns that partners may lie apart."""
-
-    skin_factor: float = NARROW
-    bond_reach: float = 0.0
-    columns: int = 1
 
 
 @dataclass
@@ -106,6 +84,22 @@ class Simulation(Model):
     with a reach of their own in the lists (physics/dem/kernels/fast.py); energy: the account of SET energy
     (budget.Budget), or None.
     """
+
+    rebuild_state: ListState
+    largest_radius: float
+    body: np.ndarray
+    """Masses and what goes with them, see kernels/motion.py; these and the laws are made with the lists (loops.py)."""
+    pair_laws: np.ndarray
+    wall_laws: np.ndarray
+    bond_laws: np.ndarray
+    _parts: int
+    _walls_move: bool
+    _mover: Any
+    _pair_forces: Any
+    _wall_forces: Any
+    _move_args: tuple[Any, ...]
+    _pair_args: tuple[Any, ...]
+    _wall_args: tuple[Any, ...]
 
     def __init__(
         self,
@@ -180,64 +174,48 @@ class Simulation(Model):
         self.trail = Trail()
         self.origin = np.empty((0, 2))
         self._longest2 = 0.0
+        self.least_skin = 0.0  # of the next lists [m]
         self._tables_stale = True
         self._pushed, self._push = np.empty(0, np.int64), np.empty((0, 2))
 
     # ---- one step ------------------------------------------------------------------------------------------------
 
-    def step(self) -> int:
-        """Advance everything by one dt. The same text on one rank and on a thousand.
-
-        Returns what the outside asked for (0 nothing, 1 save, 2 save and stop), agreed by all ranks.
-        """
-        timers, halo, request = self.timers, self.halo, 0
+    def _begin_step(self) -> None:
         if self.energy is not None:
             self.energy.before_move(self)
-        with timers("move"):
-            if self.clumps:
-                self._move_with_clumps()
-            else:
-                for first, last in halo.border:
-                    self._move(self.lists.n_blocks, first, last, *self._move_args)
-                halo.start()
-                self._move(self.lists.n_blocks, *halo.inside, *self._move_args)
-            if self._walls_move:
-                self.walls.move(self.clock.dt)
-        self.rebuild_state.age += 1
-        stale, look = False, self.rebuild_state.passed()
-        if look or self.rebuild_state.glances():
-            with timers("reduce"):
-                stale, request = self._check_rebuild(glance=not look)
-        with timers("halo"):
-            halo.finish()
-        if stale:
-            if self.energy is not None:
-                self.energy.before_rebuild(self)
+
+    def _move_rows(self, first: int, last: int) -> None:
+        self._mover(self._parts, first, last, *self._move_args)
+        if self.moves_as_one:  # clumps overwrite what the loop makes of their members
+            s = self.settings
+            self.clumps.move(self.particles, self.lists, s.gx, s.gy, s.lsm, self.clock.dt)
+
+    def _moved(self) -> None:
+        if self._walls_move:
+            self.walls.move(self.clock.dt)
+
+    def _end_step(self, outdated: int) -> None:
+        energy, timers = self.energy, self.timers
+        if outdated:
+            if energy is not None:
+                energy.before_rebuild(self)
             self.rebuild()
-        if self.energy is not None:
-            self.energy.before_forces(self)
+        if energy is not None:
+            energy.before_forces(self)
         with timers("force"):
             self._forces()
-        if self.energy is not None:
-            self.energy.after_forces(self)
+        if energy is not None:
+            energy.after_forces(self)
         for physics in self.physics:
             with timers(physics.name):
                 physics.advance(self)
         self.clock.tick()
-        return request
-
-    def _move_with_clumps(self) -> None:
-        """Particles, then clumps with their members: these overwrite what the loop made of members."""
-        s = self.settings
-        self._move(self.lists.n_blocks, 0, self.particles.n_own, *self._move_args)
-        self.clumps.move(self.particles, self.lists, s.gx, s.gy, s.lsm, self.clock.dt)
-        self.halo.start()
 
     def _forces(self) -> None:
         """Contact, bond and wall forces at the present positions."""
         lists = self.lists
-        if not self.own_laws:
-            self._pair_forces(lists.n_blocks, *self._pair_args)
+        if self.own_table is None:
+            self._pair_forces(self._parts, *self._pair_args)
         else:
             self.stamp += 1
             self._pair_forces(lists.n_blocks, *self._pair_args, float(self.stamp))
@@ -248,35 +226,29 @@ class Simulation(Model):
             self.dashpots.push(self)
         if len(self._pushed):
             lists.force[self._pushed, :2] += self._push
-        if self.clumps:
+        if self.moves_as_one:
             self.clumps.sum_forces(self.particles, self.halo, lists)
 
-    def _check_rebuild(self, glance: bool = False) -> tuple[bool, int]:
-        """How far has anyone gone since the lists were built? Sets the step of the next look. glance: between two
-        looks; it becomes one if somebody has sped up so much that the next might come too late, else nothing changes.
-
-        Returns (lists must be rebuilt now, request from outside). One reduction; only global maxima enter.
-        """
-        rebuild_state, dt = self.rebuild_state, self.clock.dt
+    def _check_rebuild(self, glance: bool = False) -> tuple[int, int]:
+        rebuild_state, p, dt = self.rebuild_state, self.particles, self.clock.dt
         found = np.zeros(9)
-        p = self.particles
         # Half of the room, in case things speed up; gravity counted twice; and never more than twice the last wait.
         fall = 2.0 * math.hypot(self.settings.gx, self.settings.gy) * dt * dt
         motion.survey(p.hot, p.n_left, p.n_own, self.origin, dt, self._fast_rows, found[:4])
         found[4] = self.stop.local_request() if self.stop is not None else 0
-        self._look_at_fast(fall, found[5:])
+        reach.look_at_fast(self, fall, found[5:])
         self.comm.max_into(found)
         broken = bool(found[motion.BROKEN] or found[5 + fast.FAST_BROKEN])
         if broken or max(found[motion.STRIDE], found[5 + fast.FAST_STRIDE]) > guards.LARGEST_STRIDE:
-            alone = self._fast_rows[self.fast.alone[self._fast_at]]
-            guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, self._mixed_laws(), self.comm, alone)
+            alone, mixed = self._fast_rows[self.fast.alone[self._fast_at]], self.own_laws.mixed(self.materials.rows)
+            guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, mixed, self.comm, alone)
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
-        stride = max(math.sqrt(found[motion.SPEED2]), self._wall_speed()) * dt
+        stride = max(math.sqrt(found[motion.SPEED2]), self.walls.fastest()) * dt
         room = 0.5 * rebuild_state.skin - path
         if glance and not rebuild_state.is_too_late(room, stride) and found[5 + fast.DUE] == 0.0:
             hurry = found[5 + fast.HURRY]  # half the room over the stride, of the fast ones
             if hurry == 0.0 or not rebuild_state.is_too_late(2.0 / hurry, 1.0):
-                return False, 0
+                return FRESH, 0
         if (room < 0.0 and self.largest_radius > 0.0) or found[5 + fast.DUE] == fast.LATE:
             with self.timers("neighbour"):
                 missed.stop_on_missed(self)
@@ -285,21 +257,7 @@ class Simulation(Model):
             room = 0.5 * rebuild_state.skin
         hurry = 0.0 if stale else found[5 + fast.HURRY]
         rebuild_state.wait(fast.wait(room, stride, fall), 1.0 / hurry if hurry > 0.0 else math.inf)
-        return stale, int(found[4])
-
-    def _look_at_fast(self, fall: float, found: np.ndarray) -> None:
-        """What fast.survey says of the owned ones into found (4,)."""
-        if not len(self._fast_rows):
-            return
-        p, at = self.particles, self._fast_at
-        fast.survey(
-            p.hot, p.n_left, self.origin, self._fast_rows, self.fast.reach[at], self.fast.alone[at], self.clock.dt,
-            fall, (None if self.clumps else self.walls.box()) or EVERYWHERE, found,
-        )  # fmt: skip
-
-    def _wall_speed(self) -> float:
-        """Speed of the fastest wall [m/s]."""
-        return float(np.hypot(self.walls.v[:, 0], self.walls.v[:, 1]).max()) if len(self.walls) else 0.0
+        return STORAGE if stale else FRESH, int(found[4])
 
     def check_soon(self) -> None:
         """Speeds or the time step were changed by a command: look at the motion at the next step."""
@@ -318,11 +276,6 @@ class Simulation(Model):
         self.tables_changed()
 
     # ---- open and closed -----------------------------------------------------------------------------------------
-
-    @property
-    def closed(self) -> bool:
-        """Whether the lists are built and the ghosts in place."""
-        return self._lists is not None
 
     @property
     def lists(self) -> neighbours.ContactLists:
@@ -367,51 +320,15 @@ class Simulation(Model):
 
     def _open_lists(self) -> None:
         p = self.particles
-        self._name_slipped()
-        self._harvest()
+        guards.name_slipped(self)
+        self.breaks += self.uncollected_breaks()
+        self.lists.tally[:, [contacts.TENSION_BREAKS, contacts.SHEAR_BREAKS]] = 0.0
         self._longest2 = self.lists.longest_bond2()
         self._hist = self.lists.histories(p.ihot, float(self.stamp))
         self.halo.close()
         p.set_owned(p.hot[p.owned], p.cold, self.clumps.rows(p), p.more[p.owned])
         self.clumps.open()
-        self._lists = None
-
-    def _name_slipped(self) -> None:
-        """A line in the log for particles that have slipped through a row of GLINE or a wall, each once. Collective."""
-        p, walls = self.particles, self.walls
-        mine = walls.side == 0
-        if not self.rows and not mine.any():
-            return
-        origin = np.empty((len(p.hot), 2))
-        origin[p.owned] = self.origin
-        chain = None
-        if self.rows:
-            self.halo.fill(origin)
-            chain = slips.neighbours_in_rows(
-                p.ihot[:, GID], p.hot[:, [X, Y]], origin, self.rows, self.rebuild_state.side
-            )
-            self.halo.fill(chain)
-        ways = np.where(mine[:, None], walls.travel, np.nan)
-        kinds = slips.found(self.lists, p.hot, origin, chain, np.hstack([walls.p1, walls.p2]), ways)
-        if not self.comm.any(bool(kinds.any())):
-            return
-        for kind, what in ((slips.ROW, "a row of GLINE"), (slips.WALL, "a wall")):
-            which = kinds == kind
-            which[which] = ~np.isin(p["gid"][which], list(self._named))
-            gids = np.concatenate(self.comm.allgather(p["gid"][which].copy())).tolist()
-            if gids:
-                self._named.update(gids)
-                names = guards.places(p, which, self.comm)
-                more = f"; and {len(gids) - guards.NAMED} more" if len(gids) > guards.NAMED else ""
-                if self.log is not None:
-                    self.log.warn(
-                        f"step {self.clock.step}: {len(gids)} particles slipped through {what}: {names}{more}"
-                    )
-
-    def _harvest(self) -> None:
-        """Take over what the force loops counted."""
-        self.breaks += self.uncollected_breaks()
-        self.lists.tally[:, [contacts.TENSION_BREAKS, contacts.SHEAR_BREAKS]] = 0.0
+        self._lists, self.closed = None, False
 
     def close(self, least_skin: float = 0.0) -> None:
         """Make the model ready to step: lists and ghosts at the present positions, stored forces in place.
@@ -419,184 +336,63 @@ class Simulation(Model):
         least_skin [m]: pairs up to this gap will be in the lists, if the model was open.
         """
         if not self.closed:
-            self._close(least_skin=least_skin)
+            self.least_skin = least_skin
+            self._close()
+            self.least_skin = 0.0
             self.lists.set_owned_forces(self.particles.cold[:, FX : TORQUE + 1])
             if self.clumps:
                 self.clumps.sum_forces(self.particles, self.halo, self.lists)
         self.refresh_tables()
         self.halo.refresh()
 
-    def _close(self, frozen: bool = False, least_skin: float = 0.0) -> None:
-        """From open to closed. frozen: keep the rebuild_state as it is (restart); least_skin [m]: bond search."""
-        with self.timers("neighbour"):
-            box = self.walls.box()
-            outside = self._choose_reach(frozen, least_skin, box)
-            if outside and box is not None:
-                self._drop_outside(box)
-        self.hist = self.hist.resized(self.own_laws.memory)
-        cell = self._share_out()
-        p, rebuild_state, borders = self.particles, self.rebuild_state, self.ownership.borders
+    def _choose_reach(self, frozen: bool) -> np.ndarray:
+        box = self.walls.box()
+        if reach.choose(self, frozen, box) and box is not None:
+            guards.drop_outside(self, box)
+        return keys(self.particles.hot, self.rebuild_state.side)
+
+    def _share_out(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        p, box = self.particles, self.walls.box()
+        cell, self.hist, (hot, cold, more, *rigid) = self._send_home(
+            cell, self.hist.resized(self.own_laws.memory),
+            [p.hot, p.cold, p.more, *([] if p.rigid is None else [p.rigid])], None if box is None else box[:2],
+            least=self.rebuild_state.columns, left=lambda leave, to: self.trail.note(p["gid"][leave], to),
+        )  # fmt: skip
+        p.set_owned(hot, cold, rigid[0] if rigid else None, more)
         if self.pace is not None and self.own_laws.loops is None:  # laws of users are compiled for one number
             self.threads = self.pace.choose(p.n_own, self.timers, self.clock.step)
-        with self.timers("neighbour"):
-            order = strips.global_order(cell, p["gid"])
-            cell = cell[order]
-        with self.timers("halo"):
-            storage, self.halo = connect(self.comm, p.hot, order, cell, borders, self.threads, rebuild_state.columns)
-            rigid = self.clumps.storage(p, order, self.halo, self.threads)
-            clump = None if rigid is None else rigid.view(np.int64)[:, CLUMP].copy()
-            more = self.halo.storage(p.more[order]) if p.extra else np.empty((len(storage), 0))
-        with self.timers("neighbour"):
-            halo, hist = self.halo, self.hist
-            cold = take_rows(p.cold, order, aligned((len(order), WIDTH)), self.threads)
-            p.place(storage, cold, halo.n_left, rigid, more)
-            left, right = storage[: halo.n_left], storage[halo.n_left + p.n_own :]
-            cell = np.concatenate([keys(left, rebuild_state.side), cell, keys(right, rebuild_state.side)])
-            self.origin = p.positions()
-            self.walls.travel[:] = 0.0
-            self._wall_table = self.walls.table()
-            bond_reach = min(rebuild_state.side, rebuild_state.bond_reach + rebuild_state.skin) if self.bonds else 0.0
-            self._lists = neighbours.build(
-                storage, cell, p.n_left, p.n_own, hist, order, self._wall_table, rebuild_state.side,
-                self.largest_radius, rebuild_state.skin, bond_reach, self.threads, clump, self.fast,
-                rebuild_state.columns,
-            )  # fmt: skip
-            self._fast_rows, self._fast_at = self.fast.among(p["gid"])
-            self.clumps.close(p, halo, self._lists, self.clock.step, rebuild_state.side)
-            self._hist = None
-            rebuild_state.age = 0
-            self.rebuilds += 1
-            self._tables_stale = True
-            self.refresh_tables()
-            self._count_bonds(hist)  # last: what is wrong is still written as a frame
+        return cell, p["gid"]
 
-    def _count_bonds(self, hist: Histories) -> None:
-        """Every bond must have found its place in the new lists (a bond is remembered by both its ends)."""
-        if self.bonds == 0:
-            return
-        found = np.array([hist.bonded(), self.lists.bonds_placed], np.int64)
-        self.comm.sum_into(found)
-        if found[0] != 2 * found[1]:
-            raise PhysicsError(
-                f"step {self.clock.step}: {found[0] // 2 - found[1]} bonds were lost when the lists were rebuilt; "
-                f"longest bond {self.rebuild_state.bond_reach:g} m, column {self.rebuild_state.side:g} m. Particles "
-                "move too far in a step: the time step is probably too large"
-            )
-        self.bonds = int(found[1])
+    def _store(self, order: np.ndarray, cell: np.ndarray) -> None:
+        p = self.particles
+        storage = self._connect(p.hot, order, cell, self.rebuild_state.columns)
+        rigid = self.clumps.storage(p, order, self.halo, self.threads)
+        more = self.halo.storage(p.more[order]) if p.extra else np.empty((len(storage), 0))
+        cold = take_rows(p.cold, order, aligned((len(order), WIDTH)), self.threads)
+        p.place(storage, cold, self.halo.n_left, rigid, more)
 
-    def _choose_reach(self, frozen: bool, least_skin: float, box: tuple[float, float, float, float] | None) -> bool:
-        """Skin and cell side for the next lists, from global values only.
+    def _build_lists(self, order: np.ndarray, cell: np.ndarray, frozen: bool) -> None:
+        p, hist, rebuild_state = self.particles, self.hist, self.rebuild_state
+        side, skin = rebuild_state.side, rebuild_state.skin
+        clump = None if p.rigid is None else p.rigid.view(np.int64)[:, CLUMP].copy()
+        cell = np.concatenate([keys(p.hot[: p.n_left], side), cell, keys(p.hot[p.owned.stop :], side)])
+        self.origin = p.positions()
+        self.walls.travel[:] = 0.0
+        self._wall_table = self.walls.table()
+        bond_reach = min(side, rebuild_state.bond_reach + skin) if self.bonds else 0.0
+        self._lists = neighbours.build(
+            p.hot, cell, p.n_left, p.n_own, hist, order, self._wall_table, side, self.largest_radius, skin, bond_reach,
+            self.threads, clump, self.fast, rebuild_state.columns,
+        )  # fmt: skip
+        self._fast_rows, self._fast_at = self.fast.among(p["gid"])
+        self.clumps.close(p, self.halo, self._lists, self.clock.step, side)
+        self._hist, self._parts, self.closed, self.moves_as_one = None, self._lists.n_blocks, True, bool(self.clumps)
+        rebuild_state.age = 0
+        self._tables_stale = True
+        self.refresh_tables()
+        guards.refuse_lost_bonds(self, hist)  # last: what is wrong is still written as a frame
 
-        Returns whether a particle is outside the box (left, right, bottom, top) [m]: it rides on the same reduction.
-        """
-        rebuild_state, p = self.rebuild_state, self.particles
-        seen = np.array([0.0, self._longest2, 0.0])
-        seen[0], seen[2] = neighbours.gauge(p.hot, p.n_left, p.n_own, box if box is not None else EVERYWHERE)
-        if self.clumps and box is not None:
-            seen[2] = guards.outside(*self.clumps.centres(p), box).any()
-        self.comm.max_into(seen)
-        self.largest_radius, outside = float(seen[0]), bool(seen[2])
-        if frozen:
-            return outside
-        rebuild_state.bond_reach = math.sqrt(seen[1])
-        limit = 0.5 * NARROW * self.largest_radius / fast.LIFE
-        first_class = self._first_fast_class(limit)
-        if first_class is not None:
-            rebuild_state.skin_factor = NARROW if fast.LIFE / 2**first_class >= SHORT_LIVED else WIDE
-        else:
-            rebuild_state.adapt_skin(NARROW, WIDE, SHORT_LIVED, LONG_LIVED)
-        rebuild_state.skin = max(rebuild_state.skin_factor * self.largest_radius, least_skin)
-        side = 2.0 * self.largest_radius + rebuild_state.skin
-        while 0.0 < side < max(rebuild_state.bond_reach + rebuild_state.skin, 1.000001 * self.clumps.reach):
-            side *= 1.05  # in steps, so that the rebuild_state seldom changes
-        rebuild_state.side = side if side > 0.0 else 1.0
-        self._choose_fast(first_class, limit)
-        return outside
-
-    def _first_fast_class(self, limit: float) -> int | None:
-        """The class of speed (fast.classes) from which on particles get a reach of their own; None: nobody does.
-        limit [m]: way per step from which on one is faster than lists of usual skin can bear."""
-        if self._drift is None:
-            return None
-        p, dt = self.particles, self.clock.dt
-        before, _ = self.fast.among(p["gid"])  # who was fast remains so till it is slow in both respects
-        self._drift[before] = np.maximum(self._drift[before], fast.strides(p.hot[before], dt))
-        _, classes = fast.classes(self._drift, limit)
-        counts = np.append(np.bincount(classes, minlength=fast.CLASSES), len(p))
-        self.comm.sum_into(counts)
-        return fast.slowest_class(counts[:-1], int(counts[-1]), self._wall_speed() * dt, limit)
-
-    def _choose_fast(self, first_class: int | None, limit: float) -> None:
-        """Reach of the fast particles, and how many columns it spans; arguments as in `_first_fast_class`."""
-        rebuild_state, p, dt = self.rebuild_state, self.particles, self.clock.dt
-        before, drift = len(self.fast), self._drift
-        self.fast, rebuild_state.columns, self._drift = Fast.none(), 1, None
-        if drift is None or first_class is None:
-            if before:
-                self.check_soon()
-            return
-        which, classes = fast.classes(drift, limit)
-        which = which[classes >= first_class]
-        hot = p.hot[which]
-        way = np.maximum(drift[which], fast.strides(hot, dt))
-        rows = np.column_stack([hot[:, X], hot[:, Y], hot[:, RADIUS], way])
-        parts = self.comm.allgather((p["gid"][which], p.clump[which], rows))
-        gid, clump, rows = (np.concatenate([part[k] for part in parts]) for k in range(3))
-        order = np.argsort(gid)
-        gid, clump, rows = gid[order], clump[order], rows[order]
-        half, gravity = 0.5 * rebuild_state.skin, math.hypot(self.settings.gx, self.settings.gy)
-        most = fast.NEARLY * (0.5 * fast.MOST_COLUMNS * rebuild_state.side - self.largest_radius)
-        wanted = fast.wanted_reach(rows[:, 3], gravity, dt)
-        asked = np.argsort(-rows[:, 3], kind="stable")[: fast.ASKED]
-        # Nothing is known here of the faces of blocks: beside them nobody is alone.
-        asked = asked[(wanted[asked] > most) & (not self.coupled)]
-        slow, gaps = np.ones(len(p), bool), np.empty(len(asked))
-        slow[which] = False
-        fast.nearest(p.hot, slow, rows[asked, :2], gaps)
-        self.comm.min_into(gaps)
-        walls = np.hstack([self.walls.p1, self.walls.p2])
-        free = fast.free_way(asked, gaps, rows[:, :3], clump, walls, half)
-        reach = np.clip(wanted, half, max(half, most))
-        alone = free >= reach
-        widest = float(reach[~alone].max(initial=half))
-        rebuild_state.columns = max(1, math.ceil(2.0 * (self.largest_radius + widest) / rebuild_state.side))
-        self.fast = Fast(gid, np.where(alone, free, reach), alone)
-        room = np.append(self.fast.reach, half)
-        pace = np.append(rows[:, 3], limit * 2.0**first_class)
-        fall = 2.0 * gravity * dt * dt
-        wait = min(fast.wait(float(r), float(s), fall) for r, s in zip(room, pace, strict=True))
-        rebuild_state.pace = rebuild_state.countdown = max(
-            1, min(rebuild_state.countdown, int(min(wait, LONGEST_WAIT)))
-        )
-
-    def _drop_outside(self, box: tuple[float, float, float, float]) -> None:
-        """Particles whose centre, or that of their clump, has left the BOX are deleted, with a line in the log;
-        PhysicsError if they ran away, which the next look would no longer see. Collective."""
-        gone = guards.outside(*self.clumps.centres(self.particles), box)
-        self._refuse_runaways(gone)
-        names = guards.places(self.particles, gone, self.comm)
-        number = self.remove(gone)
-        self.lost += number
-        if self.log is not None:
-            more = f"; and {number - guards.NAMED} more" if number > guards.NAMED else ""
-            self.log.info(f"step {self.clock.step}: {number} particles left the BOX and were deleted: {names}{more}")
-
-    def _refuse_runaways(self, which: np.ndarray) -> None:
-        """PhysicsError if one of the flagged owned particles (n_own,) bool of an open model is not finite, or goes too
-        far in a step. Collective."""
-        p, found = self.particles, np.zeros(4)
-        places, hot = p.positions()[which], p.hot[p.owned][which]
-        motion.survey(hot, 0, len(hot), places, self.clock.dt, NO_ROWS, found)
-        self.comm.max_into(found)
-        if found[motion.BROKEN] or found[motion.STRIDE] > guards.LARGEST_STRIDE:
-            broken = bool(found[motion.BROKEN])
-            guards.stop_on_runaway(
-                p, p.positions(), self.clock.dt, self.clock.step, broken, self._mixed_laws(), self.comm, NO_ROWS
-            )
-
-    def _mixed_laws(self) -> bool:
-        """Whether there are pairs of materials without a common law."""
-        return bool(np.isnan(self.own_laws.which(self.materials.rows)).any())
+    # ---- what there is -------------------------------------------------------------------------------------------
 
     def remove(self, which: np.ndarray) -> int:
         """Delete the flagged owned particles (n_own,) bool, clumps as a whole, and all memory of them. The model must
@@ -616,42 +412,6 @@ class Simulation(Model):
         self.ownership.wanted = True
         return len(gone)
 
-    def _share_out(self) -> np.ndarray:
-        """Move borders if it pays, then send every particle and its histories to the owner of its column.
-
-        Returns the cells of the particles that are owned now (n_own,) i8.
-        """
-        p, side = self.particles, self.rebuild_state.side
-        with self.timers("neighbour"):
-            cell = keys(p.hot, side)
-        with self.timers("balance"):
-            box = self.walls.box()
-            room = None if box is None else (box[0], box[1])
-            self.ownership.renew(
-                columns(cell), side, self.clock.step, self.timers.seconds(), room, least=self.rebuild_state.columns
-            )
-        with self.timers("migrate"):
-            leave = strips.strays(cell, self.ownership.borders, self.comm.rank)
-            migration = Migration(self.comm, len(p), leave, self.ownership.owner_of(columns(cell[leave])))
-            leave = migration.leave
-            self.trail.note(p["gid"][leave], migration.leave_to)
-            hist = self.hist.take(leave)
-            rows = [p.hot[leave], p.cold[leave], p.more[leave]] + ([p.rigid[leave]] if p.rigid is not None else [])
-            arrived, counts, entries = migration.exchange(np.hstack(rows), hist.counts(), hist.rows)
-            if not len(leave) and not len(arrived):
-                return cell
-            stay = migration.stay()
-            self.hist = self.hist.take(stay).joined(counts, entries)
-            hot, cold = (aligned((len(stay) + len(arrived), WIDTH)) for _ in range(2))
-            take_rows(p.hot, stay, hot[: len(stay)], self.threads)
-            take_rows(p.cold, stay, cold[: len(stay)], self.threads)
-            hot[len(stay) :], cold[len(stay) :] = arrived[:, :WIDTH], arrived[:, WIDTH : 2 * WIDTH]
-            end = 2 * WIDTH + len(p.extra)
-            more = np.concatenate([p.more[stay], arrived[:, 2 * WIDTH : end]])
-            rigid = None if p.rigid is None else np.concatenate([p.rigid[stay], arrived[:, end:]])
-            p.set_owned(hot, cold, rigid, more)
-            return np.concatenate([cell[stay], keys(arrived, side)])
-
     def broken(self) -> tuple[int, int]:
         """Bonds broken so far in tension and in shear. Collective."""
         total = self.breaks.copy()
@@ -670,86 +430,11 @@ class Simulation(Model):
             return self.bonds
         return self.bonds - int(self.comm.sum_into(self.uncollected_breaks().sum(keepdims=True))[0])
 
-    # ---- tables and parameters of the kernels --------------------------------------------------------------------
-
-    def tables_changed(self) -> None:
-        """Materials, bond types, walls or the mass rule were changed by a command."""
-        self._tables_stale = True
-
-    def refresh_tables(self) -> None:
-        """Masses, law tables and argument lists of the kernels, from materials, walls and settings."""
-        if not self._tables_stale or not self.closed:
-            return
-        p, s, lists = self.particles, self.settings, self.lists
-        rows, n_mat = self.materials.rows, len(self.materials)
-        dt, b = self.clock.dt, lists.blocks
-        self.body = aligned((p.n_own, 8))
-        motion.fill_body(
-            p.hot, p.ihot, p.icold, p.n_left, rows["density"].copy(), rows["damp"].copy(), mass.shape(s.disk), dt,
-            self.body,
-        )  # fmt: skip
-        if self.clumps:
-            self.clumps.fill(p, rows["density"].copy(), rows["damp"].copy(), dt, self.body)
-        self.own_table, bounds = self.own_laws.tables(rows) if self.own_laws else (None, None)
-        self.pair_laws = contacts.pair_table(rows, self.own_laws.which(rows), bounds)
-        self.wall_laws = wall_kernels.wall_table(rows, self.walls.kn, self.walls.ks, self.walls.fric)
-        self.bond_laws = contacts.bond_laws(self.bond_types.rows)
-        self._pushed, self._push = self._pressures()
-        self._wall_table = self.walls.table()
-        self._walls_move = bool(self.walls.v.any())
-        threaded = lists.n_blocks > 1
-        self._move: Any = motion.move_threaded if threaded else motion.move
-        self._pair_forces: Any = pair_forces.forces_threaded if threaded else pair_forces.forces
-        self._wall_forces = wall_kernels.forces_threaded if threaded else wall_kernels.forces
-        self._move_args = (
-            p.hot, p.cold, p.n_left, b.cut, b.lo, b.foff, lists.force, self.body, s.gx, s.gy, s.lsm, dt,
-        )  # fmt: skip
-        self._pair_args: tuple[Any, ...] = (
-            p.hot, p.ihot, *b, lists.ptr, lists.row, lists.partner, lists.fs, lists.bond, lists.u_made, lists.force,
-            self.pair_laws, contacts.bond_table(self.bond_laws), n_mat, dt, mass.SPHERES[s.disk], lists.tally,
-        )  # fmt: skip
-        if self.own_laws.loops is not None:
-            self._pair_forces = self.own_laws.loops.several if threaded else self.own_laws.loops.one
-            self._pair_args += self.own_table, lists.memory, self.own_laws.initial
-        self._wall_args = (
-            p.hot, p.ihot, b.lo, b.foff, lists.force, lists.wptr, self._wall_table, lists.slot_row, lists.slot_wall,
-            lists.slot_fs, lists.slot_side, lists.new_side, self.wall_laws, n_mat, dt,
-        )  # fmt: skip
-        self._tables_stale = False
-        self.dashpots = None
-        if s.restitution < 1.0:
-            self.prepare_kernels("restitution")
-            from hpcdem.physics.dem.restitution import Dashpots  # brings kernels of their own
-
-            self.dashpots = Dashpots(self)
-        for physics in self.physics:
-            physics.prepare(self)
-
-    def pressed(self) -> np.ndarray:
-        """Forces (n_own, 2) [N] of PROP xp, yp on the owned particles: pressure 2 R thickness."""
-        p, rows = self.particles, self.materials.rows
-        force = np.stack([rows["xp"], rows["yp"]], axis=1)[p["material"]]
-        return force * (2.0 * p["radius"] * self.settings.thickness)[:, None]
-
-    def _pressures(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of the force table that PROP xp, yp push on, and their forces (n, 2) [N]. They are few, the particles of
-        a side of the model, and usually none."""
-        rows = self.materials.rows
-        if not (rows["xp"].any() or rows["yp"].any()):
-            return np.empty(0, np.int64), np.empty((0, 2))
-        force = self.pressed()
-        which = np.flatnonzero(force.any(axis=1))
-        return self.lists.force_rows()[which], force[which]
-
     def used(self, column: np.ndarray, table: PropertyTable) -> np.ndarray:
         """Which rows of a property table occur among these owned row numbers, on any rank; (rows,) bool. Collective."""
         flags = np.zeros(len(table), np.int64)
         flags[column] = 1
         return self.comm.max_into(flags).astype(bool)
-
-    def count(self, n: int) -> int:
-        """Sum of an integer over the ranks. Collective."""
-        return int(self.comm.sum_into(np.array([n], dtype=np.int64))[0])
 
     def extents(self) -> dict[str, float]:
         """{left} {right} {bottom} {top} of the particles that are not fixed in both x and y [m]. Collective."""
@@ -775,3 +460,14 @@ class Simulation(Model):
         if name not in self.groups:
             self.groups.append(name)
         return self.groups.index(name)
+
+    # ---- tables and parameters of the kernels --------------------------------------------------------------------
+
+    def tables_changed(self) -> None:
+        """Materials, bond types, walls or the mass rule were changed by a command."""
+        self._tables_stale = True
+
+    def refresh_tables(self) -> None:
+        """Masses, law tables and argument lists of the kernels, from materials, walls and settings."""
+        if self._tables_stale and self.closed:
+            loops.refresh(self)

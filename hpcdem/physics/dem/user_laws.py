@@ -245,6 +245,10 @@ class ModelLaws:
             row[: len(law.initial)] = law.initial
         return out
 
+    def mixed(self, materials: np.ndarray) -> bool:
+        """Whether there are pairs of materials without a common law."""
+        return bool(np.isnan(self.which(materials)).any())
+
     def which(self, materials: np.ndarray) -> np.ndarray:
         """Numbers (n, n) of the laws of all pairs of materials; NaN if they have none in common."""
         own = np.where(materials["law"] > 0.0, materials["law"], -materials["hertz"])

@@ -123,6 +123,10 @@ class Walls:
         """Largest way of any wall since the lists were built [m]."""
         return float(np.hypot(self.travel[:, 0], self.travel[:, 1]).max()) if len(self) else 0.0
 
+    def fastest(self) -> float:
+        """Speed of the fastest wall [m/s]."""
+        return float(np.hypot(self.v[:, 0], self.v[:, 1]).max()) if len(self) else 0.0
+
     def box(self) -> tuple[float, float, float, float] | None:
         """(left, right, bottom, top) of the BOX, or None."""
         left, right, bottom, top = (self.of_side(side) for side in OLD_SIDES)

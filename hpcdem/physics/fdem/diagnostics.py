@@ -11,7 +11,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import PER_METRE
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import by_temperature, connectivity, floors, overlaps, sides, user_laws
+from hpcdem.physics.fdem import breaks, by_temperature, connectivity, floors, overlaps, sides, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
 from hpcdem.physics.fdem.kernels import plasticity, tets
@@ -630,7 +630,7 @@ def _contacts_in_space(sim: Blocks, seen: Evaluation) -> dict[str, np.ndarray]:
 
 def crack_rows(sim: Blocks) -> list[Crack]:
     """Joints broken so far, in order. Collective."""
-    return [*sim.event_rows, *(sim.waiting_events() if sim.closed else [])]
+    return [*sim.event_rows, *(breaks.waiting(sim) if sim.closed else [])]
 
 
 def events(sim: Blocks) -> dict[str, np.ndarray]:

@@ -247,6 +247,6 @@ def _close_as_it_was(sim: Blocks, state: dict[str, Any], places: dict[str, np.nd
     """Storage and lists again at the present positions: no sum depends on them. When they are due to be made again does
     depend on the positions at which they were, which are put back."""
     sim.cold.update(places)
-    sim.close_again()
+    sim.close_as_saved()
     sim.origin, sim.listed = sim.cold.pop("origin"), sim.cold.pop("listed")
     sim.local.tally[0, : len(state["tally"])] = state["tally"] if sim.comm.rank == 0 else 0

@@ -80,6 +80,7 @@ class Creep:
 class State(ModelDefinition, Model):
     """ModelDefinition, positions, velocities and histories of the elements that a rank holds."""
 
+    rebuild_state: ListState
     number: np.ndarray
     """Of each element held here; when the model is closed [ghosts of the left | owned | ghosts of the right]."""
     x: np.ndarray

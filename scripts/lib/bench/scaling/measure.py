@@ -135,7 +135,7 @@ def stepped(sim: hpcdem.Simulation, case: dict[str, Any]) -> Row:
     """One bed: its line."""
     from bench import bed as beds
     from bench.measured import no_first_frame, solver_arrays
-    from hpcdem.physics.dem.simulation import NARROW
+    from hpcdem.physics.dem.reach import NARROW
 
     bed = Bed(**case["bed"])
     if case["settled"]:

@@ -1,0 +1,87 @@
+"""Whether a model of blocks can be stepped: what it lacks, and what was said of parts that it does not have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import by_temperature, user_laws
+from hpcdem.physics.fdem.definition import DISTANCE
+from hpcdem.physics.fdem.properties import temperature_table
+from hpcdem.physics.fdem.state import State
+from hpcdem.physics.fields import kinds
+
+
+def bare(sim: State) -> np.ndarray:
+    """Elements that have no model yet. CommandError without a mesh."""
+    sim.the_mesh()
+    return np.flatnonzero(sim.alive & (sim.element_row == 0))
+
+
+def check(sim: State) -> None:
+    """CommandError unless every element has a model."""
+    lacking = bare(sim)
+    if len(lacking):
+        raise CommandError(f"element {lacking[0]} has no model ({len(lacking)} elements in all)")
+    if not sim.alive.any():
+        raise CommandError("there are no elements left")
+    _check_warmth(sim)
+    if sim.options.plane_stress:
+        user_laws.check_plane_stress(sim)
+    if sim.options.stiffness_damping and user_laws.in_use(sim):
+        raise CommandError(
+            f"the stiffness of {user_laws.some(sim)}, which has a law of the user, is not known: Rayleigh damping "
+            "can have its part mass only"
+        )
+
+
+def _check_warmth(sim: State) -> None:
+    """CommandError where properties follow temperatures that are not there, or surroundings that cannot follow."""
+    elements, joints = sim.warms()
+    for what, at, rows, row in (("element", elements, sim.element_rows, sim.element_row),
+                                ("joint", joints, sim.joint_rows, sim.joint_row)):  # fmt: skip
+        for over, which in by_temperature.followed(sim, rows, row, at):
+            if over not in sim.cold:
+                lacking = "heat" if over == by_temperature.TEMPERATURE else over
+                word = "thermal-iso-heat" if lacking == "heat" else kinds()[over].word
+                raise CommandError(
+                    f"a property of {what} {which} follows a table over {over}, but there is no {lacking}: element "
+                    f"c-model {word} for all"
+                )
+    soft = elements & (sim.element_rows.column(temperature_table("young"))[sim.element_row] > 0.0)
+    beside = np.flatnonzero(sim.quiet_faces() & np.repeat(soft, 4))
+    if len(beside) or (soft.any() and "free_field" in sim.surface_loads):
+        element = beside[0] // 4 if len(beside) else np.flatnonzero(soft)[0]
+        raise CommandError(
+            f"young of element {element} follows a table over temperature: quiet faces and free-field sides have "
+            "dashpots of one modulus, a number"
+        )
+
+
+def check_parts(sim: State) -> None:
+    """CommandError for what was said of parts of the calculation that are not there."""
+    o = sim.options
+    if sim.dim == 2 and o.potential != DISTANCE:
+        raise CommandError("in two dimensions there is no choice of the potential of contact")
+    if not o.mechanical:
+        if not any(load.keeps_time for load in sim.surface_loads):
+            raise CommandError("nothing would happen: model option mechanical is off, and neither fluid nor heat flows")
+        if not o.dynamic:
+            raise CommandError("without mechanics time passes by flow and heat: model option dynamic on comes first")
+        others = [load.name for load in sim.surface_loads if not load.own_clock]
+        if others:
+            raise CommandError(f"{others[0].replace('_', '-')} move with the blocks: model option mechanical on")
+        if sim.creep.on:
+            raise CommandError("elements creep while blocks move: model creep off, or model option mechanical on")
+    said = "one-way" if o.one_way else "sub-step" if o.flow_steps > 0 else "time-step" if o.flow_dt > 0.0 else ""
+    if o.flow_every != 1 and not o.one_way and "heat" not in sim.surface_loads:
+        said = "sub-step"
+    if said and "fluid" not in sim.surface_loads:
+        raise CommandError(
+            f"{said} of flow was said, but no joint has a hydraulic model: face-joint c-model hydraulic-porous-medium"
+        )
+    if (o.heat_steps > 0 or o.heat_dt > 0.0) and "heat" not in sim.surface_loads:
+        name = "sub-step" if o.heat_steps > 0 else "time-step"
+        raise CommandError(
+            f"{name} of heat was said, but no element has a thermal model: element c-model thermal-iso-heat"
+        )
