@@ -1,1 +1,1 @@
-"""Particles: what they are, how they are stepped, what can be asked of them. simulation.py shows the method."""
+"""Particles: what they are, how they are stepped, what can be asked of them. The method is in engine/model.py."""
