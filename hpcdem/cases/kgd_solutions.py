@@ -95,29 +95,7 @@ def viscous(young: float, viscosity: float, rate: float, time: float) -> Fractur
     )
 
 
-def lag_time(young: float, viscosity: float, confinement: float) -> float:
-    """E'^2 mu' / sigma_0^3 [s]: long after it the fluid reaches the tip. confinement: sigma_0 across the fracture, as a
-    positive number [Pa]."""
-    return 12.0 * viscosity * young * young / confinement**3
-
-
-def leaking_length(rate: float, leak: float, time: float) -> float:
-    """Half length [m] when all fluid goes into the rock, C / sqrt(t) per wall: Q = 4 C times the integral of
-    (t - x^2 / a^2)^(-1/2) to L = a sqrt(t), so L = Q sqrt(t) / (2 pi C). leak: C [m / s^1/2]."""
-    return rate * math.sqrt(time) / (2.0 * math.pi * leak)
-
-
-def process_length(young: float, energy: float, strength: float) -> float:
-    """E' G / T^2 [m]: about the length over which joints soften before the tip."""
-    return young * energy / strength**2
-
-
 def resolution(young: float, energy: float, strength: float, confinement: float, edge: float) -> float:
     """R = h (T + sigma_0)^2 / (E' G): a joint must lose its confinement before it opens; the pressure is in error by
     about 4 % R, the opening by 1.8 % R, above 1 the fracture snaps from joint to joint."""
     return edge * (strength + confinement) ** 2 / (young * energy)
-
-
-def false_energy(edge: float, strength: float, penalty: float) -> float:
-    """What joints take besides G before their peak [N/m]: 2 / 3 T o_p with o_p = 2 h T / P."""
-    return 4.0 / 3.0 * edge * strength**2 / penalty

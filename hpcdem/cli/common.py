@@ -46,7 +46,6 @@ class Finite(click.ParamType):
 
 
 FINITE, POSITIVE = Finite(), Finite(0.0, above=True)
-Work = Callable[["Comm", "Log"], None]
 
 
 def read_command_line(command: click.Command, program: str, words: list[str]) -> dict[str, Any]:

@@ -192,7 +192,6 @@ def _put_fixed(out: np.ndarray, end: int, v: float, decimals: int) -> None:
 # product is good to 16 digits, and its rounding is certain unless it falls near the middle between two integers. What
 # is left (flag 1: near the middle, three-digit exponents, nan, ...) is written by the functions above.
 
-_FAST_DIGITS = (9, 13)  # one leading digit and whole blocks of four
 _LARGEST = 99  # exponents of two digits
 _TENS = np.array([float(f"1e{k}") for k in range(-_LARGEST - 1, _LARGEST + 2)])  # _TENS[k + 100] = 10**k, rounded
 _SCALES = np.array([float(f"1e{k}") for k in range(-_LARGEST - 1, _LARGEST + 14)])

@@ -13,7 +13,6 @@ from hpcdem.physics.polyarc.outlines import Outlines, boxes, sampled
 from hpcdem.post import plots
 from hpcdem.post.measure.figures import INK, key, label, page
 
-MM = 1e-3
 STEP = 5.0
 """Arcs are drawn by chords of at most so many degrees."""
 ANCHORS = "9c3708", "e0690f", "f2b53c", "a9c46c", "46a592", "3f7fb5", "6a6fc4"

@@ -13,7 +13,6 @@ import numpy as np
 from hpcdem.core.errors import UsageError
 from hpcdem.lang.parameters import Adjustable, Value
 
-METHODS = ("latin", "sobol")
 MOST = 100_000
 """Members of a sweep: more are a slip of the keyboard."""
 
@@ -38,7 +37,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How ranges are sampled. method: of METHODS; seed: of the sampling itself."""
+    """How ranges are sampled. method: "latin" or "sobol"; seed: of the sampling itself."""
 
     method: str
     number: int

@@ -12,8 +12,9 @@ from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.check import examine, print_report, summary
 from hpcdem.lang.zdem.estimate import FAILURES, estimate, insertion
 from hpcdem.lang.zdem.parser import parse_text, read_script
-from hpcdem.lang.zdem.plan import expected_steps, follow, frame_names
+from hpcdem.lang.zdem.plan import expected_steps, follow
 from hpcdem.runtime import speed
+from tests.foretold import frame_names
 
 WALL = "WALL id 1 nodes (0 0) (0 9) xv 2.0\n"
 

@@ -13,7 +13,8 @@ from hpcdem.commands.fdem import geometry as commands
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.dxf import read_dxf
-from hpcdem.pre.mesh.geometry import Layers, distance, enclosed_area, sampled, transformed
+from hpcdem.pre.mesh.geometry import Layers, distance, sampled, transformed
+from tests.mesh.areas import enclosed_area
 from tests.pcdc.fake import FakeBlocks
 from tests.tables import each
 

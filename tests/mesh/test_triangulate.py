@@ -17,6 +17,7 @@ from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.pre.mesh.quality import corner_angles, quality
 from hpcdem.pre.mesh.sizes import Refinement, SizeField
 from hpcdem.pre.mesh.triangulate import Meshed, Region, Wishes, triangulate
+from tests.mesh.areas import enclosed_area
 from tests.tables import each
 
 pytestmark = pytest.mark.usefixtures("gmsh")
@@ -76,7 +77,7 @@ def test_corners_of_the_outline_are_exact():
     mesh = meshed({"o": ugly}).mesh
     have = set(map(tuple, mesh.points.tolist()))
     assert set(map(tuple, ugly.points.tolist())) <= have
-    assert math.isclose(mesh.areas().sum(), geometry.enclosed_area(ugly), rel_tol=1e-13)
+    assert math.isclose(mesh.areas().sum(), enclosed_area(ugly), rel_tol=1e-13)
 
 
 def test_regions_in_regions_become_groups():

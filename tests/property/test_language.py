@@ -119,7 +119,7 @@ def test_the_models_use_every_word_of_the_language() -> None:
                 if table.range_row.accepts(word):
                     in_range = True
                 elif in_range:
-                    term = table.range_term(word)
+                    term = t.find(word, table.range_terms)[0]
                     terms.update({term.name} if term else ())
                 else:
                     option = command.option(word) or next((o for o in command.leading if o.accepts(word)), None)

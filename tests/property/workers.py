@@ -19,6 +19,7 @@ from hpcdem.lang.zdem import plan
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.runtime.run_folder import RECORD
 from tests.conftest import ROOT, end, mpi_command, mpi_environment
+from tests.foretold import frame_names
 from tests.property.grammar import END, Model
 from tests.short_push import HDF5, contents, files
 
@@ -232,7 +233,7 @@ def assert_as_planned(model: Model, place: Path, step: int) -> None:
     script = parse_text(model.text)
     runs, steps = plan.follow(script.statements), plan.expected_steps(script.statements)
     assert steps in (None, step), f"{steps} steps foretold, {step} done"
-    frames = plan.frame_names(runs)
+    frames = frame_names(runs)
     if frames is not None:
         assert {path.name for path in place.rglob("all_*.dat")} == set(frames), "not the frames that were foretold"
     for kind, pattern in (("vtk", "all_*.vtk"), ("ps", "all_*.ps"), ("save", "[0-9]*.sav")):

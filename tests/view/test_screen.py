@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from hpcdem.io.axes import View
-from hpcdem.post.view import reference
 from hpcdem.post.view.model import Layer, ModelView
 from hpcdem.post.view.moment import DISCS, LINES, POLYGONS, Moment, Objects
 from hpcdem.post.view.scene import scene
 from hpcdem.post.view.screen import DARK_GROUND, Picture, paint
+from tests.view import plain
 
 WIDTH, HEIGHT = 120, 80
 SEEN = View(0.0, 12.0, 0.0, 8.0)  # ten pixels per metre, y upwards
@@ -33,7 +33,7 @@ def test_discs(seed: int):
     at = places(seed, 60)
     radius = np.random.default_rng(seed).uniform(0.08, 1.5, 60)  # all hold the middle of a pixel, or are seen by none
     found = picture(DISCS, (at, radius))
-    wanted = reference.discs(10.0 * at[:, 0], 10.0 * (8.0 - at[:, 1]), 10.0 * radius, WIDTH, HEIGHT)
+    wanted = plain.discs(10.0 * at[:, 0], 10.0 * (8.0 - at[:, 1]), 10.0 * radius, WIDTH, HEIGHT)
     np.testing.assert_array_equal(found.row, wanted)
     np.testing.assert_array_equal(found.layer == 0, wanted >= 0)
     assert (found.colours[wanted >= 0] == (255, 128, 0)).all() and (found.colours[wanted < 0] == 255).all()
@@ -44,7 +44,7 @@ def test_triangles_and_quads(seed: int):
     corners = places(seed, 90).reshape(30, 3, 2)
     found = picture(POLYGONS, (corners.reshape(-1, 2), cells(30)))
     pixels = np.stack([10.0 * corners[:, :, 0], 10.0 * (8.0 - corners[:, :, 1])], axis=2)
-    wanted = reference.triangles(pixels, WIDTH, HEIGHT)
+    wanted = plain.triangles(pixels, WIDTH, HEIGHT)
     sure = wanted > -2
     np.testing.assert_array_equal(found.row[sure], wanted[sure])
     square = np.array([[1.0, 1.0], [4.0, 1.0], [4.0, 3.0], [1.0, 3.0]])

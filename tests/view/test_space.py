@@ -17,7 +17,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.core.looks import EYES
 from hpcdem.io.axes import View
 from hpcdem.physics.fdem import tetrahedra
-from hpcdem.post.view import reference, space
+from hpcdem.post.view import space
 from hpcdem.post.view.model import Layer, ModelView
 from hpcdem.post.view.moment import FACES, Moment, Objects, read_moment, unit_of
 from hpcdem.post.view.paper import draw
@@ -25,7 +25,7 @@ from hpcdem.post.view.scene import STEPS, default_view, scene, shades_of, with_f
 from hpcdem.post.view.screen import Picture, paint
 from tests.conftest import Launcher
 from tests.pcdc.test_plastic import run as run_script
-from tests.view import frames
+from tests.view import frames, plain
 from tests.view.test_pictures import SMALL, Silent, pixels, run
 
 pytestmark = pytest.mark.figures
@@ -130,7 +130,7 @@ def test_each_pixel_shows_the_nearest_face():
     view = ModelView(layers=(Layer(object="joints", field="number"),), eye="+z")
     found = paint(scene(Moment(0, 0.0, objects, dim=3), view, View(0.0, 12.0, 0.0, 8.0)), 120, 80)
     pixels_ = points * (10.0, -10.0, 10.0) + (0.0, 80.0, 0.0)
-    expected, _ = reference.nearest(pixels_[cells[:, :3]], 120, 80)
+    expected, _ = plain.nearest(pixels_[cells[:, :3]], 120, 80)
     assert (found.row == expected).mean() > 0.9995 and len(np.unique(expected)) > 20
 
 
@@ -150,7 +150,7 @@ def test_a_pixel_tells_the_element_that_is_there(tmp_path: Path, eye: str, secti
     seen = skin.points @ shown.turn.T  # type: ignore[attr-defined]
     flat = np.column_stack([a * seen[:, 0] + b, c * seen[:, 1] + d, seen[:, 2]])
     three = np.concatenate([skin.cells[:, :3], skin.cells[skin.cells[:, 3] >= 0][:, [0, 2, 3]]])  # type: ignore[attr-defined]
-    _, near = reference.nearest(flat[three], 90, 80)
+    _, near = plain.nearest(flat[three], 90, 80)
     there = np.argwhere(np.isfinite(near) & (found.row >= 0))
     assert len(there) > 1000 and (np.isfinite(near) == (found.row >= 0)).mean() > 0.999
     wrong = 0

@@ -7,7 +7,7 @@ time step, the walls and the histories of the file are not known here; they coun
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
@@ -55,23 +55,6 @@ class Run:
         every, steps = self.every[kind], self.steps
         return bool(every and steps and steps % every) and self.start is None and not self.imple
 
-    def frames(self) -> Iterator[tuple[int, bool]] | None:
-        """(step, initial) of every frame in the order in which they are written; None if unknown."""
-        start, steps, every = self.start, self.steps, self.every["print"]
-        if start is None or steps is None or every is None:
-            return None
-        return self._frames(start, start + steps, every)
-
-    def _frames(self, start: int, end: int, every: int) -> Iterator[tuple[int, bool]]:
-        yield start, True
-        last = start
-        if every > 0:
-            first = start + every if self.imple else (start // every + 1) * every
-            for last in range(first, end + 1, every):
-                yield last, False
-        if (self.imple and last != end) or (self.imple and every == 0):
-            yield end, False
-
 
 @dataclass
 class _Known:
@@ -87,18 +70,6 @@ class _Known:
     pressure: bool = False
     histories: set[int] = field(default_factory=set)
     every: dict[str, int | None] = field(default_factory=lambda: dict.fromkeys(OUTPUTS, 0))
-
-
-def frame_names(runs: Iterable[Run], suffix: str = ".dat") -> list[str] | None:
-    """Names of all frames of a script, each once, in order; None where something is unknown. As long as there are
-    frames: ask `Run.files` how many before."""
-    names: dict[str, None] = {}
-    for run in runs:
-        frames = run.frames()
-        if frames is None:
-            return None
-        names.update((f"all_{step:010d}{'_ini' if initial else ''}{suffix}", None) for step, initial in frames)
-    return list(names)
 
 
 def follow(

@@ -171,7 +171,6 @@ FLOAT = Number("<float>", "a number")
 POSITIVE = Number("<float>", "a number above 0", low=0.0, above=True)
 NOT_NEGATIVE = Number("<float>", "a number not below 0", low=0.0)
 DISTANCE = Number("<float>", "a distance other than 0", zero=False)
-FRACTION = Number("<float>", "a number from 0 to 1", low=0.0, high=1.0)
 RATIO = Number("<float>", "a number above 0, at most 1", low=0.0, high=1.0, above=True)
 INT = Number("<int>", "a whole number", integer=True)
 COUNT = Number("<int>", "a whole number above 0", integer=True, low=1)
@@ -308,10 +307,6 @@ class Table:
     def command(self, word: str) -> Command | None:
         """The command a (lower-case) word stands for."""
         return next((command for command in self.commands if command.accepts(word)), None)
-
-    def range_term(self, word: str) -> Option | None:
-        """The RANGE term a (lower-case) word stands for."""
-        return find(word, self.range_terms)[0]
 
     def hint(self, word: str) -> str:
         """The nearest command."""

@@ -117,11 +117,6 @@ def when(stamps: Sequence[Stamp], steps: bool = False) -> tuple[np.ndarray, str]
     return np.array([s.step for s in stamps]) / 1000.0, "thousand steps"
 
 
-def numbered(text: str, seen: View) -> str:
-    """A name with the unit of a section's axes."""
-    return f"{text} ({seen.unit[1]})"
-
-
 # --- one figure per measurement --------------------------------------------------------------------------------
 
 

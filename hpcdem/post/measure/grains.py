@@ -119,12 +119,6 @@ def in_time(folder: Path, first: int = 0, last: int | None = None) -> list[Frame
     return [f for f in list_frames(folder) if f.step >= first and (last is None or f.step <= last)]
 
 
-def series(folder: Path, first: int = 0, ini: bool = False) -> list[Grains]:
-    """All frames of a folder from a step on; those before the first cycle of a command only if asked for, after
-    the others of the same step."""
-    return [grains(f.path, f.ini) for f in list_frames(folder) if f.step >= first and (ini or not f.ini)]
-
-
 def common(a: Grains, b: Grains) -> tuple[Grains, Grains]:
     """The grains that both frames hold, in the same order."""
     _, ia, ib = np.intersect1d(a.gid, b.gid, assume_unique=True, return_indices=True)

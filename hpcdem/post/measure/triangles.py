@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
-from hpcdem.post.measure.grains import Grains, common
-
 
 def triangles(x: np.ndarray, y: np.ndarray, reach: float) -> np.ndarray:
     """(m, 3): rows of the corners of the triangles between neighbouring grains (Delaunay). Those with a side longer
@@ -115,18 +113,3 @@ def strain(
         gradient = np.stack([t / area for t in total], axis=-1)
     at = [origin[k] + (np.arange(shape[1 - k]) + 0.5) * cell for k in (0, 1)]
     return Strain(at[0], at[1], gradient.reshape(*shape, 2, 2), area.reshape(shape))
-
-
-def shear(
-    before: Grains, after: Grains, cell: float, reach: float, low: float, past: float, threshold: float = 0.1
-) -> tuple[float, float]:
-    """Forward and backward shear strain above a threshold between two frames, integrated over the bed [m2].
-
-    Cells below the height `low` (a detachment) and left of `past` (a wall that drags grains along) are left out.
-    """
-    a, b = common(before, after)
-    field = strain(a.x, a.y, b.x - a.x, b.y - a.y, cell, reach)
-    rate = np.nan_to_num(field.rate)
-    counted = (field.x > past) & (field.y > low)[:, None] & (np.abs(rate) > threshold)
-    amount = (rate * field.area)[counted]
-    return float(amount[amount > 0.0].sum()), float(-amount[amount < 0.0].sum())

@@ -1,6 +1,6 @@
 """Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, faces in
 space by their depth, and beside the colours a buffer of what each pixel shows, in which a click is looked up.
-`reference.py` paints the same plainly."""
+`tests/view/plain.py` paints the same plainly."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hpcdem.io.axes import View
 from hpcdem.post.view.moment import DISCS, FACES, POLYGONS
 from hpcdem.post.view.scene import Painted, Scene
 
-GROUND, DARK_GROUND, RIM = (255, 255, 255), (240, 241, 239), (60, 60, 60)
+GROUND, DARK_GROUND = (255, 255, 255), (240, 241, 239)
 DOT = 96.0 / 72.0
 """Pixels of a point, at one pixel per pixel of the page."""
 NOTHING = -1

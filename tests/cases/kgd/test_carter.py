@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.cases import kgd_solutions
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.flow.model import Flow
+from tests.cases.kgd import forms
 from tests.conftest import absent
 from tests.pcdc.test_time import Rock
 
@@ -62,7 +62,7 @@ def test_late_lengths_are_those_of_carter(tmp_path) -> None:
         state, damage = (diagnostics.values(sim, name, joints) for name in ("state", "damage"))
         leaking, open_ = ends[state == 3].max(), ends[(state == 3) | ((state == 2) & (damage > 0.2))].max()
         leak = LEAK * (flow.values("flow-node", "pressure").max() + SUCTION) / (1e6 + SUCTION)
-        wanted = kgd_solutions.leaking_length(RATE, leak, flow.time)
+        wanted = forms.leaking_length(RATE, leak, flow.time)
         errors.append(float(leaking / wanted - 1.0))
         longer.append(float(open_ - leaking))
         assert flow.account()["relative"] < 1e-9
@@ -70,4 +70,4 @@ def test_late_lengths_are_those_of_carter(tmp_path) -> None:
     print(errors, longer, account["stored"] / account["given"])
     assert flow.time == pytest.approx(TIME) and account["stored"] < 0.01 * account["given"]
     assert abs(np.mean(errors[-4:])) < 0.03 and max(map(abs, errors[-4:])) < 0.05
-    assert 0.0 < np.mean(longer[-4:]) < 2.0 * kgd_solutions.process_length(32e9, 39.0, 5e6) and math.isfinite(leak)
+    assert 0.0 < np.mean(longer[-4:]) < 2.0 * forms.process_length(32e9, 39.0, 5e6) and math.isfinite(leak)

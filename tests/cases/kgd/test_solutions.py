@@ -8,6 +8,7 @@ import pytest
 
 from hpcdem.cases import kgd_solutions as kgd
 from hpcdem.physics.fdem.kernels.joint_law import SOFTENING_AREA, softening
+from tests.cases.kgd import forms
 
 YOUNG = 30e9 / (1.0 - 0.25**2)
 UNIT = 1e6**2 / YOUNG
@@ -43,11 +44,11 @@ def test_viscosity_alone():
 
 
 def test_times_and_lengths():
-    assert kgd.lag_time(YOUNG, 0.1, 5e6) == pytest.approx(9.83, rel=1e-3)
-    assert kgd.lag_time(YOUNG, 0.1, 50e6) == pytest.approx(9.83e-3, rel=1e-3)
-    assert kgd.process_length(YOUNG, 100.0, 5e6) == pytest.approx(0.128, rel=1e-9)
+    assert forms.lag_time(YOUNG, 0.1, 5e6) == pytest.approx(9.83, rel=1e-3)
+    assert forms.lag_time(YOUNG, 0.1, 50e6) == pytest.approx(9.83e-3, rel=1e-3)
+    assert forms.process_length(YOUNG, 100.0, 5e6) == pytest.approx(0.128, rel=1e-9)
     assert kgd.resolution(YOUNG, 100.0, 5e6, 1e6, 0.02) == pytest.approx(0.225, rel=1e-9)
-    assert kgd.false_energy(0.02, 5e6, 3e12) == pytest.approx(2.0 / 3.0 * 5e6 * 2.0 * 0.02 * 5e6 / 3e12)
+    assert forms.false_energy(0.02, 5e6, 3e12) == pytest.approx(2.0 / 3.0 * 5e6 * 2.0 * 0.02 * 5e6 / 3e12)
     assert kgd.toughness(YOUNG, UNIT) == pytest.approx(1e6)
     assert 100.0 / (SOFTENING_AREA * 5e6) == pytest.approx(51.772e-6, rel=1e-5)
     assert (softening(0.1), softening(0.2)) == pytest.approx((0.878317, 0.678411), abs=1e-6)
@@ -56,7 +57,7 @@ def test_times_and_lengths():
 def test_all_leaks_away():
     """Sum of what leaves both walls of both wings, each point since the tip passed it, is what comes."""
     rate, leak, time, n = 1e-4, 2e-5, 100.0, 200_000
-    length = kgd.leaking_length(rate, leak, time)
+    length = forms.leaking_length(rate, leak, time)
     away = 0.0
     for k in range(n):
         x = (k + 0.5) / n

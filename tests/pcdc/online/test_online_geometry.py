@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.pre.mesh.geometry import enclosed_area
+from tests.mesh.areas import enclosed_area
 from tests.pcdc.test_excavation import Desk
 
 

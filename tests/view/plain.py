@@ -1,4 +1,4 @@
-"""What screen.py paints, plainly: for every pixel the objects whose shape holds its middle, the last one on top."""
+"""What post/view/screen.py paints, plainly: each pixel shows the last object whose shape holds its middle."""
 
 from __future__ import annotations
 
