@@ -161,7 +161,7 @@ class Simulation(BlockCommands):
         self._engine: Engine | None = None
         self._project: Project | None = None
         self.coupling: Coupling | None = None
-        self._begin_blocks(self._made_project)
+        self._begin_blocks(self._made_project, self._before_steps)
         self._seen_alone = ""
         if self._session.interpreter is not None:  # its journal knows particles by their numbers
             self._asked(("Simulation", outdir, log), lambda: None, again=True)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hpcdem.api import blocks as api
+from hpcdem.api import objects as api
 from hpcdem.api import simulation
 from hpcdem.api.simulation import Simulation
 from hpcdem.core.comm import SerialComm

@@ -7,6 +7,7 @@ and ``as-layer``, in upper and lower case.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -38,12 +39,18 @@ class Keyword:
         return any(_match(segments, parts) for parts in self._parts)
 
     @cached_property
-    def _fulls(self) -> tuple[str, ...]:
+    def fulls(self) -> tuple[str, ...]:
+        """The word in full, in all its spellings."""
         return tuple("-".join(full for _, full in parts) for parts in self._parts)
 
     def is_exactly(self, typed: str) -> bool:
         """Is `typed` this word in full?"""
-        return typed.lower() in self._fulls
+        return typed.lower() in self.fulls
+
+    def spellings(self) -> list[str]:
+        """In full, then with each part in full or as short as it may be."""
+        short = (itertools.product(*(dict.fromkeys(reversed(part)) for part in parts)) for parts in self._parts)
+        return list(dict.fromkeys([*self.fulls, *("-".join(one) for one in itertools.chain(*short))]))
 
     def shortest(self) -> str:
         """The compulsory letters."""

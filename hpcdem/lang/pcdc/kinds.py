@@ -65,6 +65,8 @@ class Kind:
     """``table 'name' over plastic-strain`` may, too."""
     warms: bool = False
     """So may ``table 'name' over temperature``, or over another field of elements."""
+    python: str = "float"
+    """Its type in a Python program, in the words of `hpcdem.api.types`."""
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -75,7 +77,9 @@ class Kind:
 
 def varied(kind: Kind, softens: bool = False, warms: bool = False) -> Kind:
     """The same for a property of elements, faces or joints."""
-    made = replace(kind, varied=True, softens=softens, warms=warms)
+    made = replace(
+        kind, varied=True, softens=softens, warms=warms, python="Value" if kind.python == "float" else kind.python
+    )
     return replace(made, pattern=f"{kind.pattern}|table <s> over {'|'.join(made.axes)}|field <s>")
 
 
@@ -213,39 +217,53 @@ FLOAT = Kind("<f>", "a number", number())
 POSITIVE = Kind("<f>", "a number above 0", number(0.0, above=True))
 PART = Kind("<f>", "a number above 0, at most 1", number(0.0, 1.0, above=True))
 NOT_NEGATIVE = Kind("<f>", "a number, not negative", number(0.0))
-TABLED = Kind("<f>|table <s>|function <s>", "a number, table 'name' or function 'file.py:name'", number(), tabled=True)
-TABLED_STEP = Kind("<f>|table <s>", "a number, not negative, or table 'name'", number(0.0), tabled=True)
-COUNT = Kind("<i>", "a whole number above 0", whole(1))
-ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0))
-POINTS = Kind("3", "3, the points of a joint,", whole(3, 3))
-FREEDOM = Kind("0|1|2", "0 free, 1 held or 2 along a vector (3 is for 3-D)", whole(0, 2))
-DIMENSIONS = Kind("2|3", "2 or 3", whole(2, 3))
-SPLIT = Kind("5|6|12", "5, 6 or 12", _one_of(5, 6, 12))
-FIRST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True)
-LAST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True)
-CHOSEN = Kind("0|1", "0 or 1", _one_of(0, 1))
+TABLED = Kind(
+    "<f>|table <s>|function <s>",
+    "a number, table 'name' or function 'file.py:name'",
+    number(),
+    tabled=True,
+    python="Number",
+)
+TABLED_STEP = Kind(
+    "<f>|table <s>", "a number, not negative, or table 'name'", number(0.0), tabled=True, python="float | str"
+)
+COUNT = Kind("<i>", "a whole number above 0", whole(1), python="int")
+ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0), python="int")
+POINTS = Kind("3", "3, the points of a joint,", whole(3, 3), python="int")
+FREEDOM = Kind("0|1|2", "0 free, 1 held or 2 along a vector (3 is for 3-D)", whole(0, 2), python="int")
+DIMENSIONS = Kind("2|3", "2 or 3", whole(2, 3), python="int")
+SPLIT = Kind("5|6|12", "5, 6 or 12", _one_of(5, 6, 12), python="int")
+FIRST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True, python="int")
+LAST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True, python="int")
+CHOSEN = Kind("0|1", "0 or 1", _one_of(0, 1), python="int")
 SECOND_POSITIVE = Kind("[<f>]", "a number above 0", number(0.0, above=True), optional=True)
-STRING = Kind("<s>", "a text in quotes", _string)
-FILE = Kind("<s>", "the name of a file in quotes", _file)
-BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false", "yes", "no"))
+STRING = Kind("<s>", "a text in quotes", _string, python="str")
+FILE = Kind("<s>", "the name of a file in quotes", _file, python="File")
+BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false", "yes", "no"), python="bool")
 OPTIONAL_BOOL = replace(BOOL, pattern="[on|off]", optional=True)
 OPTIONAL_FLOAT = Kind("[<f>]", "a number", number(), optional=True)
 PAIRS = Kind("<f> <f>, <f> <f> ...", "pairs of numbers, time and value", number(), many=True)
-VECTOR = Kind("<v>", "a vector (x,y)", _vector(2))
-OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True)
-VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True)
+VECTOR = Kind("<v>", "a vector (x,y)", _vector(2), python="Point")
+OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True, python="Point")
+VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True, python="Point")
 """In any model, as of tables and charts."""
-PLACES = Kind("<v> <v> [...]", "vectors (x,y)", _vector(2), many=True)
-CORNER = Kind("(<f>,<f>)", "a vector (x,y)", _vector(2))
+PLACES = Kind("<v> <v> [...]", "vectors (x,y)", _vector(2), many=True, python="Point")
+CORNER = Kind("(<f>,<f>)", "a vector (x,y)", _vector(2), python="Point")
 """Of a picture, in space too."""
-EYE = Kind("<s>", f"one of {', '.join(EYES)}, or a direction towards the eye as '1,-2,0.5'", _read_by(eye_of))
+EYE = Kind(
+    "<s>", f"one of {', '.join(EYES)}, or a direction towards the eye as '1,-2,0.5'", _read_by(eye_of), python="str"
+)
 SECTION = Kind("<s>", "a plane, 'x=1.5', 'x<1.5', 'x>1.5', or a point and a normal as '0,0,2,0,1,1'",
-               _read_by(section_of))  # fmt: skip
+               _read_by(section_of), python="str")  # fmt: skip
 THIRD_COUNT, THIRD_POSITIVE = (replace(kind, dims=(3,)) for kind in (COUNT, POSITIVE))
 """One more in three dimensions."""
 _FREEDOM = replace(FREEDOM, meaning="0 free, 1 held, 2 along a vector or 3 across it", check=whole(0, 3))
 LEVEL = Kind(
-    "<f>|<v>|table <s>", "a number, a vector (x,y) or table 'name'", _either(number(), _vector(2)), tabled=True
+    "<f>|<v>|table <s>",
+    "a number, a vector (x,y) or table 'name'",
+    _either(number(), _vector(2)),
+    tabled=True,
+    python="Number | Point",
 )
 _IN_SPACE = (
     {FREEDOM.pattern: _FREEDOM}
@@ -274,7 +292,7 @@ def fitting(kind: Kind, dim: int | None) -> Kind:
     return kind if dim == 2 else (_IN_ANY if dim is None else _IN_SPACE).get(kind.pattern, kind)
 
 
-STRINGS = Kind("<s> ...", "texts in quotes", _string, many=True)
+STRINGS = Kind("<s> ...", "texts in quotes", _string, many=True, python="str")
 
 
 def limited(low: float, high: float, low_itself: bool, unit: str = "") -> Kind:
@@ -297,7 +315,8 @@ def choice(*words: str) -> Kind:
             raise Unfit
         return value.lower()
 
-    return Kind("|".join(words), "one of " + ", ".join(words), check, words=words)
+    return Kind("|".join(words), "one of " + ", ".join(words), check, words=words,
+                python=f"Literal[{', '.join(map(repr, words))}]".replace("'", '"'))  # fmt: skip
 
 
 # ---- from tokens to values -----------------------------------------------------------------------------------------

@@ -1,0 +1,2829 @@
+"""Blocks in a Python program: the commands of the PCDC language as methods, what is there as arrays.
+
+Made by ``python -m hpcdem.cli.python_stubs``; do not edit it."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Literal, overload
+
+import numpy as np
+
+from hpcdem.api.objects import (
+    Clocks,
+    Conditioned,
+    Fluxed,
+    GroupedElsewhere,
+    Moved,
+    Named,
+    Objects,
+    Random,
+    Recorded,
+    Stressed,
+    Tabled,
+    Words,
+)
+from hpcdem.api.types import File, Number, Piece, Point, Value, Where
+from hpcdem.commands.fdem import Project
+
+class Geometry(Words):
+    """Shapes in layers, of which meshes are made; lengths in metres, angles in degrees counter-clockwise."""
+    def polyline(self, points: Sequence[Point], as_layer: str) -> None:
+        """In the plane: straight lines from point to point.
+
+        Parameters
+        ----------
+        points : the points; or a list of vectors [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def polygon(self, points: Sequence[Point], as_layer: str) -> None:
+        """A closed line; in three dimensions the flat surface within.
+
+        Parameters
+        ----------
+        points : the corners [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def rectangle(self, first: Point, second: Point, as_layer: str) -> None:
+        """In the plane: a rectangle along the axes.
+
+        Parameters
+        ----------
+        first : a corner [m].
+        second : the corner across [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def circle(
+        self,
+        centre: Point,
+        radius: float,
+        as_layer: str,
+        *,
+        segment_length: float | None = None,
+        normal: Point | None = None,
+    ) -> None:
+        """A circle; with segment_length a polygon of equal sides. In three dimensions the surface of a disc.
+
+        Parameters
+        ----------
+        centre : centre [m].
+        radius : radius [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        segment_length : of its sides, about [m] (in the plane; default: a true circle).
+        normal : of the disc, of any length (in three dimensions; default: (0,0,1)).
+        """
+    def arc(self, centre: Point, radius: float, begin: float, end: float, as_layer: str) -> None:
+        """In the plane: a part of a circle, counter-clockwise.
+
+        Parameters
+        ----------
+        centre : centre [m].
+        radius : radius [m].
+        begin : first angle [degrees].
+        end : last angle [degrees].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def point(self, points: Sequence[Point], as_layer: str) -> None:
+        """In the plane: single points, which become points of the mesh.
+
+        Parameters
+        ----------
+        points : the points [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def box(self, first: Point, second: Point, as_layer: str) -> None:
+        """In three dimensions: a box along the axes.
+
+        Parameters
+        ----------
+        first : a corner [m].
+        second : the corner across [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def sphere(self, centre: Point, radius: float, as_layer: str) -> None:
+        """In three dimensions: a sphere.
+
+        Parameters
+        ----------
+        centre : centre [m].
+        radius : radius [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def cylinder(self, first: Point, second: Point, radius: float, as_layer: str) -> None:
+        """In three dimensions: a round cylinder.
+
+        Parameters
+        ----------
+        first : middle of one end [m].
+        second : of the other [m].
+        radius : radius [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def cone(self, first: Point, second: Point, radius: float, other: float, as_layer: str) -> None:
+        """In three dimensions: a round cone, or a part of one.
+
+        Parameters
+        ----------
+        first : middle of one end [m].
+        second : of the other [m].
+        radius : radius at the first end [m].
+        other : radius at the other [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def disc(self, centre: Point, normal: Point, radius: float, as_layer: str) -> None:
+        """In three dimensions: the surface of a round disc: meshes are cut along it.
+
+        Parameters
+        ----------
+        centre : centre [m].
+        normal : normal of any length.
+        radius : radius [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def plane(self, point: Point, normal: Point, as_layer: str) -> None:
+        """In three dimensions: a plane without end.
+
+        Parameters
+        ----------
+        point : a point of it [m].
+        normal : normal of any length.
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def extrude(self, layer: str, along: Point, as_layer: str) -> None:
+        """In three dimensions: the bodies that the polygons of a layer become, drawn along a way.
+
+        Parameters
+        ----------
+        layer : of polygons.
+        along : the way [m].
+        as_layer : name of the layer; a layer may hold several shapes.
+        """
+    def revolve(
+        self,
+        layer: str,
+        axis: Point,
+        as_layer: str,
+        about: Point | None = None,
+        angle: float | None = None,
+    ) -> None:
+        """In three dimensions: the bodies that the polygons of a layer become, turned about an axis in their plane.
+
+        Parameters
+        ----------
+        layer : of polygons.
+        axis : direction of the axis.
+        as_layer : name of the layer; a layer may hold several shapes.
+        about : a point of it [m] (default: (0,0,0)).
+        angle : right-handed, up to 360 [degrees] (default: 360).
+        """
+    def fractures(
+        self,
+        as_layer: str,
+        inside: str,
+        *,
+        orientation: tuple[Literal["fixed", "uniform", "normal", "fisher"], float],
+        orientation_spread: float | None = None,
+        orientation_towards: float | None = None,
+        length: tuple[Literal["fixed", "exponential", "lognormal", "power"], float] | None = None,
+        length_spread: float | None = None,
+        length_least: float | None = None,
+        length_greatest: float | None = None,
+        radius: tuple[Literal["fixed", "exponential", "lognormal", "power"], float] | None = None,
+        radius_spread: float | None = None,
+        radius_least: float | None = None,
+        radius_greatest: float | None = None,
+        p10: float | None = None,
+        p20: float | None = None,
+        p21: float | None = None,
+        p30: float | None = None,
+        p32: float | None = None,
+        scan_line: float | None = None,
+        scan_direction: Point | None = None,
+        reached: bool = False,
+        ends_at: float | None = None,
+        hole: Sequence[str] = (),
+        shortest: float | None = None,
+        seed: int,
+    ) -> None:
+        """A set of fractures with given statistics, as straight lines, in three dimensions discs; for `mesh.create`
+        crack, or `mesh.intersect`.
+
+        Parameters
+        ----------
+        as_layer : name of the layer; a layer may hold several shapes.
+        inside : the layer that bounds them.
+        orientation : distribution and mean of the angle to x, counter-clockwise; in three dimensions fixed or
+            fisher, and the dip [degrees].
+        orientation_spread : uniform: half width; normal: standard deviation [degrees]; fisher: kappa (default: 0).
+        orientation_towards : dip direction, clockwise from y as seen from above [degrees] (in three dimensions;
+            default: 0).
+        length : distribution of the length, and its value: the length, the mean, the mean, the exponent [m] (in the
+            plane).
+        length_spread : lognormal: standard deviation [m].
+        length_least : no shorter ones [m] (default: 0).
+        length_greatest : no longer ones [m] (default: none).
+        radius : the same of the radius of discs [m] (in three dimensions).
+        radius_spread : lognormal: standard deviation [m].
+        radius_least : no shorter ones [m] (default: 0).
+        radius_greatest : no longer ones [m] (default: none).
+        p10 : density: fractures per length of a scan line [1/m].
+        p20 : density: fractures per area [1/m2] (in the plane).
+        p21 : density: length of fractures per area [1/m] (in the plane).
+        p30 : density: fractures per volume [1/m3] (in three dimensions).
+        p32 : density: area of fractures per volume [1/m] (in three dimensions).
+        scan_line : direction of the line of p10 [degrees] (in the plane; default: 0).
+        scan_direction : direction of the line of p10 (in three dimensions; default: (0,0,1)).
+        reached : p20 or p21, p30 or p32 is met as nearly as whole ones can, not in the mean.
+        ends_at : share of the crossings with earlier fractures at which one ends (in the plane; default: 0).
+        hole : none inside of this layer (in the plane).
+        shortest : shorter pieces at the rim are left out [m] (in the plane; default: 0).
+        seed : another seed, another network.
+        """
+    def import_file(self, file: File, as_layer: str, dxf_layer: str | None = None, scale: float | None = None) -> None:
+        """Lines of a DXF file; in three dimensions the solids of a STEP or BREP file, or what the triangles of an STL
+        or DXF file (3DFACE) enclose.
+
+        Parameters
+        ----------
+        file : name of the file.
+        as_layer : name of the layer; a layer may hold several shapes.
+        dxf_layer : only this layer of the file (default: all).
+        scale : metres in a unit of the file [m] (default: as STEP and DXF files say, else 1).
+        """
+    def transform(
+        self,
+        layer: str,
+        *,
+        scale: float | None = None,
+        rotate: float | None = None,
+        axis: Point | None = None,
+        about: Point | None = None,
+        move: Point | None = None,
+    ) -> None:
+        """Moves, turns or scales a layer.
+
+        Parameters
+        ----------
+        layer : name of the layer.
+        scale : done first.
+        rotate : then, counter-clockwise; in three dimensions right-handed about an axis [degrees].
+        axis : about which it is turned (in three dimensions; default: (0,0,1)).
+        about : centre of both [m] (default: the origin).
+        move : last [m].
+        """
+    def scale(self, factors: Point, layer: Sequence[str] | None = None) -> None:
+        """Multiplies the coordinates of layers, of all without layer; a negative factor mirrors. What is round takes
+        one size of factor only.
+
+        Parameters
+        ----------
+        factors : along the axes, not 0.
+        layer : names of layers (default: all).
+        """
+    def translate(self, way: Point, layer: Sequence[str] | None = None) -> None:
+        """Moves layers, all without layer.
+
+        Parameters
+        ----------
+        way : where to [m].
+        layer : names of layers (default: all).
+        """
+    def export(self, layers: Sequence[str], file: File) -> None:
+        """In the plane: writes layers to a DXF file, in metres, each as a layer of its name.
+
+        Parameters
+        ----------
+        layers : names of the layers.
+        file : name of the file, in the folder of the results.
+        """
+    def delete(self, *layers: str) -> None:
+        """Forget layers; meshes that were made from them keep their edges.
+
+        Parameters
+        ----------
+        layers : names of the layers.
+        """
+
+class Mesh(Words):
+    """Meshes: each call makes one more body of the model. Its elements go into a group of a set."""
+    def create(
+        self,
+        from_layer: str,
+        size: float,
+        type: Literal["tri", "quad"] | None = None,
+        *,
+        refine_layer: Iterable[tuple[str, float] | tuple[str, float, float]] = (),
+        hole: Sequence[str] = (),
+        region: Iterable[str | tuple[str] | tuple[str, str]] = (),
+        embed: Sequence[str] = (),
+        crack: Sequence[str] = (),
+        bodies: bool = False,
+        irregular: bool = False,
+        smooth: bool = False,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """Meshes the inside of a layer with Gmsh. Several meshes make several bodies of one model, which may touch each
+        other.
+
+        Parameters
+        ----------
+        from_layer : its outline.
+        size : length of edges [m].
+        type : triangles or quads (in the plane; default: tri).
+        refine_layer : smaller elements near this layer; each is (refine_layer, size, distance); size: length of
+            edges there [m]; distance: over which the size grows to that of the rest [m] (default: ten times the
+            size).
+        hole : what is inside of this layer stays empty.
+        region : what is inside of this layer is a group of its own; each is (region, group); group: its name
+            (default: the name of the layer).
+        embed : lines that become edges of the mesh; in three dimensions surfaces, which become faces.
+        crack : lines that become edges with a crack from the beginning; in three dimensions surfaces.
+        bodies : each body of the layer is a group of its own: by its name in its file, else by the layer and its
+            number (in three dimensions).
+        irregular : triangles in no pattern: rows of equilateral ones lead cracks (in the plane).
+        smooth : inner points lie in the middle of their neighbours, so that joints on all edges share a uniform
+            stress evenly; for triangles (in the plane).
+        group : the group that the new elements are in.
+        set : the set of the group.
+        """
+    def structured(
+        self,
+        first: Point,
+        second: Point,
+        cells: tuple[int, ...],
+        type: Literal["tri", "quad", "tet", "hex"] | None = None,
+        diagonal: Literal["right", "left", "alternate", "both"] | None = None,
+        *,
+        split: int | None = None,
+        ratio: tuple[float, ...] | None = None,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """A regular mesh of a rectangle.
+
+        Parameters
+        ----------
+        first : a corner [m].
+        second : the corner across [m].
+        cells : along x and y, in three dimensions z.
+        type : triangles or quads, in three dimensions tetrahedra or hexahedra (default: tri, tet).
+        diagonal : of the triangles; alternating, or both of each rectangle (in the plane; default: alternate).
+        split : tetrahedra of each box: 5, mirrored from box to box, 6 about a diagonal, or 12 about a point in the
+            middle (in three dimensions; default: 6).
+        ratio : along x and y (and z): each rectangle or box is so many times as large as the one before (default: 1
+            1).
+        group : the group that the new elements are in.
+        set : the set of the group.
+        """
+    def brick(
+        self,
+        p0: Point,
+        p1: Point,
+        p2: Point,
+        p3: Point | None = None,
+        *,
+        n: tuple[int, ...],
+        ratio: tuple[float, ...] | None = None,
+        triangle: bool | None = None,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """A regular mesh of a parallelogram, in three dimensions of a parallelepiped, by a corner and the ends of its
+        edges there.
+
+        Parameters
+        ----------
+        p0 : the corner [m].
+        p1 : end of its first edge [m].
+        p2 : of the second [m].
+        p3 : of the third [m] (in three dimensions).
+        n : elements along each edge.
+        ratio : along each edge an element is so many times as large as the one before (default: 1 1).
+        triangle : triangles, or tetrahedra; False: quads, or hexahedra (default: True).
+        group : the group that the new elements are in.
+        set : the set of the group.
+        """
+    def geometry(
+        self,
+        *,
+        layer: Iterable[tuple[Sequence[str]] | tuple[Sequence[str], float] | tuple[Sequence[str], float, bool]] = (),
+        circle: Iterable[tuple[Point, float] | tuple[Point, float, float] | tuple[Point, float, float, bool]] = (),
+        arc: Iterable[tuple[Point, Point, Point] | tuple[Point, Point, Point, float] | tuple[Point, Point, Point, float, bool]] = (),
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """In the plane: triangles in the inside of closed lines, by Gmsh, with a mesh size for each piece. Other pieces
+        become edges and points of the mesh, as far as they lie inside.
+
+        Parameters
+        ----------
+        layer : layers of geometry; each is (layer, mesh_size, is_boundary); mesh_size: length of edges there [m]
+            (default: the largest of the others); is_boundary: it bounds the mesh: what is outside is cut off
+            (default: the first piece does).
+        circle : a circle; each is (center, radius, mesh_size, is_boundary); center: its centre [m]; radius: its
+            radius [m]; mesh_size: length of edges there [m] (default: the largest of the others); is_boundary: it
+            bounds the mesh: what is outside is cut off (default: the first piece does).
+        arc : an arc, counter-clockwise; each is (center, start_point, end_point, mesh_size, is_boundary); center:
+            its centre [m]; start_point: where it begins [m]; end_point: where it ends [m]; mesh_size: length of
+            edges there [m] (default: the largest of the others); is_boundary: it bounds the mesh: what is outside is
+            cut off (default: the first piece does).
+        group : the group that the new elements are in.
+        set : the set of the group.
+        """
+    def patch(
+        self,
+        boundary: Iterable[Piece],
+        *,
+        polyline: Iterable[Piece] = (),
+        point: Iterable[Piece] = (),
+        global_mesh_size: float | None = None,
+        tolerance: float | None = None,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """In the plane: triangles in the inside of closed lines, by Gmsh, that follow other lines and points as far as
+        these lie inside.
+
+        Parameters
+        ----------
+        boundary : bounds the mesh; each is (array, layer, mesh_size); array: points; or a list of vectors [m];
+            layer: layers of geometry; mesh_size: length of edges there [m] (default: the largest of the others).
+        polyline : lines that become edges; each is (array, layer, mesh_size); array: points; or a list of vectors
+            [m]; layer: layers of geometry; mesh_size: length of edges there [m] (default: the largest of the
+            others).
+        point : points of the mesh; each is (array, layer, mesh_size); array: points; or a list of vectors [m];
+            layer: layers of geometry; mesh_size: length of edges there [m] (default: the largest of the others).
+        global_mesh_size : of pieces without one, and away from them [m] (default: the largest of the pieces).
+        tolerance : points nearer than this are one [m] (default: 1e-4).
+        group : the group that the new elements are in.
+        set : the set of the group.
+        """
+    def boundary(
+        self,
+        boundary: Sequence[Point],
+        mesh_size: float | None = None,
+        *,
+        inner: Iterable[tuple[Sequence[Point]] | tuple[Sequence[Point], float] | tuple[Sequence[Point], float, bool]] = (),
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """In the plane: triangles in the inside of a closed line, by Gmsh, with others in it that are holes, or filled.
+
+        Parameters
+        ----------
+        boundary : corners of the outline; or a list of vectors [m].
+        mesh_size : length of edges there [m] (default: the largest of the others).
+        inner : corners of a line in it [m]; each is (inner_boundary, mesh_size, filled); mesh_size: length of edges
+            there [m] (default: the largest of the others); filled: elements inside; False: a hole.
+        group : the group that the new elements are in.
+        set : the set of the group.
+        """
+    def hollow_circle(
+        self,
+        center: Point,
+        radius: float,
+        inner_radius: float,
+        mesh_size: float | None = None,
+        inner_mesh_size: float | None = None,
+        *,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """In the plane: triangles in a ring, by Gmsh.
+
+        Parameters
+        ----------
+        center : centre of both circles [m].
+        radius : outer radius [m].
+        inner_radius : radius of the hole [m].
+        mesh_size : length of edges there [m] (default: the largest of the others).
+        inner_mesh_size : length of edges there [m] (default: the largest of the others).
+        group : the group that the new elements are in.
+        set : the set of the group.
+        """
+    def equilateral(
+        self,
+        first: Point,
+        second: Point,
+        size: float,
+        *,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """In the plane: nearly equilateral triangles in a rectangle.
+
+        Parameters
+        ----------
+        first : a corner [m].
+        second : the corner across [m].
+        size : length of edges [m].
+        group : the group that the new elements are in.
+        set : the set of the group.
+        """
+    def import_file(
+        self,
+        file: File,
+        *,
+        group: str | None = None,
+        set: str | None = None,
+        merge: float | None = None,
+        scale: float | None = None,
+    ) -> None:
+        """A mesh of another program, for example .msh or .inp; its physical groups and sets of elements, nodes and
+        faces become groups.
+
+        Parameters
+        ----------
+        file : name of the file.
+        group : a group that all elements are put into, besides those of the file.
+        set : the set of the group.
+        merge : points nearer than this are one [m] (default: 0).
+        scale : metres in a unit of the file [m] (default: 1).
+        """
+    def intersect(self, layer: str, follow: bool = False) -> None:
+        """Joints on a layer become cracks: the edges of the mesh that lie on it.
+
+        Parameters
+        ----------
+        layer : its lines are edges of the mesh, its surfaces faces.
+        follow : they are not: the edges that follow them best are taken, the faces between elements on either side.
+        """
+    def glue(
+        self,
+        tolerance: float | None = None,
+        between: tuple[str, str] | None = None,
+        *,
+        set: str | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Bodies that were meshed separately hang together where their faces lie on each other: these become joints, as
+        inside of a body. Elements are cut where points of others lie on their sides. With a range only faces of its
+        elements are glued, to any others.
+
+        Parameters
+        ----------
+        tolerance : points nearer than this are one [m] (default: a thousandth of the shortest edge).
+        between : only faces between the elements of these two groups.
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def densify(
+        self,
+        maximum_length: float | tuple[float, float],
+        pattern: tuple[int, int] | None = None,
+        *,
+        where: Where | None = None,
+    ) -> None:
+        """In the plane: quads are halved until they are short enough, before the first model or condition is assigned.
+        Neighbours follow, so that no side has more than one point on it; quads with such a point become triangles.
+
+        Parameters
+        ----------
+        maximum_length : of sides along x and y; one number for both [m].
+        pattern : 1: halved along x, along y; 0: not (default: 1 1).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def delete(self, *, where: Where | None = None) -> None:
+        """Elements are gone. Before the first model or condition is assigned the mesh is without them, and numbers of
+        others close up; later they are taken out, as by `elements.null`.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def add_nodes(self, points: Sequence[Point]) -> None:
+        """More nodes, for elements that are added next, before the first model or condition is assigned. Their numbers
+        follow those of the mesh.
+
+        Parameters
+        ----------
+        points : the nodes [m].
+        """
+    def add_element(self, *corners: int) -> None:
+        """One more element, by the numbers of its nodes.
+
+        Parameters
+        ----------
+        corners : three or four, in three dimensions four.
+        """
+    def scale(self, factors: Point) -> None:
+        """Coordinates of all points of the mesh are multiplied, before the first model or condition is assigned.
+
+        Parameters
+        ----------
+        factors : along the axes, above 0.
+        """
+    def translate(self, way: Point) -> None:
+        """All points of the mesh are moved, before the first model or condition is assigned.
+
+        Parameters
+        ----------
+        way : where to [m].
+        """
+    def quality(self) -> None:
+        """Say in the log how good the mesh is: angles, sizes."""
+
+class Elements(Stressed):
+    """Elements: `sim.elements["stress-xx"]`, see `Objects`."""
+    def __getitem__(
+        self,
+        name: Literal["stress-xx", "stress-yy", "stress-xy", "stress-zz", "stress-xz", "stress-yz", "plastic-state", "plastic-shear-strain", "plastic-volume-strain", "plastic-work", "creep-strain-xx", "creep-strain-yy", "creep-strain-xy", "kelvin-strain-xx", "kelvin-strain-yy", "kelvin-strain-xy", "creep-strain-zz", "creep-strain-xz", "creep-strain-yz", "kelvin-strain-zz", "kelvin-strain-xz", "kelvin-strain-yz", "creep-work", "mean-temperature", "mean-moisture", "suction", "law-state"] | str,
+    ) -> np.ndarray: ...
+    def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
+        """Put them into a group; each is in one group of a set at most.
+
+        Parameters
+        ----------
+        group : name of the group.
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["mechanical-iso-elastic", "mechanical-iso-e", "mech-iso-elastic", "mech-iso-e"],
+        *,
+        density: Value,
+        young: Value | None = None,
+        poisson_ratio: Value | None = None,
+        shear: Value | None = None,
+        bulk: Value | None = None,
+        damp_factor: Value | None = None,
+        friction: Value | None = None,
+        penalty: Value | None = None,
+        damp_b: Value | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Isotropic, linear elastic, for large rotations.
+
+        Parameters
+        ----------
+        density : density [kg/m3].
+        young : Young's modulus E [Pa].
+        poisson_ratio : Poisson's ratio.
+        shear : shear modulus, with the bulk modulus in the place of E and Poisson's ratio [Pa].
+        bulk : bulk modulus, with the shear modulus in the place of E and Poisson's ratio [Pa].
+        damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs (default:
+            0).
+        friction : friction angle of its surfaces where they have no contact model [degrees] (default: 0).
+        penalty : contact penalty of its surfaces where they have no contact model; 0: that of its joints, or 10 E
+            [Pa] (default: 0).
+        damp_b : exponent of the overlap of its surfaces while they part, where they have no contact model; above 1
+            contacts lose energy (default: 1).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(self, name: Literal["null"], *, relax: float | None = None, where: Where | None = None) -> None:
+        """The elements are taken out: excavated. Faces beside them become free. Another model in a range that names
+        them brings them back, as new material where the void is then, free of stress; they hang together with what
+        lies around them, without joints, until face-joint c-model gives them some.
+
+        Parameters
+        ----------
+        relax : what they did to the others dies down over this time (static runs: so many steps) [s] (default: at
+            once).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["mechanical-mohr-coulomb", "mechanical-mohr-c", "mechanical-m-coulomb", "mechanical-m-c", "mech-mohr-coulomb", "mech-mohr-c", "mech-m-coulomb", "mech-m-c"],
+        *,
+        density: Value,
+        young: Value | None = None,
+        poisson_ratio: Value | None = None,
+        shear: Value | None = None,
+        bulk: Value | None = None,
+        friction: Value | None = None,
+        cohesion: Value | None = None,
+        tensile: Value | None = None,
+        dilation: Value | None = None,
+        damp_factor: Value | None = None,
+        penalty: Value | None = None,
+        damp_b: Value | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Elastic up to the strength of Mohr and Coulomb, or in tension, then plastic, for large rotations.
+
+        Parameters
+        ----------
+        density : density [kg/m3].
+        young : Young's modulus E [Pa].
+        poisson_ratio : Poisson's ratio.
+        shear : shear modulus, with the bulk modulus in the place of E and Poisson's ratio [Pa].
+        bulk : bulk modulus, with the shear modulus in the place of E and Poisson's ratio [Pa].
+        friction : internal friction angle; also that of its surfaces where they have no contact model [degrees]
+            (default: 0).
+        cohesion : cohesion [Pa] (default: 0).
+        tensile : tensile strength; no more than cohesion / tan(friction) counts [Pa] (default: 0).
+        dilation : dilation angle, at most the friction angle [degrees] (default: 0).
+        damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs (default:
+            0).
+        penalty : contact penalty of its surfaces where they have no contact model; 0: that of its joints, or 10 E
+            [Pa] (default: 0).
+        damp_b : exponent of the overlap of its surfaces while they part, where they have no contact model; above 1
+            contacts lose energy (default: 1).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["user"],
+        *,
+        law: File,
+        density: Value,
+        young: Value | None = None,
+        poisson_ratio: Value | None = None,
+        shear: Value | None = None,
+        bulk: Value | None = None,
+        damp_factor: Value | None = None,
+        friction: Value | None = None,
+        penalty: Value | None = None,
+        parameter: Sequence[tuple[str, Value]] = (),
+        where: Where | None = None,
+    ) -> None:
+        """A law in a Python file of the user, see docs/user_laws.md.
+
+        Parameters
+        ----------
+        law : 'file.py:law': the file, beside the script, and the name of the law in it; plain text.
+        density : density [kg/m3].
+        young : Young's modulus E [Pa].
+        poisson_ratio : Poisson's ratio.
+        shear : shear modulus, with the bulk modulus in the place of E and Poisson's ratio [Pa].
+        bulk : bulk modulus, with the shear modulus in the place of E and Poisson's ratio [Pa].
+        damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs (default:
+            0).
+        friction : friction angle of its surfaces where they have no contact model [degrees] (default: 0).
+        penalty : contact penalty of its surfaces where they have no contact model; 0: that of its joints, or 10 E
+            [Pa] (default: 0).
+        parameter : a property that the law declares, by its name, and its value.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["mechanical-burgers", "mechanical-bur", "mech-burgers", "mech-bur"],
+        *,
+        density: Value,
+        young: Value | None = None,
+        poisson_ratio: Value | None = None,
+        bulk: Value | None = None,
+        kelvin_shear: Value | None = None,
+        kelvin_viscosity: Value | None = None,
+        maxwell_shear: Value | None = None,
+        maxwell_viscosity: Value | None = None,
+        kelvin_strain_xx: Value | None = None,
+        kelvin_strain_yy: Value | None = None,
+        kelvin_strain_xy: Value | None = None,
+        kelvin_strain_zz: Value | None = None,
+        kelvin_strain_xz: Value | None = None,
+        kelvin_strain_yz: Value | None = None,
+        damp_factor: Value | None = None,
+        friction: Value | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Elastic in its volume, creeping in its shape after Burgers while model creep is on, for large rotations.
+        Strain of the Kelvin unit goes with a stress that was there before.
+
+        Parameters
+        ----------
+        density : density [kg/m3].
+        young : Young's modulus E [Pa].
+        poisson_ratio : Poisson's ratio.
+        bulk : bulk modulus; in the place of the one that E and Poisson's ratio give [Pa].
+        kelvin_shear : shear modulus of the Kelvin unit; 0: no Kelvin unit [Pa] (default: 0).
+        kelvin_viscosity : viscosity of the Kelvin unit; 0: no Kelvin unit [Pa s] (default: 0).
+        maxwell_shear : shear modulus of the Maxwell unit; in the place of the one that E and Poisson's ratio give
+            [Pa].
+        maxwell_viscosity : viscosity of the Maxwell unit; 0: no dashpot [Pa s] (default: 0).
+        kelvin_strain_xx : strain xx of the Kelvin unit at that moment; its zz is -xx - yy (default: 0).
+        kelvin_strain_yy : strain yy of the Kelvin unit at that moment; its zz is -xx - yy (default: 0).
+        kelvin_strain_xy : strain xy of the Kelvin unit at that moment; its zz is -xx - yy (default: 0).
+        kelvin_strain_zz : strain zz of the Kelvin unit at that moment, to be said of all three (in three dimensions;
+            default: -xx - yy).
+        kelvin_strain_xz : strain xz of the Kelvin unit at that moment (in three dimensions; default: 0).
+        kelvin_strain_yz : strain yz of the Kelvin unit at that moment (in three dimensions; default: 0).
+        damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs (default:
+            0).
+        friction : friction angle of its surfaces where they have no contact model [degrees] (default: 0).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["thermal-iso-heat", "thermal-iso-h", "therm-iso-heat", "therm-iso-h"],
+        *,
+        conductivity: Value,
+        capacity: Value,
+        transfer_coeficient: Value | None = None,
+        transfer_coefficient: Value | None = None,
+        transfer_coefficent: Value | None = None,
+        expansion_coeficient: Value | None = None,
+        expansion_coefficient: Value | None = None,
+        conductivity_across: Value | None = None,
+        conductivity_angle: Value | None = None,
+        friction_heat: Value | None = None,
+        conductivity_dip: Value | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Heat conduction and thermal expansion. It acts beside the mechanical model of the elements, all of which need
+        it where one has it. Heat crosses joints until they break, and from then on passes from surface to surface
+        where they touch, with a transfer coefficient. At the temperatures of this moment elements are free of
+        thermal stress. Temperatures are those of any scale of degrees.
+
+        Parameters
+        ----------
+        conductivity : thermal conductivity [W/(m K)].
+        capacity : specific heat [J/(kg K)].
+        transfer_coeficient : heat transfer at faces: to an environment that is prescribed on them without a
+            coefficient of its own, and to surfaces that they touch, with the harmonic mean of both [W/(m2 K)]
+            (default: 0).
+        transfer_coefficient : as transfer-coeficient.
+        transfer_coefficent : as transfer-coeficient.
+        expansion_coeficient : linear thermal expansion [1/K] (default: 0).
+        expansion_coefficient : as expansion-coeficient.
+        conductivity_across : conductivity across the direction of conductivity-angle [W/(m K)] (default:
+            conductivity).
+        conductivity_angle : direction of conductivity from x, counter-clockwise, in space the strike of the planes
+            along which it is; it turns with the element [degrees] (default: 0).
+        friction_heat : how much of its share of the work of friction an element takes as heat where its faces slide
+            on others (default: 0).
+        conductivity_dip : dip of these planes [degrees] (in three dimensions; default: 90).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["hydraulic-porous-medium", "hydraulic-porous-m", "hydraulic-p-medium", "hydraulic-p-m", "hydr-porous-medium", "hydr-porous-m", "hydr-p-medium", "hydr-p-m"],
+        *,
+        fluid_density: Value,
+        fluid_bulk: Value,
+        viscosity: Value,
+        aperature_initial: Value | None = None,
+        aperture_initial: Value | None = None,
+        aperature_minumum: Value | None = None,
+        aperature_minimum: Value | None = None,
+        aperture_minimum: Value | None = None,
+        aperture_minumum: Value | None = None,
+        aperature_maximum: Value | None = None,
+        aperture_maximum: Value | None = None,
+        leak_off: bool | None = None,
+        matrix_pore_pressure: Value | None = None,
+        matrix_permeability: Value | None = None,
+        matrix_porosity_compressibility: Value | None = None,
+        matrix_porosity_compressiblity: Value | None = None,
+        matrix_porosity: Value | None = None,
+        shear_dilation: Value | None = None,
+        shear_dilation_limit: Value | None = None,
+        matrix_saturation: Value | None = None,
+        turbulence: bool | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Fluid in joints: each is a channel between its two nodes, broken or not, of the aperture aperature-initial
+        plus its mean opening, within the limits. It acts beside the mechanical model of the joint. Given again,
+        fluid that has no room any more is gone, and new room is dry. In space channels are the triangles of the
+        joints.
+
+        Parameters
+        ----------
+        fluid_density : density of the fluid [kg/m3].
+        fluid_bulk : bulk modulus of the fluid [Pa].
+        viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
+        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
+            one, which stands for the permeability of the rock [m].
+        aperture_initial : as aperature-initial.
+        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minimum : as aperature-minumum.
+        aperture_minimum : as aperature-minumum.
+        aperture_minumum : as aperature-minumum.
+        aperature_maximum : largest hydraulic aperture [m] (default: no limit).
+        aperture_maximum : as aperature-maximum.
+        leak_off : broken joints lose fluid to the rock after Carter.
+        matrix_pore_pressure : leak-off: pressure in the pores of the rock; negative: suction of rock that is not
+            saturated [Pa] (default: 0).
+        matrix_permeability : leak-off: permeability of the rock [m2] (default: needed by leak-off).
+        matrix_porosity_compressibility : leak-off: compressibility of the pores [1/Pa] (default: needed by
+            leak-off).
+        matrix_porosity_compressiblity : as matrix-porosity-compressibility.
+        matrix_porosity : leak-off: porosity of the rock (default: needed by leak-off).
+        shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees]
+            (default: 0).
+        shear_dilation_limit : what slip adds to the aperture at most [m] (default: no limit).
+        matrix_saturation : leak-off: part of the pores that was full before; below 1 a sharp front fills the rest
+            (default: 1).
+        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+            Reynolds number.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["hydraulic-porous-proppant-medium", "hydraulic-porous-proppant-m", "hydraulic-porous-p-medium", "hydraulic-porous-p-m", "hydraulic-p-proppant-medium", "hydraulic-p-proppant-m", "hydraulic-p-p-medium", "hydraulic-p-p-m", "hydr-porous-proppant-medium", "hydr-porous-proppant-m", "hydr-porous-p-medium", "hydr-porous-p-m", "hydr-p-proppant-medium", "hydr-p-proppant-m", "hydr-p-p-medium", "hydr-p-p-m"],
+        *,
+        fluid_density: Value,
+        fluid_bulk: Value,
+        viscosity: Value,
+        aperature_initial: Value | None = None,
+        aperture_initial: Value | None = None,
+        aperature_minumum: Value | None = None,
+        aperature_minimum: Value | None = None,
+        aperture_minimum: Value | None = None,
+        aperture_minumum: Value | None = None,
+        aperature_maximum: Value | None = None,
+        aperture_maximum: Value | None = None,
+        leak_off: bool | None = None,
+        matrix_pore_pressure: Value | None = None,
+        matrix_permeability: Value | None = None,
+        matrix_porosity_compressibility: Value | None = None,
+        matrix_porosity_compressiblity: Value | None = None,
+        matrix_porosity: Value | None = None,
+        shear_dilation: Value | None = None,
+        shear_dilation_limit: Value | None = None,
+        matrix_saturation: Value | None = None,
+        turbulence: bool | None = None,
+        proppant_density: float,
+        proppant_size: float,
+        proppant_size_factor: float | None = None,
+        aperature_factor: float | None = None,
+        aperture_factor: float | None = None,
+        proppant_concentration_limit: float,
+        proppant_modulus: float | None = None,
+        viscosity_power: float | None = None,
+        proppant_stokes: bool | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, make it heavier
+        and more viscous, settle, and bridge where it is narrow. A node that is filled to the limit is a pack: no
+        grains pass it, fluid does, and the walls lean on it.
+
+        Parameters
+        ----------
+        fluid_density : density of the fluid [kg/m3].
+        fluid_bulk : bulk modulus of the fluid [Pa].
+        viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
+        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
+            one, which stands for the permeability of the rock [m].
+        aperture_initial : as aperature-initial.
+        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minimum : as aperature-minumum.
+        aperture_minimum : as aperature-minumum.
+        aperture_minumum : as aperature-minumum.
+        aperature_maximum : largest hydraulic aperture [m] (default: no limit).
+        aperture_maximum : as aperature-maximum.
+        leak_off : broken joints lose fluid to the rock after Carter.
+        matrix_pore_pressure : leak-off: pressure in the pores of the rock; negative: suction of rock that is not
+            saturated [Pa] (default: 0).
+        matrix_permeability : leak-off: permeability of the rock [m2] (default: needed by leak-off).
+        matrix_porosity_compressibility : leak-off: compressibility of the pores [1/Pa] (default: needed by
+            leak-off).
+        matrix_porosity_compressiblity : as matrix-porosity-compressibility.
+        matrix_porosity : leak-off: porosity of the rock (default: needed by leak-off).
+        shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees]
+            (default: 0).
+        shear_dilation_limit : what slip adds to the aperture at most [m] (default: no limit).
+        matrix_saturation : leak-off: part of the pores that was full before; below 1 a sharp front fills the rest
+            (default: 1).
+        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+            Reynolds number.
+        proppant_density : density of the grains [kg/m3].
+        proppant_size : diameter of the grains [m].
+        proppant_size_factor : channels narrower than so many grains carry none: they bridge (default: 3).
+        aperature_factor : hydraulic aperture of a pack over that of the channel; 0: permeability of the pack after
+            Kozeny and Carman (default: 0).
+        aperture_factor : as aperature-factor.
+        proppant_concentration_limit : concentration of a pack.
+        proppant_modulus : modulus of a pack that is pressed together; 0: it bears nothing [Pa] (default: 0).
+        viscosity_power : beta of the slurry, whose viscosity is that of the fluid times (1 - C / limit)^beta
+            (default: -2.5).
+        proppant_stokes : settling after Stokes; else after Schiller and Naumann, for any Reynolds number.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["thermal-fluid", "fluid-thermal", "thermal-f", "t-fluid", "t-f", "fluid-t", "f-thermal", "f-t"],
+        *,
+        conductivity: Value,
+        capacity: Value | None = None,
+        heat_capacity: Value | None = None,
+        transfer_coeficient: Value | None = None,
+        transfer_coefficient: Value | None = None,
+        transfer_coefficent: Value | None = None,
+        convective_heat_transfer_coefficient: Value | None = None,
+        second_order: bool | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Heat in the fluid of joints with a hydraulic model, all of which need it where one has it, beside heat in the
+        elements. Fluid that has none yet has the temperature of the rock beside it. What comes in has the
+        temperature of its node.
+
+        Parameters
+        ----------
+        conductivity : thermal conductivity of the fluid [W/(m K)].
+        capacity : specific heat of the fluid [J/(kg K)].
+        heat_capacity : as capacity.
+        transfer_coeficient : heat transfer between fluid and each of the two sides [W/(m2 K)] (default: 0).
+        transfer_coefficient : as transfer-coeficient.
+        transfer_coefficent : as transfer-coeficient.
+        convective_heat_transfer_coefficient : as transfer-coeficient.
+        second_order : advection of second order with a flux limiter: fronts stay sharper.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["moisture-diffusion"],
+        *,
+        diffusivity: Value,
+        shrinkage: Value | None = None,
+        evaporation: Value | None = None,
+        moisture_saturated: Value | None = None,
+        moisture_residual: Value | None = None,
+        air_entry: Value | None = None,
+        pore_index: Value | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Diffusion of moisture, mass of water over dry mass, beside the mechanical model of the elements, all of which
+        need it where one has it. It crosses joints until they break. At the values of this moment elements are free
+        of the stress that it brings.
+
+        Parameters
+        ----------
+        diffusivity : diffusivity of moisture [m2/s].
+        shrinkage : linear shrinkage, strain over the moisture that is lost (default: 0).
+        evaporation : mass that leaves through faces, over the difference of moisture to the environment that is
+            prescribed on them without a coefficient of its own [kg/(m2 s)] (default: 0).
+        moisture_saturated : moisture at which all pores are full (default: 0.4).
+        moisture_residual : moisture that no suction takes out (default: 0).
+        air_entry : suction at which pores begin to drain, 1 / alpha of van Genuchten [Pa] (default: 10000).
+        pore_index : exponent n of van Genuchten (default: 1.5).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def property(
+        self,
+        *,
+        density: Value | None = None,
+        young: Value | None = None,
+        poisson_ratio: Value | None = None,
+        shear: Value | None = None,
+        bulk: Value | None = None,
+        damp_factor: Value | None = None,
+        friction: Value | None = None,
+        penalty: Value | None = None,
+        damp_b: Value | None = None,
+        cohesion: Value | None = None,
+        tensile: Value | None = None,
+        dilation: Value | None = None,
+        kelvin_shear: Value | None = None,
+        kelvin_viscosity: Value | None = None,
+        maxwell_shear: Value | None = None,
+        maxwell_viscosity: Value | None = None,
+        kelvin_strain_xx: Value | None = None,
+        kelvin_strain_yy: Value | None = None,
+        kelvin_strain_xy: Value | None = None,
+        kelvin_strain_zz: Value | None = None,
+        kelvin_strain_xz: Value | None = None,
+        kelvin_strain_yz: Value | None = None,
+        conductivity: Value | None = None,
+        capacity: Value | None = None,
+        transfer_coeficient: Value | None = None,
+        transfer_coefficient: Value | None = None,
+        transfer_coefficent: Value | None = None,
+        expansion_coeficient: Value | None = None,
+        expansion_coefficient: Value | None = None,
+        conductivity_across: Value | None = None,
+        conductivity_angle: Value | None = None,
+        friction_heat: Value | None = None,
+        conductivity_dip: Value | None = None,
+        diffusivity: Value | None = None,
+        shrinkage: Value | None = None,
+        evaporation: Value | None = None,
+        moisture_saturated: Value | None = None,
+        moisture_residual: Value | None = None,
+        air_entry: Value | None = None,
+        pore_index: Value | None = None,
+        parameter: Sequence[tuple[str, Value]] = (),
+        where: Where | None = None,
+    ) -> None:
+        """Change properties of the model; the others stay.
+
+        Parameters
+        ----------
+        density : density [kg/m3].
+        young : Young's modulus E [Pa].
+        poisson_ratio : Poisson's ratio.
+        shear : shear modulus, with the bulk modulus in the place of E and Poisson's ratio [Pa].
+        bulk : bulk modulus, with the shear modulus in the place of E and Poisson's ratio [Pa].
+        damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs.
+        friction : friction angle of its surfaces where they have no contact model; the internal one of
+            mechanical-mohr-coulomb [degrees].
+        penalty : contact penalty of its surfaces where they have no contact model; 0: that of its joints, or 10 E
+            [Pa].
+        damp_b : exponent of the overlap of its surfaces while they part, where they have no contact model; above 1
+            contacts lose energy.
+        cohesion : cohesion [Pa].
+        tensile : tensile strength; no more than cohesion / tan(friction) counts [Pa].
+        dilation : dilation angle, at most the friction angle [degrees].
+        kelvin_shear : shear modulus of the Kelvin unit; 0: no Kelvin unit [Pa].
+        kelvin_viscosity : viscosity of the Kelvin unit; 0: no Kelvin unit [Pa s].
+        maxwell_shear : shear modulus of the Maxwell unit; in the place of the one that E and Poisson's ratio give
+            [Pa].
+        maxwell_viscosity : viscosity of the Maxwell unit; 0: no dashpot [Pa s].
+        kelvin_strain_xx : strain xx of the Kelvin unit at that moment; its zz is -xx - yy.
+        kelvin_strain_yy : strain yy of the Kelvin unit at that moment; its zz is -xx - yy.
+        kelvin_strain_xy : strain xy of the Kelvin unit at that moment; its zz is -xx - yy.
+        kelvin_strain_zz : strain zz of the Kelvin unit at that moment, to be said of all three (in three
+            dimensions).
+        kelvin_strain_xz : strain xz of the Kelvin unit at that moment (in three dimensions).
+        kelvin_strain_yz : strain yz of the Kelvin unit at that moment (in three dimensions).
+        conductivity : thermal conductivity [W/(m K)].
+        capacity : specific heat [J/(kg K)].
+        transfer_coeficient : heat transfer at faces: to an environment that is prescribed on them without a
+            coefficient of its own, and to surfaces that they touch, with the harmonic mean of both [W/(m2 K)].
+        transfer_coefficient : as transfer_coeficient.
+        transfer_coefficent : as transfer_coeficient.
+        expansion_coeficient : linear thermal expansion [1/K].
+        expansion_coefficient : as expansion_coeficient.
+        conductivity_across : conductivity across the direction of conductivity_angle [W/(m K)].
+        conductivity_angle : direction of conductivity from x, counter-clockwise, in space the strike of the planes
+            along which it is; it turns with the element [degrees].
+        friction_heat : how much of its share of the work of friction an element takes as heat where its faces slide
+            on others.
+        conductivity_dip : dip of these planes [degrees] (in three dimensions).
+        diffusivity : diffusivity of moisture [m2/s].
+        shrinkage : linear shrinkage, strain over the moisture that is lost.
+        evaporation : mass that leaves through faces, over the difference of moisture to the environment that is
+            prescribed on them without a coefficient of its own [kg/(m2 s)].
+        moisture_saturated : moisture at which all pores are full.
+        moisture_residual : moisture that no suction takes out.
+        air_entry : suction at which pores begin to drain, 1 / alpha of van Genuchten [Pa].
+        pore_index : exponent n of van Genuchten.
+        parameter : a property that the law declares, by its name, and its value.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def tell(self, *, where: Where | None = None) -> None:
+        """Say in the log how many there are, by model and group.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def law(self, law: File) -> None:
+        """Read, check and compile a law of a Python file before `sim.restore`.
+
+        Parameters
+        ----------
+        law : 'file.py:law': the file, beside the script, and the name of the law in it; plain text.
+        """
+    def null(self, *, relax: float | None = None, where: Where | None = None) -> None:
+        """The elements are taken out: excavated. Faces beside them become free. Another model in a range that names
+        them brings them back, as new material where the void is then, free of stress; they hang together with what
+        lies around them, without joints, until `joints.model` gives them some.
+
+        Parameters
+        ----------
+        relax : what they did to the others dies down over this time (static runs: so many steps) [s] (default: at
+            once).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def hide(self, hidden: bool = True, *, where: Where | None = None) -> None:
+        """Elements are hidden from pictures and, where use-hidden is not said, from ranges; False: seen again. They go
+        on being computed.
+
+        Parameters
+        ----------
+        hidden : whether they are.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def collision(self, on: bool, *, where: Where | None = None) -> None:
+        """Whether contact of these elements is looked for; False: others pass through them.
+
+        Parameters
+        ----------
+        on : whether they touch others.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def water(self, surface: str, density: float, *, where: Where | None = None) -> None:
+        """Water stands before the surface of the model: its pressure, the depth below a water line times density and
+        gravity, pushes on all free faces of these elements that lie below the line, on parts of faces too, wherever
+        they move. Where the line, which goes from left to right, does not reach there is no water. Said again: it
+        takes the place of what was.
+
+        Parameters
+        ----------
+        surface : layer of the water line, in three dimensions of planes and polygons.
+        density : of the water; 0: there is none any more [kg/m3].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def reset_state(self, *, where: Where | None = None) -> None:
+        """The plastic state of elements is forgotten. Elastic elements have none: the log says that nothing was
+        changed. Stresses stay; plastic strain is counted from here on.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def reset_kelvin_strain(self, *, where: Where | None = None) -> None:
+        """The Kelvin units of elements that creep are without strain from here on. Stresses and displacements stay.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+
+class Faces(Fluxed):
+    """Faces of elements: contact, and stress on surfaces; see `Objects`."""
+    def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
+        """Put them into a group; each is in one group of a set at most.
+
+        Parameters
+        ----------
+        group : name of the group.
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def model(
+        self,
+        name: Literal["contact-mohr-coulomb", "contact-mohr-c", "contact-m-coulomb", "contact-m-c", "c-mohr-coulomb", "c-mohr-c", "c-m-coulomb", "c-m-c"],
+        *,
+        friction: Value | None = None,
+        penalty_normal: Value | None = None,
+        normal_stiffness: Value | None = None,
+        penalty_shear: Value | None = None,
+        shear_stiffness: Value | None = None,
+        damping_t: Value | None = None,
+        damping_b: Value | None = None,
+        damping_ratio: Value | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Contact of surfaces: potential of the overlap, Coulomb friction. Of two surfaces the smaller value counts.
+
+        Parameters
+        ----------
+        friction : friction angle [degrees] (default: 0).
+        penalty_normal : normal penalty; 10 to 100 E is usual [Pa] (default: 10 E).
+        normal_stiffness : as penalty-normal.
+        penalty_shear : shear penalty [Pa] (default: the normal penalty).
+        shear_stiffness : as penalty-shear.
+        damping_t : largest normal stress while surfaces approach; contacts that reach it lose energy [Pa] (default:
+            never).
+        damping_b : exponent of the overlap while surfaces part; above 1 contacts lose energy (default: 1).
+        damping_ratio : normal dashpot, part of the critical damping of two elements; the larger of two surfaces
+            counts; without effect in static runs (default: 0).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def property(
+        self,
+        *,
+        friction: Value | None = None,
+        penalty_normal: Value | None = None,
+        normal_stiffness: Value | None = None,
+        penalty_shear: Value | None = None,
+        shear_stiffness: Value | None = None,
+        damping_t: Value | None = None,
+        damping_b: Value | None = None,
+        damping_ratio: Value | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Change properties of the model; the others stay.
+
+        Parameters
+        ----------
+        friction : friction angle [degrees].
+        penalty_normal : normal penalty; 10 to 100 E is usual [Pa].
+        normal_stiffness : as penalty_normal.
+        penalty_shear : shear penalty [Pa].
+        shear_stiffness : as penalty_shear.
+        damping_t : largest normal stress while surfaces approach; contacts that reach it lose energy [Pa].
+        damping_b : exponent of the overlap while surfaces part; above 1 contacts lose energy.
+        damping_ratio : normal dashpot, part of the critical damping of two elements; the larger of two surfaces
+            counts; without effect in static runs.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def tell(self, *, where: Where | None = None) -> None:
+        """Say in the log how many there are, by model and group.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def stress(
+        self,
+        *,
+        xx: Number | None = None,
+        yy: Number | None = None,
+        zz: Number | None = None,
+        xy: Number | None = None,
+        xz: Number | None = None,
+        yz: Number | None = None,
+        normal: Number | None = None,
+        dip: Number | None = None,
+        quiet: bool | None = None,
+        incoming_x: Number | None = None,
+        incoming_y: Number | None = None,
+        incoming_z: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Traction on surfaces: stress times the present normal. Tension is positive. Where it is not 0 it is the
+        total: water before the face does not push besides.
+
+        Parameters
+        ----------
+        xx : stress xx [Pa].
+        yy : stress yy [Pa].
+        zz : stress zz [Pa] (in three dimensions).
+        xy : stress xy [Pa].
+        xz : stress xz [Pa] (in three dimensions).
+        yz : stress yz [Pa] (in three dimensions).
+        normal : stress along the normal, which turns with the surface; negative is pressure [Pa].
+        dip : shear stress along the surface, counter-clockwise about the body [Pa] (in the plane).
+        quiet : dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress given beside it
+            enters as a wave of half its size.
+        incoming_x : velocity along x of a plane wave that comes in through quiet faces [m/s].
+        incoming_y : the same along y [m/s].
+        incoming_z : the same along z [m/s] (in three dimensions).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def heat(
+        self,
+        *,
+        heat_flux: Number | None = None,
+        transfer_coeficient: float | None = None,
+        environment_temperature: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Heat through surfaces, which are adiabatic without it; faces that are inside begin with it when they are
+        free. Times of tables are those of heat.
+
+        Parameters
+        ----------
+        heat_flux : heat that comes in [W/m2].
+        transfer_coeficient : heat transfer to the environment [W/(m2 K)] (default: that of the elements).
+        environment_temperature : temperature of the environment [K].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def free_field(self, *, where: Where | None = None) -> None:
+        """Vertical sides beyond which the ground goes True: a column with the elements of the side and the base of the
+        model there, velocity or quiet faces, moves beside each, and the side has its stress and dashpots that see
+        the difference of both motions. The nodes of the side are held by the forces that they have now, so the
+        conditions of the static stage can go.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+
+class Joints(Objects):
+    """Joints between elements; see `Objects`."""
+    def __getitem__(
+        self,
+        name: Literal["opening", "slip", "damage", "normal-stress", "shear-stress", "state", "normal-stress-largest", "normal-stress-first", "normal-stress-middle", "normal-stress-last", "shear-stress-largest", "shear-stress-first", "shear-stress-middle", "shear-stress-last"] | str,
+    ) -> np.ndarray: ...
+    def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
+        """Put them into a group; each is in one group of a set at most.
+
+        Parameters
+        ----------
+        group : name of the group.
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["classic-intrinsic-cohesive-interface", "classic-intrinsic-cohesive-i", "classic-intrinsic-c-interface", "classic-intrinsic-c-i", "classic-i-cohesive-interface", "classic-i-cohesive-i", "classic-i-c-interface", "classic-i-c-i", "c-intrinsic-cohesive-interface", "c-intrinsic-cohesive-i", "c-intrinsic-c-interface", "c-intrinsic-c-i", "c-i-cohesive-interface", "c-i-cohesive-i", "c-i-c-interface", "c-i-c-i"],
+        *,
+        friction: Value | None = None,
+        cohesion: Value,
+        tensile_strength: Value,
+        gf1: Value,
+        gf2: Value,
+        penalty_overlay: Value | None = None,
+        penalty_overlap: Value | None = None,
+        penalty_normal: Value | None = None,
+        penalty_shear: Value | None = None,
+        np: int | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Cohesive joints between elements: they hold up to their strength, soften, break, and are contacts from then
+        on.
+
+        Parameters
+        ----------
+        friction : friction angle [degrees] (default: 0).
+        cohesion : cohesion; 0: friction alone [Pa].
+        tensile_strength : tensile strength; 0: none [Pa].
+        gf1 : fracture energy, mode I [N/m].
+        gf2 : fracture energy, mode II [N/m].
+        penalty_overlay : penalty of a closed joint [Pa] (default: that of opening).
+        penalty_overlap : as penalty-overlay.
+        penalty_normal : penalty of opening [Pa] (default: 10 E).
+        penalty_shear : penalty of shear [Pa] (default: that of opening).
+        np : integration points (default: 3).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["joint-mohr-coulomb", "joint-mohr-c", "joint-m-coulomb", "joint-m-c", "j-mohr-coulomb", "j-mohr-c", "j-m-coulomb", "j-m-c"],
+        *,
+        normal_stiffness: Value,
+        shear_stiffness: Value,
+        friction: Value | None = None,
+        cohesion: Value | None = None,
+        tensile_strength: Value | None = None,
+        dilation: Value | None = None,
+        dilation_limit: Value | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Joints that were there before, as springs: sigma = normal-stiffness opening, tau = shear-stiffness slip, at
+        most cohesion - sigma tan friction. They slide, open and close and never break. A point that opens against
+        its tensile strength loses that and its cohesion.
+
+        Parameters
+        ----------
+        normal_stiffness : normal stiffness; of Barton and Bandis at zero stress [Pa/m].
+        shear_stiffness : shear stiffness [Pa/m].
+        friction : friction angle [degrees] (default: 0).
+        cohesion : cohesion; a point that is torn open has none any more [Pa] (default: 0).
+        tensile_strength : tensile strength; a point that is torn open has none any more [Pa] (default: 0).
+        dilation : dilation angle, at most the friction angle [degrees] (default: 0).
+        dilation_limit : path of sliding up to which it dilates [m] (default: no end).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["joint-barton-bandis", "joint-barton-b", "joint-b-bandis", "joint-b-b", "j-barton-bandis", "j-barton-b", "j-b-bandis", "j-b-b"],
+        *,
+        normal_stiffness: Value,
+        shear_stiffness: Value,
+        closure_maximum: Value,
+        residual_friction: Value,
+        jrc: Value,
+        jcs: Value,
+        joint_size: Value | None = None,
+        dilation_part: Value | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Rough joints that were there before: closure v under the pressure normal-stiffness v / (1 - v /
+        closure-maximum), from the pressure jcs on along the tangent; shear strength by the angle residual-friction +
+        m jrc log10(jcs / pressure), at most 70 degrees, m: roughness that is mobilised or worn, by the path over
+        joint-size / 500 (jrc / joint-size)^0.33; dilation by dilation-part of the part with m. They slide, open and
+        close and never break.
+
+        Parameters
+        ----------
+        normal_stiffness : normal stiffness; of Barton and Bandis at zero stress [Pa/m].
+        shear_stiffness : shear stiffness [Pa/m].
+        closure_maximum : largest closure V_m [m].
+        residual_friction : residual friction angle [degrees].
+        jrc : joint roughness coefficient JRC.
+        jcs : strength of the walls JCS [Pa].
+        joint_size : length of joint that JRC and JCS belong to [m] (default: 0.1).
+        dilation_part : part of the mobilised roughness angle that dilates; 0: it does not (default: 0.5).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["hydraulic-porous-medium", "hydraulic-porous-m", "hydraulic-p-medium", "hydraulic-p-m", "hydr-porous-medium", "hydr-porous-m", "hydr-p-medium", "hydr-p-m"],
+        *,
+        fluid_density: Value,
+        fluid_bulk: Value,
+        viscosity: Value,
+        aperature_initial: Value | None = None,
+        aperture_initial: Value | None = None,
+        aperature_minumum: Value | None = None,
+        aperature_minimum: Value | None = None,
+        aperture_minimum: Value | None = None,
+        aperture_minumum: Value | None = None,
+        aperature_maximum: Value | None = None,
+        aperture_maximum: Value | None = None,
+        leak_off: bool | None = None,
+        matrix_pore_pressure: Value | None = None,
+        matrix_permeability: Value | None = None,
+        matrix_porosity_compressibility: Value | None = None,
+        matrix_porosity_compressiblity: Value | None = None,
+        matrix_porosity: Value | None = None,
+        shear_dilation: Value | None = None,
+        shear_dilation_limit: Value | None = None,
+        matrix_saturation: Value | None = None,
+        turbulence: bool | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Fluid in joints: each is a channel between its two nodes, broken or not, of the aperture aperature-initial
+        plus its mean opening, within the limits. It acts beside the mechanical model of the joint. Given again,
+        fluid that has no room any more is gone, and new room is dry. In space channels are the triangles of the
+        joints.
+
+        Parameters
+        ----------
+        fluid_density : density of the fluid [kg/m3].
+        fluid_bulk : bulk modulus of the fluid [Pa].
+        viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
+        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
+            one, which stands for the permeability of the rock [m].
+        aperture_initial : as aperature-initial.
+        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minimum : as aperature-minumum.
+        aperture_minimum : as aperature-minumum.
+        aperture_minumum : as aperature-minumum.
+        aperature_maximum : largest hydraulic aperture [m] (default: no limit).
+        aperture_maximum : as aperature-maximum.
+        leak_off : broken joints lose fluid to the rock after Carter.
+        matrix_pore_pressure : leak-off: pressure in the pores of the rock; negative: suction of rock that is not
+            saturated [Pa] (default: 0).
+        matrix_permeability : leak-off: permeability of the rock [m2] (default: needed by leak-off).
+        matrix_porosity_compressibility : leak-off: compressibility of the pores [1/Pa] (default: needed by
+            leak-off).
+        matrix_porosity_compressiblity : as matrix-porosity-compressibility.
+        matrix_porosity : leak-off: porosity of the rock (default: needed by leak-off).
+        shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees]
+            (default: 0).
+        shear_dilation_limit : what slip adds to the aperture at most [m] (default: no limit).
+        matrix_saturation : leak-off: part of the pores that was full before; below 1 a sharp front fills the rest
+            (default: 1).
+        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+            Reynolds number.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["hydraulic-porous-proppant-medium", "hydraulic-porous-proppant-m", "hydraulic-porous-p-medium", "hydraulic-porous-p-m", "hydraulic-p-proppant-medium", "hydraulic-p-proppant-m", "hydraulic-p-p-medium", "hydraulic-p-p-m", "hydr-porous-proppant-medium", "hydr-porous-proppant-m", "hydr-porous-p-medium", "hydr-porous-p-m", "hydr-p-proppant-medium", "hydr-p-proppant-m", "hydr-p-p-medium", "hydr-p-p-m"],
+        *,
+        fluid_density: Value,
+        fluid_bulk: Value,
+        viscosity: Value,
+        aperature_initial: Value | None = None,
+        aperture_initial: Value | None = None,
+        aperature_minumum: Value | None = None,
+        aperature_minimum: Value | None = None,
+        aperture_minimum: Value | None = None,
+        aperture_minumum: Value | None = None,
+        aperature_maximum: Value | None = None,
+        aperture_maximum: Value | None = None,
+        leak_off: bool | None = None,
+        matrix_pore_pressure: Value | None = None,
+        matrix_permeability: Value | None = None,
+        matrix_porosity_compressibility: Value | None = None,
+        matrix_porosity_compressiblity: Value | None = None,
+        matrix_porosity: Value | None = None,
+        shear_dilation: Value | None = None,
+        shear_dilation_limit: Value | None = None,
+        matrix_saturation: Value | None = None,
+        turbulence: bool | None = None,
+        proppant_density: float,
+        proppant_size: float,
+        proppant_size_factor: float | None = None,
+        aperature_factor: float | None = None,
+        aperture_factor: float | None = None,
+        proppant_concentration_limit: float,
+        proppant_modulus: float | None = None,
+        viscosity_power: float | None = None,
+        proppant_stokes: bool | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, make it heavier
+        and more viscous, settle, and bridge where it is narrow. A node that is filled to the limit is a pack: no
+        grains pass it, fluid does, and the walls lean on it.
+
+        Parameters
+        ----------
+        fluid_density : density of the fluid [kg/m3].
+        fluid_bulk : bulk modulus of the fluid [Pa].
+        viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
+        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
+            one, which stands for the permeability of the rock [m].
+        aperture_initial : as aperature-initial.
+        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minimum : as aperature-minumum.
+        aperture_minimum : as aperature-minumum.
+        aperture_minumum : as aperature-minumum.
+        aperature_maximum : largest hydraulic aperture [m] (default: no limit).
+        aperture_maximum : as aperature-maximum.
+        leak_off : broken joints lose fluid to the rock after Carter.
+        matrix_pore_pressure : leak-off: pressure in the pores of the rock; negative: suction of rock that is not
+            saturated [Pa] (default: 0).
+        matrix_permeability : leak-off: permeability of the rock [m2] (default: needed by leak-off).
+        matrix_porosity_compressibility : leak-off: compressibility of the pores [1/Pa] (default: needed by
+            leak-off).
+        matrix_porosity_compressiblity : as matrix-porosity-compressibility.
+        matrix_porosity : leak-off: porosity of the rock (default: needed by leak-off).
+        shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees]
+            (default: 0).
+        shear_dilation_limit : what slip adds to the aperture at most [m] (default: no limit).
+        matrix_saturation : leak-off: part of the pores that was full before; below 1 a sharp front fills the rest
+            (default: 1).
+        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+            Reynolds number.
+        proppant_density : density of the grains [kg/m3].
+        proppant_size : diameter of the grains [m].
+        proppant_size_factor : channels narrower than so many grains carry none: they bridge (default: 3).
+        aperature_factor : hydraulic aperture of a pack over that of the channel; 0: permeability of the pack after
+            Kozeny and Carman (default: 0).
+        aperture_factor : as aperature-factor.
+        proppant_concentration_limit : concentration of a pack.
+        proppant_modulus : modulus of a pack that is pressed together; 0: it bears nothing [Pa] (default: 0).
+        viscosity_power : beta of the slurry, whose viscosity is that of the fluid times (1 - C / limit)^beta
+            (default: -2.5).
+        proppant_stokes : settling after Stokes; else after Schiller and Naumann, for any Reynolds number.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    @overload
+    def model(
+        self,
+        name: Literal["thermal-fluid", "fluid-thermal", "thermal-f", "t-fluid", "t-f", "fluid-t", "f-thermal", "f-t"],
+        *,
+        conductivity: Value,
+        capacity: Value | None = None,
+        heat_capacity: Value | None = None,
+        transfer_coeficient: Value | None = None,
+        transfer_coefficient: Value | None = None,
+        transfer_coefficent: Value | None = None,
+        convective_heat_transfer_coefficient: Value | None = None,
+        second_order: bool | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Heat in the fluid of joints with a hydraulic model, all of which need it where one has it, beside heat in the
+        elements. Fluid that has none yet has the temperature of the rock beside it. What comes in has the
+        temperature of its node.
+
+        Parameters
+        ----------
+        conductivity : thermal conductivity of the fluid [W/(m K)].
+        capacity : specific heat of the fluid [J/(kg K)].
+        heat_capacity : as capacity.
+        transfer_coeficient : heat transfer between fluid and each of the two sides [W/(m2 K)] (default: 0).
+        transfer_coefficient : as transfer-coeficient.
+        transfer_coefficent : as transfer-coeficient.
+        convective_heat_transfer_coefficient : as transfer-coeficient.
+        second_order : advection of second order with a flux limiter: fronts stay sharper.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def property(
+        self,
+        *,
+        normal_stiffness: Value | None = None,
+        shear_stiffness: Value | None = None,
+        closure_maximum: Value | None = None,
+        residual_friction: Value | None = None,
+        jrc: Value | None = None,
+        jcs: Value | None = None,
+        joint_size: Value | None = None,
+        dilation_part: Value | None = None,
+        friction: Value | None = None,
+        cohesion: Value | None = None,
+        tensile_strength: Value | None = None,
+        dilation: Value | None = None,
+        dilation_limit: Value | None = None,
+        gf1: Value | None = None,
+        gf2: Value | None = None,
+        penalty_overlay: Value | None = None,
+        penalty_overlap: Value | None = None,
+        penalty_normal: Value | None = None,
+        penalty_shear: Value | None = None,
+        fluid_density: Value | None = None,
+        fluid_bulk: Value | None = None,
+        viscosity: Value | None = None,
+        aperature_initial: Value | None = None,
+        aperture_initial: Value | None = None,
+        aperature_minumum: Value | None = None,
+        aperature_minimum: Value | None = None,
+        aperture_minimum: Value | None = None,
+        aperture_minumum: Value | None = None,
+        aperature_maximum: Value | None = None,
+        aperture_maximum: Value | None = None,
+        leak_off: bool | None = None,
+        matrix_pore_pressure: Value | None = None,
+        matrix_permeability: Value | None = None,
+        matrix_porosity_compressibility: Value | None = None,
+        matrix_porosity_compressiblity: Value | None = None,
+        matrix_porosity: Value | None = None,
+        shear_dilation: Value | None = None,
+        shear_dilation_limit: Value | None = None,
+        matrix_saturation: Value | None = None,
+        turbulence: bool | None = None,
+        conductivity: Value | None = None,
+        capacity: Value | None = None,
+        heat_capacity: Value | None = None,
+        transfer_coeficient: Value | None = None,
+        transfer_coefficient: Value | None = None,
+        transfer_coefficent: Value | None = None,
+        convective_heat_transfer_coefficient: Value | None = None,
+        second_order: bool | None = None,
+        proppant_density: float | None = None,
+        proppant_size: float | None = None,
+        proppant_size_factor: float | None = None,
+        aperature_factor: float | None = None,
+        aperture_factor: float | None = None,
+        proppant_concentration_limit: float | None = None,
+        proppant_modulus: float | None = None,
+        viscosity_power: float | None = None,
+        proppant_stokes: bool | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Change properties of the model; the others stay.
+
+        Parameters
+        ----------
+        normal_stiffness : normal stiffness; of Barton and Bandis at zero stress [Pa/m].
+        shear_stiffness : shear stiffness [Pa/m].
+        closure_maximum : largest closure V_m [m].
+        residual_friction : residual friction angle [degrees].
+        jrc : joint roughness coefficient JRC.
+        jcs : strength of the walls JCS [Pa].
+        joint_size : length of joint that JRC and JCS belong to [m].
+        dilation_part : part of the mobilised roughness angle that dilates; 0: it does not.
+        friction : friction angle [degrees].
+        cohesion : cohesion; 0: friction alone [Pa].
+        tensile_strength : tensile strength; 0: none [Pa].
+        dilation : dilation angle, at most the friction angle [degrees].
+        dilation_limit : path of sliding up to which it dilates [m].
+        gf1 : fracture energy, mode I [N/m].
+        gf2 : fracture energy, mode II [N/m].
+        penalty_overlay : penalty of a closed joint [Pa].
+        penalty_overlap : as penalty_overlay.
+        penalty_normal : penalty of opening [Pa].
+        penalty_shear : penalty of shear [Pa].
+        fluid_density : density of the fluid [kg/m3].
+        fluid_bulk : bulk modulus of the fluid [Pa].
+        viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
+        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
+            one, which stands for the permeability of the rock [m].
+        aperture_initial : as aperature_initial.
+        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minimum : as aperature_minumum.
+        aperture_minimum : as aperature_minumum.
+        aperture_minumum : as aperature_minumum.
+        aperature_maximum : largest hydraulic aperture [m].
+        aperture_maximum : as aperature_maximum.
+        leak_off : broken joints lose fluid to the rock after Carter.
+        matrix_pore_pressure : leak-False: pressure in the pores of the rock; negative: suction of rock that is not
+            saturated [Pa].
+        matrix_permeability : leak-False: permeability of the rock [m2].
+        matrix_porosity_compressibility : leak-False: compressibility of the pores [1/Pa].
+        matrix_porosity_compressiblity : as matrix_porosity_compressibility.
+        matrix_porosity : leak-False: porosity of the rock.
+        shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees].
+        shear_dilation_limit : what slip adds to the aperture at most [m].
+        matrix_saturation : leak-False: part of the pores that was full before; below 1 a sharp front fills the rest.
+        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+            Reynolds number.
+        conductivity : thermal conductivity of the fluid [W/(m K)].
+        capacity : specific heat of the fluid [J/(kg K)].
+        heat_capacity : as capacity.
+        transfer_coeficient : heat transfer between fluid and each of the two sides [W/(m2 K)].
+        transfer_coefficient : as transfer_coeficient.
+        transfer_coefficent : as transfer_coeficient.
+        convective_heat_transfer_coefficient : as transfer_coeficient.
+        second_order : advection of second order with a flux limiter: fronts stay sharper.
+        proppant_density : density of the grains [kg/m3].
+        proppant_size : diameter of the grains [m].
+        proppant_size_factor : channels narrower than so many grains carry none: they bridge.
+        aperature_factor : hydraulic aperture of a pack over that of the channel; 0: permeability of the pack after
+            Kozeny and Carman.
+        aperture_factor : as aperature_factor.
+        proppant_concentration_limit : concentration of a pack.
+        proppant_modulus : modulus of a pack that is pressed together; 0: it bears nothing [Pa].
+        viscosity_power : beta of the slurry, whose viscosity is that of the fluid times (1 - C / limit)^beta.
+        proppant_stokes : settling after Stokes; else after Schiller and Naumann, for any Reynolds number.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def tell(self, *, where: Where | None = None) -> None:
+        """Say in the log how many there are, by model and group.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def reset_state(self, *, where: Where | None = None) -> None:
+        """Damage of joints that are not broken is forgotten. Those that slide forget that they are torn, not what has
+        slid.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+
+class Nodes(Moved):
+    """Nodes; see `Objects`. Conditions are numbers or names of tables of time."""
+    def __getitem__(
+        self,
+        name: Literal["displacement", "velocity", "position-x", "position-y", "position-z", "displacement-x", "displacement-y", "displacement-z", "velocity-x", "velocity-y", "velocity-z", "reaction-x", "reaction-y", "reaction-z", "temperature", "moisture"] | str,
+    ) -> np.ndarray: ...
+    def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
+        """Put them into a group; each is in one group of a set at most.
+
+        Parameters
+        ----------
+        group : name of the group.
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def velocity(
+        self,
+        *,
+        vx: Number | None = None,
+        vy: Number | None = None,
+        vz: Number | None = None,
+        ax: Number | None = None,
+        ay: Number | None = None,
+        az: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Velocity or acceleration of nodes. Components that are not given stay free; an acceleration begins at the
+        present velocity.
+
+        Parameters
+        ----------
+        vx : velocity along x [m/s].
+        vy : velocity along y [m/s].
+        vz : velocity along z [m/s] (in three dimensions).
+        ax : acceleration along x [m/s2].
+        ay : acceleration along y [m/s2].
+        az : acceleration along z [m/s2] (in three dimensions).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def force(
+        self,
+        *,
+        fx: Number | None = None,
+        fy: Number | None = None,
+        fz: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Force on each node.
+
+        Parameters
+        ----------
+        fx : force along x [N].
+        fy : force along y [N].
+        fz : force along z [N] (in three dimensions).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def damp(self, local: float, *, where: Where | None = None) -> None:
+        """Local damping of nodes: what drives one is less by this part of its size against its motion, in dynamic runs
+        (without it there is none) and in static ones (0.8). The stable time step is shorter by the root of 1 +
+        damping.
+
+        Parameters
+        ----------
+        local : part, from 0 to 1.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def fluid(
+        self,
+        *,
+        pressure: Number | None = None,
+        flow_surface: Number | Point | None = None,
+        flow_rate: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Fluid at nodes, one of the three at each; times of tables are those of flow. With a range, pressure and
+        flow_surface wet the free faces whose nodes all lie in it: water stands before them and pushes on them,
+        whether channels end there or not. Without one they are said of the fluid in joints alone.
+
+        Parameters
+        ----------
+        pressure : pressure, not negative [Pa].
+        flow_surface : level of water that stands at the nodes, against gravity, or a point of its surface:
+            hydrostatic pressure below it; above it water can leave (seepage) [m].
+        flow_rate : volume that comes in at each node; negative: is taken out, as far as there is fluid; in space
+            m3/s [m2/s].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def proppant(
+        self,
+        *,
+        proppant_volumetric_concentration: Number | None = None,
+        proppant_volumetric_flow_rate: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Proppant that comes in at flow nodes, of wells too, one of these; times of tables are those of flow. A node
+        that is packed takes none.
+
+        Parameters
+        ----------
+        proppant_volumetric_concentration : concentration of the slurry that conditions and wells bring: volume of
+            grains over that of the slurry.
+        proppant_volumetric_flow_rate : volume of grains that comes in at each node, in the slurry that is there; in
+            space m3/s [m2/s].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def temperature(self, temperature: Number, *, where: Where | None = None) -> None:
+        """Temperature of nodes; times of tables are those of heat.
+
+        Parameters
+        ----------
+        temperature : temperature [K].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def fluid_temperature(self, temperature: Number, *, where: Where | None = None) -> None:
+        """Temperature of the fluid at flow nodes, as of what is injected there; times of tables are those of heat.
+
+        Parameters
+        ----------
+        temperature : temperature [K].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def initial_velocity(
+        self,
+        velocity: Point | None = None,
+        *,
+        vx: float | None = None,
+        vy: float | None = None,
+        vz: float | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """The velocity of nodes now, or some components of it.
+
+        Parameters
+        ----------
+        velocity : velocity [m/s].
+        vx : velocity along x; the other components stay [m/s].
+        vy : velocity along y; the other components stay [m/s].
+        vz : velocity along z; the other components stay [m/s] (in three dimensions).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def initial_temperature(self, temperature: float, *, where: Where | None = None) -> None:
+        """The temperature of nodes now.
+
+        Parameters
+        ----------
+        temperature : temperature, of the fluid at them too; before, it is 0. Elements around the nodes are free of
+            thermal stress then [K].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def reset_velocity(self) -> None:
+        """All velocities become zero."""
+    def reset_displacement(self) -> None:
+        """Displacements are counted from here."""
+
+class Bolts(Objects):
+    """Rock bolts: `sim.bolts["axial-force"]` is that of their elements, see `Objects`."""
+    def __getitem__(
+        self,
+        name: Literal["axial-force", "axial-strain", "plastic-strain", "bolt-state"] | str,
+    ) -> np.ndarray: ...
+    def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
+        """Put them into a group; each is in one group of a set at most.
+
+        Parameters
+        ----------
+        group : name of the group.
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def create(
+        self,
+        points: Sequence[Point],
+        *,
+        segments: int | None = None,
+        length: float | None = None,
+        grout: tuple[float, float] | None = None,
+        plate: bool = False,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """Installs a rock bolt along these points, as things are now: at any stage of a run. It is divided at the edges
+        of elements, or as said. Nodes go with the rock across the bar, and are tied to it along the bar by grout,
+        under the plate altogether; where the rock is taken out they are free. Bolts have no weight and no stiffness
+        in bending.
+
+        Parameters
+        ----------
+        points : the points, from the head on; or a list of vectors [m].
+        segments : elements of each straight part.
+        length : of an element, at most [m] (default: to the edges of the elements of the mesh).
+        grout : from where to where along the bolt there is grout; without the rest is free [m] (default: all of it).
+        plate : the first node is tied to the rock: a face plate.
+        group : the group that its elements and nodes are put into (default: none).
+        set : the set of the group.
+        """
+    def between(
+        self,
+        first: Point,
+        second: Point,
+        mesh_size: float | None = None,
+        *,
+        group: str | None = None,
+        set: str | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Installs a rock bolt from a point to another, as `bolts.create`, in the parts of the way that lie in the
+        rock: each is a bolt. With a range only in these elements.
+
+        Parameters
+        ----------
+        first : head [m].
+        second : end [m].
+        mesh_size : length of its elements, at most [m] (default: 0.2).
+        group : the group that its elements and nodes are put into (default: none).
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def model(
+        self,
+        name: Literal["mechanical-elastic-plastic", "mechanical-elastic-p", "mechanical-e-plastic", "mechanical-e-p", "mech-elastic-plastic", "mech-elastic-p", "mech-e-plastic", "mech-e-p"],
+        *,
+        density: float,
+        young: float,
+        diameter: float,
+        tensile_yield_force: float | None = None,
+        compressive_yield_force: float | None = None,
+        tension_failure_strain: float | None = None,
+        shear_stiffness_rock_bolt: float,
+        grout_thickness: float,
+        cohesion_rock_grout: float,
+        cohesion_grout_bolt: float,
+        friction_rock_grout: float | None = None,
+        friction_grout_bolt: float | None = None,
+        spacing: float | None = None,
+        pretension_force: float | None = None,
+        damp_factor: float | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Bars with one force along them, elastic and perfectly plastic, in grout that slips at its strength. Forces
+        and stiffness are those of one bolt; the model divides them by the spacing. The strength of the grout per
+        length is the smaller of pi (diameter + 2 grout-thickness) (cohesion-rock-grout - sigma tan
+        friction-rock-grout) and pi diameter (cohesion-grout-bolt - sigma tan friction-grout-bolt), sigma: stress
+        across the bar in the rock if it is pressure, in space the mean in all directions across. Given again, the
+        force in the bar stays, but for the difference of the pretension. In space each bolt is there by itself:
+        spacing is 1.
+
+        Parameters
+        ----------
+        density : density [kg/m3].
+        young : Young's modulus E [Pa].
+        diameter : diameter of the bar [m].
+        tensile_yield_force : axial force at which it yields in tension [N] (default: never).
+        compressive_yield_force : axial force, without sign, at which it yields in compression [N] (default: that in
+            tension).
+        tension_failure_strain : lengthening of an element since it was installed, over its length, at which it
+            breaks for good (default: never).
+        shear_stiffness_rock_bolt : force of the grout per length of bolt and displacement [N/m/m].
+        grout_thickness : thickness of the grout around the bar [m].
+        cohesion_rock_grout : cohesion between rock and grout [Pa].
+        cohesion_grout_bolt : cohesion between grout and bolt [Pa].
+        friction_rock_grout : friction angle between rock and grout [degrees] (default: 0).
+        friction_grout_bolt : friction angle between grout and bolt [degrees] (default: 0).
+        spacing : from bolt to bolt across the plane [m] (default: 1).
+        pretension_force : tension with which it is installed [N] (default: 0).
+        damp_factor : viscous damping of the motion along the bar, part of 2 A sqrt(rho E); without effect in static
+            runs (default: 0).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def delete(self, *, where: Where | None = None) -> None:
+        """Takes elements of bolts out at once, with their part of the grout. Their numbers go with them, those of the
+        others stay; without RANGE all of them.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+
+class BoltNodes(Conditioned):
+    """Nodes of rock bolts: `sim.bolt_nodes["slip"]`, see `Objects`."""
+    def __getitem__(
+        self,
+        name: Literal["position-x", "position-y", "position-z", "displacement-x", "displacement-y", "displacement-z", "velocity-x", "velocity-y", "velocity-z", "bond-force", "slip", "bond-state", "reaction-x", "reaction-y", "reaction-z", "host", "distance"] | str,
+    ) -> np.ndarray: ...
+    def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
+        """Put them into a group; each is in one group of a set at most.
+
+        Parameters
+        ----------
+        group : name of the group.
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def velocity(
+        self,
+        *,
+        vx: Number | None = None,
+        vy: Number | None = None,
+        vz: Number | None = None,
+        ax: Number | None = None,
+        ay: Number | None = None,
+        az: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Velocity or acceleration of nodes of bolts. Components that are not given stay free: along the bar by its
+        forces, across it with the rock.
+
+        Parameters
+        ----------
+        vx : velocity along x [m/s].
+        vy : velocity along y [m/s].
+        vz : velocity along z [m/s] (in three dimensions).
+        ax : acceleration along x [m/s2].
+        ay : acceleration along y [m/s2].
+        az : acceleration along z [m/s2] (in three dimensions).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def force(
+        self,
+        *,
+        fx: Number | None = None,
+        fy: Number | None = None,
+        fz: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Force on each node of one bolt; across the bar the rock takes it.
+
+        Parameters
+        ----------
+        fx : force along x [N].
+        fy : force along y [N].
+        fz : force along z [N] (in three dimensions).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+
+class FlowNodes(GroupedElsewhere):
+    """Nodes at which a channel ends, with numbers and groups of nodes: `sim.flow_nodes["pressure"]`, see `Objects`."""
+    def __getitem__(
+        self,
+        name: Literal["pressure", "saturation", "fluid", "volume", "inflow", "temperature", "concentration", "proppant", "pack-pressure"] | str,
+    ) -> np.ndarray: ...
+    def initial(
+        self,
+        *,
+        pressure: float | None = None,
+        saturation: float | None = None,
+        concentration: float | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """Fluid that the flow nodes (nodes at which a channel ends) among these nodes hold now; before, channels are
+        dry.
+
+        Parameters
+        ----------
+        pressure : filled, at this pressure [Pa].
+        saturation : part of the room that is filled.
+        concentration : of proppant in the fluid that is there.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def initial_temperature(self, temperature: float, *, where: Where | None = None) -> None:
+        """The temperature of the fluid at them now.
+
+        Parameters
+        ----------
+        temperature : of the fluid alone [K].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+
+class Channels(GroupedElsewhere):
+    """Joints with a hydraulic model, with numbers and groups of joints: `sim.channels["aperture"]`, see `Objects`."""
+    def __getitem__(
+        self,
+        name: Literal["pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature", "concentration", "pack-pressure"] | str,
+    ) -> np.ndarray: ...
+
+class Wells(Named):
+    """Wells: `sim.wells["injection"]` is what one has now: pressure [Pa], rate [m2/s], injected [m2], stage."""
+    def create(self, name: str, *, where: Where | None = None) -> None:
+        """Flow nodes of a range are a well: one room, whose pressure is that at its highest node. Stages say what it
+        does; without one it is shut in. Its water pushes on free faces whose nodes all lie in the range.
+
+        Parameters
+        ----------
+        name : name.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def stage(
+        self,
+        name: str,
+        *,
+        rate: Number | None = None,
+        pressure: Number | None = None,
+        shut_in: bool = False,
+        time: float | None = None,
+        limit: float | None = None,
+    ) -> None:
+        """One more stage of a well, after those that it has; one without time that has begun ends now. After the last
+        the well is shut in. Times of tables are those of flow.
+
+        Parameters
+        ----------
+        name : name.
+        rate : volume that is pumped in; negative: drawn, as far as there is fluid; in space m3/s [m2/s].
+        pressure : pressure that is held [Pa].
+        shut_in : nothing comes in or out.
+        time : time of flow that it takes [s] (default: no end).
+        limit : with rate: pressure above which less is pumped in [Pa] (default: none).
+        """
+
+class Liners(Objects):
+    """Liners: `sim.liners["axial-force"]` is that of their elements, see `Objects`."""
+    def __getitem__(
+        self,
+        name: Literal["axial-force", "shear-force", "moment-first", "moment-last", "axial-strain", "plastic-strain", "plastic-rotation", "liner-state", "bond-pressure", "bond-shear", "gap", "slip", "bond-state", "host"] | str,
+    ) -> np.ndarray: ...
+    def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
+        """In the plane: put them into a group; each is in one group of a set at most.
+
+        Parameters
+        ----------
+        group : name of the group.
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def create(self, *, group: str | None = None, set: str | None = None, where: Where | None = None) -> None:
+        """In the plane: puts a liner on the free faces that the range chooses, as things are now: at any stage of a
+        run, without force in it. A face has one beam; where faces or liners meet at a point of the mesh they are
+        joined, also around a closed opening. Liners have weight, and no contact of their own: what pushes them is
+        the rock of their faces.
+
+        Parameters
+        ----------
+        group : the group that its elements and nodes are put into (default: none).
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def model(
+        self,
+        name: Literal["beam"],
+        *,
+        density: float,
+        young: float,
+        poisson_ratio: float | None = None,
+        thickness: float | None = None,
+        area: float | None = None,
+        inertia: float | None = None,
+        tensile_strength: float | None = None,
+        compressive_strength: float | None = None,
+        plastic_moment: float | None = None,
+        normal_stiffness: float,
+        shear_stiffness: float,
+        bond_tensile_strength: float | None = None,
+        bond_cohesion: float | None = None,
+        bond_friction: float | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """In the plane: beams in plane strain, elastic and perfectly plastic, of a metre of thickness of the plane.
+        Either a shell of a thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0.
+        The axial force is held between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N +
+        Nc) / (Nt + Nc)^2: what a rectangle bears that is plastic all over. The bond to the rock is elastic, slips at
+        bond-cohesion + pressure tan(bond-friction), and parts for good above bond-tensile-strength. Given again,
+        what elements carry stays.
+
+        Parameters
+        ----------
+        density : density [kg/m3].
+        young : Young's modulus E [Pa].
+        poisson_ratio : Poisson's ratio: E / (1 - nu^2) counts in plane strain; 0 for steel sets (default: 0).
+        thickness : thickness of the shell; without area and inertia it gives both [m] (default: that of a rectangle
+            of this area and inertia).
+        area : area of the section over the spacing of steel sets [m2/m] (default: the thickness).
+        inertia : second moment of the section over the spacing of steel sets [m4/m] (default: thickness^3 / 12).
+        tensile_strength : strength in tension; with compressive_strength [Pa] (default: never).
+        compressive_strength : strength in compression; with tensile_strength [Pa] (default: never).
+        plastic_moment : largest moment at the axial force that allows most [N m/m] (default: that of a rectangle).
+        normal_stiffness : stiffness of the bond across the face [Pa/m].
+        shear_stiffness : stiffness of the bond along the face; 0: it slips freely [Pa/m].
+        bond_tensile_strength : tension at which the bond parts for good [Pa] (default: never).
+        bond_cohesion : cohesion of the bond, until it parts [Pa] (default: never slips).
+        bond_friction : friction angle of the bond, whether it has parted or not [degrees] (default: 0).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def delete(self, *, where: Where | None = None) -> None:
+        """In the plane: takes elements of liners out at once. Their numbers go with them, those of the others stay;
+        without RANGE all of them.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+
+class LinerNodes(Objects):
+    """Nodes of liners: `sim.liner_nodes["rotation"]`, see `Objects`."""
+    def __getitem__(
+        self,
+        name: Literal["position-x", "position-y", "displacement-x", "displacement-y", "velocity-x", "velocity-y", "rotation", "spin", "reaction-x", "reaction-y", "reaction-moment", "distance"] | str,
+    ) -> np.ndarray: ...
+    def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
+        """In the plane: put them into a group; each is in one group of a set at most.
+
+        Parameters
+        ----------
+        group : name of the group.
+        set : the set of the group.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def velocity(
+        self,
+        *,
+        vx: Number | None = None,
+        vy: Number | None = None,
+        spin: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """In the plane: velocity of nodes of liners. Components that are not given stay free.
+
+        Parameters
+        ----------
+        vx : velocity along x [m/s].
+        vy : velocity along y [m/s].
+        spin : rate of rotation, counter-clockwise [rad/s].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def force(
+        self,
+        *,
+        fx: Number | None = None,
+        fy: Number | None = None,
+        moment: Number | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """In the plane: force and moment on each node of a liner, of a metre of thickness.
+
+        Parameters
+        ----------
+        fx : force along x [N/m].
+        fy : force along y [N/m].
+        moment : moment, counter-clockwise [N m/m].
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def remove_boundary(self, *, where: Where | None = None) -> None:
+        """In the plane: take back what was prescribed.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+
+class Tables(Tabled):
+    """Functions of time for conditions, or of a coordinate for properties; linear from point to point."""
+    def delete(self, name: str) -> None:
+        """Forgets a table.
+
+        Parameters
+        ----------
+        name : name.
+        """
+
+class Fields(Random):
+    """Random fields: properties that differ from object to object."""
+    def create(
+        self,
+        name: str,
+        *,
+        weibull: tuple[float, float] | None = None,
+        normal: tuple[float, float] | None = None,
+        lognormal: tuple[float, float] | None = None,
+        seed: int,
+        correlation: float | None = None,
+        covariance: Literal["exponential", "gaussian"] | None = None,
+        least: float | None = None,
+        greatest: float | None = None,
+    ) -> None:
+        """A random field: properties that differ from element to element, face to face, joint to joint. Where several
+        properties take the same field they are drawn together; another seed is another, independent field. What was
+        drawn stays, whatever becomes of the field.
+
+        Parameters
+        ----------
+        name : name.
+        weibull : scale (63 % of the values are below it) and shape.
+        normal : mean and standard deviation.
+        lognormal : mean and standard deviation of the values themselves.
+        seed : another seed, another field.
+        correlation : over this length neighbours are alike: the field is one of places, the same in any mesh [m]
+            (default: each object by itself).
+        covariance : exp(-r/L), or exp(-(r/L)2), which is smooth (default: exponential).
+        least : the distribution is cut below (default: none).
+        greatest : the distribution is cut above (default: none).
+        """
+    def delete(self, name: str) -> None:
+        """Forgets a random field; what was drawn from it stays.
+
+        Parameters
+        ----------
+        name : name.
+        """
+
+class Histories(Recorded):
+    """Numbers recorded during the run: `sim.histories["load"]` is (n, 3) step, time [s] and value so far."""
+    def delete(self, name: str) -> None:
+        """Stops a history; its file stays.
+
+        Parameters
+        ----------
+        name : name.
+        """
+    def export(self, file: File, names: Sequence[str] | None = None) -> None:
+        """Writes all histories, or some, side by side as CSV.
+
+        Parameters
+        ----------
+        file : name of the file.
+        names : only these (default: all).
+        """
+
+class Charts(Words):
+    """Diagrams of histories or points."""
+    def create(
+        self,
+        name: str,
+        *,
+        title: str | None = None,
+        x_label: str | None = None,
+        y_label: str | None = None,
+    ) -> None:
+        """A diagram.
+
+        Parameters
+        ----------
+        name : name.
+        title : over the diagram.
+        x_label : of the axis.
+        y_label : of the axis.
+        """
+    def add(
+        self,
+        name: str,
+        *,
+        x: str | None = None,
+        y: str | None = None,
+        scale_x: float | None = None,
+        scale_y: float | None = None,
+        values: Sequence[Point] | None = None,
+        profile: Literal["pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature", "concentration"] | None = None,
+        label: str | None = None,
+        style: Literal["line", "points"] | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """A curve of two histories, or of points.
+
+        Parameters
+        ----------
+        name : name.
+        x : history along x; without it the time (default: time).
+        y : history along y.
+        scale_x : factor (default: 1).
+        scale_y : factor (default: 1).
+        values : points (x,y).
+        profile : of the fluid as it is now, along the line that the joints of the range make, over the distance [m]
+            from its left end (in the plane).
+        label : in the legend.
+        style : how it is drawn (default: line).
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def export(
+        self,
+        name: str,
+        file: File,
+        cracks: bool = False,
+        plastic: bool = False,
+        fluid: Literal["pressure", "saturation", "aperture", "velocity", "concentration"] | None = None,
+        temperature: bool = False,
+    ) -> None:
+        """Writes a diagram as CSV and as a figure of the same name.
+
+        Parameters
+        ----------
+        name : name.
+        file : name of the figure: .png, .pdf or .svg.
+        cracks : beside it the model as it is now, with its cracks by the way they broke (in the plane).
+        plastic : beside it the model as it is now, with contours of plastic shear strain (in the plane).
+        fluid : beside it the model as it is now, its channels coloured by that (in the plane).
+        temperature : beside it the model as it is now, with contours of temperature, and cracks (in the plane).
+        """
+
+class Output(Words):
+    """Frames for ParaView."""
+    def vtk(self, file: File, every: int | None = None, *, off: bool = False) -> None:
+        """Frames for ParaView: now, and every so many steps.
+
+        Parameters
+        ----------
+        file : first part of the names of the files, in the folder of the results.
+        every : steps between two frames (default: once, now).
+        off : no more frames of this name.
+        """
+    def image(
+        self,
+        file: File,
+        *,
+        view: File | None = None,
+        field: str | None = None,
+        object: Literal["elements", "particles", "clumps", "walls", "contacts", "bonds", "channels", "joints", "bolts", "liners", "face-conditions", "flow-nodes", "node-conditions"] | None = None,
+        limits: tuple[float, float] | None = None,
+        full: bool = False,
+        log: bool = False,
+        colours: Literal["viridis", "cividis", "plasma", "yellow-brown", "yellow-blue", "yellow-green", "greys", "blue-red", "blue-yellow-red", "orange-violet", "spectral", "rainbow"] | None = None,
+        opacity: float | None = None,
+        edges: bool = False,
+        size: float | None = None,
+        vectors: str | None = None,
+        arrows: float | None = None,
+        filter: str | None = None,
+        deformed: float | None = None,
+        camera: tuple[Point, Point] | None = None,
+        eye: str | None = None,
+        section: str | None = None,
+        title: str | None = None,
+        where: Where | None = None,
+    ) -> None:
+        """A picture of the model as it is now, `<name>_<step>.png`, of any field that frames have.
+
+        Parameters
+        ----------
+        file : first part of the name, in the folder of the results; .pdf, .svg or .png at its end says what is
+            drawn.
+        view : what is shown, as a file *.mv says, of hpcdem view or hpcdem draw (default: everything).
+        field : what colours objects; hpcdem draw --list names the fields of a frame.
+        object : of which objects the field and the options below are (default: the first that have the field).
+        limits : values of the first and the last colour (default: those that 1 % of what is shown is below or
+            above).
+        full : in the place of limits: the least and the greatest value of what is shown.
+        log : colours by the logarithm.
+        colours : of the field (default: viridis).
+        opacity : from 0 to 1 (default: 1).
+        edges : outlines of elements.
+        size : factor on widths of lines (default: 1).
+        vectors : arrows: displacement or velocity.
+        arrows : factor on their length (default: 1).
+        filter : only objects for which this holds, as 'stress_yy < -1e6 and x > 2'.
+        deformed : factor on displacements (default: 1).
+        camera : lower left and upper right corner of the picture, in space along it and up it [m] (default: the
+            model).
+        eye : from where a body is seen: along an axis, from the right, the front and above (iso), or from a
+            direction (in three dimensions; default: 'iso').
+        section : a plane that cuts it: 'x=1.5' takes the part towards the eye away, 'x<1.5' and 'x>1.5' say what
+            stays, 'px,py,pz,nx,ny,nz' gives a point and the normal into what is taken away (in three dimensions;
+            default: whole).
+        title : over the picture; {step} and {time} are filled in.
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+
+class BlockCommands(Clocks):
+    """What a `Simulation` has of blocks. The model of blocks is made when it is first used."""
+    geometry: Geometry
+    mesh: Mesh
+    elements: Elements
+    faces: Faces
+    joints: Joints
+    nodes: Nodes
+    bolts: Bolts
+    bolt_nodes: BoltNodes
+    flow_nodes: FlowNodes
+    channels: Channels
+    wells: Wells
+    liners: Liners
+    liner_nodes: LinerNodes
+    tables: Tables
+    fields: Fields
+    histories: Histories
+    charts: Charts
+    output: Output
+    def _begin_blocks(self, project: Callable[[], Project], before: Callable[[], None] = ...) -> None: ...
+    def gravity(self, gravity: Point) -> None:
+        """Gravity of the blocks from now on; of particles it is ``set(gravity=...)``.
+
+        Parameters
+        ----------
+        gravity : acceleration [m/s2].
+        """
+    def units(self, system: Literal["si", "mm-mpa-s", "km-mpa-s"]) -> None:
+        """Units of what is given of blocks from now True: unlikely values are warned of, histories and charts are
+        labelled; no value changes. Those of particles are ``set(units=...)``.
+
+        Parameters
+        ----------
+        system : SI, mm-MPa-s, km-MPa-s.
+        """
+    def option(
+        self,
+        *,
+        dynamic: bool | None = None,
+        collision: bool | None = None,
+        overlap: Literal["refuse", "relax", "keep"] | None = None,
+        deep_overlap: Literal["warn", "stop"] | None = None,
+        potential: Literal["distance", "munjiza"] | None = None,
+        mechanical: bool | None = None,
+        large_strain: bool | None = None,
+        energy: bool | None = None,
+        hydraulic: bool | None = None,
+        one_way: bool | None = None,
+        thermal: bool | None = None,
+        proppant: bool | None = None,
+    ) -> None:
+        """Switches of the calculation of blocks.
+
+        Parameters
+        ----------
+        dynamic : true motion in time; False: static, towards equilibrium (default: True).
+        collision : contact of surfaces (default: True).
+        overlap : of bodies that overlap before the first step: refuse it, with the places; let a static stage move
+            them apart; or start as they are (default: refuse).
+        deep_overlap : of bodies that come to overlap by more than a tenth of an altitude of an element: say where,
+            or end the run there (default: warn).
+        potential : what contact presses with: the distance to the nearest side of an element over the usual altitude
+            in its body, or four times the smallest of its barycentric coordinates (in three dimensions; default:
+            distance).
+        mechanical : motion of blocks; False: they stand still while fluid or heat flows (default: True).
+        large_strain : rotations of elements are taken into account (default: True).
+        energy : keep the energy budget from here on, in dynamic runs: `energies`, histories of the model, a table at
+            the end.
+        hydraulic : flow of fluid in joints that have a hydraulic model; False: pressures stay as they are and go on
+            pushing, so that blocks come to rest at them (default: True).
+        one_way : fluid follows the blocks, but does not push on them.
+        thermal : heat flows in elements that have a thermal model; False: temperatures, and the stress that they
+            bring, stay as they are (default: True).
+        proppant : grains move in the fluid of channels that carry them; False: they stay where they are (default:
+            True).
+        """
+    def time_step(
+        self,
+        *,
+        value: float | str | None = None,
+        auto: bool | None = None,
+        update_frequency: int | None = None,
+        safety: float | None = None,
+        mass_scaling: float | None = None,
+        hydraulic: float | None = None,
+        thermal: float | None = None,
+    ) -> None:
+        """The time step of dynamic runs. In static runs a step is one unit of time. Without this command it is
+        estimated at the first step and after each change of the model. Of value, mass_scaling and auto on the one
+        said last holds and ends the others.
+
+        Parameters
+        ----------
+        value : the time step itself; 0: estimated again; a table over the time is looked at every 100 steps [s].
+        auto : True: estimated again every 100 steps; False: at the first step and after changes of the model only; a
+            value stays.
+        update_frequency : with auto: steps after which it is estimated again (default: 100).
+        safety : part of the stability limit that is taken, by estimates and mass_scaling (default: 0.8).
+        mass_scaling : nodes get as much mass as this time step needs; 0: none, and the step is estimated again [s].
+        hydraulic : sub-step of flow, which then has a clock of its own; 0: those of a cycle take the time of the
+            steps of the blocks, or without motion half of what is stable [s] (default: 0).
+        thermal : sub-step of heat, which then has a clock of its own; 0: those of a cycle take the time of the steps
+            of the blocks, or without motion 0.9 of what is stable [s] (default: 0).
+        """
+    def sub_step(
+        self,
+        *,
+        mechanical: int | None = None,
+        thermal: int | None = None,
+        hydraulic: int | None = None,
+    ) -> None:
+        """Steps of the parts of a coupled calculation.
+
+        Parameters
+        ----------
+        mechanical : steps of the blocks between two cycles of flow, and of heat (default: 1).
+        thermal : sub-steps of a cycle of heat; 0: as many as are stable, and where heat is that slow, without fluid
+            or friction, a cycle every ten steps of blocks in motion (default: 0).
+        hydraulic : sub-steps of a cycle of flow; 0: as many as are stable (default: 0).
+        """
+    def field_clock(
+        self,
+        field: Literal["moisture"],
+        *,
+        flows: bool | None = None,
+        time_step: float | None = None,
+        sub_steps: int | None = None,
+        current_time: float | None = None,
+    ) -> None:
+        """The clock of a field that diffuses in elements, as of moisture.
+
+        Parameters
+        ----------
+        field : its name.
+        flows : False: values, and the stress that they bring, stay as they are (default: True).
+        time_step : sub-step of the field, which then has a clock of its own; 0: those of a cycle take the time of
+            the steps of the blocks, or without motion 0.9 of what is stable [s] (default: 0).
+        sub_steps : in a cycle; 0: as many as are stable (default: 0).
+        current_time : what its clock shows now [s].
+        """
+    def run_time(self, time: float) -> None:
+        """The time that `solve` takes at most from now on, from its beginning or from the start-time of model reset;
+        without another aim each `solve` goes on for it. In static runs without creep no time passes.
+
+        Parameters
+        ----------
+        time : 0: no end any more [s].
+        """
+    def solve_check(self, steps: int) -> None:
+        """Steps between two looks at the ratio in `solve`.
+
+        Parameters
+        ----------
+        steps : in static runs 50, in dynamic ones 100 without this command.
+        """
+    def rayleigh(
+        self,
+        ratio: float,
+        *,
+        frequency: float | None = None,
+        part: Literal["both", "mass", "stiffness"] | None = None,
+    ) -> None:
+        """Rayleigh damping of elements in dynamic runs, beside that of their damp-factor: alpha times the mass, beta
+        times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + pi beta f.
+
+        Parameters
+        ----------
+        ratio : part of the critical damping at the frequency; 0: none any more.
+        frequency : where the ratio is this; with both parts it is least there [Hz].
+        part : both, or one of them alone (default: both).
+        """
+    def creep(
+        self,
+        on: bool = True,
+        *,
+        dt: float | None = None,
+        change: float | None = None,
+        least: float | None = None,
+        greatest: float | None = None,
+    ) -> None:
+        """Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time passes with the time of
+        the model. In static runs `solve` time makes it pass, in creep steps, each of which ends in balance; `every`
+        of histories and frames then counts creep steps.
+
+        Parameters
+        ----------
+        on : whether they creep.
+        dt : creep step of static runs; with change the first one [s].
+        change : the creep step follows this change of stress: the largest of the deviators of elements and of their
+            Kelvin dashpots in a creep step, over the largest deviator of all; from one to the next it halves or
+            doubles at most (default: dt stays).
+        least : with change: shortest creep step [s] (default: dt / 100).
+        greatest : with change: longest creep step [s] (default: 100 dt).
+        """
+    def plane_stress(self) -> None:
+        """In the plane: the model is a plate of a metre of thickness whose two faces bear nothing: the stress across
+        the plane is 0, in elements that are elastic, yield or creep, and with heat. It comes before element initial
+        and before the first step. A law of the user must give 0 for that stress itself.
+        """
+    def plane_strain(self) -> None:
+        """In the plane: nothing moves across the plane. Models of the plane are in plane strain unless `plane_stress`
+        says otherwise; it takes that back.
+        """
+    def tell_devices(self) -> None:
+        """Says in the log what the run computes with: ranks, threads, cores."""
+    def step(self, n: int) -> None:
+        """So many steps of the blocks, and of the particles that are coupled to them.
+
+        Parameters
+        ----------
+        n : number of steps.
+        """
+    def solve(
+        self,
+        *,
+        ratio: float | None = None,
+        cycles: int | None = None,
+        time: float | None = None,
+        run_time: float | None = None,
+        window: int | None = None,
+        limit: int | None = None,
+        on_failure: Literal["stop", "continue"] | None = None,
+        elastic: bool = False,
+        hydraulic: bool = False,
+        thermal: bool = False,
+        dt: float | None = None,
+        auto: bool = False,
+        steady: bool = False,
+        solver: Literal["auto", "direct", "petsc"] | None = None,
+        steps: int | None = None,
+    ) -> None:
+        """Steps until the first of ratio, cycles, time and run_time is reached. Without any of them it is ratio 1e-5 or
+        10 000 cycles; a warning says if it was the cycles. With elastic: straight to static equilibrium by Newton's
+        method, for blocks that are elastic or yield, whose joints stay before their peak and whose surfaces do not
+        touch. A run towards a ratio that gets nowhere (window, limit) ends the script with exit code 3 and names the
+        body that slides away; `solved['reason']` says how a run ended.
+
+        Parameters
+        ----------
+        ratio : unbalanced over all forces of the nodes; with elastic: 1e-8, and as far below as rounding allows.
+        cycles : steps; with elastic: units of time (1) for which prescribed velocities act.
+        time : time that passes; in static runs creep time, each creep step to its ratio (1e-5), or with elastic at
+            once [s].
+        run_time : as `run_time`, for this command alone [s].
+        window : towards a ratio: it has failed when the least ratio has not fallen by a tenth in so many steps, nor
+            in as many as the progress so far took; 0: never (default: static runs: ten times as many as a wave takes
+            there and back, at least 20 000; dynamic ones, and beside cycles or time: 0).
+        limit : towards a ratio: it has failed after so many steps; 0: never (default: static runs 1 000 000, dynamic
+            ones 10 000 000; beside time: 0).
+        on_failure : stop: with exit code 3; continue: with a warning, the script looks at solved (default: stop).
+        elastic : at once, without steps.
+        hydraulic : flow by implicit steps, backward Euler, for so much time or until it is steady; in static runs
+            blocks are in equilibrium at the end of each step, and joints may pass their peak and break; with
+            mechanical off, flow alone.
+        thermal : heat by implicit steps, backward Euler, for so much time or to its steady state at once; in static
+            runs blocks are in equilibrium at the end of each step, and joints may pass their peak and break; with
+            mechanical off, heat alone.
+        dt : with hydraulic or thermal: longest time step; those of flow are shorter where joints break or no balance
+            is found [s] (default: a hundredth of the time).
+        auto : with hydraulic and time: by explicit steps, as without the word hydraulic, where an estimate says that
+            these cost less, or where implicit ones are refused; the log has both estimates.
+        steady : with hydraulic or thermal: until as much flows out as in; no time passes.
+        solver : with elastic, hydraulic or thermal: SciPy on one rank, the same bits on any number of ranks; PETSc
+            on all; auto: PETSc, if it is there, from 400 000 unknowns on, in space from 20 000 (default: auto).
+        steps : with elastic: what is new in the loads is brought on in so many equal increments, in each of which
+            elements flow once; one that finds no balance is halved (default: 1).
+        """

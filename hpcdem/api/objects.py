@@ -1,0 +1,399 @@
+"""What methods of blocks stand on: the way to a command, objects with their quantities, and the methods that do more
+than hand their arguments to a command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from hpcdem.api.arguments import arguments, chosen_by, model_arguments
+from hpcdem.api.methods import commands
+from hpcdem.api.program import place
+from hpcdem.api.types import Number, Point, Solved, Where
+from hpcdem.commands import fdem
+from hpcdem.core.errors import CommandError
+from hpcdem.lang.pcdc.bindings import Call, carry_out
+from hpcdem.lang.pcdc.keywords import matching
+from hpcdem.lang.pcdc.kinds import FunctionName
+from hpcdem.lang.pcdc.table import PCDC, RECORDED
+from hpcdem.physics.fdem import groups as g
+from hpcdem.physics.fdem.tables import AXES, Drawn, Over
+
+if TYPE_CHECKING:
+    from hpcdem.commands.fdem import Project
+
+OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{k: k for k in (*g.SUPPORTS, *g.FLOW)}}
+"""What histories call them."""
+HOW = ("sum", "mean", "minimum", "maximum")
+"""What a history makes of several numbers."""
+
+
+class Orders:
+    """The way from a method to the function of its command. project: gives the blocks, made on the first call; before:
+    called before their steps."""
+
+    def __init__(self, project: Callable[[], Project], before: Callable[[], None] = lambda: None) -> None:
+        self.project, self.before = project, before
+
+    def __call__(
+        self, command: str, given: Mapping[str, Any], where: Where = None, kind: str = "", model: str | None = None
+    ) -> None:
+        """Carry out a command. kind: of the objects that `where` chooses; model: the constitutive model, or the
+        condition, whose properties are given."""
+        if command in ("model step", "model solve"):
+            self.before()
+        project = self.project()  # first: kernels are settled before modules that have some are imported
+        row = PCDC.command(command)
+        chosen = chosen_by(where, kind)
+        if model is None:
+            found = arguments(row, given, chosen is not None, project.dim)
+        else:
+            found = model_arguments(row, model, given, project.dim)
+        project.line = place()[1]
+        call = Call(project, found, None, lambda names, file: None)
+        call.where = chosen
+        carry_out(row, call)
+
+
+class Words:
+    """Methods of one kind. _word: what they are called in a program, ``sim.<word>``."""
+
+    _word = ""
+
+    def __init__(self, do: Orders) -> None:
+        self._do = do
+
+
+@commands
+class Objects(Words):
+    """Elements, faces, joints or nodes: `sim.elements["stress-xx"]` is a quantity of all of them.
+
+    where: text of a RANGE (``"group 'platen' set 'bc'"``, ``"x 0 1 present"``) or terms of
+    `hpcdem.physics.fdem.groups`; left out, all.
+    """
+
+    kind: str
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A quantity of all of them (n,), in the order of numbers, on every rank; names as in histories. Collective."""
+        return self.values(name)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return quantities(self.kind)
+
+    def numbers(self, where: Where = None) -> np.ndarray:
+        """Numbers of those that are there, ascending. Collective."""
+        return fdem.queries.numbers(self._do.project(), self.kind, chosen_by(where, self.kind))
+
+    def values(self, name: str, where: Where = None) -> np.ndarray:
+        """A quantity by name, in the order of `numbers`; NaN where there is none. Collective."""
+        chosen = chosen_by(where, self.kind)
+        return fdem.queries.values(self._do.project(), self.kind, _quantity(name), chosen)
+
+    def total(self, name: str, where: Where = None) -> float:
+        """Exact sum of a quantity. Collective."""
+        chosen = chosen_by(where, self.kind)
+        return fdem.queries.total(self._do.project(), self.kind, _quantity(name), chosen)
+
+    def _take_back(self, conditions: Sequence[str], where: Where) -> None:
+        """Conditions by their names, short or in full; all, if none is named."""
+        command = f"{self.kind} boundary remove"
+        rows = PCDC.command(command).options
+        names = [next((row.name for row in matching(one.replace("_", "-"), rows)), one) for one in conditions]
+        self._do(command, dict.fromkeys(names, True), where, self.kind)
+
+
+@commands
+class Conditioned(Objects):
+    """With conditions that can be taken back."""
+
+    def remove_boundary(self, *conditions: str, where: Where = None) -> None:
+        """Take boundary conditions back, all of them. conditions: only these, as the command ... boundary of PCDC calls
+        them."""
+        self._take_back(conditions, where)
+
+
+@commands
+class Stressed(Objects):
+    """Elements."""
+
+    def initial_stress(
+        self,
+        *,
+        xx: float | None = None,
+        yy: float | None = None,
+        xy: float | None = None,
+        zz: float | None = None,
+        xz: float | None = None,
+        yz: float | None = None,
+        gradient: Mapping[str, Point] | None = None,
+        where: Where = None,
+    ) -> None:
+        """Stress [Pa] from the beginning, tension positive, 0 where it is left out; in the plane zz is then that of
+        plane strain, Poisson's ratio times xx + yy, in plane stress 0. gradient: by component, per metre in x and y
+        (and z) [Pa/m], ``{"yy": (0.0, 25e3)}``."""
+        stress = {"xx": xx, "yy": yy, "xy": xy, "zz": zz, "xz": xz, "yz": yz}
+        slopes = dict(gradient or {})
+        for name in slopes:
+            if stress.get(name) is None:
+                raise ValueError(f"gradient: there is no stress {name!r} that it could be added to")
+        given = {
+            f"stress_{name}": None if value is None else {"value": value, "gradient": slopes.get(name)}
+            for name, value in stress.items()
+        }
+        self._do("element initial", given, where, self.kind)
+
+
+@commands
+class Fluxed(Conditioned):
+    """Faces."""
+
+    def field(
+        self,
+        name: str,
+        *,
+        flux: Number | None = None,
+        transfer: float | None = None,
+        environment: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """A field of elements, as "moisture": what comes in, or goes to an environment of this value, over the
+        difference to it; without a coefficient with that of the elements. Numbers or names of tables over the time of
+        the field. Without a range: the whole surface of the model."""
+        given = {"flux": flux, "transfer": transfer, "environment": environment}
+        self._do("element-face boundary", given, where, self.kind, f"{name}-flux-boundary-condition")
+
+
+@commands
+class Moved(Conditioned):
+    """Nodes."""
+
+    def function(self, function: str) -> FunctionName:
+        """Read, check and compile a function of place and time in a Python file, "file.py:function"
+        (docs/user_laws.md): a value for conditions of nodes and faces. Before `sim.restore` it names the function."""
+        self._do("node function", {"function": function})
+        return FunctionName(function)
+
+    def move(self, type: int, along: Point | None = None, *, where: Where = None) -> None:
+        """Freedom of nodes: 0 free, 1 held, 2 along a vector only, 3 (in three dimensions) across it only."""
+        given = {"type": (type,) if along is None else (type, along)}
+        self._do("node boundary", given, where, self.kind, "mechanical-move-boundary-constraint")
+
+    def field(self, name: str, value: Number, *, where: Where = None) -> None:
+        """The value of a field of elements, as "moisture", from now on: a number or the name of a table over its
+        time."""
+        self._do("node boundary", {name: value}, where, self.kind, f"{name}-boundary-condition")
+
+    def initial_field(self, name: str, value: float, *, where: Where = None) -> None:
+        """The value of a field of elements, as "moisture", now; elements around the nodes are free of the stress that
+        it brings then."""
+        self._do("node initial", {name: value}, where, self.kind)
+
+
+@commands
+class GroupedElsewhere(Objects):
+    """With the groups of other objects. grouped: what these are called."""
+
+    grouped = ""
+
+    def group(self, group: str, set: str | None = None, *, where: Where = None) -> None:
+        """They have the groups of nodes, or joints: `sim.nodes.group`, `sim.joints.group`."""
+        name = self._word.replace("_", " ")
+        raise CommandError(f"{name} have the groups of {self.grouped}: sim.{self.grouped}.group")
+
+
+@commands
+class Named(Words):
+    """Wells."""
+
+    _word = "wells"
+
+    def __getitem__(self, name: str) -> dict[str, float]:
+        found = fdem.queries.wells(self._do.project())
+        if name not in found:
+            known = ", ".join(f"'{other}'" for other in found) or "none so far"
+            raise CommandError(f"there is no well '{name}'; there is {known}")
+        return found[name]
+
+
+@commands
+class Tabled(Words):
+    """Tables."""
+
+    _word = "tables"
+
+    def create(self, name: str, values: Sequence[Point], *, relative: bool | None = None) -> None:
+        """(time [s], coordinate [m] or plastic strain, value), the first ascending. relative: times count from the
+        moment at which a condition takes the table."""
+        if relative is None:
+            self._do("table create", {"name": name, "values": values})
+            return
+        word = "relative-time" if relative else "absolute-time"
+        numbers = [number for pair in values for number in pair]
+        self._do("table", {"name": name, "data": numbers, "type": {"value": True, word: True}})
+
+    def over(self, name: str, axis: str) -> Over:
+        """For a property: the table over "x", "y" or in space "z" in the mesh, over "plastic-strain" (what softens or
+        hardens), or over "temperature" (moduli and strengths)."""
+        if axis not in AXES:
+            raise ValueError(f"axis: expected {', '.join(map(repr, AXES))}, got {axis!r}")
+        return Over(name, AXES.index(axis))
+
+
+@commands
+class Random(Words):
+    """Random fields."""
+
+    _word = "fields"
+
+    def drawn(self, name: str) -> Drawn:
+        """For a property: drawn from this field."""
+        return Drawn(name)
+
+
+@commands
+class Recorded(Words):
+    """Histories."""
+
+    _word = "histories"
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        rows = fdem.histories.find(self._do.project(), name).rows
+        return np.array(rows, np.float64).reshape(-1, 3)
+
+    def create(
+        self,
+        name: str,
+        object: str,
+        value: str,
+        *,
+        id: int | None = None,
+        nearest: Point | None = None,
+        how: str | None = None,
+        every: int | None = None,
+        variable: str | None = None,
+        well: str | None = None,
+        where: Where = None,
+    ) -> None:
+        """Follow a value of a "node", "element", "joint", a part of bolts or liners ("bolt-node", "liner-element"), a
+        "flow-node", a "flow-channel", a "well" (well: its name) or of the "model": of one (id, or nearest to a point),
+        or of those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many steps. variable:
+        with the value "law-state", which state variable of laws of the user."""
+        words = value.replace("_", "-") if isinstance(value, str) else value
+        given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,
+                 "variable": variable, "well": well}  # fmt: skip
+        if how is not None and how not in HOW:
+            raise ValueError(f"how: expected one of {', '.join(HOW)}, got {how!r}")
+        if how is not None:
+            given[how] = True
+        self._do("history create", given, where, OBJECTS.get(object, g.NODE))
+
+
+@commands
+class Clocks(Words):
+    """The parts of a calculation, and the state of the blocks."""
+
+    def cycle_option(
+        self,
+        part: str,
+        *,
+        time_step: float | None = None,
+        cycle_number: int | None = None,
+    ) -> None:
+        """Time step [s] and number of steps of a part ("mechanical", "thermal", "hydraulic", "proppant-transport") in a
+        cycle of a coupled calculation."""
+        self._of_part("model cycle-option", part, time_step=time_step, cycle_number=cycle_number)
+
+    def reset_clock(
+        self,
+        part: str,
+        *,
+        current_time: float | None = None,
+        start_time: float | None = None,
+        time_step: float | None = None,
+    ) -> None:
+        """What the clock of a part shows now, from when `run_time` counts, and its time step [s]; parts: see
+        `cycle_option`."""
+        self._of_part("model reset", part, current_time=current_time, start_time=start_time, time_step=time_step)
+
+    def tell_time(self, part: str) -> None:
+        """Say in the log what time a part has come to; parts: see `cycle_option`."""
+        self._of_part("model query", part, time=True)
+
+    def _of_part(self, command: str, part: str, **given: Any) -> None:
+        self._do(command, {part: {"value": True, **{name: v for name, v in given.items() if v is not None}}})
+
+    def field_account(self, name: str) -> dict[str, float]:
+        """The account of a field of elements, as "moisture": given, commands, stored, removed; what does not add up.
+        Collective."""
+        return fdem.fields.account(self._do.project(), name)
+
+    @property
+    def wet_faces(self) -> dict[str, np.ndarray]:
+        """Free faces before which water stands: number (element * 4 + face), size [m], in space [m2], and the mean
+        pressure that pushes on each [Pa]. Collective."""
+        return fdem.queries.wet_faces(self._do.project())
+
+    @property
+    def fluid(self) -> dict[str, float]:
+        """The account of the fluid [m2]: given, stored, leaked, removed; what does not add up. Collective."""
+        return fdem.queries.fluid(self._do.project())
+
+    @property
+    def fluid_energies(self) -> dict[str, float]:
+        """The energy of blocks and fluid in implicit steps [J/m], in space [J]: pumped, leaked, viscous, fluid, strain,
+        joints, fracture, outside; what does not add up. Collective."""
+        return fdem.queries.fluid_energies(self._do.project())
+
+    @property
+    def proppant(self) -> dict[str, float]:
+        """The account of proppant [m2]: came, stored, packed, left, removed; what does not add up. Collective."""
+        return fdem.queries.proppant(self._do.project())
+
+    @property
+    def heat(self) -> dict[str, float]:
+        """The account of heat [J/m]: given, commands, stored, fluid, removed; what does not add up. Collective."""
+        return fdem.queries.heat(self._do.project())
+
+    @property
+    def creep_time(self) -> float:
+        """Time that the elements have crept [s]."""
+        return float(self._do.project().blocks.creep.time)
+
+    @property
+    def solved(self) -> Solved:
+        """How the last `solve` ended: reason, ratio (NaN if nobody looked), steps. Empty before the first."""
+        return cast(Solved, dict(self._do.project().solved))
+
+    @property
+    def ratio(self) -> float:
+        """Unbalanced over all forces of the nodes. Collective."""
+        return fdem.queries.ratio(self._do.project())
+
+    @property
+    def energies(self) -> dict[str, float]:
+        """The energy budget of the blocks [J/m], in space [J], after ``option(energy=True)``. Collective."""
+        return fdem.queries.energies(self._do.project())
+
+    @property
+    def block_time(self) -> float:
+        """Model time of the blocks [s]."""
+        return float(self._do.project().blocks.clock.time)
+
+    @property
+    def block_steps(self) -> int:
+        """Steps of the blocks."""
+        return self._do.project().step
+
+
+def quantities(kind: str) -> list[str]:
+    """Names of what objects of a kind have."""
+    return list(RECORDED.get("joint" if kind == g.JOINT else kind, ()))
+
+
+def _quantity(name: str) -> str:
+    if not isinstance(name, str):
+        raise TypeError(f"expected the name of a quantity, got {name!r}")
+    return name.replace("-", "_")

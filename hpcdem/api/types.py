@@ -1,0 +1,39 @@
+"""Types of what methods of blocks take and give, as their signatures name them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypedDict
+
+import numpy as np
+
+from hpcdem.lang.pcdc.kinds import FunctionName
+from hpcdem.physics.fdem import groups as g
+from hpcdem.physics.fdem.tables import Drawn, Over
+
+Point = tuple[float, ...]
+"""Two numbers, three in a model of three dimensions."""
+File = str | Path
+Number = float | str | FunctionName
+"""Of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
+Value = float | Over | Drawn | np.ndarray
+"""Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
+Where = str | g.Term | tuple[g.Term, ...] | None
+"""The text of a RANGE, or terms of `hpcdem.physics.fdem.groups`, all of which must hold; None: everything."""
+
+
+class Piece(TypedDict, total=False):
+    """A line or points in a mesh: array, points [m], or layer, names of layers; mesh_size [m]."""
+
+    array: Sequence[Point]
+    layer: Sequence[str]
+    mesh_size: float
+
+
+class Solved(TypedDict, total=False):
+    """How `solve` ended: why, unbalanced over all forces (NaN if nobody looked), steps. Empty before the first."""
+
+    reason: str
+    ratio: float
+    steps: int
