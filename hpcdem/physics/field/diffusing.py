@@ -480,7 +480,8 @@ class Diffusing(Assigned, Field):
         first, start, one = (np.empty(n, np.int64) for _ in range(3))
         build.special_nodes(*args, first, start, one)
         width, total = self.t.shape[1], int(one.sum())
-        begin, corner, place, again = np.zeros(n + 1, np.int64), *(np.empty(total, np.int64) for _ in range(3))
+        begin = np.zeros(n + 1, np.int64)
+        corner, place, again = (np.empty(total, np.int64) for _ in range(3))
         lost = build.place_nodes(
             first, start, one, member, blocks.where, mesh.cells, blocks.v.shape[1], FORCE, 2, blocks.local.true_mass,
             begin, corner, place, again, np.empty(n),
