@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.post.measure import breaks, cracks, faults, layers, tracks, triangles, walls, wedge
+from hpcdem.post.measure import cracks, faults, layers, tracks, triangles, walls, wedge
 from hpcdem.post.measure.grains import Grains, columns_of, driving_wall
 from hpcdem.post.measure.surface import surface
+from tests.published import breaks
 from tests.unit.measured import R, lattice, ramp
 
 FLAT = {0: ((-9e4, 0.0), (9e4, 0.0))}
