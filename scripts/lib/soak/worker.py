@@ -20,7 +20,8 @@ import numpy as np
 
 import hpcdem
 from hpcdem import session
-from hpcdem.physics.dem import diagnostics, simulation
+from hpcdem.engine import model as engine
+from hpcdem.physics.dem import diagnostics
 from soak import model
 
 PERIOD, WINDOW = 2500, 200
@@ -152,14 +153,14 @@ class Soak:
         ownership.renew = counted
 
     def _count_migrations(self) -> None:
-        tally, usual = self.tally, simulation.Migration
+        tally, usual = self.tally, engine.Migration
 
         class Counted(usual):  # type: ignore[valid-type, misc]
             def __init__(self, comm: Any, n: int, leave: np.ndarray, owner: np.ndarray) -> None:
                 super().__init__(comm, n, leave, owner)
                 tally.migrations += len(leave)
 
-        simulation.Migration = Counted  # type: ignore[misc]
+        engine.Migration = Counted  # type: ignore[misc]
 
     def look(self, seconds: float, steps: int) -> dict[str, Any]:
         """A line; collective."""
