@@ -4,9 +4,7 @@
 forces; the passes are in physics/dem/kernels/energy.py and read only, so a run with it has the same bits as one
 without. All sums are exact integers (numerics/exact_sum.py): neither ranks, threads nor a restart change a bit of them.
 
-Flows are booked a whole kick at a time, from half step to half step, but read at whole steps: a reading adds the first
-half of the coming kick. `begin` takes that half out again with the forces and settings of the command that begins, so
-that what a command between two runs changes is the difference of two readings.
+When the account is taken up, interrupted and read: engine/budget.py.
 """
 
 from __future__ import annotations
@@ -16,15 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.engine import budget as engine
 from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, from_integer
 from hpcdem.physics.dem.kernels import energy, mass
 from hpcdem.physics.dem.simulation import Simulation
 
-COMMANDS, BOX = energy.FLOWS, energy.FLOWS + 1
-BLOCKS = energy.FLOWS + 2
-ACCOUNTS = energy.FLOWS + 3
-"""Flows of the kernels, then stored energy changed by commands, gone with particles that left the BOX, and work done by
-blocks that touch the particles."""
 EMPTIED = 512
 """Steps after which bins are emptied into integers: long before they are full."""
 
@@ -67,26 +61,20 @@ class Energy:
 
 
 NAMES = tuple(f.name for f in fields(Energy))
-SIGNS = (1, 1, 1, -1, -1, -1, -1, -1, -1, -1, 1, 1, 1)
-"""Whether an account raises what is stored."""
+STORED, FLOWS = NAMES[: energy.STORED], NAMES[energy.STORED : -2]
+"""Flows are those of the kernels, then stored energy changed by commands, gone with particles that left the BOX, and
+work done by blocks that touch the particles."""
 
 
-class Budget:
-    """The account of one simulation. Integers are in units of exact_sum.as_integer; they are this rank's share, the sum
-    over the ranks counts.
-
-    running: a CYC or IMPLE goes on; accounts then stand at the half step, otherwise at the whole step.
-    """
+class Budget(engine.Budget[Simulation, int]):
+    """The account of one simulation. running: a CYC or IMPLE goes on."""
 
     def __init__(self) -> None:
-        self.accounts = [0] * ACCOUNTS
-        self.start: list[int] | None = None
-        self.left = [0] * energy.STORED
-        self.running = False
+        super().__init__(STORED, FLOWS, 0)
         self.finite = True
         self._bins = np.zeros((energy.FLOWS, *BINS_SHAPE), np.int64)
         self._steps = 0
-        self._at_rebuild: tuple[int, list[int]] | None = None
+        self._at_rebuild: tuple[int, int] | None = None
         self._shear, self._bonds = np.empty(0), np.empty(0, np.int32)
         self._wall_shear, self._wall_side = np.empty(0), np.empty(0)
         self._normal, self._memory = np.empty(0), np.empty((0, 0))
@@ -96,14 +84,14 @@ class Budget:
     def before_move(self, sim: Simulation) -> None:
         """Book the coming kick."""
         with sim.timers("energy"):
-            _kicks(sim, True, 1.0, self._bins)
+            _kicks(sim, True, self._bins)
         self._steps += 1
         if self._steps % EMPTIED == 0:
             self._empty()
 
     def before_rebuild(self, sim: Simulation) -> None:
         """The lists may be rebuilt without some particles: note what is stored with them."""
-        self._at_rebuild = sim.lost, self._stored(sim, whole_step=False)
+        self._at_rebuild = sim.lost, sum(self._stored(sim, whole_step=False).values())
 
     def before_forces(self, sim: Simulation) -> None:
         """Keep the histories of the slots."""
@@ -111,7 +99,7 @@ class Budget:
             lost, stored = self._at_rebuild
             self._at_rebuild = None
             if sim.lost != lost:
-                self.accounts[BOX] += sum(self._stored(sim, whole_step=False)) - sum(stored)
+                self.accounts["box"] += sum(self._stored(sim, whole_step=False).values()) - stored
         lists = sim.lists
         self._shear = _copied(lists.fs, self._shear)
         self._wall_shear = _copied(lists.slot_fs, self._wall_shear)
@@ -138,61 +126,50 @@ class Budget:
                 )
             _wall_losses(*_wall_slots(sim), self._wall_shear, self._wall_side, sim.wall_laws, n_mat, dt, self._bins)
 
-    # ---- called by the commands ------------------------------------------------------------------------------------
+    # ---- readings --------------------------------------------------------------------------------------------------
 
-    def begin(self, sim: Simulation) -> None:
-        """A CYC or IMPLE begins (or goes on after a function of the user). The model is closed, its tables fresh."""
-        _kicks(sim, False, -1.0, self._bins)
-        stored = self._stored(sim)
-        if self.start is None:
-            self.start = stored
-        else:
-            self.accounts[COMMANDS] += sum(stored) - sum(self.left)
-        self.running = True
+    def _read(self, sim: Simulation) -> tuple[dict[str, int], dict[str, int]]:
+        bins = np.zeros_like(self._bins)
+        _kicks(sim, False, bins)
+        return self._stored(sim), {**self._nothing, **dict(zip(FLOWS, map(self._integer, bins)))}
 
-    def pause(self, sim: Simulation) -> None:
-        """It ends: bring the accounts to the whole step, and note what is stored."""
-        _kicks(sim, False, 1.0, self._bins)
-        self.left = self._stored(sim)
-        self.running = False
+    def _booked(self, sim: Simulation) -> dict[str, int]:
+        self._empty()
+        return self._nothing
+
+    def _book_change(self, change: dict[str, int]) -> None:
+        self.accounts["commands"] += sum(change.values())
 
     def look(self, sim: Simulation) -> Energy:
         """The budget now. The model must be closed. Collective."""
-        self._empty()
-        accounts = list(self.accounts)
-        if self.running:
-            stored = self._stored(sim)
-            bins = np.zeros_like(self._bins)
-            _kicks(sim, False, 1.0, bins)
-            accounts[: energy.FLOWS] = [a + self._integer(b) for a, b in zip(accounts, bins)]
-        else:  # what commands have changed since then is booked when the next run begins
-            stored = self.left
-        mine = [*stored, *(self.start or stored), *accounts]
-        total = _summed(sim, mine)
+        found = self.now(sim)
+        total = [_summed(sim, list(part.values())) for part in found]
         if sim.comm.any(not self.finite):
             return Energy(*[float("nan")] * len(NAMES))
-        n = energy.STORED
-        now, start, flows = total[:n], total[n : 2 * n], total[2 * n :]
-        closing = sum(now) - sum(start) - sum(sign * flow for sign, flow in zip(SIGNS, flows))
+        now, start, flows = total
+        given = sum(-flow if name.startswith("loss") else flow for name, flow in zip(FLOWS, flows))
+        closing = sum(now) - sum(start) - given
         scale = max(map(abs, flows)) or max(sum(now), sum(start))
         relative = closing / scale if scale else 0.0
         return Energy(*[from_integer(v) for v in (*now, *flows, closing)], relative)  # type: ignore[call-arg]
 
     def add_from_blocks(self, work: int) -> None:
         """Book work that blocks did on particles, this rank's share, as an integer of exact_sum.as_integer."""
-        self.accounts[BLOCKS] += work
+        self.accounts["work_blocks"] += work
 
     # ---- checkpoints -----------------------------------------------------------------------------------------------
 
     def state(self, sim: Simulation) -> dict[str, Any]:
         """As JSON values; whole integers, so nothing is rounded. Collective."""
         self._empty()
-        n = energy.STORED
-        total = [hex(v) for v in _summed(sim, [*self.accounts, *(self.start or [0] * n), *self.left])]
+        accounts, left, start = (
+            [hex(v) for v in _summed(sim, list(part.values()))]
+            for part in (self.accounts, self.left, self.start or self.left)
+        )
         return {
-            "accounts": total[:ACCOUNTS],
-            "start": None if self.start is None else total[ACCOUNTS : ACCOUNTS + n],
-            "left": total[ACCOUNTS + n :],
+            "accounts": accounts,
+            "start": None if self.start is None else start,
+            "left": left,
             "running": self.running,
             "finite": not sim.comm.any(not self.finite),
         }
@@ -202,15 +179,15 @@ class Budget:
         """From `state`; first: this rank takes the whole of it, the others nothing."""
         budget = Budget()
 
-        def share(numbers: list[str]) -> list[int]:
-            return [int(v, 16) if first else 0 for v in numbers]
+        def share(names: tuple[str, ...], numbers: list[str]) -> dict[str, int]:
+            return {name: int(v, 16) if first else 0 for name, v in zip(names, numbers, strict=True)}
 
         accounts = list(state["accounts"])
-        if len(accounts) < ACCOUNTS:  # in files of earlier versions
+        if len(accounts) < len(FLOWS):  # in files of earlier versions
             accounts.insert(energy.LAWS, "0x0")
-            accounts += ["0x0"] * (ACCOUNTS - len(accounts))
-        budget.accounts, budget.left = share(accounts), share(state["left"])
-        budget.start = None if state["start"] is None else share(state["start"])
+            accounts += ["0x0"] * (len(FLOWS) - len(accounts))
+        budget.accounts, budget.left = share(FLOWS, accounts), share(STORED, state["left"])
+        budget.start = None if state["start"] is None else share(STORED, state["start"])
         budget.running, budget.finite = state["running"], state["finite"]
         return budget
 
@@ -222,12 +199,12 @@ class Budget:
         return value or 0
 
     def _empty(self) -> None:
-        for k, bins in enumerate(self._bins):
-            self.accounts[k] += self._integer(bins)
+        for name, bins in zip(FLOWS, self._bins):
+            self.accounts[name] += self._integer(bins)
         self._bins[:] = 0
 
-    def _stored(self, sim: Simulation, whole_step: bool = True) -> list[int]:
-        return [self._integer(bins) for bins in _stored_bins(sim, whole_step)]
+    def _stored(self, sim: Simulation, whole_step: bool = True) -> dict[str, int]:
+        return dict(zip(STORED, map(self._integer, _stored_bins(sim, whole_step))))
 
 
 def stored_energy(sim: Simulation) -> float:
@@ -270,17 +247,17 @@ def _own_pairs(sim: Simulation) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def _kicks(sim: Simulation, whole: bool, sign: float, bins: np.ndarray) -> None:
+def _kicks(sim: Simulation, whole: bool, bins: np.ndarray) -> None:
     lists, p, s, b, dt = sim.lists, sim.particles, sim.settings, sim.lists.blocks, sim.clock.dt
     for t in range(lists.n_blocks):
         energy.kicks(
-            t, p.hot, p.n_left, b.cut, b.lo, b.foff, lists.force, sim.body, s.gx, s.gy, s.lsm, dt, whole, sign, bins
+            t, p.hot, p.n_left, b.cut, b.lo, b.foff, lists.force, sim.body, s.gx, s.gy, s.lsm, dt, whole, 1.0, bins
         )
     if sim.clumps:
         c = sim.clumps.bodies
-        energy.kicks(0, c.hot, 0, *c.mine_as_block(), c.force, c.body, s.gx, s.gy, s.lsm, dt, whole, sign, bins)
+        energy.kicks(0, c.hot, 0, *c.mine_as_block(), c.force, c.body, s.gx, s.gy, s.lsm, dt, whole, 1.0, bins)
     if sim.walls.v.any():
-        _wall_work(*_wall_slots(sim), sim.wall_laws, len(sim.materials), sign * (dt if whole else 0.5 * dt), bins)
+        _wall_work(*_wall_slots(sim), sim.wall_laws, len(sim.materials), dt if whole else 0.5 * dt, bins)
 
 
 def _wall_slots(sim: Simulation) -> Any:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.account import closed
+from hpcdem.engine import budget as engine
 from hpcdem.numerics.exact_sum import exact_sum, from_integer
 from hpcdem.physics.fdem.kernels import energy, plasticity
 
@@ -24,23 +25,15 @@ WORK = ("joints", "contact", "viscous", "gravity", "outside", "plastic", "creep"
 it."""
 
 
-class Budget:
-    """The account of one model. accounts: work of each kind up to the last interruption [J/m],
-    in space [J]; commands: changes by
-    commands of what is stored; start, left: what was stored at the beginning and at the interruption; discs: the part
-    of the work from outside that discs did, this rank's share, as an integer of exact_sum.as_integer; heat: changes of
-    what is stored by temperatures, of_joints: those of them in joints; by_heat: that is what interrupts the account
-    now.
-
-    running: steps are being booked; otherwise the account stands at a whole step.
-    """
+class Budget(engine.Budget["Blocks", float]):
+    """The account of one model. accounts: work of each kind [J/m], in space [J]; commands: changes by commands of what
+    is stored; discs: the part of the work from outside that discs did, this rank's share, as an integer of
+    exact_sum.as_integer; heat: changes of what is stored by temperatures, of_joints: those of them in joints; by_heat:
+    that is what interrupts the account now."""
 
     def __init__(self) -> None:
-        self.accounts = dict.fromkeys(WORK, 0.0)
+        super().__init__(STORED, WORK, 0.0)
         self.commands = dict.fromkeys(STORED, 0.0)
-        self.start: dict[str, float] | None = None
-        self.left = dict.fromkeys(STORED, 0.0)
-        self.running = False
         self.heat = self.of_joints = 0.0
         self.by_heat = False
         self.discs = 0
@@ -51,7 +44,8 @@ class Budget:
     def before_forces(self, sim: Blocks) -> None:
         """A step begins: take up the account again after an interruption; keep the velocities. Collective."""
         if not self.running:
-            self._begin(sim)
+            self.begin(sim)
+            sim.cold["work"] = np.zeros((sim.n_own, energy.WORK))
         with sim.timers("energy"):
             self._before = sim.v.copy()
 
@@ -66,55 +60,30 @@ class Budget:
 
     # ---- interruptions ---------------------------------------------------------------------------------------------
 
-    def _begin(self, sim: Blocks) -> None:
-        stored, half = self._read(sim)
-        if self.start is None:
-            self.start = stored
-        else:
-            self._book_change(stored)
-        for name in WORK:
-            self.accounts[name] -= half[name]
-        sim.cold["work"] = np.zeros((sim.n_own, energy.WORK))
-        self.running = True
-
-    def _book_change(self, stored: dict[str, float]) -> None:
-        """So much is stored after the interruption."""
+    def _book_change(self, change: dict[str, float]) -> None:
         for name in STORED:
-            change = stored[name] - self.left[name]
             if self.by_heat:
-                self.heat += change
-                self.of_joints += change if name == "joints" else 0.0
+                self.heat += change[name]
+                self.of_joints += change[name] if name == "joints" else 0.0
             else:
-                self.commands[name] += change
+                self.commands[name] += change[name]
 
     def pause(self, sim: Blocks, by_heat: bool = False) -> None:
         """A command, or heat, is about to change the model: bring the account to the whole step. Collective."""
-        if not self.running:
-            if self.by_heat and not by_heat:  # what heat did since then is its own
-                stored, _ = self._read(sim)
-                self._book_change(stored)
-                self.left, self.by_heat = stored, False
-            return
-        self.by_heat = by_heat
-        self.left, half = self._read(sim)
-        done = self._done(sim)
-        for name in WORK:
-            self.accounts[name] += done[name] + half[name]
-        self.running = False
-        del sim.cold["work"]
+        if self.running:
+            self.by_heat = by_heat
+            super().pause(sim)
+            del sim.cold["work"]
+        elif self.by_heat and not by_heat:  # what heat did since then is its own
+            stored, _ = self._read(sim)
+            self._book_change({name: stored[name] - self.left[name] for name in STORED})
+            self.left, self.by_heat = stored, False
 
     # ---- readings --------------------------------------------------------------------------------------------------
 
     def reading(self, sim: Blocks) -> dict[str, float]:
         """The budget now, see `diagnostics.energies`. Collective."""
-        stored, half = self._read(sim) if self.running else (dict(self.left), dict.fromkeys(WORK, 0.0))
-        if self.start is None:
-            stored, _ = self._read(sim)
-            start = stored
-        else:
-            start = self.start
-        done = self._done(sim) if self.running else dict.fromkeys(WORK, 0.0)
-        work = {name: self.accounts[name] + done[name] + half[name] for name in WORK}
+        stored, start, work = self.now(sim)
         change = sum(stored.values()) - sum(start.values())
         by_commands = sum(self.commands.values())
         of_discs, of_loads = self._of_discs(sim), sim.surface_loads.work_done()
@@ -151,13 +120,12 @@ class Budget:
     def _of_discs(self, sim: Blocks) -> float:
         return from_integer(sum(sim.comm.allgather(self.discs)))
 
-    def _done(self, sim: Blocks) -> dict[str, float]:
+    def _booked(self, sim: Blocks) -> dict[str, float]:
         """Work booked in the columns of the elements, summed over the model."""
         columns = sim.cold["work"]
         return {name: exact_sum(columns[:, k], sim.comm) for k, name in enumerate(WORK)}
 
     def _read(self, sim: Blocks) -> tuple[dict[str, float], dict[str, float]]:
-        """What is stored at the present step, and the first half of the work of this moment's forces."""
         seen, local = sim.evaluate(), sim.local
         with sim.timers("energy"):
             kinetic = np.empty(sim.n_own)

@@ -433,7 +433,7 @@ def test_the_file(tmp_path):
 def test_numbers_that_are_none_do_not_hide(tmp_path):
     sim = one_ball(tmp_path, 1e-3)
     cycles.cycle(sim, 1)
-    sim.energy.accounts[0] += sim.energy._integer(np.zeros((2, 2112), np.int64))
+    sim.energy.accounts["work_gravity"] += sim.energy._integer(np.zeros((2, 2112), np.int64))
     bad = np.zeros((2, 2112), np.int64)
     bad[1, 0] = 1
     sim.energy._integer(bad)
