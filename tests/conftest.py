@@ -171,9 +171,27 @@ _ELSEWHERE = {"browser", "slurm"}
 """Fixtures of tests that look at hpcdem from outside of it, through programs of others: scripts/test --nightly."""
 
 
+def _leave_some_of_each(items: list[pytest.Item]) -> None:
+    """Of a test that is marked so: some cases, which have each value of each parameter, stay quick, others are slow."""
+    tests: dict[str, list[pytest.Function]] = {}
+    for item in items:
+        if isinstance(item, pytest.Function) and item.get_closest_marker("some_of_each"):
+            if not item.get_closest_marker("slow"):
+                tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for cases in tests.values():
+        values = {item: {(name, id(value)) for name, value in item.callspec.params.items()} for item in cases}
+        left = set().union(*values.values())
+        while left:
+            chosen = max(values, key=lambda item: len(left & values[item]))
+            left -= values.pop(chosen)
+        for item in values:
+            item.add_marker("slow")
+
+
 @pytest.hookimpl(tryfirst=True)  # before pytest sorts out what `-m` asks for
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """A mark is a promise about the machine: let it check the machine too. And who needs how much of it."""
+    _leave_some_of_each(items)
     for item in items:
         if not isinstance(item, pytest.Function):
             continue

@@ -481,7 +481,7 @@ def the_ground_shakes(found: Found) -> None:
 # Checkpoints: of creep in the middle of a creep step, of the fill between two fillings. What flies goes through borders
 # that stay; else they follow the load.
 MODELS = {
-    "impact": Model(impact, result, much_breaks),
+    "impact": Model(impact, result, much_breaks, slow=True),
     "mixed": Model(mixed, result, much_breaks, slow=True),
     "flight": Model(flight, result, much_breaks, balance=False, come=10),
     "yielding": Model(yielding, result, much_yields, yield_more, come=10),
@@ -489,7 +489,7 @@ MODELS = {
     "opening": Model(opening, result, a_hole_is_made, open_up, slow=True),
     "backfill": Model(backfill, result, the_fill_carries, fill_up, steps=1100),
     "creeping": Model(creeping, result, much_creeps, creep_more, steps=1400),
-    "plate": Model(plate, result, a_plate_flows, steps=300, middle=131),
+    "plate": Model(plate, result, a_plate_flows, steps=300, middle=131, slow=True),
     "parting": Model(parting, parted, sides_part, part_more, steps=600, middle=300),
     "weir": Model(weir, result, the_weir_gives_way, steps=700, middle=401),
     "shaking": Model(shaking, result, the_ground_shakes, shake_more, steps=700, middle=401),

@@ -108,6 +108,7 @@ def bent_bar(n: int, kind: str, diagonal: str = "both", nu: float = 0.25, aspect
     )
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize(("nu", "aspect"), [(0.25, 1.0), (0.4, 1.0), (0.25, 2.0)])
 @pytest.mark.parametrize("n", [2, 4, 8])
 def test_a_bar_of_quads_is_too_stiff_by_a_known_factor(n, nu, aspect):

@@ -49,6 +49,7 @@ def pressed(
     return np.array(out)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 @pytest.mark.parametrize(
     "name, value",

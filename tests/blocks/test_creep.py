@@ -119,6 +119,7 @@ def after_step(n: np.poly1d, d: np.poly1d, t: float) -> float:
     return found
 
 
+@pytest.mark.some_of_each
 @every_kind
 @pytest.mark.parametrize(
     ("time", "strain"), [(1e4, 8.98469e-4), (2e4, 1.142121e-3), (5e4, 1.442915e-3), (1e5, 1.543262e-3)]
@@ -144,6 +145,7 @@ def test_the_order_is_two():
     assert 90.0 < errors[0] / errors[1] < 110.0 and errors[1] < 5e-5
 
 
+@pytest.mark.some_of_each
 @every_kind
 @pytest.mark.parametrize("time", [2e4, 1e5])
 def test_uniaxial_stress_in_plane_strain(time, kind):
@@ -158,6 +160,7 @@ def test_uniaxial_stress_in_plane_strain(time, kind):
     assert not np.allclose(stresses(sim)[:, 3], stresses(loaded(0.0, -LOAD, kind, **ROCK))[:, 3], rtol=0.05)
 
 
+@pytest.mark.some_of_each
 @every_kind
 @pytest.mark.parametrize("gradient", [[[1.0, 1e-4], [1e-4, 1.0]], [[1.0 - 2e-4, 0.0], [0.0, 1.0 + 1e-4]]])
 def test_relaxation_at_fixed_strain(gradient, kind):

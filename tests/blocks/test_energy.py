@@ -150,6 +150,7 @@ def test_the_account_does_not_change_the_run():
     assert math.isfinite(float(np.nansum(ends[0])))
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("damping", ["viscous", "rayleigh", "creep"])
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 def test_small_strains_close_to_rounding(kind, damping):

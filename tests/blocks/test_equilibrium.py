@@ -45,6 +45,7 @@ def on_floor(mesh: Mesh, **options) -> Blocks:
 # ---- the tangent ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 @pytest.mark.parametrize("large, within", [(False, 1e-7), (True, 2e-3)])
 def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within):

@@ -23,6 +23,7 @@ ROCK = {"density": 2200.0, "young": 2.6e9, "poisson_ratio": 0.3}
 SOIL = {"density": 1800.0, "young": 0.2e9, "poisson_ratio": 0.25}
 WIDTH, HEIGHT = 24.0, 20.0
 AMPLITUDE = 0.01
+SLOW = pytest.mark.slow
 
 
 def speeds(ground: dict[str, float]) -> tuple[float, float]:
@@ -74,8 +75,10 @@ def surface(sim: Blocks, time: float, every: int = 1, axis: str = "x") -> tuple[
     return np.array(found), np.array(times)
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad"])
-@pytest.mark.parametrize("wave", ["x", "y"])
+@pytest.mark.parametrize(
+    ("wave", "kind"),
+    [("x", "cross"), ("y", "quad"), *(pytest.param(*one, marks=SLOW) for one in (("x", "quad"), ("y", "cross")))],
+)
 def test_the_surface_of_a_half_space_moves_by_twice_the_wave(wave, kind):
     """S and P waves of 40 elements: within 1.5 %, at the sides as in the middle; other sides lose half of it."""
     c = speeds(ROCK)[0 if wave == "y" else 1]
@@ -91,6 +94,7 @@ def test_the_surface_of_a_half_space_moves_by_twice_the_wave(wave, kind):
             assert wrong.max() > 0.4 * 2.0 * AMPLITUDE
 
 
+@SLOW
 @pytest.mark.parametrize("part", [None, "both"])
 def test_amplification_of_a_soft_layer(part):
     """Spectra of the surface over those of a free surface of rock, 2 v, from 3 to 15 Hz; damped: with the complex wave
@@ -128,6 +132,7 @@ def test_amplification_of_a_soft_layer(part):
     assert found == pytest.approx(exact, rel=0.04)
 
 
+@SLOW
 def test_little_of_a_source_in_the_middle_comes_back():
     """A shear pulse in the middle against a model five times as wide, until its own sides are heard: some 8 % of the
     peak, as of quiet sides, which dashpots are; from sides that are held more than came."""

@@ -67,6 +67,7 @@ def test_of_elements_without_a_model_it_belongs_to_the_first_one():
     assert diagnostics.values(sim, "stress_yy") == pytest.approx(-1e6 / 3.0, rel=1e-12)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("way", ["relaxation", "at once", "motion", "joints"])
 @pytest.mark.parametrize("kind", ["cross", "quad"])
 def test_a_softened_layer_between_rigid_ends(way, kind):

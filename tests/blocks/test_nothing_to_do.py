@@ -52,6 +52,7 @@ def solves(sim: Blocks) -> None:
     assert convergence.solve(sim, ratio=1e-5, limit=3000).reason == "ratio"
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("law", ["mech_iso_elastic", "mech_mohr_coulomb"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_loads_and_after_unloading(kind, law):

@@ -27,6 +27,7 @@ def deepest(sim: Blocks) -> np.ndarray:
     return overlaps.deepest(sim, sim.local)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["cross", "quad"])
 @pytest.mark.parametrize("dynamic", [True, False])
 def test_an_overlap_is_refused_and_the_model_stays(kind, dynamic):

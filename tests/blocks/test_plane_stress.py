@@ -122,6 +122,7 @@ def pulled(sim: Blocks, xx: float = 0.0, yy: float = 0.0) -> Blocks:
     return sim
 
 
+@pytest.mark.some_of_each
 @every_kind
 @pytest.mark.parametrize("name", ["mech_iso_elastic", "mech_mohr_coulomb", "mech_burgers"])
 def test_uniaxial_stress(kind, name):
@@ -179,6 +180,7 @@ def test_a_footing_at_rest_is_that_of_relaxation(kind):
     assert np.abs(found[0] - found[1]).max() < 1e-3 * np.abs(found[1]).max()
 
 
+@pytest.mark.some_of_each
 @every_kind
 @pytest.mark.parametrize("time", [2e4, 1e5])
 def test_uniaxial_creep(kind, time):
@@ -264,6 +266,7 @@ def test_a_bar_rings_at_the_speed_of_a_plate():
 # ---- motion --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.some_of_each
 @every_kind
 @pytest.mark.parametrize("name", ["mech_mohr_coulomb", "mech_burgers"])
 def test_the_energy_account_closes(kind, name):

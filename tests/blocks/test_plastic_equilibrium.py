@@ -68,6 +68,7 @@ def test_slopes_of_the_return():
     assert len(met) >= 8
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 @pytest.mark.parametrize("large, within", [(False, 2e-5), (True, 2e-2)])
 @pytest.mark.parametrize("plate", [False, True], ids=["plane strain", "plane stress"])
@@ -109,6 +110,7 @@ def walls(sim: Blocks, speed: float) -> None:
     sim.velocity_condition(np.flatnonzero(y > 1.0 - 1e-9), vy=speed)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["cross", "mixed", "quad"])
 @pytest.mark.parametrize("steps", [1, 7])
 def test_uniaxial_strain(kind, steps, newton):
@@ -148,6 +150,7 @@ def hole(
     return sim
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("each", [4, 1])
 @pytest.mark.parametrize("dilation, steps", [(30.0, 1), (30.0, 10), (0.0, 10)])
 def test_a_hole_in_rock_that_yields(dilation, steps, each):
@@ -223,6 +226,7 @@ BODIES = {
 }  # fmt: skip
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", BODIES)
 @pytest.mark.parametrize("steps", [1, 3])
 @pytest.mark.parametrize("what", ["stiffer", "initial", "weaker"])

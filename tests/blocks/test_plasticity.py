@@ -97,7 +97,10 @@ def test_corners(trial, end, bits):
     assert seen == bits
 
 
-@pytest.mark.parametrize("name", list(FLOWS))
+@pytest.mark.parametrize(
+    "name",
+    [n if n in ("usual", "up to the apex", "no tension") else pytest.param(n, marks=pytest.mark.slow) for n in FLOWS],
+)
 def test_as_the_plain_loop(name):
     """Against Koiter's rule with every choice of planes, in all regions."""
     rock = FLOWS[name]

@@ -61,6 +61,7 @@ def vibration(sim: Blocks, mode: int) -> tuple[float, float]:
     return decay / omega, omega / (2.0 * math.pi)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("part", ["both", "mass", "stiffness"])
 @pytest.mark.parametrize("kind", ["cross", "quad"])
 def test_damping_ratios_of_three_modes(kind, part):

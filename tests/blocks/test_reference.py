@@ -117,6 +117,7 @@ def rows_of(sim: Blocks, found: Evaluation) -> tuple[np.ndarray, np.ndarray]:
     return found.force.reshape(-1, 4, 2), found.of_joints.reshape(-1, 4, 2)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("large", [True, False])
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 def test_elements_and_nodes(kind: str, large: bool) -> None:
@@ -149,6 +150,7 @@ def check_kick(sim: Blocks, force: np.ndarray, after: np.ndarray, tied: bool) ->
         assert all(out[r, k] == pytest.approx(expected, abs=1e-9 * scale + 1e-12) for r, k in at)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("large", [True, False])
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 def test_joints(kind: str, large: bool) -> None:

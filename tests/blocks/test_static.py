@@ -50,6 +50,7 @@ def test_at_rest_and_after_motion_stresses_agree(kind, with_joints):
         assert diagnostics.values(moved, name) == pytest.approx(values, abs=0.005 * scale)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["cross", "quad"])
 @pytest.mark.parametrize("with_joints", [False, True])
 def test_a_block_rests_on_a_slope(kind, with_joints):

@@ -41,6 +41,7 @@ def clay(limit: float = 1e6, **options) -> Blocks:
     return sim
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize(
     "kind, part",
     [

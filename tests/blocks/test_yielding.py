@@ -63,6 +63,7 @@ def compressed(sim: Blocks, strain: float, parts: int = 20, sign: float = -1.0) 
         deform(sim, np.diag([1.0, 1.0 + sign * strain * k / parts]))
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("dilation", [0.0, 10.0, 30.0])
 @pytest.mark.parametrize("parts", [1, 20])
 def test_uniaxial_strain(kind, dilation, parts):

@@ -146,5 +146,5 @@ def in_pieces(found: Found) -> None:
 MODELS = {
     "bolts torn": Model(breaking, result, bars_rupture, more, steps=1400, middle=1101),
     "bolts in space": Model(in_space, result, in_pieces, more_in_space, steps=900, middle=601),
-    "bolts at rest": Model(relaxing, result, grout_slips, excavate, steps=1400, middle=1101),
+    "bolts at rest": Model(relaxing, result, grout_slips, excavate, steps=1400, middle=1101, slow=True),
 }

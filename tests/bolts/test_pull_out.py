@@ -58,6 +58,7 @@ def test_ultimate_load_by_displacement() -> None:
     assert np.abs(bolts.values("bolt-node", "bond_force")) == pytest.approx(STRENGTH, rel=0.005)
 
 
+@pytest.mark.slow
 def test_yield_at_the_head_and_rupture() -> None:
     sim, bolts = in_fixed_rock(tensile_yield_force=100e3, tension_failure_strain=0.02)
     bolts.condition(HEAD, does_x=kernels.VELOCITY, at_x=-1e-7)
@@ -79,7 +80,7 @@ def test_yield_at_the_head_and_rupture() -> None:
     assert (bolts.elements["state"] & kernels.RUPTURED != 0).tolist() == [True] + 39 * [False]
 
 
-@pytest.mark.parametrize("slipping", [0.3, 0.9])
+@pytest.mark.parametrize("slipping", [0.3, pytest.param(0.9, marks=pytest.mark.slow)])
 def test_another_bolt_while_it_slips(slipping) -> None:
     """2 m of a thinner bar in soft grout that fails at the rock, with a spacing of 1.6 m: the force and the way of the
     head when a part of it slips. 80 elements: the error falls with the square of their length."""
@@ -105,6 +106,7 @@ def test_compression_yields_at_its_own_force() -> None:
     assert bolts.elements["state"][0] == kernels.IN_COMPRESSION | kernels.WAS_IN_COMPRESSION
 
 
+@pytest.mark.slow
 def test_pressure_across_the_bar_adds_friction() -> None:
     """sigma_yy -2 MPa in the rock: S = pi D (C + 2 MPa tan 30) at the bolt; tension adds nothing."""
     found = {}

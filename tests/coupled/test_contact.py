@@ -165,6 +165,7 @@ def test_no_bump_between_faces(tmp_path):
     assert (np.abs(many - one) / scale).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_no_bump_between_jointed_elements(tmp_path):
     """Corners of neighbours are nodes of their own there, yet the surface is one."""
     mesh = rectangle(15, 1, 1.5, 0.4)

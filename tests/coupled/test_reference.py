@@ -14,6 +14,7 @@ from tests.blocks.support import joined, rectangle, shaken
 from tests.coupled.support import body, discs, together
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("hertz", [False, True])
 @pytest.mark.parametrize("kind", ["cross", "mixed"])
 def test_forces(tmp_path, kind: str, hertz: bool) -> None:

@@ -34,10 +34,7 @@ from hpcdem.core.comm import SerialComm
 from hpcdem.lang.zdem.execute import Interpreter
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.physics.dem.simulation import Simulation
-from hpcdem.runtime import kept
 from hpcdem.runtime.progress import Log
-
-kept.install()
 
 def play(*lines, begin=("START", "SET dt 1e-3 disk on")):
     sim = Simulation(SerialComm(), 1, Path("data"), Log(0, io.StringIO()))
@@ -427,10 +424,14 @@ assert re.search(r"^gravity = 2(.0)? +# m/s2", said, re.M), said
 }
 
 
+STORE = "from hpcdem.runtime import kept\nkept.install()\n"
+"""What a program of the package does first: kernels that a recipe does not reach come from the store."""
+
+
 def copy_of_the_package(folder: Path) -> Path:
-    """Links to its files; what is changed becomes a file. Kernels that it does not reach come from the store."""
+    """Links to its files, and to what Python has made of them; what is changed becomes a file."""
     for file in PACKAGE.rglob("*"):
-        if file.is_file() and file.suffix != ".pyc":
+        if file.is_file():
             link = folder / file.relative_to(ROOT)
             link.parent.mkdir(parents=True, exist_ok=True)
             link.symlink_to(file)
@@ -454,6 +455,6 @@ def test_a_recipe_is_complete(tmp_path: Path, name: str) -> None:
         (package / file).parent.mkdir(parents=True, exist_ok=True)
         (package / file).write_text(text)
     env = dict(os.environ, PYTHONPATH=f"{tmp_path}:{ROOT}", PYTHONDONTWRITEBYTECODE="1")
-    done = subprocess.run([sys.executable, "-c", recipe.program], cwd=tmp_path, env=env, capture_output=True, text=True,
-                          check=False)  # fmt: skip
+    command = [sys.executable, "-c", STORE + recipe.program]
+    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""A small run to be disturbed: about 250 particles, a few seconds, a checkpoint every 1000 steps."""
+"""A small run to be disturbed: about 250 particles, two seconds, a checkpoint every 400 steps."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ WALL id 2 nodes (5000.0, 0.0) (5000.0, 3000.0) fric 0.2
 GEN num 1000 rad discrete 70.0 90.0, x (0.0, 5000.0), y (0.0, 2400.0) group bed
 PROP density 2400.0 fric 0.1 shear 2.0e9 poiss 0.25 damp 0.5 hertz
 SET dt 0.04 gravity 0.0 -9.8
-SET print 5000 save 1000
+SET print 2000 save 400
 
-CYC 5000
+CYC 2000
 
 PROP ebmod 1e8 gbmod 1e8 tstrength 1e7 sstrength 2e7
 WALL id 1 xv 0.5
-IMPLE wall id 1 xmove 200.0 print 100.0 save 20.0
+IMPLE wall id 1 xmove 80.0 print 40.0 save 8.0
 STOP
 """
-LAST_STEP = 15000
+LAST_STEP = 6000
 LAST_FRAME = f"all_{LAST_STEP:010d}.dat"
 
 

@@ -26,7 +26,7 @@ QUICK = (
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("names", [QUICK[::2], pytest.param(QUICK, marks=pytest.mark.slow)], ids=["half", "all"])
+@pytest.mark.parametrize("names", [QUICK[::4], pytest.param(QUICK, marks=pytest.mark.slow)], ids=["some", "all"])
 def test_a_dozen_faults(names: tuple[str, ...], tmp_path: Path) -> None:
     """All runs, of particles, blocks and both by turns, come to the same end. One rank; two runs at a time."""
     paths = [str(ROOT / "scripts" / "lib"), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]

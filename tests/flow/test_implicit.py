@@ -464,6 +464,7 @@ def test_fluid_that_is_pumped_in_lifts_the_block() -> None:
     assert diagnostics.values(sim, "stress_yy").mean() == pytest.approx(-pressure.mean(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_joint_is_pumped_open() -> None:
     """From one end into a whole joint under pressure: joints break one after the other, nothing is lost, and fluid and
     crack go together."""
@@ -536,6 +537,7 @@ def test_the_static_solve_keeps_pressures() -> None:
     assert account["relative"] < 1e-12
 
 
+@pytest.mark.slow
 def test_a_file_in_mid_injection(tmp_path) -> None:
     """The rest of the way from a checkpoint ends where the whole way ends."""
     whole, flow = plate()

@@ -27,6 +27,7 @@ def speed(gradient: float, aperture: float, nu: float = 1e-6, rho: float = 1000.
     return low
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("gradient", [1.0, 90.0, 2e2, 5e4])
 @pytest.mark.parametrize("implicit", [True, False])
 def test_a_fracture_flows_as_darcy_and_weisbach_say(gradient: float, implicit: bool) -> None:

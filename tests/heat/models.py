@@ -248,8 +248,8 @@ def it_flows(found: Found) -> None:
 # Checkpoints after excavation, and after the blocks have begun to move.
 MODELS = {
     "cracking by heat": Model(cracking, result, it_cracks, more, steps=1100, middle=703),
-    "steaming": Model(steaming, of_water, it_steams, steaming_on, steps=1100, middle=703),
-    "hot slurry": Model(hot_slurry, of_slurry, it_bursts, slurry_on, steps=880, middle=503),
+    "steaming": Model(steaming, of_water, it_steams, steaming_on, steps=1100, middle=703, slow=True),
+    "hot slurry": Model(hot_slurry, of_slurry, it_bursts, slurry_on, steps=880, middle=503, slow=True),
     "hot slurry in space": Model(
         hot_slurry_in_space, of_slurry, it_bursts_in_space, slurry_on_in_space, steps=700, middle=603
     ),

@@ -158,7 +158,7 @@ def lauwerier(swept: np.ndarray, z: np.ndarray, time: float, rate: float, apertu
     return erfc((2.0 * CONDUCTIVITY * swept / (RHO_C * rate) + np.abs(z)) * np.sqrt(ROCK_C / CONDUCTIVITY / left) / 2.0)
 
 
-@pytest.mark.parametrize(("second", "error"), [(0.0, 0.02), (1.0, 0.004)])
+@pytest.mark.parametrize(("second", "error"), [pytest.param(0.0, 0.02, marks=pytest.mark.slow), (1.0, 0.004)])
 def test_water_cools_a_fracture_as_lauwerier_says(second: float, error: float) -> None:
     """Within 2 % of the difference of temperature, as in the plane, in the water and in the rock beside it; far nearer
     of second order."""
@@ -179,7 +179,8 @@ def test_water_cools_a_fracture_as_lauwerier_says(second: float, error: float) -
     assert heat.account()["relative"] < 1e-10
 
 
-@pytest.mark.parametrize(("second", "error"), [(0.0, 0.03), pytest.param(1.0, 0.01, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("second", "error"), [(0.0, 0.03), (1.0, 0.01)])
 def test_water_that_spreads_from_a_well_cools_a_fracture(second: float, error: float) -> None:
     """Lauwerier's form by the area pi (r2 - r02) that has been passed, in a sector of 60 degrees: within 3 %."""
     radii = 0.2 + np.concatenate([[0.0], np.linspace(0.6, 30.0, 40)])
@@ -319,6 +320,7 @@ def test_the_temperature_of_what_comes_in_follows_its_table() -> None:
     assert t[near] == pytest.approx(0.1 * (400.0 - x[near] / 0.01), abs=0.6)
 
 
+@pytest.mark.slow
 def test_filling_a_dry_fracture_brings_its_heat() -> None:
     """Water of 40 K runs into dry triangles: what is in them has come in at 40 K, to the last digit."""
     mesh = box((6, 1, 2), (0.6, 0.1, 0.2))

@@ -264,6 +264,7 @@ def bears(sim: Blocks, stress: float) -> None:
         assert diagnostics.values(sim, name) == pytest.approx(wanted, rel=1e-8, abs=1e-8 * stress), name
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("steps", [1, 4])
 def test_a_bar_that_cools_flows_in_balance_only(kind: str, steps: int) -> None:

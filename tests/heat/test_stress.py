@@ -85,6 +85,7 @@ def test_a_block_between_walls_is_pressed(law: str) -> None:
             assert found == pytest.approx(-share * E * ALPHA * 50.0 / (1.0 - NU), rel=3e-3, abs=1e-3 * E * ALPHA * 50.0)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("held", [0, 1, 2], ids=["free", "held along x", "held"])
 def test_a_plate_in_plane_stress(law: str, held: int) -> None:

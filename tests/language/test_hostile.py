@@ -263,6 +263,7 @@ def test_two_ranks_refuse_alike(workplace, launch, request):
         assert first == second and message in first
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.mpi)])
 @pytest.mark.parametrize(
     ("source", "message"),

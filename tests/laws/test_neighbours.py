@@ -131,6 +131,7 @@ MODELS = [
 ]
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("fast_ones", [False, True])
 @pytest.mark.parametrize("n_blocks", [1, 2, 5])
 @pytest.mark.parametrize(("seed", "columns", "bonds"), MODELS)
@@ -149,6 +150,7 @@ def test_the_list_holds_the_pairs_that_a_search_of_all_finds(seed, columns, bond
     assert lists.longest_bond2() == max((model.d2[pair] for pair in bonded), default=0.0)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("fast_ones", [False, True])
 @pytest.mark.parametrize(("seed", "columns", "bonds"), MODELS)
 def test_wall_slots_are_those_near_or_remembered(seed, columns, bonds, fast_ones):
@@ -167,6 +169,7 @@ def test_wall_slots_are_those_near_or_remembered(seed, columns, bonds, fast_ones
     assert lists.wptr.tolist() == np.searchsorted(lists.slot_row, lists.blocks.cut).tolist()
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("n_blocks", [1, 3])
 @pytest.mark.parametrize(("seed", "columns", "bonds"), MODELS)
 def test_what_is_put_in_comes_out(seed, columns, bonds, n_blocks):

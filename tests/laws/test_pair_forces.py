@@ -61,6 +61,7 @@ def slots(sim: Simulation, t: int) -> range:
     return range(lists.ptr[poff[t]], lists.ptr[poff[t] + max(cut[t + 1] - lo[t], 0)])
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("bonded", BONDS)
 @pytest.mark.parametrize("law", ["hertz", "linear"])
 def test_against_the_laws_pair_by_pair(tmp_path: Path, law: str, bonded: str) -> None:

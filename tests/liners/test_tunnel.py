@@ -31,6 +31,7 @@ def lined(p: float, k: float, slips: bool, thickness: float, around: int = 72) -
     return liners, *stiffness(concrete)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("slips", [False, True])
 @pytest.mark.parametrize(("k", "thickness"), [(0.5, 0.3), (1.6, 0.15)])
 def test_thrust_and_moment(slips, k, thickness) -> None:

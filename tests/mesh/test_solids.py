@@ -228,6 +228,7 @@ def test_solids_of_a_cad_file_hang_together_and_are_groups(tmp_path: Path, gmsh:
         cad.read(tmp_path / "flat.brep")
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("name", ["rock.step", "rock.brep", "rock.stl", "rock.dxf"])
 @pytest.mark.parametrize("content", [b"", b"solid nothing", bytes(range(256)) * 8])
 def test_hostile_files_are_refused_by_name(tmp_path: Path, name: str, content: bytes, gmsh: object) -> None:

@@ -19,6 +19,7 @@ SOLIDS = {
 }  # fmt: skip
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("mirror", [(1.0, 1.0, 1.0), (1.0, -1.0, 1.0)], ids=["turned", "mirrored"])
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_distances_go_along(kind, mirror):

@@ -340,6 +340,7 @@ HOSTILE = {
 }  # fmt: skip
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["tri", "quad"])
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_geometry_makes_a_mesh_that_passes(name, kind):

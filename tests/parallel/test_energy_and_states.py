@@ -102,7 +102,7 @@ def test_the_same_across_a_restart(one: tuple[Path, str], resident: Resident, tm
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_a_changed_state_is_found_at_its_step(
     one: tuple[Path, str], resident: Resident, tmp_path: Path, ranks: int
 ) -> None:

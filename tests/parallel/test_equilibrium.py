@@ -16,15 +16,19 @@ WORKER = Path(__file__).with_name("equilibrium_worker.py")
 
 pytestmark = pytest.mark.ranks
 SLOW = pytest.mark.slow
-KINDS = ("", "-yields", "-pumped", "-propped", "-cooled", "-rinsed", "-solid", "-crushed", "-burst", "-sides", "-seam")
+QUICK = ("", "-yields", "-propped", "-cooled", "-crushed", "-seam")
+"""Of each physics, of each kind of element, with joints that break and without."""
+KINDS = (*QUICK, "-pumped", "-rinsed", "-solid", "-burst", "-sides")
 Found = dict[str, np.ndarray]
 
 
 @pytest.fixture(scope="module")
 def runs(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, str], Found]:
     """What a run on so many ranks found; all runs on these ranks are done by one start, by PETSc those asked for."""
-    items = [item for item in request.session.items if item.name.startswith("test_petsc_on_several_ranks")]
-    petsc = {item.callspec.params["kind"] for item in items if isinstance(item, pytest.Function)}
+    items = [item for item in request.session.items if getattr(item, "module", None) is request.module]
+    names = [item for item in items if item.name.startswith("test_petsc_on_several_ranks")]
+    petsc = {item.callspec.params["kind"] for item in names if isinstance(item, pytest.Function)}
+    direct = KINDS if any(item.get_closest_marker("slow") for item in items) else QUICK
 
     @cache
     def started(ranks: int, *names: str) -> dict[str, Found]:
@@ -39,7 +43,9 @@ def runs(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 
     def found(ranks: int, name: str) -> Found:
         solver = name.split("-")[0]
-        return started(ranks, *(solver + kind for kind in KINDS if solver == "direct" or kind in petsc))[name]
+        return started(ranks, *(solver + kind for kind in KINDS if kind in (direct if solver == "direct" else petsc)))[
+            name
+        ]
 
     return found
 
@@ -65,6 +71,7 @@ def test_rock_that_yields_is_in_balance(yielding):
     assert np.nanmax(yielding["plastic_shear_strain"]) > 1e-3
 
 
+@SLOW
 def test_fluid_opens_the_joint(runs):
     found = runs(1, "direct-pumped")
     assert found["joints"][2] > 3 and found["pressure"].max() > 1e6 and found["saturation"].min() < 0.5
@@ -72,7 +79,7 @@ def test_fluid_opens_the_joint(runs):
     assert pressure > 1e5 and (rate, stage) == (0.0, 2.0) and injected == pytest.approx(5e-5 * 0.83, rel=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["pumped", "propped"])
+@pytest.mark.parametrize("kind", [pytest.param("pumped", marks=SLOW), "propped"])
 def test_a_file_in_mid_injection_goes_on_with_the_same_bits(runs, kind):
     """Written by as many ranks as go on from it; on more of them: test_the_same_bits."""
     found = runs(1, f"direct-{kind}")
@@ -80,6 +87,7 @@ def test_a_file_in_mid_injection_goes_on_with_the_same_bits(runs, kind):
         assert np.array_equal(found[f"again_{name}"], found[name])
 
 
+@SLOW
 def test_slurry_opens_it_too(runs):
     found, water = runs(1, "direct-propped"), runs(1, "direct-pumped")
     stored, packed, came, left, removed = found["sand"]
@@ -94,6 +102,7 @@ def test_cold_strains_the_joints(runs):
     assert np.nanmax(found["stress_xx"]) > 1e6 and np.nanmax(found["opening"]) > 1e-7
 
 
+@SLOW
 def test_cold_water_cools_the_rock(runs):
     found = runs(1, "direct-rinsed")
     given, commands, stored, fluid, removed = found["account"]
@@ -103,14 +112,18 @@ def test_cold_water_cools_the_rock(runs):
     assert found["steady"] == pytest.approx(10.0, abs=1e-6)
 
 
-def test_tetrahedra_break_and_yield(runs):
+def test_tetrahedra_yield(runs):
     crushed = runs(1, "direct-crushed")
-    for solid in (runs(1, "direct-solid"), runs(1, "direct-sides")):
-        assert solid["ratios"].max() < 1e-8 and solid["joints"][1:].sum() > 3
     assert crushed["ratios"].max() < 1e-8 and np.nanmax(crushed["plastic_shear_strain"]) > 1e-3
 
 
-@pytest.mark.parametrize("kind", ["burst", "seam"])
+@SLOW
+def test_tetrahedra_and_hexahedra_break(runs):
+    for solid in (runs(1, "direct-solid"), runs(1, "direct-sides")):
+        assert solid["ratios"].max() < 1e-8 and solid["joints"][1:].sum() > 3
+
+
+@pytest.mark.parametrize("kind", [pytest.param("burst", marks=SLOW), "seam"])
 def test_fluid_opens_joints_of_tetrahedra_and_hexahedra(runs, kind):
     found = runs(1, f"direct-{kind}")
     assert found["joints"][1:].sum() > 5 and found["pressure"].max() > 1e6 and found["saturation"].min() < 0.5
@@ -119,7 +132,7 @@ def test_fluid_opens_joints_of_tetrahedra_and_hexahedra(runs, kind):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("name", [f"direct{kind}" for kind in KINDS])
+@pytest.mark.parametrize("name", [pytest.param(f"direct{kind}", marks=() if kind in QUICK else SLOW) for kind in KINDS])
 @pytest.mark.parametrize("ranks", [pytest.param(2, marks=SLOW), 3, pytest.param(4, marks=SLOW)])
 def test_the_same_bits(runs, name, ranks):
     alone, found = runs(1, name), runs(ranks, name)
@@ -146,15 +159,15 @@ CRUSHED = ("stress_xx", "displacement_x", "displacement_z", "plastic_shear_strai
     ("kind", "quantities"),
     [
         ("", ELASTIC),
-        ("-pumped", PUMPED),
+        ("-propped", PROPPED),
         ("-cooled", COOLED),
-        ("-solid", SOLID),
+        ("-crushed", CRUSHED),
         *(
             pytest.param(*one, marks=SLOW)
             for one in (
                 ("-yields", PLASTIC),
-                ("-propped", PROPPED),
-                ("-crushed", CRUSHED),
+                ("-pumped", PUMPED),
+                ("-solid", SOLID),
                 ("-burst", BURST),
                 ("-sides", SOLID),
             )

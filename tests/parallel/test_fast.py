@@ -110,7 +110,7 @@ def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_p
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_resumed_run_equals_the_uninterrupted_one(
     reference: Path, resident: Resident, tmp_path: Path, ranks: int
 ) -> None:

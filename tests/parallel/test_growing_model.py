@@ -116,7 +116,7 @@ def test_growing_model_on_more_ranks(grown: Path, resident: Resident, tmp_path: 
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_growth_goes_on_after_a_restart(grown: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     """RES and GEN give what the run without a break gave: particles, ids, frames."""
     (tmp_path / "again").mkdir()
@@ -128,7 +128,7 @@ def test_growth_goes_on_after_a_restart(grown: Path, resident: Resident, tmp_pat
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [2, 4])
+@pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.slow), 4])
 def test_strips_without_particles(starved: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     """No particles at all, and fewer columns than ranks: the run goes on."""
     assert_same_files(starved, run_text(resident, STARVED, tmp_path / "more", ranks))

@@ -39,10 +39,11 @@ CHAINS: dict[str, dict[str, str | None]] = {
 """Scripts in the order in which they run, and the file each of them needs."""
 
 QUICK = {("push_add_del", 2)}
-"""Chains and numbers of ranks of the quick tests; those on one rank run all of them."""
+"""Chains and numbers of ranks of the quick tests."""
 
 OTHERS = {"push", *(chain for chain, _ in QUICK)}
-"""Chains that quick tests of several ranks are compared with: what looks at their run on one rank runs beside them."""
+"""Chains that quick tests of several ranks are compared with: what looks at their run on one rank runs beside them, and
+what looks at other chains is slow."""
 
 LAST_STEP = {
     "push": 8_000, "syn_erosion": 10_000, "syn_sedimentaion": 10_600, "pre_struct": 5_000, "detachment": 6_000,
@@ -106,7 +107,7 @@ def test_same_files_on_more_ranks(
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", ways({"2 threads", "2 ranks x 2 threads"}))
+@pytest.mark.parametrize("case", ways({"2 ranks x 2 threads"}))
 def test_same_push_however_it_is_run(
     on_one_rank: Callable[[str], Path], manual_scripts: Path, resident: Resident, tmp_path: Path, case: str
 ) -> None:
@@ -119,7 +120,7 @@ def test_same_push_however_it_is_run(
 @pytest.mark.parametrize(
     ("chain", "name"),
     [
-        pytest.param(chain, name, marks=pytest.mark.ranks if chain in OTHERS else ())
+        pytest.param(chain, name, marks=pytest.mark.ranks if chain in OTHERS else pytest.mark.slow)
         for chain, scripts in CHAINS.items()
         for name in scripts
     ],

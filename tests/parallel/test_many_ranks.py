@@ -214,7 +214,7 @@ def test_damage_is_found_by_all_ranks_in_the_same_words(tmp_path: Path) -> None:
             spoilt = whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
             path.write_bytes(spoilt)
             assert refusals(path, 1) == {f"{path} is damaged: checksum of {full} is wrong"}
-            texts |= {spoilt} if column.shape[0] > 30 else set()
+            texts |= {spoilt} if column.shape[0] > 30 and len(texts) < 6 else set()
     for text in texts:
         path.write_bytes(text)
         assert refusals(path, 16) == refusals(path, 1) and len(refusals(path, 16)) == 1

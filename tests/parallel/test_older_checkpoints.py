@@ -17,6 +17,7 @@ from hpcdem.io import checkpoint
 FILES = Path(__file__).with_name("checkpoints")
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("version", range(1, checkpoint.VERSION))
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.mpi)])
 def test_an_older_checkpoint_comes_to_the_same_end(resident, tmp_path, version, ranks):

@@ -21,7 +21,7 @@ TWO = (
     "pcdc node boundary mech-m-b-c type 1 range y -0.001 0.001\npcdc model gravity (0,-10)\n"
     "pcdc model option dynamic off\n"
 )
-LOOSE = r"the body of 2 elements around \(5\.[56].*\), with element 16, slides or falls away by \(.*, -.*\) m per step"
+LOOSE = r"the body of 2 elements around \(5\.[456].*\), with element 16, slides or falls away by \(.*, -.*\) m per step"
 
 
 def watched(ratio, window: int, limit: int = 0, steps: int = 1_000_000, broken=lambda n: 0) -> tuple[str, int]:
@@ -94,9 +94,10 @@ def test_a_restart_in_the_middle_comes_to_the_same_end(tmp_path, monkeypatch):
 
 def test_a_body_that_is_soon_too_fast_is_no_wrong_time_step(tmp_path):
     """Soft ground: it goes half an edge per step before a window is over."""
+    soft = "young = 1e5\n" + TWO + "pcdc model option collision off\n"  # or contacts are searched for in each step
     with pytest.raises(EquilibriumError, match=rf"over half an edge per static step.*{LOOSE}"):
-        Rock(tmp_path, "young = 1e5\n" + TWO + "pcdc model solve ratio 1e-5\n")
-    rock = Rock(tmp_path, "young = 1e5\n" + TWO + "pcdc model solve on-failure continue\n")
+        Rock(tmp_path, soft + "pcdc model solve ratio 1e-5\n")
+    rock = Rock(tmp_path, soft + "pcdc model solve on-failure continue\n")
     assert rock.project.solved["reason"] == "runaway"
     rock("pcdc element c-model null range group 'loose'\npcdc node reset velocity\npcdc model solve ratio 1e-5\n")
     assert rock.project.solved["reason"] == "ratio"

@@ -84,6 +84,7 @@ def test_zdem_scripts(tmp_path, text, message):
 CURVES = "pcdc mesh structured (0,0) (1,1) cells 1 1\npcdc history create 'a' model value time\n" + CHART
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("command", ["history export '{}.csv'", "chart export 'c' '{}.png'"])
 @pytest.mark.parametrize("name", ["../x", "../../x", "a/../../x", "./../x"])
 def test_results_stay_in_their_folder(bench, command, name):
@@ -96,6 +97,7 @@ def test_results_stay_in_their_folder(bench, command, name):
     assert not list(bench.project.directory.parent.glob("**/x.*"))
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("command", ["history export '{}.csv'", "chart export 'c' '{}.png'"])
 @pytest.mark.parametrize("name", ["x", "more/and/x", "a/../x", "{folder}/elsewhere/x"])
 def test_folders_of_results_are_made(bench, command, name):

@@ -92,6 +92,7 @@ def test_refusals(desk, second, line, message):
     assert not desk.project.in_use
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize(("second", "joints"), [("(2,0) (4,1) cells 4 3", 4), ("(2,0.25) (4,1.25) cells 4 2", 3)])
 @pytest.mark.parametrize("kind", ["tri", "quad"])
 def test_edges_of_other_lengths(desk, second, joints, kind):

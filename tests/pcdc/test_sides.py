@@ -40,6 +40,7 @@ def dim_of(kind: str) -> int:
     return 3 if kind in ("tet", "hex") else 2
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", MESHES)
 @pytest.mark.parametrize("said_by", ["face-of", "group of nodes", "elements", "before the joint"])
 def test_a_joint_opens_between_two_groups(tmp_path: Path, kind: str, said_by: str):

@@ -144,6 +144,7 @@ def leaking(dim: int, modulus: float) -> tuple[Blocks, Flow, Proppant]:
     return sim, flow, proppant
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("modulus", [1e7, 1e9])
 def test_a_fracture_closes_on_its_pack(dim: int, modulus: float) -> None:

@@ -52,6 +52,7 @@ def case(tmp_path: Path) -> Case:
     return Case(Bed(4), x, r - 1.0, r, pushed=True, cores=2)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_tiny_bed_on_one_and_two_ranks(cache, tmp_path):
     """The whole way: bed, ranks, lines, table. All layouts end with the same bits."""

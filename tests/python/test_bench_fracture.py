@@ -17,6 +17,7 @@ from bench.launch import Layout
 from bench.tables import Lines
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_small_fracture_and_its_stages(tmp_path):
     file = tmp_path / "lines.json"

@@ -37,6 +37,7 @@ def row_of_discs(folder: Path, threads: int = 1, conductance: float = 3.0, capac
     return sim
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize(("conductance", "capacity", "q"), [(3.0, 2.0, 1), (3.0, 2.0, 5), (1.0, 2.0, 1), (3.0, 5.0, 1)])
 def test_modes_of_a_row_decay_as_computed(tmp_path, threads, conductance, capacity, q):

@@ -32,6 +32,7 @@ def soak(folder: Path, *words: str, timeout: float = 120.0) -> tuple[int, str, l
     return done.returncode, done.stderr, [json.loads(row) for row in lines.read_text().splitlines()]
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_two_thousand_steps(tmp_path: Path) -> None:
     """Everything has happened, momentum is in balance, files do not pile up."""

@@ -618,11 +618,11 @@ def it_settles(found: Found) -> None:
 
 
 MODELS = {
-    "swinging": Model(swinging, result, it_swings, dig_and_fill, steps=1000, middle=401, come=10),
+    "swinging": Model(swinging, result, it_swings, dig_and_fill, steps=1000, middle=401, come=10, slow=True),
     "soil that swings": Model(yielding, flow, it_flows, dig_soil, steps=1000, middle=401, come=10),
     "salt bar": Model(creeping, crept, it_creeps, creep_more, steps=1000, middle=401),
     "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
-    "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10),
+    "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10, slow=True),
     "hexahedra that shatter": Model(
         shattering_hexes, in_pieces_that_creep, hexes_shatter, dig_beam_of_hexes, steps=900, middle=501, come=10
     ),
@@ -631,7 +631,9 @@ MODELS = {
     "soil that gets warm": Model(
         warm_soil, warm_and_flowing, it_is_warm, dig_soil, steps=1000, middle=401, come=10, slow=True
     ),
-    "hexahedra": Model(damped_blocks_of_hexes, touching, it_hits, dig_hexes_and_fill, steps=900, middle=401, come=10),
+    "hexahedra": Model(
+        damped_blocks_of_hexes, touching, it_hits, dig_hexes_and_fill, steps=900, middle=401, come=10, slow=True
+    ),
     "hexahedra that flow": Model(
         hexes_that_flow, flow_and_creep, they_flow_and_creep, dig_hexes_that_flow, steps=900, middle=401, come=10
     ),

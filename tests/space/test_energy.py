@@ -20,6 +20,7 @@ def run(sim: Blocks, until: float) -> dict[str, float]:
     return diagnostics.energies(sim)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("mesh", [box((40, 1, 1), (4.0, 0.1, 0.1), 12), hexes((40, 1, 1), (4.0, 0.1, 0.1))])
 @pytest.mark.parametrize("damped", [False, True])
 def test_a_bar_that_is_hit(mesh, damped: bool) -> None:

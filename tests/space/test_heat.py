@@ -403,6 +403,7 @@ def heated(law: str, held: str, warmer: float = 50.0, dynamic: bool = False, of:
     return sim, mesh
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("of, held", [*((box, held) for held in ("", "x", "xy", "xyz")), (hexes, ""), (hexes, "x")])
 def test_thermal_stress(law: str, of: Any, held: str) -> None:

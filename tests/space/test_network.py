@@ -83,7 +83,7 @@ def test_rock_breaks_beside_the_network(alone: Path) -> None:
     assert len({row["step"] for row in rows}) > 5
 
 
-@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.slow), pytest.param(4, marks=pytest.mark.slow)])
 def test_the_whole_run_on_several_ranks(alone: Path, tmp_path: Path, ranks: int, needs_parallel_hdf5: None) -> None:
     start(tmp_path, SCRIPT, ranks)
     same(alone, tmp_path)

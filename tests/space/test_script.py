@@ -61,8 +61,9 @@ def test_it_yields_and_creeps(alone: Path) -> None:
         assert any(found[f"VTKHDF/CellData/{name}"])
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [2, 4])
 def test_the_same_files_on_several_ranks(alone: Path, tmp_path: Path, ranks: int) -> None:
     """The whole run, and its second half gone on with on other ranks."""
     other = run(tmp_path / "many", ranks, BEGIN + END)

@@ -78,8 +78,9 @@ def test_it_gets_warm_and_cracks(alone: Path) -> None:
     assert list((alone / "data").glob("heat_*.png"))
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [2, 4])
 def test_the_same_on_several_ranks(alone: Path, tmp_path: Path, ranks: int) -> None:
     """The whole run, and its second half gone on with on other ranks: every bit until implicit steps, then 1e-9."""
     other = run(tmp_path / "many", ranks, BEGIN + END)

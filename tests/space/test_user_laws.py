@@ -39,6 +39,7 @@ def everything(sim: Blocks) -> np.ndarray:
     return np.concatenate([*moves, *stresses(sim)])
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("dynamic", [True, False], ids=["motion", "relaxation"])
 @pytest.mark.parametrize("part", [1.0, 0.4], ids=["all", "some"])
 @BOTH

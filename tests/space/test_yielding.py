@@ -146,6 +146,7 @@ def test_what_may_be_outside(name: str) -> None:
     assert least < 1e-3
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("large", [False, True])
 @pytest.mark.parametrize("threads", [1, 3])
 def test_flow_as_the_plain_loop(large: bool, threads: int) -> None:
@@ -236,6 +237,7 @@ def loaded(sim: Blocks, turn: np.ndarray, strain: tuple[float, float, float], pa
         deform(sim, turn @ np.diag(1.0 + np.array(strain) * k / parts) @ turn.T)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("turned", list(AXES))
 @pytest.mark.parametrize("parts", [1, 20])
 @pytest.mark.parametrize("mesh", ["tetrahedron", "cube", "hexahedra"])
@@ -265,6 +267,7 @@ def test_uniaxial_strain(turned: str, parts: int, mesh: str, dilation: float) ->
             assert done == pytest.approx(work * volume, rel=1e-9)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("turned", list(AXES))
 @pytest.mark.parametrize("mesh", ["tetrahedron", "cube", "hexahedra"])
 @pytest.mark.parametrize("parts", [1, 10])

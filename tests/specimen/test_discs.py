@@ -47,6 +47,7 @@ def cases() -> list:
     ]
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("gap", [0.01, GAP, 0.1])
 @pytest.mark.parametrize("name, outlines, most", cases(), ids=[case[0] for case in cases()])
 def test_discs(name: str, outlines, most: int, gap: float) -> None:

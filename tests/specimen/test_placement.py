@@ -53,6 +53,7 @@ def test_box() -> None:
     assert made.counts.tolist() == [17, 28, 37, 598, 3320]
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("shape", KINDS)
 @pytest.mark.parametrize("number", [1000, 4000])
 def test_cells(shape: str, number: int) -> None:
@@ -152,6 +153,7 @@ def test_width_given(shape: str) -> None:
     assert 600e-6 / made.area.sum() - 1.0 == pytest.approx(0.5, abs=0.03)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("shape", KINDS)
 @pytest.mark.parametrize("curve", [EXAMPLE, WINDOW])
 def test_grading_by_true_areas(curve: tuple, shape: str) -> None:

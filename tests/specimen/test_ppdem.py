@@ -38,6 +38,7 @@ def test_sample() -> None:
     assert round_.area == pytest.approx(math.pi / 4 * round_.size**2, rel=1e-6)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("layout", ["sample", "full"])
 @pytest.mark.parametrize("shape", KINDS)
 def test_written_and_read_back(tmp_path: Path, shape: str, layout: str) -> None:

@@ -99,6 +99,7 @@ def test_wedge_of_the_last_frame(folder: Path) -> None:
     assert flat["height[m]"] == "" and flat["note"].startswith("no wedge yet: the surface is flat") and not row["note"]
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["vtkhdf", "dat"])
 @pytest.mark.parametrize(("fix", "counts"), [(3, False), (7, False), (1, True), (0, True)])
 def test_rows_that_stand_for_walls_are_no_surface(

@@ -134,6 +134,7 @@ def test_each_pixel_shows_the_nearest_face():
     assert (found.row == expected).mean() > 0.9995 and len(np.unique(expected)) > 20
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("eye", ["-y", "+x", "iso", "0.2,-1,0.4"])
 @pytest.mark.parametrize("section", ["", "1.9,1.4,0.9,1,-1,1"])
 def test_a_pixel_tells_the_element_that_is_there(tmp_path: Path, eye: str, section: str):

@@ -119,8 +119,8 @@ def _logical(lines: list[str], number: int, words: str) -> tuple[int, str]:
 
 def _goes_on(words: str) -> int | None:
     """Place of the backslash, or the three dots, that end the line, if they stand outside of texts and comments."""
-    at = 0
-    while at < len(words):
+    at, last = 0, len(words.rstrip())
+    while at < last:
         char = words[at]
         if char == "#":
             return None
@@ -129,7 +129,7 @@ def _goes_on(words: str) -> int | None:
             if end < 0:
                 return None
             at = end
-        elif words[at:].rstrip() in ("\\", "..."):
+        elif last - at in (1, 3) and words[at:last] in ("\\", "..."):
             return at
         at += 1
     return None

@@ -102,6 +102,7 @@ def test_servo_reaches_an_isotropic_stress(launch: Launcher, tmp_path: Path) -> 
     assert float(told["sides"][0]) == pytest.approx(200.0, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_servo_is_the_same_on_two_ranks(launch: Launcher, tmp_path: Path) -> None:
     """Wall forces are exact sums, so the feedback does not depend on ranks: the same bits after all of it."""

@@ -101,6 +101,7 @@ def test_unlike_spheres(tmp_path):
     assert pair(sim).fn == pytest.approx(-exact.E * math.pi * rt**2 / 140.0, rel=1e-10)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 @pytest.mark.parametrize("u", [0.2, 1.0, 3.0])
 def test_v20_shear_of_a_pressed_pair(tmp_path, u, sense):

@@ -281,6 +281,7 @@ def cluster(folder, hertz: bool, kind: str, damp: float = 0.0, **more):
     return stored_energy(sim) / before, budget(sim).closing / before, sim.log._stream.getvalue()
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["elastic", "contact"])
 @pytest.mark.parametrize("hertz", [False, True])
 def test_conserving_bonds_make_no_energy(tmp_path, hertz, kind):

@@ -56,6 +56,7 @@ def biaxial(launch: Launcher, ranks: int, folder: Path) -> str:
     return "\n".join(re.findall(r"(?:s3 \d+ MPa: peak|friction angle) [^\r\n]*", done.stdout))
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_short_biaxial_is_the_same_on_two_ranks(launch: Launcher, tmp_path: Path) -> None:
     """Peaks and last state of a small, quick press, with its servo and its restored specimen."""

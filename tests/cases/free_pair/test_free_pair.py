@@ -30,6 +30,7 @@ def momenta(sim) -> tuple[float, float, float]:
     return px, py, angular
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("law", [LINEAR, HERTZ], ids=["linear", "hertz"])
 @pytest.mark.parametrize("disk", ["on", "off", "hex"])
 @pytest.mark.parametrize("mu", [0.1, 0.8])

@@ -19,6 +19,7 @@ THICK = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_short_fracture_on_a_coarse_mesh(launch, tmp_path):
     """Three process zones long: 10 % of length, 3 % of opening, 6 % of pressure. On two ranks the same to 1e-9."""

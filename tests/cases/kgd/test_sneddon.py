@@ -133,6 +133,7 @@ def opened(launch, folder, cells: int, penalty: float, ranks: int = 1, everywher
     return json.loads((folder / "found.json").read_text())
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_the_opening_converges_with_the_mesh(launch, tmp_path):
     """Of first order: errors of the opening fall by 1.6 and 0.9 % from 10 to 20 to 40 joints, to some -1.2 % that held

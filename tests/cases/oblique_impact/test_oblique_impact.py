@@ -13,6 +13,7 @@ from tests.cases.oblique_impact import exact
 from tests.support import body, model, steps, value, velocity
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("disk", ["on", "off", "hex"])
 @pytest.mark.parametrize("slope", [0.0, 0.5, 2.0])
 def test_v14_gross_slip(tmp_path, disk, slope):

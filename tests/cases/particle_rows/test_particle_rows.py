@@ -48,6 +48,7 @@ def test_an_inclined_row(tmp_path):
     assert centres == pytest.approx(p1 + 20.0 * np.arange(26)[:, None] * e, abs=1e-10)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("angle", [0.0, 30.0, 90.0, 137.0])
 @pytest.mark.parametrize(("rext", "neighbours"), [(0.4, 1), (1.0, 2)])
 def test_v23_only_nearest_neighbours_are_bonded(tmp_path, angle, rext, neighbours):

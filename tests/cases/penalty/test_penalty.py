@@ -89,6 +89,7 @@ def strains(sim: Blocks) -> tuple[float, float]:
     return float(np.mean(along)), float(np.mean(across))
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", exact.FACTORS)
 @pytest.mark.parametrize(
     ("times", "sense"), [(1.0, 1.0), (10.0, 1.0), (10.0, -1.0), pytest.param(100.0, 1.0, marks=pytest.mark.slow)]

@@ -58,6 +58,7 @@ def test_a_drop_on_a_wall_with_the_law_of_hertz(tmp_path, e):
     assert crossing(3e-6 * np.arange(len(u)), u) == pytest.approx(duration, rel=0.01)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("hertz", [False, True])
 @pytest.mark.parametrize("fixed", [False, True])
 def test_two_discs(tmp_path, hertz, fixed):

@@ -64,6 +64,7 @@ def test_v15_at_rest(tmp_path, angle, mu):
         assert here[-1] == pytest.approx(exact.GRAVITY * math.sin(angle) / W**2, rel=0.005)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize(("disk", "ratio", "limit"), [("on", 0.5, 3.0), ("off", 0.4, 3.5)])
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
 def test_v16_rolling(tmp_path, disk, ratio, limit, share):

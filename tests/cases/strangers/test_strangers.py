@@ -16,6 +16,7 @@ import pytest
 
 from tests.conftest import ROOT
 
+pytestmark = pytest.mark.slow
 FOLDER = Path(os.environ.get("HPCDEM_STRANGERS", ROOT.parent / "shared" / "cases_turn3"))
 Run = Callable[..., str]
 

@@ -30,6 +30,7 @@ def test_pressure_around_a_hole_in_the_documented_mesh(launch, tmp_path):
     assert done.error < 0.01 and done.imbalance < 1e-6
 
 
+@pytest.mark.slow
 def test_levels_in_a_dam(launch, tmp_path):
     """9.11 in the documented mesh: levels within 4 % of Dupuit's up to x = 12 m, discharge within 3 % of Charny's."""
     done = results(launch, tmp_path, DamSeepage())
@@ -70,6 +71,7 @@ def test_uplift_in_the_documented_mesh(launch, tmp_path):
     assert curtain.discharge == pytest.approx(curtain.exact_discharge, rel=0.04)
 
 
+@pytest.mark.slow
 def test_a_fault_slips_when_coulomb_says_so(launch, tmp_path):
     done = results(launch, tmp_path, FaultInjection(size=4.0, coarse=40.0, duration=40.0, shut_in=4.0, steps=8000))
     print({name: value for name, value in vars(done).items() if name != "curve"})
@@ -80,6 +82,7 @@ def test_a_fault_slips_when_coulomb_says_so(launch, tmp_path):
     assert done.injected > 0.0 and done.account < 1e-10
 
 
+@pytest.mark.slow
 def test_a_fault_that_does_not_slip_says_so(launch, tmp_path):
     done = results(
         launch, tmp_path, FaultInjection(size=4.0, coarse=40.0, duration=2.0, shut_in=0.5, steps=1000),

@@ -329,6 +329,7 @@ PARTS = {
 }
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("name", PARTS)
 @pytest.mark.parametrize("split", [True, False])
 def test_small_blocks_on_parts_of_large_faces_in_space(desk, name, split):

@@ -39,6 +39,7 @@ def pushed(desk: Desk) -> tuple[np.ndarray, np.ndarray]:
     return at, force
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("tri", [True, False])
 @pytest.mark.parametrize("level", [4.0, 4.3, 9.0, 12.0])
 @pytest.mark.parametrize("n", ["9 9", "2 7"])
@@ -94,6 +95,7 @@ def test_beside_an_excavation(desk):
     assert force[np.abs(at[:, 0]) < 1e-12, 0].sum() == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("tri", [True, False])
 @pytest.mark.parametrize("level", [3.0, 2.6])
 def test_in_space(desk, level, tri):
