@@ -10,6 +10,7 @@ import numpy as np
 from hpcdem.commands.fdem import frames, histories
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.histories import find
+from hpcdem.commands.fdem.needed import needed
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import Chart, Curve
 from hpcdem.commands.fdem.values import figure_name
@@ -71,8 +72,8 @@ def _profile(project: Project, name: str, where: Range | None) -> list[tuple[flo
     s = np.append(0.0, np.cumsum(np.hypot(*np.diff(at[points], axis=0).T)))
     if name == "temperature" and name not in flow.more:
         raise CommandError("the fluid has no heat: face-joint c-model thermal-fluid comes first")
-    if name == "concentration" and name not in flow.more:
-        raise CommandError("there is no proppant: face-joint c-model hydraulic-porous-proppant-medium comes first")
+    if name == "concentration":
+        needed(project, Proppant)
     if name in ("pressure", "saturation", "temperature", "concentration"):
         values = _by_number(flow.values(FLOW_NODE, name, np.sort(points)), points)
     else:
@@ -100,12 +101,9 @@ def export(
     beside = [panel for panel in ("cracks" * cracks, "plastic" * plastic, "temperature" * temperature, fluid) if panel]
     if len(beside) > 1:
         raise CommandError("cracks, plastic, temperature and fluid: beside a diagram there is room for one of them")
-    if temperature and Heat.there(project.ready(use=False)) is None:
-        raise CommandError("there is no heat: element c-model thermal-iso-heat comes first")
-    if fluid and Flow.there(project.ready(use=False)) is None:
-        raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
-    if fluid == "concentration" and Proppant.there(project.ready(use=False)) is None:
-        raise CommandError("there is no proppant: face-joint c-model hydraulic-porous-proppant-medium comes first")
+    for asked, physics in ((temperature, Heat), (fluid, Flow), (fluid == "concentration", Proppant)):
+        if asked:
+            needed(project, physics, use=False)
     curves = [(curve.label, curve.style, _points(project, curve)) for curve in chart.curves]
     if not any(points for _, _, points in curves):
         raise CommandError(f"chart '{name}' has no points yet")

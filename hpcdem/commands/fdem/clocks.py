@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.commands.fdem import flow, settings
+from hpcdem.commands.fdem.needed import needed
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.flow.model import Flow
@@ -86,16 +87,9 @@ def _set_clock(project: Project, part: str, time: float) -> None:
 
 def _physics(project: Project, part: str) -> Any:
     """Whose clock it is; CommandError if it is not there."""
-    blocks = project.ready(use=False)
-    found = Heat.there(blocks) if part == THERMAL else Flow.there(blocks)
-    if found is None or (part == PROPPANT and Proppant.there(blocks) is None):
-        lacking = {
-            THERMAL: "heat yet: element c-model thermal-iso-heat",
-            HYDRAULIC: "fluid yet: face-joint c-model hydraulic-porous-medium",
-            PROPPANT: "proppant yet: face-joint c-model hydraulic-porous-proppant-medium",
-        }[part]
-        raise CommandError(f"there is no {lacking} comes first")
-    return found
+    if part == PROPPANT:
+        needed(project, Proppant, use=False)
+    return needed(project, Heat if part == THERMAL else Flow, use=False)
 
 
 def time(project: Project, part: str) -> float:

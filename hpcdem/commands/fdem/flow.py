@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from hpcdem.commands.fdem import assignments
 from hpcdem.commands.fdem.choices import chosen, points
 from hpcdem.commands.fdem.heat import assign
-from hpcdem.commands.fdem.heat import of_heat as heat_of
+from hpcdem.commands.fdem.needed import needed
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import JOINT, Range
@@ -18,6 +18,7 @@ from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow import wells as w
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.properties import POROUS
+from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.heat.properties import FLUID_HEAT
 from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant, checked
 from hpcdem.physics.proppant.properties import PROPPANT, split
@@ -43,13 +44,6 @@ def with_proppant(project: Project, properties: Mapping[str, Value], where: Rang
     Proppant.of(project.ready()).assign(joints, grains)
 
 
-def _proppant(project: Project) -> Proppant:
-    found = Proppant.there(project.ready())
-    if found is None:
-        raise CommandError("there is no proppant: face-joint c-model hydraulic-porous-proppant-medium comes first")
-    return found
-
-
 def proppant_condition(
     project: Project,
     proppant_volumetric_concentration: Number | None = None,
@@ -65,7 +59,7 @@ def proppant_condition(
             "proppant that comes in at a flow node has one of proppant-volumetric-concentration, "
             "proppant-volumetric-flow-rate"
         )
-    proppant = _proppant(project)
+    proppant = needed(project, Proppant)
     kind, value = assignments.from_now(project, proppant.time, said).popitem()
     proppant.prescribe(points(project, where), kind, value)
 
@@ -78,22 +72,15 @@ def joint_property(project: Project, properties: Mapping[str, Value], where: Ran
     of_grains = {name: value for name, value in properties.items() if PROPPANT.has(name)}
     others = {name: value for name, value in properties.items() if name not in of_fluid | of_heat | of_grains}
     if of_fluid:
-        _flow(project).adjust(chosen(project, JOINT, where), of_fluid)
+        needed(project, Flow).adjust(chosen(project, JOINT, where), of_fluid)
     if of_heat:
-        heat_of(project).of_fluid().adjust(chosen(project, JOINT, where), of_heat)
+        needed(project, Heat).of_fluid().adjust(chosen(project, JOINT, where), of_heat)
     if of_grains:
         if where is not None:
             raise CommandError("there is one proppant in all channels: its properties are changed without a range")
-        _proppant(project).adjust(of_grains)
+        needed(project, Proppant).adjust(of_grains)
     if others:
         assignments.joint_property(project, others, where)
-
-
-def _flow(project: Project) -> Flow:
-    found = Flow.there(project.ready())
-    if found is None:
-        raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
-    return found
 
 
 def condition(
@@ -111,7 +98,7 @@ def condition(
     said = {name: value for name, value in given.items() if value is not None}
     if len(said) != 1:
         raise CommandError(f"a flow node has one of {', '.join(given)}, got {' and '.join(said) or 'none'}")
-    flow = _flow(project)
+    flow = needed(project, Flow)
     name, value = assignments.from_now(project, flow.time, said).popitem()
     flow.prescribe(points(project, where), _DOES[name], value)
 
@@ -145,16 +132,16 @@ def initial(
     """Fluid that flow nodes hold now: its pressure [Pa], or the part of their room that is filled; concentration of
     proppant in it."""
     nodes = points(project, where)
-    grains = None if concentration is None else _proppant(project)
+    grains = None if concentration is None else needed(project, Proppant)
     if (pressure, saturation) != (None, None) or grains is None:
-        _flow(project).fill(nodes, pressure, saturation)
+        needed(project, Flow).fill(nodes, pressure, saturation)
     if grains is not None and concentration is not None:
         grains.fill(nodes, concentration)
 
 
 def well(project: Project, name: str, where: Range | None = None) -> None:
     """Flow nodes are a well, see physics/flow/wells.py."""
-    _flow(project).drill(name, points(project, where))
+    needed(project, Flow).drill(name, points(project, where))
 
 
 def stage(
@@ -172,9 +159,9 @@ def stage(
     said = {does: value for does, value in given.items() if value is not None}
     if len(said) != 1:
         raise CommandError(f"a stage of a well is one of rate, pressure, shut_in, got {' and '.join(said) or 'none'}")
-    does, value = assignments.from_now(project, _flow(project).time, said).popitem()
+    does, value = assignments.from_now(project, needed(project, Flow).time, said).popitem()
     duration, most = (math.inf if one is None else one for one in (time, limit))
-    _flow(project).stage(name, does, value, duration, most)
+    needed(project, Flow).stage(name, does, value, duration, most)
 
 
 def sub_step(

@@ -9,6 +9,7 @@ import numpy as np
 
 from hpcdem.commands.fdem import assignments
 from hpcdem.commands.fdem.choices import chosen, points
+from hpcdem.commands.fdem.needed import needed
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, OnBoundary, Range
@@ -48,7 +49,7 @@ def element_property(project: Project, properties: Mapping[str, Value], where: R
     thermal = {name: value for name, value in properties.items() if ISO_HEAT.has(name)}
     others = {name: value for name, value in properties.items() if name not in thermal}
     if thermal:
-        of_heat(project).adjust(chosen(project, ELEMENT, where), thermal)
+        needed(project, Heat).adjust(chosen(project, ELEMENT, where), thermal)
     for kind in kinds().values():
         mine = {name: value for name, value in others.items() if kind.model.has(name)}
         others = {name: value for name, value in others.items() if name not in mine}
@@ -63,33 +64,25 @@ def element_property(project: Project, properties: Mapping[str, Value], where: R
 
 def fluid_model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """The fluid of channels has heat, with these properties; without a range that of all channels."""
-    of_heat(project).of_fluid().assign(chosen(project, JOINT, where), properties)
-
-
-def of_heat(project: Project) -> Heat:
-    """The heat of the model; CommandError without one."""
-    found = Heat.there(project.ready())
-    if found is None:
-        raise CommandError("there is no heat yet: element c-model thermal-iso-heat comes first")
-    return found
+    needed(project, Heat).of_fluid().assign(chosen(project, JOINT, where), properties)
 
 
 def condition(project: Project, temperature: Number, where: Range | None = None) -> None:
     """Temperature of nodes."""
-    heat = of_heat(project)
+    heat = needed(project, Heat)
     heat.prescribe(points(project, where), **assignments.from_now(project, heat.time, {"value": temperature}))
 
 
 def fluid_condition(project: Project, temperature: Number, where: Range | None = None) -> None:
     """Temperature of the fluid at flow nodes."""
-    heat = of_heat(project)
+    heat = needed(project, Heat)
     given = assignments.from_now(project, heat.time, {"temperature": temperature})
     heat.prescribe_fluid(points(project, where), **given)
 
 
 def initial_fluid(project: Project, temperature: float, where: Range | None = None) -> None:
     """Temperature of the fluid at flow nodes now."""
-    of_heat(project).of_fluid().initial(project.blocks.numbers_of_nodes(points(project, where)), temperature)
+    needed(project, Heat).of_fluid().initial(project.blocks.numbers_of_nodes(points(project, where)), temperature)
 
 
 def face_condition(
@@ -105,7 +98,7 @@ def face_condition(
     said = {name: value for name, value in given.items() if value is not None}
     if not said:
         raise CommandError("heat through faces is one of heat_flux, transfer_coeficient, environment_temperature")
-    heat = of_heat(project)
+    heat = needed(project, Heat)
     faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
     heat.expose(faces, **assignments.from_now(project, heat.time, said))
 
@@ -126,4 +119,4 @@ def remove_face_conditions(project: Project, where: Range | None = None) -> None
 
 def initial(project: Project, temperature: float, where: Range | None = None) -> None:
     """Temperature of nodes now, and of the fluid at them; elements around them are free of thermal stress."""
-    of_heat(project).initial(points(project, where), temperature)
+    needed(project, Heat).initial(points(project, where), temperature)

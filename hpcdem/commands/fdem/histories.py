@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hpcdem.commands.fdem.choices import chosen, everything, places
+from hpcdem.commands.fdem.needed import needed
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES, LAW_STATE, MODEL, UNITS, WELL, History
 from hpcdem.commands.fdem.values import history_name, result_name
@@ -60,10 +61,7 @@ def create(
     if (kind == WELL) != bool(well):
         raise CommandError("object well and well, its name, go together")
     if well:
-        flow = Flow.there(project.ready())
-        if flow is None:
-            raise CommandError(f"there is no well '{well}': there are no channels yet")
-        flow.well(well)
+        needed(project, Flow).well(well)
     numbers: list[int] = []
     if kind not in (MODEL, WELL):
         if ident is not None:

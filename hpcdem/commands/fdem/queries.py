@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from hpcdem.commands.fdem.choices import everything
+from hpcdem.commands.fdem.needed import needed
 from hpcdem.commands.fdem.project import Project
-from hpcdem.core.errors import CommandError
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, sides
 from hpcdem.physics.fdem.groups import FLOW, NODE, SUPPORTS, Range
@@ -71,34 +71,22 @@ def wet_faces(project: Project) -> dict[str, np.ndarray]:
 
 def fluid(project: Project) -> dict[str, float]:
     """The account of the fluid [m2], see `Flow.account`. Collective."""
-    found = Flow.there(project.ready(use=False))
-    if found is None:
-        raise CommandError("there is no fluid: face-joint c-model hydraulic-porous-medium comes first")
-    return found.account()
+    return needed(project, Flow, use=False).account()
 
 
 def fluid_energies(project: Project) -> dict[str, float]:
     """Of blocks and fluid in implicit steps [J/m], see `Flow.energies`. Collective."""
-    found = Flow.there(project.ready(use=False))
-    if found is None:
-        raise CommandError("there is no fluid: face-joint c-model hydraulic-porous-medium comes first")
-    return found.energies()
+    return needed(project, Flow, use=False).energies()
 
 
 def proppant(project: Project) -> dict[str, float]:
     """The account of proppant [m2], see `Proppant.account`. Collective."""
-    found = Proppant.there(project.ready(use=False))
-    if found is None:
-        raise CommandError("there is no proppant: face-joint c-model hydraulic-porous-proppant-medium comes first")
-    return found.account()
+    return needed(project, Proppant, use=False).account()
 
 
 def heat(project: Project) -> dict[str, float]:
     """The account of heat [J/m], see `Heat.account`. Collective."""
-    found = Heat.there(project.ready(use=False))
-    if found is None:
-        raise CommandError("there is no heat: element c-model thermal-iso-heat comes first")
-    return found.account()
+    return needed(project, Heat, use=False).account()
 
 
 def energies(project: Project) -> dict[str, float]:

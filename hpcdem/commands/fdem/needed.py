@@ -1,0 +1,27 @@
+"""A physics of blocks that a command needs."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.proppant.model import Proppant
+
+LACKS: dict[type[SurfaceLoad], str] = {
+    Flow: "there are no channels yet: face-joint c-model hydraulic-porous-medium comes first",
+    Heat: "there is no heat yet: element c-model thermal-iso-heat comes first",
+    Proppant: "there is no proppant yet: face-joint c-model hydraulic-porous-proppant-medium comes first",
+}
+_P = TypeVar("_P", bound=SurfaceLoad)
+
+
+def needed(project: Project, physics: type[_P], use: bool = True) -> _P:
+    """That of the model; CommandError without one. use: see `Project.ready`."""
+    found = physics.there(project.ready(use=use))
+    if found is None:
+        raise CommandError(LACKS[physics])
+    return found
