@@ -1,5 +1,4 @@
-"""Tetrahedra and hexahedra that creep after Burgers: closed forms of creep and relaxation, the plain step, restarts,
-refusals.
+"""Tetrahedra and hexahedra that creep after Burgers: closed forms of creep and relaxation, restarts, refusals.
 
 J(t) and what it becomes in the Laplace domain: see tests/blocks/test_creep.py."""
 
@@ -16,8 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, reference, saved_state
-from hpcdem.physics.fdem.kernels import creep_tets
+from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_state
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.test_creep import LOAD, ROCK, SALT, after_step, compliance, transform
@@ -143,53 +141,6 @@ def test_relaxation_at_fixed_strain(turned: bool, make: Callable[..., Mesh]) -> 
         mean = np.trace(before, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
         errors.append(np.abs(matrices(sim) - (mean + left * (before - mean))).max() / np.abs(before).max())
     assert left < 0.7 and errors[0] < 1e-3 and 80.0 < errors[0] / errors[1] < 120.0
-
-
-def test_a_creep_step_is_the_plain_one() -> None:
-    """Of random elements, strains, turns and memories: reference.burgers_step; in one part and in three, and a look at
-    it (keep) changes nothing."""
-    rng, n = np.random.default_rng(4), 23
-    sim = body()
-    held(sim, Rotation.random(random_state=2).as_matrix() @ (np.eye(3) + rng.uniform(-1e-3, 1e-3, (3, 3))))
-    local = sim.local
-    who = np.arange(0, 2 * n, 2)
-    memory = rng.uniform(-1e-4, 1e-4, (sim.n_own, creep_tets.MEMORY))
-    memory[:, creep_tets.BEFORE] *= 1e11
-    memory[:, 9] = 0.0
-    base = rng.uniform(-1e6, 1e6, (local.count, 8))
-    law = np.array([[5e9, 1e-14, 1e-16], [0.0, 0.0, 2e-16], [8e9, 1e-13, 0.0]])
-    row = rng.integers(0, 3, local.count + 3).astype(np.int32)
-    found = []
-    for threads, keep in ((1, True), (3, True), (1, False)):
-        mine, s0 = memory.copy(), np.zeros((local.count + 3, 8))
-        creep_tets.creep.py_func(
-            threads, who, local.rows, sim.n_left, sim.x, local.c, base, row, law, False, 1e4, keep, mine, s0
-        )
-        found.append((mine, s0))
-    assert all(np.array_equal(a, b) for a, b in zip(found[0], found[1]))
-    assert np.array_equal(found[2][0], memory) and np.array_equal(found[2][1], found[0][1])
-
-    def tensor(components: np.ndarray) -> np.ndarray:
-        a, b, c, d, e = components
-        return np.array([[a, c, d], [c, b, e], [d, e, -a - b]])
-
-    for i in who:
-        at = sim.mesh.cells[sim.number[i]]
-        corners = sim.x[i].reshape(4, 4)[:, :3]
-        strain = reference.deformation(sim.mesh.points[at], corners, np.zeros((4, 3)), False).strain
-        xx, yy, xy, zz, xz, yz = base[i, :6]
-        initial = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        parts = (tensor(memory[i, list(k)]) for k in (creep_tets.CREPT, creep_tets.IN_KELVIN, creep_tets.BEFORE))
-        stress, crept_, kelvin, lost = reference.burgers_step(
-            strain, initial, *parts, 1e4, local.c[i, creep_tets.TWO_MU], *law[row[i]]
-        )
-        mine, s0 = found[0][0][i], found[0][1][i]
-        assert tensor(mine[list(creep_tets.CREPT)]) == pytest.approx(crept_, abs=1e-15)
-        assert tensor(mine[list(creep_tets.IN_KELVIN)]) == pytest.approx(kelvin, abs=1e-15)
-        assert tensor(mine[list(creep_tets.BEFORE)]) == pytest.approx(stress, abs=1e-3)
-        assert mine[9] == pytest.approx(lost * sim.areas[sim.number[i]], rel=1e-9)
-        relieved = initial - local.c[i, creep_tets.TWO_MU] * crept_
-        assert s0[:6] == pytest.approx(relieved[[0, 1, 0, 2, 0, 1], [0, 1, 1, 2, 2, 2]], abs=1e-3)
 
 
 @pytest.mark.parametrize("component", ["xx", "yy", "xy", "xz", "yz"])

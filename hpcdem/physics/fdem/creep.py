@@ -16,9 +16,9 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.definition import finite
 from hpcdem.physics.fdem.kernels import creep as kernels
-from hpcdem.physics.fdem.kernels import creep_tets as space
 from hpcdem.physics.fdem.kernels import elements
 from hpcdem.physics.fdem.kernels import nodes as moving
+from hpcdem.physics.fdem.properties import KELVIN_STRAIN
 from hpcdem.physics.fdem.structures import Structure
 
 if TYPE_CHECKING:
@@ -28,8 +28,6 @@ RANGE = 100.0
 """Creep steps that adapt stay within the given one over and times this, unless other bounds are given."""
 FASTEST = 2.0
 """Most by which one creep step differs from the one before."""
-STRESS, STRAIN = (kernels.S11, kernels.S22, kernels.S12), (kernels.K11, kernels.K22, kernels.K12)
-"""In the plane: columns of stress and of strain of the Kelvin unit, of what elements remember."""
 FULL = 1.0 - 1e-9
 """A creep step this near to the end goes there."""
 PER_STEP = ": in static runs nodes move so far per step, not in creep time; in dynamic runs they do"
@@ -105,7 +103,7 @@ def begin(sim: Blocks, end: float) -> None:
     """A creep step begins, which goes to the creep time `end` [s] at most. Collective."""
     clock = sim.creep
     sim.close_model()
-    sim.local.creep(sim.cold["creep"], sim.local.s0, sim.local.quad_s0, keep=True)
+    sim.local.keep_creep()
     left = end - clock.time
     clock.passed = left if left * FULL <= clock.dt else clock.dt
     _warn_of_long_step(sim)
@@ -118,7 +116,7 @@ def finish(sim: Blocks, end: float) -> None:
     if sim.comm.any(bool(local.tally[:, elements.NEW_BROKEN].any())):
         sim._renew_lists()  # joints that broke did so in this creep step
     before = sim.cold["creep"].copy()
-    local.creep(sim.cold["creep"], local.s0, local.quad_s0, keep=True)
+    local.keep_creep()
     whole = end - clock.time <= clock.passed
     done, clock.time = clock.passed, end if whole else clock.time + clock.passed
     clock.passed = 0.0
@@ -134,7 +132,8 @@ def _change(sim: Blocks, before: np.ndarray) -> float:
     that is done, over the largest deviator of all. Equal on all ranks. Collective."""
     local, after = sim.local, sim.cold["creep"]
     found = np.zeros(2)
-    stress, kelvin = map(list, (space.BEFORE, space.IN_KELVIN) if sim.dim == 3 else (STRESS, STRAIN))
+    n = len(KELVIN_STRAIN[sim.dim])
+    stress, kelvin = list(kernels.BEFORE[:n]), list(kernels.IN_KELVIN[:n])
     for (old, law), (new, _) in zip(local.creep_memory(before), local.creep_memory(after)):
         if not len(law):
             continue
@@ -150,8 +149,7 @@ def _change(sim: Blocks, before: np.ndarray) -> float:
 
 def _size(s: np.ndarray) -> np.ndarray:
     """sqrt(s : s) of deviators (n, 3) 11, 22, 12, in space (n, 5) with 13, 23."""
-    shear = s[:, 2] ** 2 if s.shape[1] == 3 else (s[:, 2:] ** 2).sum(axis=1)
-    return np.sqrt(s[:, 0] ** 2 + s[:, 1] ** 2 + (s[:, 0] + s[:, 1]) ** 2 + 2.0 * shear)
+    return np.sqrt(s[:, 0] ** 2 + s[:, 1] ** 2 + (s[:, 0] + s[:, 1]) ** 2 + 2.0 * (s[:, 2:] ** 2).sum(axis=1))
 
 
 def _warn_of_long_step(sim: Blocks) -> None:

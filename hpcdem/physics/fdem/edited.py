@@ -12,7 +12,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import notices
 from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.kernels import elements as element_kernels
-from hpcdem.physics.fdem.kernels.creep_tets import IN_KELVIN
+from hpcdem.physics.fdem.kernels.creep import IN_KELVIN
 from hpcdem.physics.fdem.local import Local
 from hpcdem.physics.fdem.properties import KELVIN_STRAIN, MECH_BURGERS
 from hpcdem.physics.fdem.state import State
@@ -58,7 +58,7 @@ class Edited(State):
         if self.options.dynamic:
             self.close_model()
             if self.local.creeps:
-                self.local.creep(self.cold["creep"], self.local.s0, self.local.quad_s0, keep=True)
+                self.local.keep_creep()
             self.creep.passed = 0.0
 
     def drop_creep_step(self) -> None:

@@ -865,13 +865,7 @@ def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
     local, small, number = sim.local, not sim.options.large_strain, sim.number
     rows, quad_rows = local.triangle_rows[: local.count], local.quad_rows
     triangles, quads = np.empty((len(rows), 6, 6)), np.empty((len(quad_rows), 8, 8))
-    c, s0, q, quad_s0 = local.linear()
-    if local.yields:
-        _, flowed, quads_flowed = local.flowed()
-        if local.creeps:
-            flowed[local.creeping] = s0[local.creeping]
-            quads_flowed[local.creeping_quads] = quad_s0[local.creeping_quads]
-        s0, quad_s0 = flowed, quads_flowed
+    (c, s0), (q, quad_s0) = local.linear()
     stiffness.triangles(rows, sim.x, c, s0, small, triangles)
     stiffness.quads(quad_rows, sim.x, q, quad_s0, small, quads)
     if local.yields and flows:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -149,12 +148,9 @@ class Hexes:
         found[self.rows - self.sim.n_left] = np.arange(self.count)[:, None]
         return found
 
-    def spread(
-        self, stress: np.ndarray, energy: np.ndarray, at: np.ndarray, s0: np.ndarray,
-        more: Callable[[np.ndarray, np.ndarray], None],
-    ) -> None:  # fmt: skip
-        """Put them into those of owned elements, `at` (n,) their indices among these, in any order; energies by volume,
-        to which `more` adds what it finds of some of them."""
+    def spread(self, stress: np.ndarray, energy: np.ndarray, at: np.ndarray, s0: np.ndarray) -> None:
+        """Put them into those of owned elements, `at` (n,) their indices among these, in any order; energies by
+        volume."""
         hex_of = self.numbers()
         here = np.flatnonzero(hex_of[at] >= 0)
         if not len(here):
@@ -163,7 +159,6 @@ class Hexes:
         found, stored = self.stresses(which, s0)
         stress[here] = found[back]
         if len(energy):
-            more(which, stored)
             volume = self.sim.areas[self.sim.number[at[here] + self.sim.n_left]]
             whole = self.sim.areas[self.number[which, None] + np.arange(PARTS)].sum(axis=1)
             energy[here] = stored[back] * volume / whole[back]

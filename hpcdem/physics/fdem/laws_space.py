@@ -1,20 +1,20 @@
-"""Tetrahedra and hexahedra that yield or creep: what `Local` does for the elements of the plane, by plastic_tets.py,
-creep_tets.py, plastic_hexes.py and creep_hexes.py."""
+"""Tetrahedra and hexahedra that yield or obey a law of the user: what `Local` does for the elements of the plane, by
+plastic_tets.py and plastic_hexes.py."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hpcdem.physics.fdem import user_laws
+from hpcdem.physics.fdem.elements.block import ElementBlock
+from hpcdem.physics.fdem.elements.kind import HEXAHEDRON, TETRAHEDRON
 from hpcdem.physics.fdem.hexahedra import PARTS
 from hpcdem.physics.fdem.hexes import Hexes
 from hpcdem.physics.fdem.kernels import (
-    creep_hexes,
-    creep_tets,
     hexes,
     plastic_hexes,
     plastic_tets,
@@ -22,7 +22,7 @@ from hpcdem.physics.fdem.kernels import (
     space,
     tets,
 )
-from hpcdem.physics.fdem.local import Local, creep_table, element_table
+from hpcdem.physics.fdem.local import Local, element_table
 
 NORMAL = [0, 1, 3]
 """Places of xx, yy and zz in a row of stress."""
@@ -60,35 +60,44 @@ class LawsSpace(Local):
         of_hexes = self.hexes
         many = of_hexes.count + 3 if of_hexes is not None and of_hexes.remember else 0
         self.quad_s0 = np.zeros((many, hexes.PARTS, tets.STRESSES))
+        every = np.arange(count)[:, None]
+        self.solids = [
+            ElementBlock(sim, TETRAHEDRON, self.rows, self.c, self.s0, every, np.ones(every.shape)),
+            ElementBlock(sim, HEXAHEDRON, *self._of_hexes()),
+        ]
         self._make_laws()
         if not (self.plastic or self.creeps):
             self._begin_warm()
             return
-        number = sim.number[self.rows[:count]]
+        number, alone = sim.number[self.rows[:count]], np.ones(count, bool)
         self.law = np.zeros(count + 3, np.int32)
         self.law[:count] = sim.element_row[number]
-        self.said, self.uncrept, self.initial = (np.zeros((count, tets.STRESSES)) for _ in range(3))
-        self.quad_said, self.quad_uncrept, self.quad_initial = (np.zeros_like(self.quad_s0) for _ in range(3))
-        yields, creeps, apart = sim.yielding()[number], sim.creeping()[number], np.empty(0, np.int32)
-        self.quad_law, self.creeping_quads = np.zeros((many, hexes.PARTS), np.int32), np.empty(0, np.int64)
+        yields, apart = sim.yielding()[number], np.empty(0, np.int32)
+        self.quad_law = np.zeros((many, hexes.PARTS), np.int32)
         if of_hexes is not None:
             apart = of_hexes.rows[:, 0]
             parts = (apart - sim.n_left)[:, None] + np.arange(PARTS)
             self.law[parts] = 0
             self.quad_law[: len(apart)] = of_hexes.model[:, None]
-            self.creep_law_of_hexes = of_hexes.model.astype(np.int32)
             self.hexes_yield = yields[parts[:, 0]]
-            self.creeping_quads = np.flatnonzero(creeps[parts[:, 0]])
-            yields[parts] = creeps[parts] = False
-        if self.creeps:
-            self.creep_table, self.creep_law = creep_table(sim.element_rows), self.law.copy()
-            self.creeping = np.flatnonzero(creeps)
+            yields[parts] = False
+            alone[parts] = False
+        self._make_creep()
+        self.solids[0].creeping = np.flatnonzero(alone & sim.creeping()[number])
         if self.plastic:
             yielding = np.flatnonzero(yields)
             self.yielding, fill = len(yielding), np.repeat(yielding[-1:], 3)
             self.who_yields = np.concatenate([yielding, fill]).astype(np.int32)
             self._make_strength(self.rows[:count], apart)
         self._begin_warm()
+
+    def _of_hexes(self) -> tuple[np.ndarray, ...]:
+        """Of the block of hexahedra: what `ElementBlock` takes."""
+        if (own := self.hexes) is None:
+            nobody = np.empty((0, PARTS), np.int64)
+            return nobody[:, 0], np.empty((0, hexes.HEX)), self.quad_s0, nobody, np.empty((0, PARTS))
+        stored = own.rows - self.sim.n_left
+        return own.rows[:, 0], own.h, self.quad_s0, stored, own.part_of_volume(), own.place, own.parts
 
     def _make_laws(self) -> None:
         """As in the plane: in the tables of forces elements with a law of the user have no moduli; stiff, stiff_hexes:
@@ -169,18 +178,9 @@ class LawsSpace(Local):
         self._relieve()
         return heat is not None
 
-    def _quad_count(self) -> int:
-        return 0 if self.hexes is None else self.hexes.count
-
-    def _relieve_crept(self, who: np.ndarray, quads: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
-        memory = self.sim.cold["creep"]
-        creep_tets.relieve_all(who, self.rows, self.sim.n_left, self.c, self.uncrept, memory, s0)
-        if self.hexes is not None and len(quads):
-            creep_hexes.relieve_all(quads, self.hexes.begin, self.hexes.h, self.quad_uncrept, memory, quad_s0)
-
-    def _relieve_flowed(self, base: np.ndarray, quad_base: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
-        memory = self.sim.cold["plastic"]
-        plastic_tets.relieve_all(self.rows[: self.count], self.sim.n_left, self.c, base, memory, s0)
+    def _relieve_flowed(self, of: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+        memory, (base, s0), (quad_base, quad_s0) = self.sim.cold["plastic"], *of
+        plastic_tets.relieve_all(self.rows[: self.count], self.sim.n_left, self.c, base[:, 0], memory, s0[:, 0])
         if self.hexes is not None:
             plastic_hexes.relieve_all(self.hexes.count, self.hexes.begin, self.hexes.h, quad_base, memory, quad_s0)
 
@@ -198,7 +198,7 @@ class LawsSpace(Local):
         if self.yields:
             self.flow(self.plastic_state(), sim.clock.step)
         if self._creeps_now():
-            self.creep(sim.cold["creep"], self.s0, self.quad_s0, keep=sim.options.dynamic)
+            self.creep(sim.cold["creep"], [of.s0 for of in self.solids], keep=sim.options.dynamic)
         if self.laws:
             self._obey(sim.cold[user_laws.COLUMN], self.s0, self.quad_s0)
 
@@ -251,57 +251,6 @@ class LawsSpace(Local):
                 self.hexes_yield, self.strength._replace(history=history), small, step, memory, quad_s0, table,
             )  # fmt: skip
 
-    def creep(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, keep: bool) -> None:
-        sim, own = self.sim, self.hexes
-        how = self.creep_table, not sim.options.large_strain, sim.creep.passed, keep, memory
-        kernel: Any = creep_tets.creep if sim.threads == 1 else creep_tets.creep_threaded
-        kernel(sim.threads, self.creeping, self.rows, sim.n_left, sim.x, self.c, self.uncrept, self.creep_law, *how, s0)
-        if own is not None and len(self.creeping_quads):
-            kernel = creep_hexes.creep if sim.threads == 1 else creep_hexes.creep_threaded
-            kernel(
-                sim.threads, self.creeping_quads, own.begin, own.place, sim.x, own.parts, own.h, self.quad_uncrept,
-                self.creep_law_of_hexes, *how, quad_s0,
-            )  # fmt: skip
-
-    def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Constants (count + 3, 16) and stress without strain (count + 3, 8) [Pa] of the elastic tetrahedra that those
-        that creep are within this creep step; of hexahedra (count + 3, 20) and (count + 3, 10, 8). Not to be
-        changed."""
-        sim, own = self.sim, self.hexes
-        h, quad_s0 = np.empty((0, hexes.HEX)) if own is None else own.h, self.quad_s0
-        if not (self.creeps and sim.creep.passed > 0.0):
-            return self.c, self.s0, h, quad_s0
-        c, s0, h, quad_s0 = self.c.copy(), self.s0.copy(), h.copy(), quad_s0.copy()
-        how = self.creep_table, sim.creep.passed, sim.cold["creep"]
-        creep_tets.as_elastic(self.creeping, self.rows, sim.n_left, self.c, self.uncrept, self.creep_law, *how, c, s0)
-        if own is not None and len(self.creeping_quads):
-            creep_hexes.as_elastic(
-                self.creeping_quads, own.begin, own.h, self.quad_uncrept, self.creep_law_of_hexes, *how, h, quad_s0
-            )
-        return c, s0, h, quad_s0
-
-    def creep_memory(self, memory: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """What the elements that creep, and the tetrahedra of hexahedra, remember in memory (n_own, 16 or 32): (n, 16),
-        and the rows (n,) of their models."""
-        of_tets = memory[self.rows[self.creeping] - self.sim.n_left, : creep_tets.MEMORY]
-        found = [(of_tets, self.creep_law[self.creeping])]
-        if self.hexes is not None and len(self.creeping_quads):
-            parts = self.hexes.histories(memory)[self.creeping_quads].reshape(-1, creep_tets.MEMORY)
-            found.append((parts, np.repeat(self.creep_law_of_hexes[self.creeping_quads], hexes.PARTS)))
-        return found
-
-    def creep_strains(self) -> np.ndarray:
-        """Creep strain and strain of the Kelvin unit, xx, yy, xy, zz, xz, yz each (n_own, 12), along the axes of
-        space."""
-        sim, out = self.sim, np.zeros((self.sim.n_own, 12))
-        small, memory = not sim.options.large_strain, self.crept()[0]
-        creep_tets.strains(self.rows[: self.count], sim.n_left, sim.x, self.c, small, memory, out)
-        if (own := self.hexes) is not None:
-            found = np.empty((own.count, 12))
-            creep_hexes.strains(own.count, own.begin, own.place, sim.x, own.parts, own.h, small, memory, found)
-            out[own.rows - sim.n_left] = found[:, None]
-        return out
-
     def _surfaces(self) -> np.ndarray:
         """As in the plane; of parts of a hexahedron that of its first tetrahedron."""
         of = self.law[: self.count].astype(np.int64)
@@ -325,57 +274,12 @@ class LawsSpace(Local):
             found[own.rows - self.sim.n_left, plasticity.WORK] = work[:, None] * own.part_of_volume()
         return found[at]
 
-    def lost_by_creep(self) -> np.ndarray:
-        """As in the plane; parts of a hexahedron have the part of their volume."""
-        found = self.crept()[0].reshape(self.sim.n_own, self.sim.element_parts, -1)[:, :, creep_tets.LOST].sum(axis=1)
+    def _add_locked_in(self, initial: Sequence[np.ndarray], plastic: np.ndarray, more: np.ndarray) -> None:
+        (base, of_hexes), rows = initial, self.rows[: self.count]
+        found = np.zeros(self.sim.n_own)
+        plastic_tets.locked_in(rows, self.sim.n_left, self.c, base[:, 0], plastic, found)
         if (own := self.hexes) is not None:
-            rows = own.rows - self.sim.n_left
-            found[rows] = found[rows].sum(axis=1, keepdims=True) * own.part_of_volume()
-        return found
-
-    def hexes_store(self, plastic: np.ndarray | None, crept: np.ndarray | None) -> Callable[..., None]:
-        """What adds `remembered_energy` to energies of some hexahedra, see `Hexes.spread`."""
-        own, base = self.hexes, self.quad_initial if plastic is not None else None
-        assert own is not None
-
-        def add(which: np.ndarray, energy: np.ndarray) -> None:
-            nonlocal base
-            if crept is not None:
-                creep_hexes.stored(
-                    which, own.begin, own.parts, own.h, self.quad_said, self.creep_law_of_hexes, self.creep_table,
-                    crept, energy,
-                )  # fmt: skip
-            if plastic is not None:
-                if crept is not None:
-                    base, every = self.quad_said.copy(), np.arange(own.count)
-                    creep_hexes.relieve_all(every, own.begin, own.h, self.quad_said, crept, base)
-                plastic_hexes.locked_in(which, own.begin, own.parts, own.h, base, plastic, energy)
-
-        return add
-
-    def remembered(self, flow: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
-        """Stress without strain (n + 3, 8) [Pa] after this moment, that of hexahedra (count + 3, 10, 8), and what is
-        remembered then of yielding and creep. flow: after the flow of this moment; else that of the last step."""
-        plastic, s0, quad_s0, crept = None, self.s0, self.quad_s0, None
-        if self.plastic and flow:
-            plastic, s0, quad_s0 = self.flowed()
-        if self.creeps:
-            crept, s0, quad_s0 = self.crept(*(() if plastic is None else (s0, quad_s0)))
-        if self.laws:
-            s0, quad_s0 = s0.copy(), quad_s0.copy()
-            self.obeyed(s0, quad_s0)
-        return s0, quad_s0, plastic, crept
-
-    def remembered_energy(self, plastic: np.ndarray | None, crept: np.ndarray | None) -> np.ndarray:
-        """(n_own,) [J] by which the elastic energy differs from that of elements with their stress without strain as
-        initial stress; plastic, crept: what is remembered."""
-        sim, rows, more = self.sim, self.rows[: self.count], np.zeros(self.sim.n_own)
-        if crept is not None:
-            creep_tets.stored(rows, sim.n_left, self.c, self.said, self.creep_law, self.creep_table, crept, more)
-        if plastic is not None:
-            initial = self.initial
-            if crept is not None:
-                initial, every = self.said.copy(), np.arange(self.count)
-                creep_tets.relieve_all(every, rows, sim.n_left, self.c, self.said, crept, initial)
-            plastic_tets.locked_in(rows, sim.n_left, self.c, initial, plastic, more)
-        return more
+            energy = np.zeros(own.count)
+            plastic_hexes.locked_in(np.arange(own.count), own.begin, own.parts, own.h, of_hexes, plastic, energy)
+            self.solids[1].share_out(energy, found)
+        more += found

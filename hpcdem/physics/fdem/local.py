@@ -15,6 +15,8 @@ from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, by_temperature, connectivity, user_laws
 from hpcdem.physics.fdem.definition import TRACTIONS
+from hpcdem.physics.fdem.elements.block import ElementBlock
+from hpcdem.physics.fdem.elements.kind import QUAD, TRIANGLE
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
 from hpcdem.physics.fdem.kernels import (
     creep,
@@ -117,6 +119,11 @@ def strength_tables(rows: Rows, of: np.ndarray, tables: list[Table], history: np
         np.concatenate([np.empty((0, 2)), *pieces]),
         history,
     )
+
+
+def _by_rows(of_parts: np.ndarray) -> np.ndarray:
+    """(n, parts, 4 or 8) as (n, ...)."""
+    return of_parts.reshape(-1, of_parts.shape[1] * of_parts.shape[2])
 
 
 @dataclass
@@ -237,19 +244,18 @@ class Local:
         if self.plastic or self.creeps:
             self.law = np.zeros(count + 3, np.int32)
             self.law[:count] = sim.element_row[sim.number[rows]]
-        if self.creeps:
-            self.creep_table = creep_table(sim.element_rows)
-            self.creep_law, self.quad_creep_law = self.law.copy(), quad_law
-            creeping = sim.creeping()[sim.number]
-            self.creeping = np.flatnonzero(creeping[rows])
-            self.creeping_quads = np.flatnonzero(creeping[self.quad_rows])
         if self.plastic:
             self.quad_law = np.repeat(quad_law[:, None], 4, axis=1)
             self._make_strength(rows, self.quad_rows)
         quads = len(self.quad_rows)
         self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((quads, 16))
-        self.said, self.uncrept, self.initial = (np.zeros((count, 4)) for _ in range(3))
-        self.quad_said, self.quad_uncrept, self.quad_initial = (np.zeros((quads, 16)) for _ in range(3))
+        self.solids: list[ElementBlock] = []
+        for kind, of, n, c, s0 in (
+            (TRIANGLE, self.triangle_rows, count, self.c, self.s0), (QUAD, self.quad_rows, quads, self.q, self.quad_s0)
+        ):  # fmt: skip
+            stored = of[:n, None].astype(np.int64) - sim.n_left
+            self.solids.append(ElementBlock(sim, kind, of, c, s0, stored, np.ones(stored.shape)))
+        self._make_creep()
         self._of_initial = np.zeros((count, 4)), np.zeros((quads, 4))
         if sim.stress0 is not None:
             self._of_initial = sim.initial_stresses(sim.number[rows]), sim.initial_stresses(sim.number[self.quad_rows])
@@ -258,6 +264,18 @@ class Local:
         if self.warms:
             self._follow_elements()
         self.heated = self._find_stress_without_strain()
+
+    def _make_creep(self) -> None:
+        """What elements that creep, or yield, need to know besides."""
+        sim = self.sim
+        if not (self.plastic or self.creeps):
+            return
+        for of in self.solids:
+            of.remember()
+            number = sim.number[of.stored[:, 0] + sim.n_left]
+            of.model, of.creeping = sim.element_row[number].astype(np.int32), np.flatnonzero(sim.creeping()[number])
+        if self.creeps:
+            self.creep_table = creep_table(sim.element_rows)
 
     def follow_heat(self) -> None:
         """Temperatures have changed: moduli, strengths and stress without strain are those of now."""
@@ -343,31 +361,32 @@ class Local:
         """Stress without strain, with that of what elements remember."""
         if not (self.plastic or self.creeps):
             return
-        self.said[:] = self.uncrept[:] = self.s0[: self.count]
-        self.quad_said[:] = self.quad_uncrept[:] = self.quad_s0
+        for of in self.solids:
+            of.said[:] = of.uncrept[:] = of.s0
         if self.creeps:
-            self._relieve_crept(np.arange(self.count), np.arange(self._quad_count()), self.s0, self.quad_s0)
-        self.initial[:], self.quad_initial[:] = self.s0[: self.count], self.quad_s0
+            self._relieve_crept([(of, np.arange(of.count), of.uncrept, of.s0) for of in self.solids])
+        for of in self.solids:
+            of.initial[:] = of.s0
         if self.plastic:
-            self._relieve_flowed(self.initial, self.quad_initial, self.s0, self.quad_s0)
+            self._relieve_flowed([(of.initial, of.s0) for of in self.solids])
         if self.plastic and self.creeps:  # some that creep may have yielded before, with another model
-            self._relieve_flowed(self.said, self.quad_said, self.uncrept, self.quad_uncrept)
-            self._relieve_crept(self.creeping, self.creeping_quads, self.s0, self.quad_s0)
+            self._relieve_flowed([(of.said, of.uncrept) for of in self.solids])
+            self._relieve_crept([(of, of.creeping, of.uncrept, of.s0) for of in self.solids])
 
-    def _quad_count(self) -> int:
-        """Quads of this rank, in space hexahedra."""
-        return len(self.quad_rows)
+    def _relieve_crept(
+        self, of: Iterable[tuple[ElementBlock, np.ndarray, np.ndarray, np.ndarray]], memory: np.ndarray | None = None
+    ) -> None:
+        """Stress without strain, the last of each, of some elements: that of their creep strain less than that before
+        it. memory: what they remember of creep."""
+        for one, who, base, s0 in of:
+            if len(who):
+                creep.relieve_all(who, one.tables, base, self.sim.cold["creep"] if memory is None else memory, s0)
 
-    def _relieve_crept(self, who: np.ndarray, quads: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
-        """Stress without strain of these triangles and quads, less that of their creep strain."""
-        sim, memory, rows = self.sim, self.sim.cold["creep"], self.triangle_rows
-        creep.relieve_all(who, rows, sim.n_left, self.c, self.uncrept, memory, s0)
-        if len(quads):
-            creep.relieve_quads(quads, self.quad_rows, sim.n_left, self.q, self.quad_uncrept, memory, quad_s0)
-
-    def _relieve_flowed(self, base: np.ndarray, quad_base: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
-        """Stress without strain of all, that of their plastic strain less than base."""
+    def _relieve_flowed(self, of: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+        """Stress without strain of all triangles, of all quads: that of their plastic strain less than base, both
+        (n, parts, 4) [Pa]."""
         sim, memory, rows = self.sim, self.sim.cold["plastic"], self.triangle_rows[: self.count]
+        (base, s0), (quad_base, quad_s0) = (map(_by_rows, both) for both in of)
         plasticity.relieve_all(rows, sim.n_left, self.c[: self.count], base, memory, s0)
         if len(self.quad_rows):
             plastic_quads.relieve_all(self.quad_rows, sim.n_left, self.q, quad_base, memory, quad_s0)
@@ -850,7 +869,7 @@ class Local:
         if self.yields:
             self._flow_triangles(self.plastic_state(), step)
         if self._creeps_now():
-            self.creep(sim.cold["creep"], self.s0, self.quad_s0, keep=o.dynamic)
+            self.creep(sim.cold["creep"], [of.s0 for of in self.solids], keep=o.dynamic)
         if self.laws:
             memory = sim.cold[user_laws.COLUMN]
             self._obey(memory, self.s0, self.quad_s0, every=False)
@@ -966,77 +985,85 @@ class Local:
         sim = self.sim
         return self.creeps and sim.creep.on and (sim.options.dynamic or sim.creep.passed > 0.0)
 
-    def creep(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, keep: bool) -> None:
-        """Elements creep for the time that has passed, see `creep.creep`: memory (n_own, 10 or 40), if they keep it,
-        s0 (count + 3, 4) and quad_s0 (quads, 16) [Pa] become those after it."""
-        sim, one = self.sim, self.sim.threads == 1
+    def creep(self, memory: np.ndarray, s0: Sequence[np.ndarray], keep: bool) -> None:
+        """Elements creep for the time that has passed, see `creep.creep`: memory, if they keep it, and stress without
+        strain of `solids` [Pa] become those after it."""
+        sim = self.sim
+        kernel = creep.creep if sim.threads == 1 else creep.creep_threaded
         how = self.creep_table, not sim.options.large_strain, sim.creep.passed, keep, memory
-        kernel = creep.creep if one else creep.creep_threaded
-        kernel(
-            sim.threads, self.creeping, self.triangle_rows, sim.n_left, sim.x, self.c, self.uncrept, self.creep_law,
-            *how, s0,
-        )  # fmt: skip
-        if len(self.creeping_quads):
-            kernel = creep.creep_quads if one else creep.creep_quads_threaded
-            kernel(
-                sim.threads, self.creeping_quads, self.quad_rows, sim.n_left, sim.x, self.q, self.quad_uncrept,
-                self.quad_creep_law, *how, quad_s0,
-            )  # fmt: skip
+        for of, stress in zip(self.solids, s0):
+            if len(of.creeping):
+                kernel(sim.threads, of.creeping, of.tables, of.uncrept, of.model, *how, stress)
 
-    def crept(
-        self, s0: np.ndarray | None = None, quad_s0: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same of what elements remember of creep (n_own, 10 or 40), into s0 and quad_s0 or copies."""
-        memory, s0 = self.sim.cold["creep"].copy(), self.s0.copy() if s0 is None else s0
-        quad_s0 = self.quad_s0.copy() if quad_s0 is None else quad_s0
+    def keep_creep(self) -> None:
+        """Elements have crept for the time that has passed, and remember it."""
+        self.creep(self.sim.cold["creep"], [of.s0 for of in self.solids], keep=True)
+
+    def crept(self, s0: Sequence[np.ndarray]) -> np.ndarray:
+        """What elements remember of creep after that of this moment, which the next forces will see; the stress without
+        strain of `solids` becomes that after it. The model stays as it is."""
+        memory = self.sim.cold["creep"].copy()
         if self._creeps_now():
-            self.creep(memory, s0, quad_s0, keep=True)
-        return memory, s0, quad_s0
+            self.creep(memory, s0, keep=True)
+        return memory
 
     def lost_by_creep(self) -> np.ndarray:
-        """What owned elements have lost by creep (n_own,) [J/m]."""
-        parts = self.crept()[0].reshape(self.sim.n_own, self.sim.element_parts, -1)
-        return parts[:, :, creep.LOST].sum(axis=1)
-
-    def creep_memory(self, memory: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """What the triangles that creep, and those of quads, remember in memory (n_own, 10 or 40): (n, 10), and the
-        rows (n,) of their models in the table."""
-        found = []
-        for rows, parts, law in (
-            (self.triangle_rows[self.creeping], 1, self.creep_law[self.creeping]),
-            (self.quad_rows[self.creeping_quads], 4, self.quad_creep_law[self.creeping_quads]),
-        ):
-            of = memory[rows - self.sim.n_left, : parts * creep.MEMORY]
-            found.append((of.reshape(-1, creep.MEMORY), np.repeat(law, parts)))
+        """What owned elements have lost by creep (n_own,) [J], in the plane [J/m]."""
+        memory, found = self.crept([of.s0.copy() for of in self.solids]), np.zeros(self.sim.n_own)
+        for of in self.solids:
+            of.share_out(of.histories(memory, self.sim.memory("creep"))[:, :, creep.LOST].sum(axis=1), found)
         return found
 
-    def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Constants (count + 3, 12) and stress without strain (count + 3, 4) [Pa] of the elastic triangles that those
-        that creep are within this creep step, and (quads, 32), (quads, 16) of quads. Not to be changed."""
+    def creep_memory(self, memory: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """What the parts of elements that creep remember in memory (n, 10 or 16), and the rows (n,) of their models in
+        the table."""
+        found = []
+        for of in self.solids:
+            parts = of.histories(memory, self.sim.memory("creep"))[of.creeping]
+            found.append((parts.reshape(-1, parts.shape[2]), np.repeat(of.model[of.creeping], parts.shape[1])))
+        return found
+
+    def linear(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Constants and stress without strain [Pa], a row each, of the elastic elements that those of `solids` are at
+        this moment: those that creep within this creep step, others after the flow of this moment. Not to be
+        changed."""
         sim = self.sim
-        if not (self.creeps and sim.creep.passed > 0.0):
-            return self.c, self.s0, self.q, self.quad_s0
-        c, s0, q, quad_s0 = (one.copy() for one in (self.c, self.s0, self.q, self.quad_s0))
-        how = self.creep_table, sim.creep.passed, sim.cold["creep"]
-        creep.as_elastic(
-            self.creeping, self.triangle_rows, sim.n_left, self.c, self.uncrept, self.creep_law, *how, c, s0
-        )
-        if len(self.creeping_quads):
-            creep.quads_as_elastic(
-                self.creeping_quads, self.quad_rows, sim.n_left, self.q, self.quad_uncrept, self.quad_creep_law, *how,
-                q, quad_s0,
-            )  # fmt: skip
-        return c, s0, q, quad_s0
+        found = [(of.c, of.s0) for of in self.solids]
+        if self.creeps and sim.creep.passed > 0.0:
+            found = [(c.copy(), s0.copy()) for c, s0 in found]
+            how = self.creep_table, sim.creep.passed, sim.cold["creep"]
+            for of, like in zip(self.solids, found):
+                if len(of.creeping):
+                    creep.as_elastic(of.creeping, of.tables, of.uncrept, of.model, *how, *like)
+        if self.yields:
+            for k, (of, flowed) in enumerate(zip(self.solids, self.flowed()[1:])):
+                (c, s0), flowed = found[k], flowed.reshape(of.s0.shape)
+                flowed[of.creeping] = s0[of.creeping]
+                found[k] = c, flowed
+        return [(c, s0.reshape(old.shape)) for (c, s0), old in zip(found, (self.s0, self.quad_s0))]
 
     def creep_strains(self) -> np.ndarray:
-        """Creep strain and strain of the Kelvin unit, xx, yy, xy each (n_own, 6), along the axes of space; of quads the
-        mean over their triangles by area."""
-        sim, out = self.sim, np.zeros((self.sim.n_own, 6))
-        small, memory = not sim.options.large_strain, self.crept()[0]
-        creep.strains(self.triangle_rows[: self.count], sim.n_left, sim.x, self.c, small, memory, out)
-        if len(self.quad_rows):
-            creep.strains_of_quads(self.quad_rows, sim.n_left, sim.x, self.q, small, memory, out)
+        """Creep strain and strain of the Kelvin unit, xx, yy, xy, in space zz, xz, yz besides, each (n_own, 6 or 12),
+        along the axes of space; means over the parts of elements by volume."""
+        sim = self.sim
+        out = np.zeros((sim.n_own, 6 if self.dim == 2 else 12))
+        memory = self.crept([of.s0.copy() for of in self.solids])
+        for of in self.solids:
+            found = np.zeros((of.count, out.shape[1]))
+            if of.count:
+                creep.strains(of.count, of.tables, not sim.options.large_strain, memory, found)
+            of.spread(found, out)
         return out
+
+    @property
+    def initial(self) -> np.ndarray:
+        """Stress [Pa] of triangles without plastic strain, a row each."""
+        return self.solids[0].initial.reshape(-1, self.s0.shape[1])
+
+    @property
+    def quad_initial(self) -> np.ndarray:
+        """The same of quads, of hexahedra (n, 10, 8)."""
+        return self.solids[1].initial.reshape(-1, *self.quad_s0.shape[1:])
 
     def flowed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What elements remember of yielding (n_own, 9 or 36) and the stresses without strain of triangles
@@ -1226,13 +1253,7 @@ class Local:
         owned elements, or of some of them (at: the how-manieth). flow: after the flow of this moment, which the next
         forces will see; without it, which looks at all elements, after that of the last step."""
         sim = self.sim
-        memory, s0, quad_s0 = self.flowed() if self.plastic and flow else (None, self.s0, self.quad_s0)
-        crept = None
-        if self.creeps:
-            crept, s0, quad_s0 = self.crept(*(() if memory is None else (s0, quad_s0)))
-        if self.laws:
-            s0, quad_s0 = s0.copy(), quad_s0.copy()
-            self.obeyed(s0, quad_s0)
+        s0, quad_s0, memory, crept = self.remembered(flow)
         if at is None:
             rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, s0, quad_s0
             n, first = sim.n_own, sim.n_left
@@ -1247,25 +1268,7 @@ class Local:
         stress, energy = np.zeros((n, 4)), np.zeros(n if energies else 0)
         build.stresses(*rows, not sim.options.large_strain, first, stress, energy)
         if energies and (memory is not None or crept is not None):
-            more, triangles, quads = np.zeros(sim.n_own), self.triangle_rows[: self.count], self.quad_rows
-            if crept is not None:
-                table = self.creep_table
-                creep.stored(triangles, sim.n_left, self.c, self.said, self.creep_law, table, crept, more)
-                if len(quads):
-                    creep.stored_in_quads(
-                        quads, sim.n_left, self.q, self.quad_said, self.quad_creep_law, table, crept, more
-                    )
-            if memory is not None:
-                initial, of_quads = self.initial, self.quad_initial
-                if crept is not None:
-                    initial, of_quads = self.said.copy(), self.quad_said.copy()
-                    every, all_quads = np.arange(self.count), np.arange(len(quads))
-                    creep.relieve_all(every, triangles, sim.n_left, self.c, self.said, crept, initial)
-                    if len(quads):
-                        creep.relieve_quads(all_quads, quads, sim.n_left, self.q, self.quad_said, crept, of_quads)
-                plasticity.locked_in(triangles, sim.n_left, self.c, initial, memory, more)
-                if len(quads):
-                    plastic_quads.locked_in(quads, sim.n_left, self.q, of_quads, memory, more)
+            more = self.remembered_energy(memory, crept)
             energy += more if at is None else more[at]
         if self.heated and energies:
             energy += self._energy_of_heat() if at is None else self._energy_of_heat()[at]
@@ -1273,6 +1276,48 @@ class Local:
             of_users = user_laws.numbers(sim)[sim.number[sim.owned]] > 0
             energy[of_users if at is None else of_users[at]] = math.nan
         return stress, energy
+
+    def remembered(self, flow: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
+        """Stress without strain [Pa] after this moment of both `solids`, and what is remembered then of yielding and of
+        creep. flow: after the flow of this moment; else that of the last step."""
+        plastic = crept = None
+        s0, quad_s0 = self.s0, self.quad_s0
+        if self.plastic and flow:
+            plastic, s0, quad_s0 = self.flowed()
+        if plastic is None and (self.creeps or self.laws):
+            s0, quad_s0 = s0.copy(), quad_s0.copy()
+        if self.creeps:
+            crept = self.crept([one.reshape(of.s0.shape) for of, one in zip(self.solids, (s0, quad_s0))])
+        if self.laws:
+            self.obeyed(s0, quad_s0)
+        return s0, quad_s0, plastic, crept
+
+    def remembered_energy(self, plastic: np.ndarray | None, crept: np.ndarray | None) -> np.ndarray:
+        """(n_own,) [J], in the plane [J/m], by which the elastic energy differs from that of elements with their stress
+        without strain as initial stress; plastic, crept: what is remembered."""
+        initial, more = [of.initial for of in self.solids], np.zeros(self.sim.n_own)
+        found = [np.zeros(of.count) for of in self.solids]
+        if crept is not None:
+            for of, energy in zip(self.solids, found):
+                if of.count:
+                    every = np.arange(of.count)
+                    creep.stored(every, of.tables, of.said, of.model, self.creep_table, crept, energy)
+            if plastic is not None:
+                initial = [of.said.copy() for of in self.solids]
+                with_ = [(of, np.arange(of.count), of.said, s0) for of, s0 in zip(self.solids, initial)]
+                self._relieve_crept(with_, crept)
+        for of, energy in zip(self.solids, found):
+            of.share_out(energy, more)
+        if plastic is not None:
+            self._add_locked_in(initial, plastic, more)
+        return more
+
+    def _add_locked_in(self, initial: Sequence[np.ndarray], plastic: np.ndarray, more: np.ndarray) -> None:
+        """What plastic strain means for it, see `plasticity.locked_in`; initial: stress without it of `solids`."""
+        sim, (base, quad_base) = self.sim, map(_by_rows, initial)
+        plasticity.locked_in(self.triangle_rows[: self.count], sim.n_left, self.c, base, plastic, more)
+        if len(self.quad_rows):
+            plastic_quads.locked_in(self.quad_rows, sim.n_left, self.q, quad_base, plastic, more)
 
     def _energy_of_heat(self) -> np.ndarray:
         """Elastic energy (n_own,) [J/m] that thermal stress p means where there is no strain, beside the mean m of the

@@ -440,10 +440,10 @@ class LocalSpace(LawsSpace):
         small = not sim.options.large_strain
         x = sim.x[at + sim.n_left]
         tets.stresses(x, np.arange(n, dtype=np.int32), self.c[at], s0[at], small, 0, stress, energy)
+        if self.hexes is not None:
+            self.hexes.spread(stress, energy, at, quad_s0)
         if energies:
             energy += self.remembered_energy(plastic, crept)[at]
-        if self.hexes is not None:
-            self.hexes.spread(stress, energy, at, quad_s0, self.hexes_store(plastic, crept))
         if energies and self.heated:
             energy += self._energy_of_heat()[at]
         if energies and self.lawful:  # what such a law stores is not known

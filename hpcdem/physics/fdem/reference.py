@@ -1,4 +1,4 @@
-"""What elements.py, tets.py, hexes.py, plasticity.py, creep_tets.py, joints.py, joints_space.py and nodes.py compute,
+"""What elements.py, tets.py, hexes.py, plasticity.py, creep.py, joints.py, joints_space.py and nodes.py compute,
 for one element, joint or node and in small matrices, written plainly. To be read beside them; tests hold the two
 against each other."""
 

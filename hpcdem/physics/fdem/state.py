@@ -20,7 +20,7 @@ from hpcdem.engine.rebuild import RebuildState
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.definition import ModelDefinition, Relaxation
 from hpcdem.physics.fdem.histories import Histories
-from hpcdem.physics.fdem.kernels import creep, creep_tets, plastic_tets, plasticity
+from hpcdem.physics.fdem.kernels import creep, plastic_tets, plasticity
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.surface_loads import SurfaceLoads
 
@@ -180,8 +180,7 @@ class State(ModelDefinition, Model):
 
     def memory(self, name: str) -> int:
         """Columns of what an element, of a quad each triangle, remembers of yielding ("plastic") or of "creep"."""
-        of = {"plastic": (plasticity, plastic_tets), "creep": (creep, creep_tets)}[name]
-        return of[self.dim == 3].MEMORY
+        return creep.MEMORY[self.dim] if name == "creep" else (plasticity, plastic_tets)[self.dim == 3].MEMORY
 
     def the_mesh(self) -> Mesh:
         """The mesh; CommandError if there is none."""

@@ -59,13 +59,7 @@ def of_elements(sim: Blocks, flows: bool) -> list[Pieces]:
     local, small = cast(LocalSpace, sim.local), not sim.options.large_strain
     rows = local.rows[: local.count]
     found = np.empty((len(rows), 12, 12))
-    c, s0, h, quad_s0 = local.linear()
-    if local.yields:
-        _, flowed, of_hexes = local.flowed()
-        if local.creeps:
-            flowed[local.creeping] = s0[local.creeping]
-            of_hexes[local.creeping_quads] = quad_s0[local.creeping_quads]
-        s0, quad_s0 = flowed, of_hexes
+    (c, s0), (h, quad_s0) = local.linear()
     tet_stiffness.elastic(rows, sim.x, c, s0, small, found)
     if local.yields and flows:
         who = local.who_yields[: local.yielding]
