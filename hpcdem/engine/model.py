@@ -135,6 +135,18 @@ class Model(ABC):
         self._end_step(outdated)
         return request
 
+    def advance(self, steps: int) -> int:
+        """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""
+        request = done = 0
+        try:
+            while done < steps and not request:
+                request = self.step()
+                done += 1
+        finally:
+            if done:
+                self.timers.count(done, self.halo.n_own)
+        return request
+
     @abstractmethod
     def _begin_step(self) -> None:
         """What comes before anything moves. The model is closed."""

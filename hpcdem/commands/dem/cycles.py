@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -16,6 +15,7 @@ from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.outputs import OUTPUTS
 from hpcdem.core.units import with_prefix
+from hpcdem.engine.due import Task, answer, first_after
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.guards import NAMED
@@ -354,21 +354,6 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
         )  # fmt: skip
 
 
-@dataclass
-class Task:
-    """Something to do at the steps origin + k * every, k > 0, and at the step `also`."""
-
-    every: int
-    origin: int
-    run: Callable[..., object]
-    also: int = -1
-
-    def next_after(self, step: int) -> int:
-        """The first step after `step` at which it is due."""
-        regular = self.origin + ((step - self.origin) // self.every + 1) * self.every
-        return min(regular, self.also) if self.also > step else regular
-
-
 class Due:
     """What is due while the running command (sim.progress) steps the particles; used by every loop that does.
 
@@ -418,8 +403,7 @@ class Due:
 
     def next(self) -> int:
         """The next step at which something is due, or a function waits."""
-        step = self.sim.clock.step
-        return min(task.next_after(step) for task in [*self._tasks, *_calls(self.sim)])
+        return first_after(self.sim.clock.step, [*self._tasks, *_calls(self.sim)])
 
     def finish(self) -> None:
         """At the end of a command of which the end was not known: the report that is due then. Collective."""
@@ -439,7 +423,7 @@ class Due:
             self._tasks = self._listed()
         moment = output.Snapshot(sim, waits=False)
         for task in self._tasks:
-            if task.next_after(step - 1) == step:
+            if task.due_at(step):
                 task.run(moment)
 
 
@@ -452,23 +436,15 @@ def _run(sim: Simulation) -> None:
         before = sim.clock.step - progress["first"]
         sim.log.command_started(progress["name"], sim.line, last - sim.clock.step, sim.clock.step, before)
     due = Due(sim)
-    clock, counted = sim.clock, sim.clock.step
+    clock = sim.clock
     try:
         while clock.step < last:
-            event = min(last, due.next())
-            request = 0
-            while clock.step < event:
-                request = sim.step()
-                if request:
-                    break
-            sim.timers.count(clock.step - counted, len(sim.particles))
-            counted = clock.step
+            request = sim.advance(min(last, due.next()) - clock.step)
             due.serve()
             last = progress["last"]
             if request:
-                _answer(sim, request)
+                answer(sim, request, partial(output.write_checkpoint, sim, None), lambda _: sim.resume_advice)
     except PhysicsError:
-        sim.timers.count(clock.step - counted, len(sim.particles))
         output.write_crash_frame(sim)
         raise
     finally:
@@ -495,7 +471,7 @@ def _call_watchers(sim: Simulation) -> bool:
     any rank, wants the command to end here.
     """
     step, enough = sim.clock.step, False
-    due = [task for task in _calls(sim) if task.next_after(step - 1) == step]
+    due = [task for task in _calls(sim) if task.due_at(step)]
     if due:
         output.settle(sim)  # they may look at files
         if sim.energy is not None:
@@ -512,19 +488,3 @@ def _call_watchers(sim: Simulation) -> bool:
     if sim.energy is not None:
         sim.energy.begin(sim)
     return sim.comm.any(enough)
-
-
-def _answer(sim: Simulation, request: int) -> None:
-    """A signal or the time limit asked for a checkpoint, perhaps for the end."""
-    what = sim.stop.decide(request)
-    if what == "none":
-        return
-    path = output.write_checkpoint(sim, automatic=what == "auto")
-    if what == "stop":
-        raise sim.stop.end(
-            f"stopped at step {sim.clock.step} by {sim.stop.reason}; checkpoint {path} written, "
-            f"go on with {sim.resume_advice}"
-        )
-    if sim.log is not None:
-        why = "as the last one was long ago" if what == "auto" else "on request"
-        sim.log.info(f"step {sim.clock.step}: checkpoint {path} written {why}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,13 @@ from hpcdem.commands.fdem.histories import flush
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import Chart, Curve, History
 from hpcdem.core.errors import CommandError, UsageError
+from hpcdem.engine.checkpoint import take_newest
 from hpcdem.physics.fdem.groups import Groups
 from hpcdem.physics.flow import coupled
 from hpcdem.physics.user_files import UnknownLaw
 from hpcdem.pre.mesh import solids
 from hpcdem.pre.mesh.geometry import Layers
-from hpcdem.runtime import checkpoints, run_folder
+from hpcdem.runtime import run_folder
 
 FORMAT = 1
 """Of what is saved beside the simulation."""
@@ -64,10 +64,7 @@ def _write(project: Project, path: Path, more: dict[str, Any]) -> None:
     if project.mesh is not None:
         project.ready(use=False)
     frames.settle(project)
-    began = time.perf_counter()
     coupling.save(project, path, {"project": _state(project), **more})
-    if project.blocks.stop is not None:
-        project.blocks.stop.saved(time.perf_counter() - began)
 
 
 def found(project: Project, path: str) -> str:
@@ -125,30 +122,19 @@ def restore_newest(project: Project, before: float = math.inf) -> bool:
 
 def _newest(project: Project, before: float) -> tuple[Path, Any] | None:
     """Take the state of the newest whole checkpoint; its path, and what it says of the run that wrote it."""
-    folder, comm, log = project.outdir, project.comm, project.log
-    found, damaged = checkpoints.newest_first([folder], before) if comm.rank == 0 else ([], [])
-    for error in damaged if log is not None else []:
-        log.warn(f"{error}; it is passed over")
-    for path in comm.bcast(found):
+
+    def take(path: Path) -> dict[str, Any]:
         try:
-            extra = _restored(project, path, begins=True)
-        except UnknownLaw as error:
-            raise UsageError(str(error)) from None
-        except CommandError as error:
-            if log is not None:
-                log.warn(f"{error}; trying the checkpoint before it")
+            return _restored(project, path, begins=True)
+        except CommandError:
             project.clear()
-            continue
-        if log is not None:
-            log.info(f"going on from {path}, step {project.step}")
-        if before < math.inf:
-            checkpoints.go_back_to(path, [folder], comm)
-        return path, extra.get("run")
-    if before < math.inf:
-        raise checkpoints.none_before(before, [folder])
-    if log is not None:
-        log.info(f"no checkpoint in {folder}: starting at the beginning")
-    return None
+            raise
+
+    try:
+        taken = take_newest([project.outdir], project.blocks, before, take, UnknownLaw)
+    except UnknownLaw as error:
+        raise UsageError(str(error)) from None
+    return None if taken is None else (taken[0], taken[1].get("run"))
 
 
 def _restored(project: Project, path: Path, begins: bool = False) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from hpcdem.commands.fdem import clocks as clocks_of
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.core.units import counted, with_prefix
+from hpcdem.engine.due import after, answer
 from hpcdem.io.behind import under_way
 from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium, notices, overlaps
 from hpcdem.physics.fdem.convergence import RATIO, Watch
@@ -513,13 +514,13 @@ def _advance(
     if not creeps:
         frames.write_due(project)
     while clock.step < last and clock.time < end - 0.5 * clock.dt and not progress.get("done"):
-        due = min(last, _after(clock.step, STRIDE, first), coupling.next_checkpoint(project))
+        due = min(last, after(clock.step, STRIDE, first), coupling.next_checkpoint(project))
         if not creeps:  # else after the creep step
-            due = min([due, *(_after(clock.step, every, 0) for every in _intervals(project))])
+            due = min([due, *(after(clock.step, every) for every in _intervals(project))])
         if histories.wait(project):
             due = clock.step + 1
         if ratio is not None:
-            due = min(due, _after(clock.step, look, first))
+            due = min(due, after(clock.step, look, first))
         try:
             request = coupling.advance(project, int(min(due - clock.step, _within(project, end))))
         except (EquilibriumError, PhysicsError):
@@ -607,11 +608,6 @@ def _intervals(project: Project) -> list[int]:
     return [history.every for history in project.histories.values()] + list(project.frames.values())
 
 
-def _after(step: int, every: int, origin: int) -> int:
-    """The first step after this one that is a multiple of `every` from the origin on."""
-    return origin + ((step - origin) // every + 1) * every
-
-
 def stop_here(project: Project, request: int) -> None:
     """A command is about to be carried out, and none that steps has answered a signal or the time limit that asked for
     the end: between two commands is a good place. Collective; the request is the same on all ranks."""
@@ -627,20 +623,13 @@ def _answer_requests(project: Project) -> None:
 
 def _answer(project: Project, request: int) -> None:
     """A signal or the time limit asked for a checkpoint, perhaps for the end."""
-    stop, log, step = project.blocks.stop, project.log, project.step
-    what = stop.decide(request)
-    if what == "none":
-        return
-    histories.flush(project)
-    cracks.flush(project)
-    path = checkpoints.write_checkpoint(project, automatic=what == "auto")
-    if what == "stop":
-        raise stop.end(
-            f"stopped at step {step} by {stop.reason}; checkpoint {path} written, go on with {_onwards(project, path)}"
-        )
-    if log is not None:
-        why = "as the last one was long ago" if what == "auto" else "on request"
-        log.info(f"step {step}: checkpoint {path} written {why}")
+
+    def save(automatic: bool) -> Path:
+        histories.flush(project)
+        cracks.flush(project)
+        return checkpoints.write_checkpoint(project, automatic=automatic)
+
+    answer(project.blocks, request, save, partial(_onwards, project))
 
 
 def _onwards(project: Project, path: Path) -> str:

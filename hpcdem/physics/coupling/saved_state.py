@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hpcdem.engine import checkpoint as engine
 from hpcdem.io import checkpoint
 from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.coupling.links import Touching
@@ -23,16 +24,19 @@ KIND, PREFIX, CONTACTS = checkpoint.BOTH, checkpoint.OF_PARTICLES, checkpoint.LI
 def save(both: Coupled, path: Path | str, extra: Mapping[str, Any]) -> None:
     """Write the state, and `extra` (JSON values) with it. Reads only: a run that saves goes on exactly like one that
     does not. Collective."""
+    engine.save(both.blocks, path, lambda: _contents(both, extra))
+
+
+def _contents(both: Coupled, extra: Mapping[str, Any]) -> engine.Contents:
     particles, blocks = both.particles, both.blocks
-    with blocks.timers("checkpoint"):
-        state = of_blocks.state_of(blocks, extra)
-        state.update(kind=KIND, particles=of_particles.state_of(particles), coupled=both.state())
-        tables = dict(of_blocks.tables(blocks))
-        tables.update({PREFIX + name: table for name, table in of_particles.tables_of(particles).items()})
-        known = both.known()
-        columns = {"gid": known.gid, "face": known.face, "friction": known.friction}
-        tables[CONTACTS] = to_slabs(both.comm, ("gid", "face"), columns)
-        checkpoint.write(path, state, tables, both.comm)
+    state = of_blocks.state_of(blocks, extra)
+    state.update(kind=KIND, particles=of_particles.state_of(particles), coupled=both.state())
+    tables = dict(of_blocks.tables(blocks))
+    tables.update({PREFIX + name: table for name, table in of_particles.tables_of(particles).items()})
+    known = both.known()
+    columns = {"gid": known.gid, "face": known.face, "friction": known.friction}
+    tables[CONTACTS] = to_slabs(both.comm, ("gid", "face"), columns)
+    return state, tables
 
 
 def restore(both: Coupled, path: Path | str) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 
 from hpcdem.core.clock import Clock
 from hpcdem.core.comm import Comm
-from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import (
     AREA,
     CLUMP,
@@ -32,6 +31,8 @@ from hpcdem.core.fields import (
     OFFSET_Y,
     TORQUE,
 )
+from hpcdem.engine import checkpoint as engine
+from hpcdem.engine.checkpoint import take_newest
 from hpcdem.halo.migrate import Trail
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
@@ -49,16 +50,11 @@ from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.dem.walls import Walls
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.physics.user_files import UnknownLaw
-from hpcdem.runtime.checkpoints import go_back_to, newest_first, none_before
 
 
 def save(sim: Simulation, path: Path | str) -> None:
     """SAV: write the state. Reads only: a run that saves goes on exactly like one that does not. Collective."""
-    began = time.perf_counter()
-    with sim.timers("checkpoint"):
-        checkpoint.write(path, state_of(sim), tables_of(sim), sim.comm)
-    if sim.stop is not None:
-        sim.stop.saved(time.perf_counter() - began)
+    engine.save(sim, path, lambda: (state_of(sim), tables_of(sim)))
 
 
 def state_of(sim: Simulation) -> dict[str, Any]:
@@ -194,12 +190,7 @@ def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
     CYC or IMPLE in which it was, or None); what to do with it is the caller's affair. CommandError if the file is
     missing, foreign or damaged; the simulation is then as it was.
     """
-    try:
-        state, tables = checkpoint.read(path, sim.comm)
-    except HpcdemError as problem:
-        raise CommandError(str(problem)) from None
-    if "kind" in state:
-        raise CommandError(f"{path} is a checkpoint, but not one of particles: a PCDC script can restore it")
+    state, tables = engine.read(sim.comm, path, None, "particles: a PCDC script can restore it")
     apply_state(sim, state, tables)
     return {name: state[name] for name in ("script", "position", "progress")}
 
@@ -212,29 +203,12 @@ def restore_newest(sim: Simulation, folders: list[Path], before: float = math.in
     earlier run left in a folder does not count. Returns what `restore` returns, and "path". A damaged file is named in
     the log and the one before it is tried.
     """
-    found, damaged = newest_first(folders, before) if sim.comm.rank == 0 else ([], [])
-    for error in damaged if sim.log is not None else []:
-        sim.log.warn(f"{error}; it is passed over")
-    for path in sim.comm.bcast(found):
-        try:
-            state = restore(sim, path)
-        except UnknownLaw:
-            raise
-        except CommandError as error:
-            if sim.log is not None:
-                sim.log.warn(f"{error}; trying the checkpoint before it")
-            continue
-        if sim.log is not None:
-            sim.log.info(f"going on from {path}, step {sim.clock.step}")
-        sim.resumed = True
-        if before < math.inf:
-            go_back_to(path, folders, sim.comm)
-        return {**state, "path": path}
-    if before < math.inf:
-        raise none_before(before, folders)
-    if sim.log is not None:
-        sim.log.info(f"no checkpoint in {' or '.join(map(str, folders))}: starting at the beginning")
-    return None
+    taken = take_newest(folders, sim, before, lambda path: restore(sim, path), UnknownLaw)
+    if taken is None:
+        return None
+    path, state = taken
+    sim.resumed = True
+    return {**state, "path": path}
 
 
 def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Tables) -> None:

@@ -95,12 +95,7 @@ def advance(sim: Blocks, steps: int) -> int:
     """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""
     if steps < 0:
         raise CommandError(f"the number of steps must not be negative, got {steps}")
-    request = done = 0
-    while done < steps and not request:
-        request = sim.step()
-        done += 1
-    sim.timers.count(done, len(sim.number[sim.owned]))
-    return request
+    return sim.advance(steps)
 
 
 def solve(

@@ -11,7 +11,8 @@ import numpy as np
 
 from hpcdem.core.clock import Clock
 from hpcdem.core.comm import Comm
-from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.errors import HpcdemError
+from hpcdem.engine import checkpoint as engine
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import holders, to_slabs
@@ -38,8 +39,7 @@ ARRAYS = {
 def save(sim: Blocks, path: Path | str, extra: Mapping[str, Any] | None = None) -> None:
     """Write the state, and `extra` (JSON values) with it. Reads only: a run that saves goes on exactly like one that
     does not. Collective."""
-    with sim.timers("checkpoint"):
-        checkpoint.write(path, state_of(sim, extra or {}), tables(sim), sim.comm)
+    engine.save(sim, path, lambda: (state_of(sim, extra or {}), tables(sim)))
 
 
 def state_of(sim: Blocks, extra: Mapping[str, Any]) -> dict[str, Any]:
@@ -152,13 +152,7 @@ def read(comm: Comm, path: Path | str, kind: str, what: str) -> tuple[dict[str, 
     """The state in a checkpoint of this kind, and its tables: slabs of those of elements, contacts and particles, all
     rows of the others. Collective. what: its name in messages. CommandError if the file is missing, foreign or damaged.
     """
-    try:
-        state, tables = checkpoint.read(path, comm, _replicated)
-    except HpcdemError as problem:
-        raise CommandError(str(problem)) from None
-    if state.get("kind") != kind:
-        raise CommandError(f"{path} is a checkpoint, but not one of {what}")
-    return state, tables
+    return engine.read(comm, path, kind, what, _replicated)
 
 
 def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:

@@ -1,0 +1,82 @@
+"""The state of a model to a file and back: what is the same for all physics."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from hpcdem.core.comm import Comm
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.engine.model import Model
+from hpcdem.io import checkpoint
+from hpcdem.io.frame import Table
+from hpcdem.runtime.checkpoints import go_back_to, newest_first, none_before
+
+Contents = tuple[Mapping[str, Any], Mapping[str, Table]]
+
+
+def save(model: Model, path: Path | str, contents: Callable[[], Contents]) -> None:
+    """Write what contents() returns: the state as JSON values, and tables. Reads only: a run that saves goes on exactly
+    like one that does not. Collective."""
+    began = time.perf_counter()
+    with model.timers("checkpoint"):
+        checkpoint.write(path, *contents(), model.comm)
+    if model.stop is not None:
+        model.stop.saved(time.perf_counter() - began)
+
+
+def read(
+    comm: Comm, path: Path | str, kind: str | None, what: str, whole: Callable[[str], bool] = lambda table: False
+) -> tuple[dict[str, Any], checkpoint.Tables]:
+    """The state in a checkpoint of this kind, and its tables, see `io.checkpoint.read`. Collective. what: its name in
+    messages. CommandError if the file is missing, foreign or damaged."""
+    try:
+        state, tables = checkpoint.read(path, comm, whole)
+    except HpcdemError as problem:
+        raise CommandError(str(problem)) from None
+    if state.get("kind") != kind:
+        raise CommandError(f"{path} is a checkpoint, but not one of {what}")
+    return state, tables
+
+
+def take_newest(
+    folders: list[Path],
+    model: Model,
+    before: float,
+    take: Callable[[Path], dict[str, Any]],
+    fatal: type[CommandError],
+) -> tuple[Path, dict[str, Any]] | None:
+    """The newest whole checkpoint among the .sav files of some folders, and what take(path) returned for it; None if
+    there is none. before: that of this time of the model [s] or the last one before it, UsageError if there is none.
+    Collective.
+
+    The newest is the one that is farthest in the script, then that of the latest step: clocks may go wrong. What an
+    earlier run left in a folder does not count. A file that take refuses (CommandError, but for those that are fatal)
+    is named in the log, and the one before it is tried.
+    """
+    comm, log = model.comm, model.log
+    found, damaged = newest_first(folders, before) if comm.rank == 0 else ([], [])
+    for text in damaged if log is not None else []:
+        log.warn(f"{text}; it is passed over")
+    for path in comm.bcast(found):
+        try:
+            taken = take(path)
+        except fatal:
+            raise
+        except CommandError as error:
+            if log is not None:
+                log.warn(f"{error}; trying the checkpoint before it")
+            continue
+        if log is not None:
+            log.info(f"going on from {path}, step {model.clock.step}")
+        if before < math.inf:
+            go_back_to(path, folders, comm)
+        return path, taken
+    if before < math.inf:
+        raise none_before(before, folders)
+    if log is not None:
+        log.info(f"no checkpoint in {' or '.join(map(str, folders))}: starting at the beginning")
+    return None
