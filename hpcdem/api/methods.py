@@ -93,10 +93,10 @@ def _item(option: Option) -> str:
     return " | ".join((["str"] if first == ["str"] and least == 1 else []) + longer)
 
 
-def _tokens(order: str) -> Iterator[tuple[str, str, str]]:
+def tokens(order: str) -> Iterator[tuple[str, str, str]]:
     """Name, mark and default of each word of an order."""
     for token in order.split():
-        found = re.fullmatch(r"(\*?)(\w+)(\??)(?:=(\w+))?", token)
+        found = re.fullmatch(r"(\*?)(\w+)([?!]?)(?:=(\w+))?", token)
         assert found, order
         yield found[2], found[1] or found[3], found[4] or ""
 
@@ -138,7 +138,7 @@ class Row:
         """As a method has them."""
         there = {one.name: one for one in self._all()}
         found = []
-        for name, mark, default in _tokens(self.order):
+        for name, mark, default in tokens(self.order):
             one = there.pop(name)
             how = Parameter.VAR_POSITIONAL if mark == "*" else Parameter.POSITIONAL_OR_KEYWORD
             value = _usual(one) if mark == "?" else True if default == "True" else Parameter.empty

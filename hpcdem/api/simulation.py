@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import math
-from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Sequence, ValuesView
+from collections.abc import Callable, ItemsView, Iterator, Mapping, ValuesView
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, TypeVar
 
 import numpy as np
 
 from hpcdem import session
 from hpcdem.api.blocks import BlockCommands
 from hpcdem.api.frames import Frame, shown
-from hpcdem.api.program import carried_out, spelt
+from hpcdem.api.functions import command as _command
+from hpcdem.api.functions import look as _look
+from hpcdem.api.particles import ParticleCommands
+from hpcdem.api.program import carried_out
 from hpcdem.api.program import place as _place
 from hpcdem.commands import dem, fdem
 from hpcdem.core.errors import (
@@ -26,14 +27,11 @@ from hpcdem.core.errors import (
     UsageError,
     WrongValueError,
 )
-from hpcdem.core.fields import FIELDS, FIX_BITS
-from hpcdem.core.material import Material
+from hpcdem.core.fields import FIELDS
 from hpcdem.core.nearest import hint
-from hpcdem.core.selection import Selection
 from hpcdem.io import checkpoint
-from hpcdem.lang.zdem.execute import Interpreter, find, look_at_units, tell_warnings
+from hpcdem.lang.zdem.execute import Interpreter, find, tell_warnings
 from hpcdem.lang.zdem.parser import parse_text
-from hpcdem.lang.zdem.table import COLORS
 from hpcdem.physics.dem.materials import MATERIAL
 from hpcdem.runtime.checkpoints import newest_first
 
@@ -45,66 +43,9 @@ if TYPE_CHECKING:
 SETTABLE = ("x", "y", "vx", "vy", "spin", "radius", "angle", "fix", "color", "group")
 """Fields that a program may write."""
 MATERIAL_FIELDS = MATERIAL.names or ()
-MATERIAL_WORDS = tuple(Material.__annotations__)
 Point = tuple[float, float]
-Where = str | Selection | None
-Method = TypeVar("Method", bound=Callable[..., Any])
 Given = ParamSpec("Given")
 Returned = TypeVar("Returned")
-
-
-OF_BOTH = {"start", "save", "restore", "resume", "finish", "cycle", "imple", "energy"}
-"""Methods that may find blocks alone. The others make the particles first: kernels must be settled before modules that
-have some are imported, and these import them when they are named."""
-LOOKED_AT = {
-    "box": "BOX", "wall": "WALL", "ball": "BALL", "gen": "GEN", "gen_grid": "GEN", "gline": "GLINE", "prop": "PROP",
-    "bond": "PROP", "set": "SET",
-}  # fmt: skip
-"""Methods whose values are held against declared units, and the commands whose units they have."""
-
-
-def _command(method: Method, edits: bool = True) -> Method:
-    """Errors of a command leave with file and line of the program; values of a wrong kind too. edits: it may change the
-    particles."""
-
-    signature = inspect.signature(method)
-    names = [name for name, one in signature.parameters.items() if name != "self" and one.kind is not one.VAR_KEYWORD]
-    names += MATERIAL_WORDS if "properties" in signature.parameters else ()
-
-    @functools.wraps(method)
-    def call(self: Simulation, *values: Any, **options: Any) -> Any:
-        place, options = _place(), spelt(options, names)
-        if self._engine is not None:
-            self._engine.line = place[1]
-
-        def carry_out() -> Any:
-            if "properties" in signature.parameters:
-                for name in options:
-                    if name not in names:
-                        raise TypeError(f"got an unexpected keyword argument '{name}'")
-            if method.__name__ not in OF_BOTH:
-                _ = self.engine
-            value = method(self, *values, **options)
-            if self._engine is not None and self._engine.settings.units and method.__name__ in LOOKED_AT:
-                given = signature.bind(self, *values, **options).arguments
-                given |= given.pop("options", {}) | given.pop("properties", {})
-                look_at_units(self._engine, LOOKED_AT[method.__name__], given)
-            return value
-
-        def done() -> Any:
-            value = carried_out(place, method.__name__, carry_out, names=names)
-            if self._engine is not None:
-                self._engine.edited |= edits
-            return value
-
-        return self._asked((method.__name__, values, options), done)
-
-    return call  # type: ignore[return-value]
-
-
-def _look(method: Method) -> Method:
-    """A command that changes nothing."""
-    return _command(method, edits=False)
 
 
 @dataclass(frozen=True)
@@ -135,7 +76,7 @@ class Call:
         self._sim._asked(("cancel", self._watcher.every), remove, again=True)
 
 
-class Simulation(BlockCommands):
+class Simulation(ParticleCommands, BlockCommands):
     """A model and its run: particles, blocks, or both. Born empty, as after START.
 
     Particles are made by the methods of this class, blocks by those of `mesh`, `elements`, `faces`, `joints`, `nodes`,
@@ -232,274 +173,7 @@ class Simulation(BlockCommands):
             engine = self.engine
             dem.particles.start(engine)
 
-    @_command
-    def box(
-        self,
-        left: float,
-        right: float,
-        bottom: float,
-        height: float,
-        kn: float = 0.0,
-        ks: float = 0.0,
-        fric: float = 0.0,
-    ) -> None:
-        """BOX: four walls around the space of the model; particles that leave it are deleted.
-
-        Parameters
-        ----------
-        left, right, bottom, height : its sides [m].
-        kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient of the walls.
-        """
-        dem.walls.box(self.engine, left, right, bottom, height, kn, ks, fric)
-
-    @_command
-    def wall(
-        self,
-        id: int,
-        nodes: tuple[Point, Point] | None = None,
-        *,
-        kn: float | None = None,
-        ks: float | None = None,
-        fric: float | None = None,
-        color: str | int | None = None,
-        xv: float | None = None,
-        yv: float | None = None,
-    ) -> None:
-        """WALL: make a wall from node to node, or change the one with this id; what is left out stays.
-
-        Parameters
-        ----------
-        id : number of the wall.
-        nodes : its ends, ((x, y), (x, y)) [m]; both sides act, unless set(wallside="left").
-        kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient.
-        color : name or number.
-        xv, yv : velocity, until it is changed [m/s].
-        """
-        dem.walls.wall(self.engine, id, nodes, kn, ks, fric, _color(color), xv, yv)
-
-    @_command
-    def ball(
-        self, x: float, y: float, rad: float, id: int | None = None, color: str | int = 0, group: str = "***"
-    ) -> None:
-        """BALL: one particle.
-
-        Parameters
-        ----------
-        x, y : place of its centre [m].
-        rad : radius [m].
-        id : number; left out, the next free one.
-        color, group : name or number; name.
-        """
-        dem.particles.ball(self.engine, id, x, y, rad, _color(color), group)
-
-    @_command
-    def gen(self, num: int, rad: Iterable[float], x: Point, y: Point, color: str | int = 0, group: str = "***") -> int:
-        """GEN num: random insertion without overlap.
-
-        Parameters
-        ----------
-        num : number of particles to place.
-        rad : radii that are drawn from [m].
-        x, y : sides of the rectangle, (least, greatest) [m].
-        color, group : name or number; name.
-
-        Returns
-        -------
-        int : how many found room.
-        """
-        return dem.particles.gen(self.engine, int(num), _radii(rad), x, y, _color(color), group)
-
-    @_command
-    def gen_grid(
-        self,
-        rad: Iterable[float],
-        x: Point,
-        y: Point,
-        idmin: int | None = None,
-        color: str | int = 0,
-        group: str = "***",
-    ) -> int:
-        """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad).
-
-        Parameters
-        ----------
-        rad : radii that are drawn from [m].
-        x, y : sides of the rectangle, (least, greatest) [m].
-        idmin : first number; left out, the next free one.
-        color, group : name or number; name.
-
-        Returns
-        -------
-        int : how many were made.
-        """
-        return dem.particles.gen_grid(self.engine, _radii(rad), x, y, idmin, _color(color), group)
-
-    @_command
-    def gline(
-        self,
-        p1: Point,
-        p2: Point,
-        rad: float,
-        cratio: float = 1.0,
-        *,
-        kn: float | None = None,
-        ks: float | None = None,
-        fric: float | None = None,
-        color: str | int = 0,
-        group: str = "***",
-    ) -> int:
-        """GLINE: a row of particles from p1 towards p2.
-
-        Parameters
-        ----------
-        p1, p2 : ends, (x, y) [m].
-        rad : radius [m].
-        cratio : distance of neighbours over the sum of their radii.
-        kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient.
-        color, group : name or number; name.
-
-        Returns
-        -------
-        int : how many were made.
-        """
-        return dem.particles.gline(self.engine, p1, p2, rad, cratio, kn, ks, fric, _color(color), group)
-
-    @_command
-    def load(self, file: str | Path, scale: float = 1.0, x: Point | None = None, y: Point | None = None) -> int:
-        """LOAD: a new model from rows ``x y r [group]``, or from a frame all_<step>.dat; x, y: window in the numbers of
-        the file; how many."""
-        self._refuse_coupled("load")
-        return dem.particles.load(self.engine, self._existing(file), scale, x, y)
-
-    @_command
-    def clump(
-        self,
-        file: str | Path,
-        x: float = 0.0,
-        y: float = 0.0,
-        angle: float = 0.0,
-        scale: float = 1.0,
-        color: str | int = 0,
-        group: str = "***",
-    ) -> int:
-        """CLUMP file: rigid bodies of discs from a clump file, scaled, turned by `angle` [rad] about its origin, moved
-        by (x, y); how many bodies."""
-        return dem.clumps.clump(self.engine, self._existing(file), x, y, angle, scale, _color(color), group)
-
-    @_command
-    def join(self, where: Where, group: str | None = None, color: str | int | None = None) -> int:
-        """CLUMP RANGE: make one rigid clump of the chosen particles; of how many."""
-        return dem.clumps.join(self.engine, _selection(where), group, _color(color))
-
-    @_command
-    def delete(self, where: Where = None) -> int:
-        """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
-        return dem.particles.delete(self.engine, _selection(where))
-
-    @_look
-    def export(self, file: str | Path, group: bool = False, where: Where = None) -> None:
-        """EXP: rows ``x y r [group]`` in the order of ids."""
-        dem.particles.export(self.engine, self.directory / file, group, _selection(where))
-
     # ---- what it is made of ----------------------------------------------------------------------------------------
-
-    @_command
-    def prop(
-        self,
-        where: Where = None,
-        *,
-        hertz: bool = False,
-        xv: float | None = None,
-        yv: float | None = None,
-        spin: float | None = None,
-        color: str | int | None = None,
-        group: str | None = None,
-        law: str | None = None,
-        between: Sequence[str] = (),
-        parameter: Mapping[str, float] | None = None,
-        **properties: Unpack[Material],
-    ) -> None:
-        """PROP: properties, velocities, colour and group of particles; what is left out stays.
-
-        Parameters
-        ----------
-        where : the particles.
-        hertz : contacts of Hertz and Mindlin, by shear [Pa] and poiss.
-        xv, yv, spin : velocity [m/s] and angular velocity, anticlockwise [rad/s].
-        color, group : name or number; name.
-        law : 'file.py:function' beside the program (docs/user_laws.md), or "linear".
-        between : the law is that of pairs of discs with these two laws.
-        parameter : properties that the law declares.
-        properties : density [kg/m3], of discs of unit thickness [kg/m2]; fric; shear [Pa]; poiss; damp; kn, ks [N/m];
-            xp, yp: pressures that push along x and y [Pa].
-        """
-        dem.properties.prop(
-            self.engine, _selection(where), hertz=hertz, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
-            law=law, between=between, parameter=parameter, folder=self.directory, **properties,
-        )  # fmt: skip
-
-    @_command
-    def bond(
-        self,
-        where: Where = None,
-        *,
-        ebmod: float | None = None,
-        gbmod: float | None = None,
-        tstrength: float | None = None,
-        sstrength: float | None = None,
-        n_bond: float | None = None,
-        s_bond: float | None = None,
-        tolerate: float | None = None,
-        rext: float | None = None,
-        fric: float | None = None,
-        rubber: bool = False,
-        conserving: bool = False,
-    ) -> int:
-        """PROP with bond keys: bond the pairs that touch, renew the bonds that are there.
-
-        Parameters
-        ----------
-        where : particles; both of a pair are among them.
-        ebmod, gbmod : Young's and shear modulus of elastic bonds [Pa].
-        tstrength, sstrength : their tensile strength and cohesion [Pa].
-        n_bond, s_bond : tensile and shear strength of contact bonds [N].
-        tolerate : largest gap that is bonded [m].
-        rext : factor on the radii in the search for pairs.
-        fric : friction coefficient of the particles.
-        rubber : mark the bonds as those of a membrane, without any effect on the motion.
-        conserving : one shear stiffness, touching or open, so that opening and closing make no energy.
-
-        Returns
-        -------
-        int : how many are new.
-        """
-        return dem.bonds.bond(
-            self.engine, _selection(where), ebmod=ebmod, gbmod=gbmod, tstrength=tstrength, sstrength=sstrength,
-            n_bond=n_bond, s_bond=s_bond, tolerate=tolerate, rext=rext, fric=fric, rubber=rubber,
-            conserving=conserving,
-        )  # fmt: skip
-
-    @_command
-    def break_bonds(self, where: Where = None) -> int:
-        """BOND break: remove the bonds with both ends in `where`; how many."""
-        return dem.bonds.break_bonds(self.engine, _selection(where))
-
-    @_command
-    def fix(self, *dofs: str, where: Where = None) -> None:
-        """FIX: these of "x", "y", "spin" keep the velocity they have."""
-        dem.properties.fix(self.engine, _degrees(dofs), where=_selection(where))
-
-    @_command
-    def free(self, *dofs: str, where: Where = None) -> None:
-        """FREE: undo `fix`."""
-        dem.properties.free(self.engine, _degrees(dofs), where=_selection(where))
-
-    @_command
-    def add_physics(self, name: str, **parameters: float) -> None:
-        """Physics on the particles beside their motion, from the next step on. There is "diffusion": heat through
-        contacts; conductance of each [W/K], capacity [J/(kg K)]; fields temperature [K], heat_source [W], heat_given
-        [J]; HIST follows heat and heat_given [J], which are columns of energy.csv."""
-        dem.physics.add(self.engine, name, **parameters)
 
     @_command
     def set(
@@ -695,17 +369,6 @@ class Simulation(BlockCommands):
             except HpcdemError:  # the command that reads it says what is wrong
                 pass
         return comm.bcast(kind)
-
-    @_look
-    def hist(self, id: int, interval: int, what: str) -> None:
-        """HIST: record kinetic, step, time, unbalanced, contacts, bonds or energy, or "gstress group a", "gstrain group
-        a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and hist_<id>.csv."""
-        dem.history.hist(self.engine, id, interval, what)
-
-    @_look
-    def plot(self, y: int, x: int) -> None:
-        """PLOT: at `finish`, write history y against history x."""
-        dem.history.plot_hist(self.engine, y, x)
 
     @_command
     def command(self, text: str) -> None:
@@ -903,37 +566,6 @@ class Simulation(BlockCommands):
         return {name: Wall(*row) for name, row in self._asked(("walls",), rows).items()}
 
     @_look
-    def extents(self) -> dict[str, float]:
-        """{left, right, bottom, top} of the particles that are not fixed in both x and y [m]."""
-        return self.engine.extents()
-
-    @_look
-    def wall_force(self, id: int) -> Point:
-        """Force on a wall (x, y) [N], exactly summed."""
-        from hpcdem.physics.dem import diagnostics
-
-        row = self.engine.walls.row(id)
-        self._ready()
-        return _point(diagnostics.wall_forces(self.engine)[row])
-
-    @_look
-    def wall_forces(self) -> dict[int, Point]:
-        """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
-        from hpcdem.physics.dem import diagnostics
-
-        self._ready()
-        force = diagnostics.wall_forces(self.engine)
-        return {int(i): _point(f) for i, f in zip(self.engine.walls.id, force, strict=True)}
-
-    @_look
-    def kinetic_energy(self) -> float:
-        """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
-        from hpcdem.physics.dem import diagnostics
-
-        self._ready()
-        return diagnostics.kinetic_energy(self.engine)
-
-    @_look
     def energy(self) -> dict[str, float]:
         """The energy budget since the first cycle after ``set(energy=n)`` [J]: the columns of energy.csv by name."""
         import dataclasses
@@ -943,14 +575,6 @@ class Simulation(BlockCommands):
         if self.engine.energy is None or self.engine.energy.start is None:
             raise CommandError("there is no account yet: set(energy=n) comes first, then a cycle")
         return dataclasses.asdict(self.engine.energy.look(self.engine))
-
-    @_look
-    def unbalanced(self) -> float:
-        """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
-        from hpcdem.commands.dem import output
-
-        self._ready()
-        return output.unbalanced(self.engine)
 
     def contacts(self) -> dict[str, np.ndarray]:
         """Touching pairs of the whole model, on every rank, in the order of ids: id1 id2, normal force fn and shear
@@ -964,15 +588,6 @@ class Simulation(BlockCommands):
     def wall_contacts(self) -> dict[str, np.ndarray]:
         """Contacts with walls: id1, wall (its id), fn fs, fx fy on the particle, x y, overlap."""
         return self._table("wall_contacts")
-
-    @_look
-    def clumps(self) -> dict[str, np.ndarray]:
-        """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
-        spin, angle, area, mass, inertia, members (how many)."""
-        from hpcdem.physics.dem import diagnostics
-
-        self._ready()
-        return diagnostics.clumps(self.engine)
 
     @property
     def bonds_left(self) -> int:
@@ -1369,38 +984,3 @@ def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0
 
 def _point(values: Any) -> Point:
     return float(values[0]), float(values[1])
-
-
-def _color(color: str | int | None) -> Any:
-    if color is None or (isinstance(color, int) and color in COLORS.values()):
-        return color
-    if isinstance(color, str) and color.lower() in COLORS:
-        return COLORS[color.lower()]
-    raise CommandError(f"expected a colour, {', '.join(f'{n} ({i})' for n, i in COLORS.items())}, got {color!r}")
-
-
-def _radii(rad: Iterable[float] | float) -> list[float]:
-    return [float(r) for r in (rad if isinstance(rad, Iterable) else [rad])]
-
-
-def _degrees(dofs: tuple[str, ...]) -> tuple[str, ...]:
-    wrong = [d for d in dofs if d not in FIX_BITS]
-    if wrong or not dofs:
-        raise CommandError(f"say which of {', '.join(FIX_BITS)}" + (f", not {wrong[0]!r}" if wrong else ""))
-    return dofs
-
-
-@functools.lru_cache(maxsize=256)
-def _parsed(text: str) -> Selection | None:
-    return parse_text(f"RES model\nDEL RANGE {text}", "where").statements[1].selection
-
-
-def _selection(where: Where) -> Selection | None:
-    if where is None or isinstance(where, Selection):
-        return where
-    if not isinstance(where, str) or "\n" in where:
-        raise CommandError(f"where: expected the text of a RANGE or a selection, got {where!r}")
-    try:
-        return _parsed(where)
-    except ScriptError as error:
-        raise CommandError(f"where '{where}': {error.message.removeprefix('DEL RANGE: ')}") from None

@@ -1,4 +1,4 @@
-"""Types of what methods of blocks take and give, as their signatures name them."""
+"""Types of what methods take and give, as their signatures name them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from hpcdem.core.selection import Selection
 from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.tables import Drawn, Over
@@ -21,6 +22,8 @@ Value = float | Over | Drawn | np.ndarray
 """Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
 Where = str | g.Term | tuple[g.Term, ...] | None
 """The text of a RANGE, or terms of `hpcdem.physics.fdem.groups`, all of which must hold; None: everything."""
+Selected = str | Selection | None
+"""The text of a RANGE of ZDEM, or an object of `hpcdem.core.selection`; None: all particles."""
 
 
 class Piece(TypedDict, total=False):

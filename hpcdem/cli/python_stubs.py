@@ -1,5 +1,5 @@
 """What editors and mypy see of methods that are made from the table of a language: ``python -m
-hpcdem.cli.python_stubs`` writes hpcdem/__init__.pyi and hpcdem/api/blocks.pyi."""
+hpcdem.cli.python_stubs`` writes hpcdem/__init__.pyi, hpcdem/api/blocks.pyi and particles.pyi."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import textwrap
 from collections.abc import Iterable, Iterator
 from inspect import Parameter
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import hpcdem
-from hpcdem.api import blocks
+from hpcdem.api import blocks, particles
 from hpcdem.api.methods import Models
 from hpcdem.api.objects import quantities
 
@@ -25,9 +26,10 @@ Made by ``python -m hpcdem.cli.python_stubs``; do not edit it."""
 '''
 _NAMES = {
     "collections.abc": ("Callable", "Iterable", "Mapping", "Sequence"),
-    "typing": ("Any", "Literal", "overload"),
-    "hpcdem.api.types": ("File", "Number", "Piece", "Point", "Value", "Where"),
+    "typing": ("Any", "Literal", "Unpack", "overload"),
+    "hpcdem.api.types": ("File", "Number", "Piece", "Point", "Selected", "Value", "Where"),
     "hpcdem.commands.fdem": ("Project",),
+    "hpcdem.core.material": ("Material",),
 }
 """What signatures are written with."""
 
@@ -35,7 +37,8 @@ _NAMES = {
 def files() -> dict[Path, str]:
     """Every stub, by its path."""
     folder = Path(hpcdem.__file__).parent
-    return {folder / "__init__.pyi": top(), folder / "api/blocks.pyi": of_blocks()}
+    made = {folder / f"api/{module.__name__.rpartition('.')[2]}.pyi": stub(module) for module in (blocks, particles)}
+    return {folder / "__init__.pyi": top(), **made}
 
 
 def top() -> str:
@@ -45,18 +48,19 @@ def top() -> str:
     return _HEAD.format(doc=doc) + "\n".join(sorted(names)) + "\n\n_NAMES: dict[str, str]\n"
 
 
-def of_blocks() -> str:
-    """Of hpcdem.api.blocks."""
-    classes = [of for of in vars(blocks).values() if inspect.isclass(of) and of.__module__ == blocks.__name__]
+def stub(module: ModuleType) -> str:
+    """Of a module of methods."""
+    classes = [of for of in vars(module).values() if inspect.isclass(of) and of.__module__ == module.__name__]
     body = "\n\n".join("\n".join(_class(of)) for of in classes) + "\n"
-    bases = tuple(sorted({base.__name__ for of in classes for base in of.__bases__}))
+    bases = {base.__module__: base for of in classes for base in of.__bases__ if base.__module__ != "builtins"}
+    own_bases = {where: tuple(sorted({base.__name__ for of in classes for base in of.__bases__})) for where in bases}
     lines = []
-    for module, names in {**_NAMES, classes[0].__bases__[0].__module__: bases}.items():
+    for where, names in {**_NAMES, **own_bases}.items():
         if used := [name for name in names if re.search(rf"\b{name}\b", body)]:
-            lines.append(f"from {module} import {', '.join(used)}")
+            lines.append(f"from {where} import {', '.join(used)}")
     top = [line for line in lines if "hpcdem" not in line]
     own = [_wrapped(line) for line in sorted(set(lines) - set(top))]
-    doc = (inspect.getdoc(blocks) or "").partition("\n")[0]
+    doc = (inspect.getdoc(module) or "").partition("\n")[0]
     return _HEAD.format(doc=doc) + "\n".join([*top, "", "import numpy as np", "", *own, "", body])
 
 
@@ -68,7 +72,8 @@ def _wrapped(line: str) -> str:
 
 
 def _class(of: type) -> Iterator[str]:
-    yield f"class {of.__name__}({', '.join(base.__name__ for base in of.__bases__)}):"
+    bases = ", ".join(base.__name__ for base in of.__bases__ if base is not object)
+    yield f"class {of.__name__}({bases}):" if bases else f"class {of.__name__}:"
     yield from _doc(of, 1)
     for name, kind in inspect.get_annotations(of).items():
         yield f"    {name}: {kind}"

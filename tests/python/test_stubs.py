@@ -9,9 +9,11 @@ from typing import Any
 
 import pytest
 
-from hpcdem.api import blocks
+from hpcdem.api import blocks, functions
 from hpcdem.api.methods import Models, Row, bound
+from hpcdem.api.particles import ParticleCommands
 from hpcdem.cli import python_stubs
+from hpcdem.commands import dem
 from tests.tables import each
 
 MADE = [(f"{of.__name__}.{name}", value) for of in (blocks.BlockCommands, *blocks.GROUPS)
@@ -35,6 +37,27 @@ def test_help_says_what_each_argument_is(name: str, method: Any) -> None:
     else:
         assert isinstance(made, Models) and names == ["name", "where", "properties"]
         assert all(f"{model.keyword.name} : " in text for model in made.row.models)
+
+
+OF_FUNCTIONS = {name: value for name, value in vars(ParticleCommands).items() if hasattr(value, "made_by")}
+
+
+@each("name", OF_FUNCTIONS)
+def test_a_method_of_particles_has_the_arguments_of_its_function(name: str) -> None:
+    """Which are read from its text, as a module must not be imported for them."""
+    method = OF_FUNCTIONS[name]
+    module, _, function = method.made_by.name.partition(".")
+    real = inspect.signature(getattr(getattr(dem, module), function)).parameters
+    names = {method.made_by.names.get(one, one): value for one, value in real.items() if one not in ("sim", "folder")}
+    own = {one: value for one, value in inspect.signature(method).parameters.items() if one != "self"}
+    assert own.keys() == names.keys() and inspect.getdoc(method)
+    for one, parameter in own.items():
+        if {parameter.default, names[one].default} != {None, inspect.Parameter.empty} and name != "join":
+            assert parameter.default == names[one].default, one
+        if one not in ("where", "color", "rad", "file", "dofs"):
+            kind = names[one].annotation
+            assert parameter.annotation in (kind, f"{kind} | None")
+    assert not any(one in functions.TAKEN for one in own if one not in ("where", "color", "dofs", "num"))
 
 
 class Python:

@@ -18,12 +18,14 @@ if TYPE_CHECKING:
         particles,
         physics,
         properties,
+        queries,
         settings,
         walls,
     )
 
 __all__ = [
-    "bonds", "checkpoints", "clumps", "cycles", "history", "particles", "physics", "properties", "settings", "walls",
+    "bonds", "checkpoints", "clumps", "cycles", "history", "particles", "physics", "properties", "queries", "settings",
+    "walls",
 ]  # fmt: skip
 
 

@@ -40,14 +40,27 @@ def bond(
     rubber: bool = False,
     conserving: bool = False,
 ) -> int:
-    """Bond the pairs with both particles in `where` and d - (Ra + Rb) rext <= tolerate; returns the bonds made.
+    """PROP with bond keys: bond the pairs that touch, renew the bonds that are there.
 
-    Either ebmod, gbmod [Pa], tstrength, sstrength [Pa] (elastic bond) or n_bond, s_bond [N] (contact bond). Pairs in
-    `where` that are bonded already get the new values; keys left out keep theirs, or are 0 in a new bond. tolerate [m]
-    defaults to 1e-6, rext to 1 (it scales radii for this search only). fric is set on the particles as by PROP. rubber
-    marks the bonds as those of a membrane, without any effect on the motion. conserving: while the bond holds, its own
-    shear stiffness counts where the pair touches too, so that opening and closing make no energy (of a contact bond of
-    Hertz particles that at the moment of bonding).
+    Pairs are those with d - (Ra + Rb) rext <= tolerate. Either ebmod, gbmod, tstrength, sstrength (elastic bonds)
+    or n_bond, s_bond (contact bonds). What is left out stays, or is 0 in a new bond.
+
+    Parameters
+    ----------
+    where : particles; both of a pair are among them.
+    ebmod, gbmod : Young's and shear modulus of elastic bonds [Pa].
+    tstrength, sstrength : their tensile strength and cohesion [Pa].
+    n_bond, s_bond : tensile and shear strength of contact bonds [N].
+    tolerate : largest gap that is bonded [m]; 1e-6.
+    rext : factor on the radii in the search for pairs; 1.
+    fric : friction coefficient of the particles.
+    rubber : mark the bonds as those of a membrane, without any effect on the motion.
+    conserving : one shear stiffness, touching or open, so that opening and closing make no energy (of a contact bond of
+        Hertz particles that at the moment of bonding).
+
+    Returns
+    -------
+    int : how many are new.
     """
     values = dict(zip(ELASTIC, (ebmod, gbmod, tstrength, sstrength), strict=True))
     elastic = any(v is not None for v in values.values())
@@ -185,8 +198,8 @@ def warn_of_two_stiffnesses(sim: Simulation) -> None:
 
 
 def break_bonds(sim: Simulation, where: Selection | None = None) -> int:
-    """Remove the bonds with both ends in `where`; returns how many. Shear forces stay, limited by friction from then
-    on."""
+    """BOND break: remove the bonds with both ends in `where`; how many. Shear forces stay, limited by friction from
+    then on."""
     sim.close()
     lists = sim.lists
     which = _flags_with_ghosts(sim, where)

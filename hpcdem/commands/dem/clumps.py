@@ -46,10 +46,21 @@ def clump(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """CLUMP file: add the bodies of a clump file; returns how many.
+    """CLUMP file: rigid bodies of discs from a clump file, scaled, turned about its origin, then moved.
 
-    The file is multiplied by `scale`, turned by `angle` [rad] about its origin, then moved by (x, y) [m]. Mass and
-    inertia are density times the area and polar second moment of area in the file.
+    Mass and inertia are density times the area and polar second moment of area in the file.
+
+    Parameters
+    ----------
+    path : the file.
+    x, y : way [m].
+    angle : of the turn [rad].
+    scale : factor on all lengths.
+    color, group : name or number; name.
+
+    Returns
+    -------
+    int : how many bodies.
     """
     _need_discs(sim)
     sim.prepare_kernels("clumps")

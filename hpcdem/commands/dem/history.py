@@ -14,11 +14,9 @@ DRAW_INTERVAL = 1000
 
 
 def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
-    """HIST: write `what` to hist_id_<id>.dat and hist_<id>.csv every `interval` steps. Collective.
-
-    what: one of output.followed, or of platens.OF_PARTS with the parts meant: ``gstress group a``, ``gstrain group
-    a|b``, ``ystress wall 3``, ``ystrain wall 0|3``; strains begin at 0 here.
-    """
+    """HIST: record kinetic, step, time, unbalanced, contacts, bonds or energy, or "gstress group a", "gstrain group
+    a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and hist_<id>.csv;
+    strains begin at 0 here."""
     if interval <= 0:
         raise CommandError(f"HIST INTERVAL must be positive, got {interval}")
     if what == "energy" and (law := sim.own_laws.unaccounted()):
@@ -35,7 +33,7 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
 
 
 def plot_hist(sim: Simulation, y: int, x: int) -> None:
-    """PLOT: at STOP write history y against history x."""
+    """PLOT: at `finish`, write history y against history x."""
     sim.plots.append((y, x))
 
 

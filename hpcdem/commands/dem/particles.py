@@ -39,10 +39,17 @@ def load(
     y: tuple[float, float] | None = None,
 ) -> int:
     """LOAD: a new model from rows "x y r [group]" [m], or from a frame all_<step>.dat of ZDEM or hpcdem with all that
-    it holds (commands/dem/frame_state.py); returns the number of particles.
+    it holds (commands/dem/frame_state.py).
 
-    x, y: keep only centres in these ranges (of the file's numbers); then everything is multiplied by `scale`, which is
-    for rows.
+    Parameters
+    ----------
+    path : the file.
+    scale : factor on all lengths, of rows.
+    x, y : only centres in these ranges, (least, greatest), in the numbers of the file.
+
+    Returns
+    -------
+    int : how many there are.
     """
     if sim.comm.bcast(is_frame(path) if sim.comm.rank == 0 else None):
         if scale != 1.0:
@@ -123,7 +130,15 @@ def _agree(sim: Simulation, error: str | None) -> None:
 def ball(
     sim: Simulation, gid: int | None, x: float, y: float, rad: float, color: int = 0, group: str = NO_GROUP
 ) -> None:
-    """BALL: one particle. gid None takes the next free id."""
+    """BALL: one particle.
+
+    Parameters
+    ----------
+    x, y : place of its centre [m].
+    rad : radius [m].
+    gid : number; left out, the next free one.
+    color, group : name or number; name.
+    """
     limits.check_circle(x, y, rad)
     if gid is not None:
         if gid < 0:
@@ -142,10 +157,21 @@ def gen(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """GEN num: random insertion without overlap into a rectangle; returns the number of particles made.
+    """GEN num: random insertion without overlap.
 
     Scripts ask for far more than fit: it gives up after FAILURES attempts in a row that found no room, or after SET
     gentry attempts per particle asked for, if that is set.
+
+    Parameters
+    ----------
+    num : number of particles to place.
+    radii : radii that are drawn from [m].
+    x, y : sides of the rectangle, (least, greatest) [m].
+    color, group : name or number; name.
+
+    Returns
+    -------
+    int : how many found room.
     """
     limits.check_rectangle(radii, x, y, grid=False)
     limits.check_attempts(num, sim.settings.gentry)
@@ -170,7 +196,19 @@ def gen_grid(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """GEN GRID: a particle of a random listed radius at each node of a square lattice of spacing 2 max(r)."""
+    """GEN grid: a particle at each node of a square lattice of spacing 2 max(radii).
+
+    Parameters
+    ----------
+    radii : radii that are drawn from [m].
+    x, y : sides of the rectangle, (least, greatest) [m].
+    idmin : first number; left out, the next free one.
+    color, group : name or number; name.
+
+    Returns
+    -------
+    int : how many were made.
+    """
     limits.check_rectangle(radii, x, y, grid=True)
     total = math.prod(packing.nodes(np.array(radii), x, y))
     first, end = share(total, sim.comm)
@@ -193,7 +231,20 @@ def gline(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """GLINE: a row of equal particles from p1 towards p2, spacing 2 rad cratio; overlaps are not looked at."""
+    """GLINE: a row of particles from p1 towards p2, of spacing 2 rad cratio; overlaps are not looked at.
+
+    Parameters
+    ----------
+    p1, p2 : ends, (x, y) [m].
+    rad : radius [m].
+    cratio : distance of neighbours over the sum of their radii.
+    kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient.
+    color, group : name or number; name.
+
+    Returns
+    -------
+    int : how many were made.
+    """
     limits.check_row(p1, p2, rad, cratio)
     centres = row(p1, p2, rad, cratio)
     material = {name: v for name, v in (("kn", kn), ("ks", ks), ("fric", fric)) if v is not None}
@@ -203,7 +254,7 @@ def gline(
 
 
 def delete(sim: Simulation, where: Selection | None = None) -> int:
-    """DEL: remove particles with their contacts and bonds; returns how many. Their ids are not used again."""
+    """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
     which = chosen(sim, where)
     if not sim.comm.any(bool(which.any())):
         return 0
@@ -212,7 +263,14 @@ def delete(sim: Simulation, where: Selection | None = None) -> int:
 
 
 def export(sim: Simulation, path: Path | str, with_group: bool = False, where: Selection | None = None) -> None:
-    """EXP: rows "x y r [group]" in the order of ids, 13 significant digits."""
+    """EXP: rows "x y r [group]" in the order of ids, 13 significant digits.
+
+    Parameters
+    ----------
+    path : the file.
+    with_group : with the names of groups.
+    where : the particles.
+    """
     p = sim.particles
     which = chosen(sim, where)
     mine = (

@@ -8,8 +8,9 @@ from hpcdem.physics.dem.simulation import Simulation
 
 
 def add(sim: Simulation, name: str, **parameters: float) -> None:
-    """Physics by its name in physics/particle_physics.py, from the next step on. CommandError for names and parameters
-    that there are not. Collective."""
+    """Physics on the particles beside their motion, from the next step on. There is "diffusion": heat through
+    contacts; conductance of each [W/K], capacity [J/(kg K)]; fields temperature [K], heat_source [W], heat_given
+    [J]; HIST follows heat and heat_given [J], which are columns of energy.csv."""
     saved_state.add_physics(sim, name, parameters)
 
 

@@ -59,17 +59,23 @@ def prop(
     folder: Path = Path(),
     **properties: Unpack[Material],
 ) -> None:
-    """Set properties of the particles in `where`; keys left out keep their values. properties: of `core.material`.
+    """PROP: properties, velocities, colour and group of particles; what is left out stays.
 
-    SI units; density is per volume, or per area when SET disk makes disks. HERTZ chooses the Hertz-Mindlin law, giving
-    kn or ks without it the linear one. xp, yp [Pa] push each particle with pressure 2 R thickness (decision: the source
-    shows the words only; published scripts press the particles of a freed side wall with them).
-    law: 'file.py:function' of the user, in `folder` (physics/dem/user_laws.py), or LINEAR, which takes it back;
-    parameter: properties that it declares. Walls go on with kn and ks, or HERTZ. between: two laws, 'file.py:function',
-    LINEAR or "hertz"; `law`, of the user or LINEAR, is then that of pairs of discs that have these, and nothing else is
-    set.
-    Existing contacts use the new values from the next step. Velocities of a clump are those of its centre; its members
-    follow.
+    A density is per volume, or per area when SET disk makes disks. Properties of Hertz and Mindlin are taken with
+    `hertz`; kn or ks without it give the linear law. Contacts use the new values from the next step. Velocities of
+    a clump are those of its centre; its members follow.
+
+    Parameters
+    ----------
+    where : the particles.
+    hertz : contacts of Hertz and Mindlin, by shear [Pa] and poiss.
+    xv, yv, spin : velocity [m/s] and angular velocity, anticlockwise [rad/s].
+    color, group : name or number; name.
+    law : 'file.py:function' beside the program (docs/user_laws.md), or "linear".
+    between : the law is that of pairs of discs with these two laws; nothing else is set.
+    parameter : properties that the law declares.
+    properties : density [kg/m3], of discs of unit thickness [kg/m2]; fric; shear [Pa]; poiss; damp; kn, ks [N/m];
+        xp, yp: pressures that push along x and y, on 2 R thickness of each particle [Pa].
     """
     if between:
         others = (*properties.values(), xv, yv, spin, color, group, where)
@@ -172,12 +178,12 @@ def _say_between(sim: Simulation, law: str, pair: Sequence[str], parameter: Mapp
 
 
 def fix(sim: Simulation, dofs: tuple[str, ...], where: Selection | None = None) -> None:
-    """FIX: the components in `dofs` ("x", "y", "spin") keep the velocity they have."""
+    """FIX: these of "x", "y", "spin" keep the velocity they have."""
     sim.particles["fix"][chosen(sim, where)] |= sum(FIX_BITS[d] for d in set(dofs))
     sim.tables_changed()
 
 
 def free(sim: Simulation, dofs: tuple[str, ...], where: Selection | None = None) -> None:
-    """FREE: undo FIX."""
+    """FREE: undo `fix`."""
     sim.particles["fix"][chosen(sim, where)] &= ~sum(FIX_BITS[d] for d in set(dofs))
     sim.tables_changed()

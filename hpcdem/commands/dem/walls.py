@@ -20,7 +20,16 @@ def wall(
     xv: float | None = None,
     yv: float | None = None,
 ) -> None:
-    """Make a wall (with nodes) or change one. SI units; kn, ks act on particles of the linear law only."""
+    """WALL: make a wall from node to node, or change the one with this id; what is left out stays.
+
+    Parameters
+    ----------
+    id : number of the wall.
+    nodes : its ends, ((x, y), (x, y)) [m]; both sides act, unless set(wallside="left").
+    kn, ks, fric : normal and shear stiffness [N/m], for particles of the linear law, and friction coefficient.
+    color : name or number.
+    xv, yv : velocity, until it is changed [m/s].
+    """
     if id < 0:
         raise CommandError(f"wall id must not be negative, got {id}")
     if nodes is not None and not np.isfinite(nodes).all():
@@ -55,7 +64,13 @@ def box(
     ks: float = 0.0,
     fric: float = 0.0,
 ) -> None:
-    """BOX: four walls that keep particles in; who leaves it is deleted. `height` is measured from `bottom`."""
+    """BOX: four walls around the space of the model; particles that leave it are deleted.
+
+    Parameters
+    ----------
+    left, right, bottom, height : its sides [m]; the height is measured from the bottom.
+    kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient of the walls.
+    """
     if right <= left or height <= 0.0:
         raise CommandError(f"BOX is empty: left {left:g}, right {right:g}, height {height:g}")
     top = bottom + height

@@ -1,0 +1,291 @@
+"""Methods that are made from the functions of `hpcdem.commands.dem`: signature and docstring are theirs.
+
+They are read from the text of the module, as most modules there bring kernels, which takes a second, and must not be
+imported before the first simulation has settled them.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from inspect import Parameter
+from pathlib import Path
+from typing import Any, TypeVar
+
+from hpcdem.api.methods import bound, tokens
+from hpcdem.api.program import carried_out, place, spelt
+from hpcdem.commands import dem
+from hpcdem.core.errors import CommandError, ScriptError
+from hpcdem.core.fields import FIX_BITS
+from hpcdem.core.material import Material
+from hpcdem.core.selection import Selection
+from hpcdem.lang.zdem.execute import look_at_units
+from hpcdem.lang.zdem.parser import parse_text
+from hpcdem.lang.zdem.table import COLORS
+
+MATERIAL_WORDS = tuple(Material.__annotations__)
+OF_BOTH = {"start", "save", "restore", "resume", "finish", "cycle", "imple", "energy"}
+"""Methods that may find blocks alone. The others make the particles first: kernels must be settled before modules that
+have some are imported, and these import them when they are named."""
+LOOKED_AT = {
+    "box": "BOX", "wall": "WALL", "ball": "BALL", "gen": "GEN", "gen_grid": "GEN", "gline": "GLINE", "prop": "PROP",
+    "bond": "PROP", "set": "SET",
+}  # fmt: skip
+"""Methods whose values are held against declared units, and the commands whose units they have."""
+Method = TypeVar("Method", bound=Callable[..., Any])
+Kind = TypeVar("Kind", bound=type)
+
+
+# ---- values as functions take them -----------------------------------------------------------------------------------
+
+
+def color_number(color: str | int | None) -> Any:
+    """Of a name or number; CommandError for others."""
+    if color is None or (isinstance(color, int) and color in COLORS.values()):
+        return color
+    if isinstance(color, str) and color.lower() in COLORS:
+        return COLORS[color.lower()]
+    raise CommandError(f"expected a colour, {', '.join(f'{n} ({i})' for n, i in COLORS.items())}, got {color!r}")
+
+
+def _radii(rad: Iterable[float] | float) -> list[float]:
+    return [float(r) for r in (rad if isinstance(rad, Iterable) else [rad])]
+
+
+def _degrees(dofs: tuple[str, ...]) -> tuple[str, ...]:
+    wrong = [d for d in dofs if d not in FIX_BITS]
+    if wrong or not dofs:
+        raise CommandError(f"say which of {', '.join(FIX_BITS)}" + (f", not {wrong[0]!r}" if wrong else ""))
+    return dofs
+
+
+@functools.lru_cache(maxsize=256)
+def _parsed(text: str) -> Selection | None:
+    return parse_text(f"RES model\nDEL RANGE {text}", "where").statements[1].selection
+
+
+def selection(where: str | Selection | None) -> Selection | None:
+    """The particles that are meant; CommandError for what says none."""
+    if where is None or isinstance(where, Selection):
+        return where
+    if not isinstance(where, str) or "\n" in where:
+        raise CommandError(f"where: expected the text of a RANGE or a selection, got {where!r}")
+    try:
+        return _parsed(where)
+    except ScriptError as error:
+        raise CommandError(f"where '{where}': {error.message.removeprefix('DEL RANGE: ')}") from None
+
+
+@dataclass(frozen=True)
+class Taken:
+    """How a method takes what a function calls so. type: in a signature, in the words of `hpcdem.api.types`; make: the
+    value for the function, from the simulation and what was given."""
+
+    type: str
+    make: Callable[[Any, Any], Any]
+
+
+TAKEN = {
+    "where": Taken("Selected", lambda sim, where: selection(where)),
+    "color": Taken("str | int", lambda sim, color: color_number(color)),
+    "radii": Taken("Iterable[float]", lambda sim, radii: _radii(radii)),
+    "dofs": Taken("str", lambda sim, dofs: _degrees(dofs)),
+    "num": Taken("int", lambda sim, num: int(num)),
+}
+READ = Taken("File", lambda sim, file: sim._existing(file))
+WRITTEN = Taken("File", lambda sim, file: sim.directory / file)
+
+
+# ---- methods ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Function:
+    """Which function of `hpcdem.commands.dem` a method is.
+
+    order: arguments that may be given by their place, if it is not that of the function; ``name?`` may be left out
+    though the function needs it, ``name!`` may not; the others are keywords. names: of arguments, by those of the
+    function; file: how a file is taken; alone: not for particles that touch blocks; looks: it changes nothing.
+    """
+
+    name: str
+    order: str = ""
+    names: Mapping[str, str] = field(default_factory=dict)
+    file: Taken = READ
+    alone: bool = False
+    looks: bool = False
+
+    @functools.cached_property
+    def node(self) -> ast.FunctionDef:
+        """The function, as it is written."""
+        module, _, name = self.name.partition(".")
+        return _functions(module)[0][name]
+
+    def taken(self, own: str) -> Taken | None:
+        """How an argument of the function is taken, if not as it is."""
+        return self.file if own == "path" else TAKEN.get(own)
+
+    @functools.cached_property
+    def parameters(self) -> list[Parameter]:
+        """As a method has them."""
+        own = {self.names.get(one.name, one.name): one for one in _parameters(self.node, self.name.partition(".")[0])}
+        own = {name: replaced(one, name, self.taken(one.name)) for name, one in own.items() if one.name != "folder"}
+        if not self.order:
+            return list(own.values())
+        found = []
+        for name, mark, _ in tokens(self.order):
+            one = own.pop(name)
+            if mark == "*":
+                one = Parameter(name, Parameter.VAR_POSITIONAL, annotation=one.annotation)
+            elif mark:
+                one = one.replace(default=None if mark == "?" else Parameter.empty)
+                one = one.replace(annotation=_optional(one.annotation) if mark == "?" else one.annotation)
+            found.append(one)
+        return found + [one.replace(kind=max(one.kind, Parameter.KEYWORD_ONLY)) for one in own.values()]
+
+    @property
+    def docstring(self) -> str:
+        text = ast.get_docstring(self.node) or ""
+        for own, name in self.names.items():
+            text = re.sub(rf"(?<!\w){own}(?!\w)", name, text)
+        return text
+
+    def method(self, owner: type, name: str) -> Callable[..., Any]:
+        """The method of a class."""
+        parameters = self.parameters
+        more = any(one.kind is Parameter.VAR_KEYWORD for one in parameters)
+        known = [one for one in parameters if one.kind is not Parameter.VAR_KEYWORD]
+        usual = {one.name: one.default for one in known if one.default is not Parameter.empty}
+        own = {public: of for of, public in self.names.items()}
+        module, _, function = self.name.partition(".")
+        folder = any(one.arg == "folder" for one in self.node.args.kwonlyargs)
+
+        def call(self_: Any, *values: Any, **options: Any) -> Any:
+            found = {**usual, **bound(known, values, options, more)}
+            given = {own.get(key, key): value for key, value in found.items()}
+            if self.alone:
+                self_._refuse_coupled(name)
+            engine = self_.engine
+            for key, value in given.items():
+                if (taken := self.taken(key)) is not None:
+                    given[key] = taken.make(self_, value)
+            if folder:
+                given["folder"] = self_.directory
+            return getattr(getattr(dem, module), function)(engine, **given)
+
+        returned = ast.unparse(self.node.returns) if self.node.returns is not None else "None"
+        call.__name__, call.__qualname__, call.__module__ = name, f"{owner.__qualname__}.{name}", owner.__module__
+        call.__doc__ = self.docstring
+        call.__annotations__ = {one.name: one.annotation for one in parameters} | {"return": returned}
+        first = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
+        signature = inspect.Signature([first, *parameters], return_annotation=returned)
+        call.__signature__ = signature  # type: ignore[attr-defined]
+        call.made_by = self  # type: ignore[attr-defined]
+        return call
+
+
+def _optional(kind: str) -> str:
+    return kind if kind.endswith("None") else f"{kind} | None"
+
+
+def replaced(one: Parameter, name: str, taken: Taken | None) -> Parameter:
+    """An argument of a function as a method has it."""
+    kind = one.annotation if taken is None else taken.type
+    if one.default is None and kind != "Selected":
+        kind = _optional(kind)
+    return one.replace(name=name, annotation=kind)
+
+
+@functools.cache
+def _functions(module: str) -> tuple[dict[str, ast.FunctionDef], dict[str, Any]]:
+    """Functions of a module, and the constants that are texts."""
+    spec = find_spec(f"hpcdem.commands.dem.{module}")
+    assert spec is not None and spec.origin is not None
+    body = ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body
+    constants = {
+        one.targets[0].id: one.value.value
+        for one in body
+        if isinstance(one, ast.Assign) and isinstance(one.targets[0], ast.Name) and isinstance(one.value, ast.Constant)
+    }
+    return {one.name: one for one in body if isinstance(one, ast.FunctionDef)}, constants
+
+
+def _parameters(node: ast.FunctionDef, module: str) -> Iterator[Parameter]:
+    """All but the first, the simulation."""
+    given = node.args
+    placed = given.args[1:]
+    defaults = [None] * (len(placed) - len(given.defaults)) + list(given.defaults)
+    for how, names, values in (
+        (Parameter.POSITIONAL_OR_KEYWORD, placed, defaults),
+        (Parameter.KEYWORD_ONLY, given.kwonlyargs, given.kw_defaults),
+        (Parameter.VAR_KEYWORD, [given.kwarg] if given.kwarg else [], [None]),
+    ):
+        for one, value in zip(names, values):
+            kind = ast.unparse(one.annotation) if one.annotation is not None else "Any"
+            yield Parameter(one.arg, how, default=_value(value, module), annotation=kind)
+
+
+def _value(node: ast.expr | None, module: str) -> Any:
+    """A default; texts may be constants of the module, or of the one that it has them from."""
+    if node is None:
+        return Parameter.empty
+    if isinstance(node, ast.Name):
+        return next(of[1][node.id] for of in map(_functions, (module, "particles")) if node.id in of[1])
+    return ast.literal_eval(node) if not isinstance(node, ast.Call) else None
+
+
+def commands(cls: Kind) -> Kind:
+    """Rows become methods, whose errors leave with file and line of the program."""
+    for name, found in list(vars(cls).items()):
+        if isinstance(found, Function):
+            setattr(cls, name, command(found.method(cls, name), edits=not found.looks))
+    return cls
+
+
+def command(method: Method, edits: bool = True) -> Method:
+    """Errors of a command leave with file and line of the program; values of a wrong kind too. edits: it may change the
+    particles."""
+
+    signature = inspect.signature(method)
+    names = [name for name, one in signature.parameters.items() if name != "self" and one.kind is not one.VAR_KEYWORD]
+    names += MATERIAL_WORDS if "properties" in signature.parameters else ()
+
+    @functools.wraps(method)
+    def call(self: Any, *values: Any, **options: Any) -> Any:
+        at, options = place(), spelt(options, names)
+        if self._engine is not None:
+            self._engine.line = at[1]
+
+        def carry_out() -> Any:
+            if "properties" in signature.parameters:
+                for name in options:
+                    if name not in names:
+                        raise TypeError(f"got an unexpected keyword argument '{name}'")
+            if method.__name__ not in OF_BOTH:
+                _ = self.engine
+            value = method(self, *values, **options)
+            if self._engine is not None and self._engine.settings.units and method.__name__ in LOOKED_AT:
+                given = signature.bind(self, *values, **options).arguments
+                given |= given.pop("options", {}) | given.pop("properties", {})
+                look_at_units(self._engine, LOOKED_AT[method.__name__], given)
+            return value
+
+        def done() -> Any:
+            value = carried_out(at, method.__name__, carry_out, names=names)
+            if self._engine is not None:
+                self._engine.edited |= edits
+            return value
+
+        return self._asked((method.__name__, values, options), done)
+
+    return call  # type: ignore[return-value]
+
+
+def look(method: Method) -> Method:
+    """A command that changes nothing."""
+    return command(method, edits=False)

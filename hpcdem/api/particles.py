@@ -1,0 +1,42 @@
+"""Discs in a Python program: the commands of ZDEM as methods.
+
+`Function` says which function of `hpcdem.commands.dem` a method is; arguments, types and texts are those of the
+function. Editors see them in particles.pyi, which is made from this file: ``python -m hpcdem.cli.python_stubs``.
+"""
+
+from __future__ import annotations
+
+from hpcdem.api.functions import WRITTEN, Function, commands
+
+FILE = {"path": "file"}
+
+
+@commands
+class ParticleCommands:
+    """What a `Simulation` has of particles."""
+
+    box = Function("walls.box")
+    wall = Function("walls.wall", "id nodes")
+    ball = Function("particles.ball", "x y rad id? color group", names={"gid": "id"})
+    gen = Function("particles.gen", names={"radii": "rad"})
+    gen_grid = Function("particles.gen_grid", names={"radii": "rad"})
+    gline = Function("particles.gline", "p1 p2 rad cratio")
+    load = Function("particles.load", names=FILE, alone=True)
+    clump = Function("clumps.clump", names=FILE)
+    join = Function("clumps.join", "where! group color")
+    delete = Function("particles.delete")
+    export = Function("particles.export", names={**FILE, "with_group": "group"}, file=WRITTEN, looks=True)
+    prop = Function("properties.prop")
+    bond = Function("bonds.bond")
+    break_bonds = Function("bonds.break_bonds")
+    fix = Function("properties.fix", "*dofs")
+    free = Function("properties.free", "*dofs")
+    add_physics = Function("physics.add")
+    hist = Function("history.hist", looks=True)
+    plot = Function("history.plot_hist", looks=True)
+    extents = Function("queries.extents", looks=True)
+    wall_force = Function("queries.wall_force", looks=True)
+    wall_forces = Function("queries.wall_forces", looks=True)
+    kinetic_energy = Function("queries.kinetic_energy", looks=True)
+    unbalanced = Function("queries.unbalanced", looks=True)
+    clumps = Function("queries.clumps", looks=True)

@@ -1,0 +1,323 @@
+"""Discs in a Python program: the commands of ZDEM as methods.
+
+Made by ``python -m hpcdem.cli.python_stubs``; do not edit it."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Unpack
+
+import numpy as np
+
+from hpcdem.api.types import File, Selected
+from hpcdem.core.material import Material
+
+class ParticleCommands:
+    """What a `Simulation` has of particles."""
+    def box(
+        self,
+        left: float,
+        right: float,
+        bottom: float,
+        height: float,
+        kn: float = 0.0,
+        ks: float = 0.0,
+        fric: float = 0.0,
+    ) -> None:
+        """BOX: four walls around the space of the model; particles that leave it are deleted.
+
+        Parameters
+        ----------
+        left, right, bottom, height : its sides [m]; the height is measured from the bottom.
+        kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient of the walls.
+        """
+    def wall(
+        self,
+        id: int,
+        nodes: tuple[tuple[float, float], tuple[float, float]] | None = None,
+        *,
+        kn: float | None = None,
+        ks: float | None = None,
+        fric: float | None = None,
+        color: str | int | None = None,
+        xv: float | None = None,
+        yv: float | None = None,
+    ) -> None:
+        """WALL: make a wall from node to node, or change the one with this id; what is left out stays.
+
+        Parameters
+        ----------
+        id : number of the wall.
+        nodes : its ends, ((x, y), (x, y)) [m]; both sides act, unless set(wallside="left").
+        kn, ks, fric : normal and shear stiffness [N/m], for particles of the linear law, and friction coefficient.
+        color : name or number.
+        xv, yv : velocity, until it is changed [m/s].
+        """
+    def ball(
+        self,
+        x: float,
+        y: float,
+        rad: float,
+        id: int | None = None,
+        color: str | int = 0,
+        group: str = '***',
+    ) -> None:
+        """BALL: one particle.
+
+        Parameters
+        ----------
+        x, y : place of its centre [m].
+        rad : radius [m].
+        id : number; left out, the next free one.
+        color, group : name or number; name.
+        """
+    def gen(
+        self,
+        num: int,
+        rad: Iterable[float],
+        x: tuple[float, float],
+        y: tuple[float, float],
+        color: str | int = 0,
+        group: str = '***',
+    ) -> int:
+        """GEN num: random insertion without overlap.
+
+        Scripts ask for far more than fit: it gives up after FAILURES attempts in a row that found no room, or after
+        SET
+        gentry attempts per particle asked for, if that is set.
+
+        Parameters
+        ----------
+        num : number of particles to place.
+        rad : rad that are drawn from [m].
+        x, y : sides of the rectangle, (least, greatest) [m].
+        color, group : name or number; name.
+
+        Returns
+        -------
+        int : how many found room.
+        """
+    def gen_grid(
+        self,
+        rad: Iterable[float],
+        x: tuple[float, float],
+        y: tuple[float, float],
+        idmin: int | None = None,
+        color: str | int = 0,
+        group: str = '***',
+    ) -> int:
+        """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad).
+
+        Parameters
+        ----------
+        rad : rad that are drawn from [m].
+        x, y : sides of the rectangle, (least, greatest) [m].
+        idmin : first number; left out, the next free one.
+        color, group : name or number; name.
+
+        Returns
+        -------
+        int : how many were made.
+        """
+    def gline(
+        self,
+        p1: tuple[float, float],
+        p2: tuple[float, float],
+        rad: float,
+        cratio: float = 1.0,
+        *,
+        kn: float | None = None,
+        ks: float | None = None,
+        fric: float | None = None,
+        color: str | int = 0,
+        group: str = '***',
+    ) -> int:
+        """GLINE: a row of particles from p1 towards p2, of spacing 2 rad cratio; overlaps are not looked at.
+
+        Parameters
+        ----------
+        p1, p2 : ends, (x, y) [m].
+        rad : radius [m].
+        cratio : distance of neighbours over the sum of their radii.
+        kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient.
+        color, group : name or number; name.
+
+        Returns
+        -------
+        int : how many were made.
+        """
+    def load(
+        self,
+        file: File,
+        scale: float = 1.0,
+        x: tuple[float, float] | None = None,
+        y: tuple[float, float] | None = None,
+    ) -> int:
+        """LOAD: a new model from rows "x y r [group]" [m], or from a frame all_<step>.dat of ZDEM or hpcdem with all
+        that
+        it holds (commands/dem/frame_state.py).
+
+        Parameters
+        ----------
+        file : the file.
+        scale : factor on all lengths, of rows.
+        x, y : only centres in these ranges, (least, greatest), in the numbers of the file.
+
+        Returns
+        -------
+        int : how many there are.
+        """
+    def clump(
+        self,
+        file: File,
+        x: float = 0.0,
+        y: float = 0.0,
+        angle: float = 0.0,
+        scale: float = 1.0,
+        color: str | int = 0,
+        group: str = '***',
+    ) -> int:
+        """CLUMP file: rigid bodies of discs from a clump file, scaled, turned about its origin, then moved.
+
+        Mass and inertia are density times the area and polar second moment of area in the file.
+
+        Parameters
+        ----------
+        file : the file.
+        x, y : way [m].
+        angle : of the turn [rad].
+        scale : factor on all lengths.
+        color, group : name or number; name.
+
+        Returns
+        -------
+        int : how many bodies.
+        """
+    def join(self, where: Selected, group: str | None = None, color: str | int | None = None) -> int:
+        """CLUMP RANGE: make one clump of the chosen particles; returns how many they are.
+
+        Area and polar second moment of area are the sums of those of the discs, overlaps counted twice; it moves on
+        with
+        their momentum and angular momentum. CommandError if the particles are bonded to each other, or differ in
+        density,
+        damping or fixed directions.
+        """
+    def delete(self, where: Selected = None) -> int:
+        """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
+    def export(self, file: File, group: bool = False, where: Selected = None) -> None:
+        """EXP: rows "x y r [group]" in the order of ids, 13 significant digits.
+
+        Parameters
+        ----------
+        file : the file.
+        group : with the names of groups.
+        where : the particles.
+        """
+    def prop(
+        self,
+        where: Selected = None,
+        *,
+        hertz: bool = False,
+        xv: float | None = None,
+        yv: float | None = None,
+        spin: float | None = None,
+        color: str | int | None = None,
+        group: str | None = None,
+        law: str | None = None,
+        between: Sequence[str] = (),
+        parameter: Mapping[str, float] | None = None,
+        **properties: Unpack[Material],
+    ) -> None:
+        """PROP: properties, velocities, colour and group of particles; what is left out stays.
+
+        A density is per volume, or per area when SET disk makes disks. Properties of Hertz and Mindlin are taken
+        with
+        `hertz`; kn or ks without it give the linear law. Contacts use the new values from the next step. Velocities
+        of
+        a clump are those of its centre; its members follow.
+
+        Parameters
+        ----------
+        where : the particles.
+        hertz : contacts of Hertz and Mindlin, by shear [Pa] and poiss.
+        xv, yv, spin : velocity [m/s] and angular velocity, anticlockwise [rad/s].
+        color, group : name or number; name.
+        law : 'file.py:function' beside the program (docs/user_laws.md), or "linear".
+        between : the law is that of pairs of discs with these two laws; nothing else is set.
+        parameter : properties that the law declares.
+        properties : density [kg/m3], of discs of unit thickness [kg/m2]; fric; shear [Pa]; poiss; damp; kn, ks
+            [N/m];
+            xp, yp: pressures that push along x and y, on 2 R thickness of each particle [Pa].
+        """
+    def bond(
+        self,
+        where: Selected = None,
+        *,
+        ebmod: float | None = None,
+        gbmod: float | None = None,
+        tstrength: float | None = None,
+        sstrength: float | None = None,
+        n_bond: float | None = None,
+        s_bond: float | None = None,
+        tolerate: float | None = None,
+        rext: float | None = None,
+        fric: float | None = None,
+        rubber: bool = False,
+        conserving: bool = False,
+    ) -> int:
+        """PROP with bond keys: bond the pairs that touch, renew the bonds that are there.
+
+        Pairs are those with d - (Ra + Rb) rext <= tolerate. Either ebmod, gbmod, tstrength, sstrength (elastic
+        bonds)
+        or n_bond, s_bond (contact bonds). What is left out stays, or is 0 in a new bond.
+
+        Parameters
+        ----------
+        where : particles; both of a pair are among them.
+        ebmod, gbmod : Young's and shear modulus of elastic bonds [Pa].
+        tstrength, sstrength : their tensile strength and cohesion [Pa].
+        n_bond, s_bond : tensile and shear strength of contact bonds [N].
+        tolerate : largest gap that is bonded [m]; 1e-6.
+        rext : factor on the radii in the search for pairs; 1.
+        fric : friction coefficient of the particles.
+        rubber : mark the bonds as those of a membrane, without any effect on the motion.
+        conserving : one shear stiffness, touching or open, so that opening and closing make no energy (of a contact
+            bond of
+            Hertz particles that at the moment of bonding).
+
+        Returns
+        -------
+        int : how many are new.
+        """
+    def break_bonds(self, where: Selected = None) -> int:
+        """BOND break: remove the bonds with both ends in `where`; how many. Shear forces stay, limited by friction from
+        then on.
+        """
+    def fix(self, *dofs: str, where: Selected = None) -> None:
+        """FIX: these of "x", "y", "spin" keep the velocity they have."""
+    def free(self, *dofs: str, where: Selected = None) -> None:
+        """FREE: undo `fix`."""
+    def add_physics(self, name: str, **parameters: float) -> None:
+        """Physics on the particles beside their motion, from the next step on. There is "diffusion": heat through
+        contacts; conductance of each [W/K], capacity [J/(kg K)]; fields temperature [K], heat_source [W], heat_given
+        [J]; HIST follows heat and heat_given [J], which are columns of energy.csv.
+        """
+    def hist(self, id: int, interval: int, what: str) -> None:
+        """HIST: record kinetic, step, time, unbalanced, contacts, bonds or energy, or "gstress group a", "gstrain group
+        a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and hist_<id>.csv;
+        strains begin at 0 here.
+        """
+    def plot(self, y: int, x: int) -> None:
+        """PLOT: at `finish`, write history y against history x."""
+    def extents(self) -> dict[str, float]:
+        """{left, right, bottom, top} of the particles that are not fixed in both x and y [m]."""
+    def wall_force(self, id: int) -> tuple[float, float]:
+        """Force on a wall (x, y) [N], exactly summed."""
+    def wall_forces(self) -> dict[int, tuple[float, float]]:
+        """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
+    def kinetic_energy(self) -> float:
+        """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
+    def unbalanced(self) -> float:
+        """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
+    def clumps(self) -> dict[str, np.ndarray]:
+        """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
+        spin, angle, area, mass, inertia, members (how many).
+        """

@@ -1,0 +1,48 @@
+"""What a program can ask of particles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hpcdem.commands.dem import output
+from hpcdem.physics.dem import diagnostics
+from hpcdem.physics.dem.simulation import Simulation
+
+
+def extents(sim: Simulation) -> dict[str, float]:
+    """{left, right, bottom, top} of the particles that are not fixed in both x and y [m]."""
+    return sim.extents()
+
+
+def wall_force(sim: Simulation, id: int) -> tuple[float, float]:
+    """Force on a wall (x, y) [N], exactly summed."""
+    row = sim.walls.row(id)
+    sim.close()
+    x, y = diagnostics.wall_forces(sim)[row]
+    return float(x), float(y)
+
+
+def wall_forces(sim: Simulation) -> dict[int, tuple[float, float]]:
+    """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
+    sim.close()
+    force = diagnostics.wall_forces(sim)
+    return {int(i): (float(x), float(y)) for i, (x, y) in zip(sim.walls.id, force, strict=True)}
+
+
+def kinetic_energy(sim: Simulation) -> float:
+    """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
+    sim.close()
+    return diagnostics.kinetic_energy(sim)
+
+
+def unbalanced(sim: Simulation) -> float:
+    """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
+    sim.close()
+    return output.unbalanced(sim)
+
+
+def clumps(sim: Simulation) -> dict[str, np.ndarray]:
+    """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
+    spin, angle, area, mass, inertia, members (how many)."""
+    sim.close()
+    return diagnostics.clumps(sim)
