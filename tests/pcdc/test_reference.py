@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import pytest
 
-from hpcdem.commands.fdem.records import UNITS
+from hpcdem.commands.fdem.recorded import MODEL, UNITS, WELL
+from hpcdem.commands.fdem.records import _OF_MODEL
 from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc import check, trial
 from hpcdem.lang.pcdc import table as t
@@ -16,8 +17,10 @@ from hpcdem.lang.pcdc.kinds import Unfit
 from hpcdem.lang.pcdc.parser import parse
 from hpcdem.lang.pcdc.reference import IN_THE_PLANE, missing_in_space, page
 from hpcdem.lang.pcdc.trial import MODELS, python
-from hpcdem.physics.fdem import groups as g
+from hpcdem.physics import supports
 from hpcdem.physics.fdem.properties import Property
+from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
+from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
 from tests.conftest import ROOT
 
 PAGE = ROOT / "docs" / "pcdc_reference.md"
@@ -144,17 +147,11 @@ def test_a_new_property_is_a_word_of_the_language(monkeypatch):
     assert row.endswith("| MPa m0.5 | 2 | toughness of the tip |")
 
 
-def test_histories_record_what_the_commands_can():
-    kinds = {
-        "node": g.NODE,
-        "element": g.ELEMENT,
-        "joint": g.JOINT,
-        "model": "model",
-        "well": "well",
-        **{kind: kind for kind in (*g.SUPPORTS, *g.FLOW)},
-    }
-    for kind, values in t.RECORDED.items():
-        assert {python(name): unit for name, unit in values.items()} == UNITS[kinds[kind]]
+def test_histories_record_what_the_physics_have():
+    theirs = {**supports.QUANTITIES, **OF_FLOW, WELL: OF_WELLS}
+    for kind, of in theirs.items():
+        assert UNITS[kind] == {name: unit for name, (unit, _) in of.items()}
+    assert set(_OF_MODEL) == set(UNITS[MODEL])
 
 
 def test_scripts_of_the_chinese_guide_are_read():

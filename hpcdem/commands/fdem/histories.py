@@ -9,7 +9,8 @@ import numpy as np
 from hpcdem.commands.fdem.choices import chosen, everything, places
 from hpcdem.commands.fdem.needed import needed
 from hpcdem.commands.fdem.project import Project
-from hpcdem.commands.fdem.records import ENERGIES, LAW_STATE, MODEL, UNITS, WELL, History
+from hpcdem.commands.fdem.recorded import LAW_STATE, MODEL, UNITS, WELL
+from hpcdem.commands.fdem.records import ENERGIES, History
 from hpcdem.commands.fdem.values import history_name, result_name
 from hpcdem.core.errors import CommandError
 from hpcdem.core.units import label

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.commands.fdem.recorded import MODEL, UNITS, WELL
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
-from hpcdem.physics.fdem.groups import CHANNEL, ELEMENT, JOINT, NODE, SUPPORTS
+from hpcdem.physics.fdem.groups import CHANNEL, NODE, SUPPORTS
 from hpcdem.physics.fields import kinds
 from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
 from hpcdem.physics.flow.model import Flow
-from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import Proppant
 
@@ -24,55 +24,6 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.probes import Probe
     from hpcdem.physics.fdem.simulation import Blocks
 
-MODEL, WELL = "model", "well"
-LAW_STATE = "law_state"
-"""A state variable of laws of the user, see user_laws.py; a history has its name as quantity."""
-UNITS = {
-    NODE: {
-        "displacement": "m", "velocity": "m/s",
-        "position_x": "m", "position_y": "m", "position_z": "m", "displacement_x": "m", "displacement_y": "m",
-        "displacement_z": "m", "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s", "reaction_x": "N/m",
-        "reaction_y": "N/m", "reaction_z": "N/m", "temperature": "K",
-        **{one.name: one.unit for one in kinds().values()},
-    },
-    ELEMENT: {
-        "stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa", "stress_xz": "Pa",
-        "stress_yz": "Pa", "plastic_state": "1",
-        "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m",
-        "creep_strain_xx": "1", "creep_strain_yy": "1", "creep_strain_xy": "1", "kelvin_strain_xx": "1",
-        "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_strain_zz": "1", "creep_strain_xz": "1",
-        "creep_strain_yz": "1", "kelvin_strain_zz": "1", "kelvin_strain_xz": "1", "kelvin_strain_yz": "1",
-        "creep_work": "J/m", "mean_temperature": "K",
-        **{f"mean_{one.name}": one.unit for one in kinds().values()},
-        **{name: unit for one in kinds().values() for name, (unit, _) in one.derived.items()},
-        LAW_STATE: "that of the law",
-    },
-    JOINT: {
-        "opening": "m", "slip": "m", "damage": "1", "normal_stress": "Pa", "shear_stress": "Pa", "state": "1",
-        "normal_stress_largest": "Pa", "normal_stress_first": "Pa", "normal_stress_middle": "Pa",
-        "normal_stress_last": "Pa", "shear_stress_largest": "Pa", "shear_stress_first": "Pa",
-        "shear_stress_middle": "Pa", "shear_stress_last": "Pa",
-    },
-    **{
-        kind: {name: unit for name, (unit, _) in of.items()}
-        for kind, of in {**supports.QUANTITIES, **OF_FLOW}.items()
-    },
-    WELL: {name: unit for name, (unit, _) in OF_WELLS.items()},
-    MODEL: {
-        "time": "s", "creep_time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1",
-        "broken_joints": "1",
-        "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
-        "contact_energy": "J/m", "viscous_loss": "J/m", "plastic_loss": "J/m", "creep_loss": "J/m",
-        "gravity_work": "J/m", "outside_work": "J/m", "disc_work": "J/m", "bolt_work": "J/m", "liner_work": "J/m",
-        "heat_work": "J/m", "energy_error": "J/m",
-        "flow_time": "s", "fluid_given": "m2", "fluid_stored": "m2", "fluid_leaked": "m2",
-        "proppant_came": "m2", "proppant_stored": "m2", "proppant_packed": "m2", "proppant_left": "m2",
-        "heat_time": "s", "heat_given": "J/m", "heat_stored": "J/m", "heat_in_fluid": "J/m",
-        **{f"{one.name}_time": "s" for one in kinds().values()},
-        **{f"{one.name}_{part}": one.amount for one in kinds().values() for part in ("given", "stored")},
-    },
-}  # fmt: skip
-"""What can be recorded of each kind of object, with its unit."""
 _FORCES = ("reaction_x", "reaction_y", "reaction_z")
 
 

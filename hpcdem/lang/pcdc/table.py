@@ -16,6 +16,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from hpcdem.commands.fdem.recorded import UNITS as UNITS_OF
 from hpcdem.core.looks import COLOURS, OBJECTS
 from hpcdem.core.units import CHOICES as UNITS
 from hpcdem.lang.pcdc.keywords import Keyword
@@ -60,6 +61,7 @@ from hpcdem.lang.pcdc.kinds import (
 )  # fmt: skip
 from hpcdem.physics.bolts.properties import BOLT as BOLT_PROPERTIES
 from hpcdem.physics.fdem import properties
+from hpcdem.physics.fdem.groups import JOINT
 from hpcdem.physics.fields import kinds
 from hpcdem.physics.flow.properties import POROUS as POROUS_PROPERTIES
 from hpcdem.physics.heat.properties import FLUID_HEAT as FLUID_HEAT_PROPERTIES
@@ -654,66 +656,9 @@ _LAYER = Option("a{s}-l{ayer}", (STRING,), "name of the layer; a layer may hold 
 _SOME_LAYERS = Option("l{ayer}", (STRINGS,), "names of layers", "", "all")
 _NAME = Option("name", (STRING,), "name", required=True)
 RECORDED = {
-    "node": {
-        "displacement": "m", "velocity": "m/s",
-        "position-x": "m", "position-y": "m", "position-z": "m", "displacement-x": "m", "displacement-y": "m",
-        "displacement-z": "m", "velocity-x": "m/s", "velocity-y": "m/s", "velocity-z": "m/s", "reaction-x": "N/m",
-        "reaction-y": "N/m", "reaction-z": "N/m", "temperature": "K",
-        **{one.name: one.unit for one in kinds().values()},
-    },
-    "element": {
-        "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "stress-xz": "Pa",
-        "stress-yz": "Pa", "plastic-state": "1",
-        "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m", "creep-strain-xx": "1",
-        "creep-strain-yy": "1", "creep-strain-xy": "1", "kelvin-strain-xx": "1", "kelvin-strain-yy": "1",
-        "kelvin-strain-xy": "1", "creep-strain-zz": "1", "creep-strain-xz": "1", "creep-strain-yz": "1",
-        "kelvin-strain-zz": "1", "kelvin-strain-xz": "1", "kelvin-strain-yz": "1", "creep-work": "J/m",
-        "mean-temperature": "K", **{f"mean-{one.name}": one.unit for one in kinds().values()},
-        **{name.replace("_", "-"): unit for one in kinds().values() for name, (unit, _) in one.derived.items()},
-        "law-state": "that of the law",
-    },
-    "joint": {
-        "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
-        "normal-stress-largest": "Pa", "normal-stress-first": "Pa", "normal-stress-middle": "Pa",
-        "normal-stress-last": "Pa", "shear-stress-largest": "Pa", "shear-stress-first": "Pa",
-        "shear-stress-middle": "Pa", "shear-stress-last": "Pa",
-    },
-    "bolt-node": {
-        "position-x": "m", "position-y": "m", "position-z": "m", "displacement-x": "m", "displacement-y": "m",
-        "displacement-z": "m", "velocity-x": "m/s", "velocity-y": "m/s", "velocity-z": "m/s", "bond-force": "N/m",
-        "slip": "m", "bond-state": "1", "reaction-x": "N", "reaction-y": "N", "reaction-z": "N", "host": "1",
-        "distance": "m",
-    },
-    "bolt-element": {"axial-force": "N", "axial-strain": "1", "plastic-strain": "1", "bolt-state": "1"},
-    "flow-node": {"pressure": "Pa", "saturation": "1", "fluid": "m2", "volume": "m2", "inflow": "m2/s",
-                  "temperature": "K", "concentration": "1", "proppant": "m2", "pack-pressure": "Pa"},
-    "flow-channel": {"pressure": "Pa", "saturation": "1", "aperture": "m", "flow-rate": "m2/s", "velocity": "m/s",
-                     "temperature": "K", "concentration": "1", "pack-pressure": "Pa"},
-    "well": {"pressure": "Pa", "rate": "m2/s", "injected": "m2", "stage": "1"},
-    "liner-node": {
-        "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
-        "velocity-y": "m/s", "rotation": "rad", "spin": "rad/s", "reaction-x": "N/m", "reaction-y": "N/m",
-        "reaction-moment": "N m/m", "distance": "m",
-    },
-    "liner-element": {
-        "axial-force": "N/m", "shear-force": "N/m", "moment-first": "N m/m", "moment-last": "N m/m",
-        "axial-strain": "1", "plastic-strain": "1", "plastic-rotation": "rad", "liner-state": "1",
-        "bond-pressure": "Pa", "bond-shear": "Pa", "gap": "m", "slip": "m", "bond-state": "1", "host": "1",
-    },
-    "model": {
-        "time": "s", "creep-time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1",
-        "broken-joints": "1",
-        "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
-        "contact-energy": "J/m", "viscous-loss": "J/m", "plastic-loss": "J/m", "creep-loss": "J/m",
-        "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "bolt-work": "J/m", "liner-work": "J/m",
-        "heat-work": "J/m", "energy-error": "J/m",
-        "flow-time": "s", "fluid-given": "m2", "fluid-stored": "m2", "fluid-leaked": "m2",
-        "proppant-came": "m2", "proppant-stored": "m2", "proppant-packed": "m2", "proppant-left": "m2",
-        "heat-time": "s", "heat-given": "J/m", "heat-stored": "J/m", "heat-in-fluid": "J/m",
-        **{f"{one.name}-time": "s" for one in kinds().values()},
-        **{f"{one.name}-{part}": one.amount for one in kinds().values() for part in ("given", "stored")},
-    },
-}  # fmt: skip
+    {JOINT: "joint"}.get(kind, kind): {name.replace("_", "-"): unit for name, unit in of.items()}
+    for kind, of in UNITS_OF.items()
+}
 """What a history can follow, and its unit."""
 _RECORDED = choice(*dict.fromkeys(name for of in RECORDED.values() for name in of))
 _EVERY = Option("ev{ery}", (COUNT,), "steps between two records", "", "1")
