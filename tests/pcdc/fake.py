@@ -21,10 +21,10 @@ from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.connectivity import centroids
 from hpcdem.physics.fdem.convergence import Watch
-from hpcdem.physics.fdem.definition import Options
 from hpcdem.physics.fdem.equilibrium import Balanced
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import MODELS, Rows
+from hpcdem.physics.fdem.settings import Options
 from hpcdem.physics.fdem.state import Creep
 from hpcdem.physics.fdem.surface_loads import SurfaceLoads
 from hpcdem.physics.fdem.tables import Table

@@ -12,7 +12,7 @@ from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import CONTACTS, CORNERS, FACE_CONDITIONS, FLOW_NODES, NODE_CONDITIONS
 from hpcdem.physics.fdem import diagnostics, sides
-from hpcdem.physics.fdem.definition import TRACTIONS
+from hpcdem.physics.fdem.conditions import TRACTIONS
 from hpcdem.physics.fdem.groups import FLOW_NODE
 from hpcdem.physics.fdem.kernels import nodes, space
 from hpcdem.physics.fdem.simulation import Blocks

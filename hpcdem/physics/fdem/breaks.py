@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.physics.fdem.definition import AGAIN
 from hpcdem.physics.fdem.kernels.joint_law import MODE
 from hpcdem.physics.fdem.kernels.joints import BROKEN
 from hpcdem.physics.fdem.state import Crack
+from hpcdem.physics.fdem.topology import AGAIN
 
 
 def waiting(sim: Any) -> list[Crack]:

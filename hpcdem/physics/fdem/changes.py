@@ -9,12 +9,13 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import backfill, diagnostics, hexahedra, user_laws
 from hpcdem.physics.fdem import mesh as meshes
-from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
+from hpcdem.physics.fdem.conditions import Relaxation
 from hpcdem.physics.fdem.kernels.creep import IN_KELVIN
 from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
 from hpcdem.physics.fdem.properties import ELEMENT, KELVIN_STRAIN, MECH_BURGERS, model
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.fdem.topology import Numbers, finite
 from hpcdem.physics.fdem.user_laws import MARK
 
 VECTORS = "position", "displacement", "velocity"

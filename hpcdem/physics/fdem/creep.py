@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.definition import finite
 from hpcdem.physics.fdem.kernels import creep as kernels
 from hpcdem.physics.fdem.kernels import elements
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.properties import KELVIN_STRAIN
 from hpcdem.physics.fdem.structures import Structure
+from hpcdem.physics.fdem.topology import finite
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks

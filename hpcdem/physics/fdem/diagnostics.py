@@ -12,8 +12,8 @@ from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import PER_METRE
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import breaks, by_temperature, connectivity, floors, overlaps, sides, user_laws
+from hpcdem.physics.fdem.assignments import COMPONENTS
 from hpcdem.physics.fdem.budget import Budget
-from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
 from hpcdem.physics.fdem.kernels import plasticity, tets
 from hpcdem.physics.fdem.kernels.joint_law import BARTON_BANDIS, DAMAGE, PATH
 from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE, YIELDED
@@ -23,6 +23,7 @@ from hpcdem.physics.fdem.probes import ForceProbe, Probe
 from hpcdem.physics.fdem.properties import MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, OF_JOINTS
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.state import Crack
+from hpcdem.physics.fdem.topology import Numbers
 from hpcdem.physics.fields import FIELDS, kinds
 
 

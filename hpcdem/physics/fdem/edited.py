@@ -10,13 +10,13 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import notices
-from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.kernels import elements as element_kernels
 from hpcdem.physics.fdem.kernels.creep import IN_KELVIN
 from hpcdem.physics.fdem.local import Local
 from hpcdem.physics.fdem.properties import KELVIN_STRAIN, MECH_BURGERS
 from hpcdem.physics.fdem.state import State
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.fdem.topology import Numbers
 
 
 class Edited(State):
@@ -137,7 +137,7 @@ class Edited(State):
         any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap before the first step: refuse
         it; "relax": a static stage moves them apart; "keep": they start as they are. deep_overlap ("warn"): of bodies
         that come to overlap by more than a tenth of an altitude: say where; "stop": end the run. potential
-        ("distance"): of contact in space, see `definition.POTENTIAL`. plane_stress (off): a model of the plane is a
+        ("distance"): of contact in space, see `settings.POTENTIAL`. plane_stress (off): a model of the plane is a
         plate whose faces bear nothing; off: in plane strain. Said before stress and steps are."""
         before = self.options.dynamic
         if plane_stress not in (None, self.options.plane_stress) and self.clock.step > 0:

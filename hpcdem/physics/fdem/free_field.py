@@ -26,8 +26,8 @@ from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.user_functions import Placed
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.definition import Numbers
     from hpcdem.physics.fdem.simulation import Blocks
+    from hpcdem.physics.fdem.topology import Numbers
 
 UPRIGHT = 1e-6
 """How far a face may lean in the mesh, over its height."""

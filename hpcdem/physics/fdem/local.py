@@ -14,7 +14,7 @@ import numpy as np
 from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, by_temperature, connectivity, user_laws
-from hpcdem.physics.fdem.definition import TRACTIONS
+from hpcdem.physics.fdem.conditions import TRACTIONS
 from hpcdem.physics.fdem.elements.block import ElementBlock
 from hpcdem.physics.fdem.elements.kind import QUAD, TRIANGLE
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
@@ -49,7 +49,7 @@ from hpcdem.physics.fdem.tables import Table
 from hpcdem.physics.fdem.user_functions import Placed
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.definition import NodeCondition
+    from hpcdem.physics.fdem.node_conditions import NodeCondition
     from hpcdem.physics.fdem.state import State
 
 ALPHA = 0.8

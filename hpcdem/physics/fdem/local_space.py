@@ -8,7 +8,7 @@ import numpy as np
 
 from hpcdem.core.memory import sparse_zeros
 from hpcdem.physics.fdem import user_laws
-from hpcdem.physics.fdem.definition import TRACTIONS
+from hpcdem.physics.fdem.conditions import TRACTIONS
 from hpcdem.physics.fdem.hexes import Hexes, place_masses
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
 from hpcdem.physics.fdem.joints_hexes import Faces, HexJoints
@@ -24,7 +24,7 @@ from hpcdem.physics.fdem.tetrahedra import FACES
 from hpcdem.physics.fdem.user_functions import Placed
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.definition import NodeCondition
+    from hpcdem.physics.fdem.node_conditions import NodeCondition
     from hpcdem.physics.fdem.state import State
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.physics.fdem.definition import COMPONENTS
+from hpcdem.physics.fdem.assignments import COMPONENTS
 from hpcdem.physics.fdem.kernels import joint_law
 from hpcdem.physics.fdem.state import State
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError, PhysicsError
-from hpcdem.physics.fdem.definition import REFUSE, RELAX, STOP
 from hpcdem.physics.fdem.kernels import contact, detect
 from hpcdem.physics.fdem.pairs import Bodies
 from hpcdem.physics.fdem.pairs_space import AllPairs
+from hpcdem.physics.fdem.settings import REFUSE, RELAX, STOP
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Local

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hpcdem.physics.fdem import connectivity, tetrahedra
-from hpcdem.physics.fdem.definition import MUNJIZA
 from hpcdem.physics.fdem.histories import FIRST, KEY, WORDS
 from hpcdem.physics.fdem.kernels import contact_space as contact
 from hpcdem.physics.fdem.kernels import detect_space as detect
 from hpcdem.physics.fdem.kernels.tets import ROW, STRIDE
 from hpcdem.physics.fdem.pairs import Kinds, Surfaces, smallest_overlay
+from hpcdem.physics.fdem.settings import MUNJIZA
 from hpcdem.physics.fdem.tetrahedra import FACES
 
 if TYPE_CHECKING:

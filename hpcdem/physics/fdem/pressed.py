@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hpcdem.physics.fdem.definition import AGAIN, CRACK
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories
 from hpcdem.physics.fdem.kernels.joint_law import DAMAGE, MODE, SLIPPED
 from hpcdem.physics.fdem.kernels.joints import BROKEN
+from hpcdem.physics.fdem.topology import AGAIN, CRACK
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.equilibrium import Nodes

@@ -6,8 +6,8 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import by_temperature, user_laws
-from hpcdem.physics.fdem.definition import DISTANCE
 from hpcdem.physics.fdem.properties import temperature_table
+from hpcdem.physics.fdem.settings import DISTANCE
 from hpcdem.physics.fdem.state import State
 from hpcdem.physics.fields import kinds
 

@@ -18,7 +18,8 @@ from hpcdem.core.units import with_prefix
 from hpcdem.engine.model import Model
 from hpcdem.engine.rebuild import RebuildState
 from hpcdem.physics.fdem import hexahedra
-from hpcdem.physics.fdem.definition import ModelDefinition, Relaxation
+from hpcdem.physics.fdem.conditions import Relaxation
+from hpcdem.physics.fdem.definition import ModelDefinition
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep, plastic_tets, plasticity
 from hpcdem.physics.fdem.mesh import Mesh

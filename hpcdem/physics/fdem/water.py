@@ -16,8 +16,8 @@ from hpcdem.physics.fdem.kernels import tets
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.definition import Numbers
     from hpcdem.physics.fdem.simulation import Blocks
+    from hpcdem.physics.fdem.topology import Numbers
 
 SLACK = 1e-9
 """Of the size of the model: so far beyond the end of a line points count as below it."""

@@ -1,0 +1,462 @@
+"""Models and properties of elements, faces and joints, tables and random fields that they follow, initial stress."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.core.memory import sparse_zeros
+from hpcdem.numerics.random_field import RandomField
+from hpcdem.physics.fdem import properties
+from hpcdem.physics.fdem.moduli import moduli
+from hpcdem.physics.fdem.node_conditions import Number
+from hpcdem.physics.fdem.properties import (
+    BARTON_BANDIS,
+    COHESIVE,
+    COULOMB_JOINT,
+    ELEMENT,
+    FACE,
+    JOINT,
+    MECH_BURGERS,
+    MECH_MOHR_COULOMB,
+    MODELS,
+    Model,
+    Rows,
+    softening_rows,
+    softening_table,
+    temperature_table,
+)
+from hpcdem.physics.fdem.settings import Settings
+from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN, TEMPERATURE, Drawn, Over, Table, Value
+from hpcdem.physics.fdem.topology import Numbers, finite
+from hpcdem.physics.fdem.user_functions import FUNCTIONS
+
+COMPONENTS = {2: ("xx", "yy", "xy", "zz"), 3: ("xx", "yy", "xy", "zz", "xz", "yz")}
+"""Of stress, in the order of all tables, by dimensions of space."""
+ACROSS = 3
+"""Place of zz there."""
+SLIDING = (COULOMB_JOINT.name, BARTON_BANDIS.name)
+"""Models of joints that slide and never break."""
+
+
+class Assignments(Settings):
+    """Which model and properties each object has: rows of tables, and the row of each. Methods that assign raise
+    CommandError, alike on all ranks, and change nothing then."""
+
+    tables: dict[str, Table]
+    fields: dict[str, RandomField]
+
+    def clear_assignments(self) -> None:
+        """Nothing has a model."""
+        self.tables, self.fields = {}, {}
+        self.varied: list[list[str]] = []
+        """Kinds of objects and properties of theirs that differ from object to object by a table or a field."""
+        self.followed: list[Table] = []
+        """Tables over plastic strain or temperature, as they were given: rows hold their numbers, from 1 on."""
+        self.element_rows, self.face_rows, self.joint_rows = Rows(), Rows(), Rows()
+        self._make_assignments(0)
+
+    def _make_assignments(self, elements: int) -> None:
+        self.element_row = np.zeros(elements, np.int32)
+        self.face_row = sparse_zeros(4 * elements, np.int32)
+        self.stress0 = None
+        self.stress0_row = sparse_zeros(elements, np.int32)
+        """Row of the element models for whose moduli it was said; 0: the element had no model yet."""
+
+    def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+        """Assign a model (model.blocks.properties) with all its properties to elements."""
+        model = MODELS.get(name)
+        if model is not None and self.dim not in model.dims:
+            raise CommandError(
+                f"{model.doc} is not for {self.dim} dimensions: element_law(dim={self.dim}) declares one that is"
+            )
+        at = self.numbers_of_elements(elements)
+        self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
+        self._note_moduli(at)
+
+    def yielding(self) -> np.ndarray:
+        """(ne,) bool: elements that are there and have a model that can yield."""
+        return self._has_model(MECH_MOHR_COULOMB)
+
+    def creeping(self) -> np.ndarray:
+        """(ne,) bool: elements that are there and have a model that can creep."""
+        return self._has_model(MECH_BURGERS)
+
+    def slides(self) -> np.ndarray:
+        """(4 ne,) bool: joints, by their lower faces, with a model that slides and never breaks."""
+        names = [self.joint_rows.name(row) for row in range(len(self.joint_rows))]
+        return self.joint_exists() & np.isin(names, SLIDING)[self.joint_row]
+
+    def _has_model(self, model: Model) -> np.ndarray:
+        names = [self.element_rows.name(row) for row in range(len(self.element_rows))]
+        return self.alive & np.array([name == model.name for name in names])[self.element_row]
+
+    def softens(self) -> bool:
+        """Whether an element that is there can yield, and has a strength that follows a table."""
+        return bool(softening_rows(self.element_rows)[self.element_row[self.alive]].any())
+
+    def warms(self) -> tuple[np.ndarray, np.ndarray]:
+        """Elements (ne,) and joints (4 ne,) bool with a property that follows a table over temperature or another
+        field."""
+        elements, joints = (
+            np.any([rows.column(temperature_table(p.name)) > 0.0 for p in of.properties if p.warms], axis=0)
+            for rows, of in ((self.element_rows, MECH_MOHR_COULOMB), (self.joint_rows, COHESIVE))
+        )
+        return self.alive & elements[self.element_row], self.joint_exists() & joints[self.joint_row]
+
+    def _note_moduli(self, at: np.ndarray) -> None:
+        """Initial stresses of elements that had no model belong to the moduli of the one that they have now; where
+        nothing was said of the stress across the plane, it is that of plane strain, in plane stress 0."""
+        new = at[self.stress0_row[at] == 0]
+        self.stress0_row[new] = self.element_row[new]
+        if self.stress0 is not None:
+            new = at[np.isnan(self.stress0[at, ACROSS]) & (self.element_row[at] > 0)]
+            nu = np.nan_to_num(self.element_rows.column("poisson_ratio"))[self.element_row[new]]
+            nu = 0.0 * nu if self.options.plane_stress else nu
+            self.stress0[new, ACROSS] = nu * (self.stress0[new, 0] + self.stress0[new, 1])
+
+    def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
+        """Change some properties of elements that have a model. The stress follows the strain (total form)."""
+        at = self.numbers_of_elements(elements)
+        self._adjust(self.element_rows, (self.element_row, at), at, ELEMENT, properties, _keep_moduli)
+
+    def face_model(self, faces: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+        """Assign a contact model to faces, also to those that will be free only when a joint breaks."""
+        at = self.numbers_of_faces(faces)
+        self._assign(self.face_rows, (self.face_row, at), at, FACE, name, properties)
+
+    def face_property(self, faces: Numbers, properties: Mapping[str, Value]) -> None:
+        """Change some properties of the contact model of faces; None: of all that have one."""
+        if faces is None:
+            faces = np.flatnonzero((self.face_row > 0) & self.face_exists())
+        at = self.numbers_of_faces(faces)
+        self._adjust(self.face_rows, (self.face_row, at), at, FACE, properties)
+
+    def joint_model(self, joints: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+        """Assign a cohesive model to inner edges: elements on both sides get nodes of their own, tied by tractions.
+
+        Joints that are broken stay broken: a model that slides, which would never act there, is refused. None: all
+        inner edges."""
+        at = self.numbers_of_joints(joints)
+        if name in SLIDING:
+            self._refuse_cracks(at, name)
+        self._assign(self.joint_rows, self._both_sides(at), at, JOINT, name, properties, True)
+
+    def _refuse_cracks(self, joints: np.ndarray, name: str) -> None:
+        """CommandError if some of these joints are cracks."""
+        self.before_change()  # those that broke just now are known from here on
+        if len(cracks := joints[self.open[joints]]):
+            at = ", ".join(f"{c:g}" for c in self._mesh().points[self._mesh().face_points(cracks)][0].mean(axis=0))
+            raise CommandError(
+                f"face-joint {cracks[0]} at ({at}) is a crack ({len(cracks)} in all): its sides are free and meet by "
+                f"contact, so {name.replace('_', '-')} would not act there. mesh create embed, in the place of crack, "
+                "makes edges along a line that are whole; a range leaves out what broke"
+            )
+
+    def joint_property(self, joints: Numbers, properties: Mapping[str, Value]) -> None:
+        """Change some properties of joints that have a model; None: of all that have one."""
+        if joints is None:
+            joints = np.flatnonzero((self.joint_row > 0) & self.joint_exists())
+        at = self.numbers_of_joints(joints)
+        self._adjust(self.joint_rows, self._both_sides(at), at, JOINT, properties)
+
+    def _both_sides(self, joints: np.ndarray) -> tuple[np.ndarray, ...]:
+        return self.joint_row, joints, self.joint_row, self.partner[joints]
+
+    def _assign(
+        self, rows: Rows, columns: Sequence[np.ndarray], of: np.ndarray, on: str, name: str, given: Mapping[str, Value],
+        topology: bool = False,
+    ) -> None:  # fmt: skip
+        """Give objects a model. columns: where the row of each object goes, as (array, places (n,)) in turn."""
+        model = properties.model(name, on)
+        all_of_them = np.arange(len(of))
+        made = [(all_of_them, model, self.complete(on, of, model, {}, given))]
+        self._put_rows(rows, columns, made, on, given, all_of_them)
+        self.changed(topology)
+
+    def _adjust(
+        self, rows: Rows, columns: Sequence[np.ndarray], of: np.ndarray, on: str, given: Mapping[str, Value],
+        keep: Callable[[dict[str, Any], Mapping[str, Any]], dict[str, Any]] | None = None,
+    ) -> None:  # fmt: skip
+        """Change properties of objects that have a model; keep: what stays of the old ones beside the new."""
+        if not len(of):
+            raise CommandError(f"no {on} has a model whose properties could be changed: {on} c-model comes first")
+        old = columns[0][columns[1]]
+        bare = of[old == 0]
+        if len(bare):
+            raise CommandError(f"{on} {bare[0]} has no model whose properties could be changed")
+        present, which = np.unique(old, return_inverse=True)
+        names = np.array([rows.name(row) for row in present.tolist()])
+        which = which.reshape(-1)
+        if not all(map(_is_number, given.values())):
+            old, names, which = old, names[which], np.arange(len(of))  # one set for each object
+        else:
+            old, of = present, of[np.unique(which, return_index=True)[1]]  # one for each that there is
+        made = []
+        for name in np.unique(names).tolist():
+            at, model = np.flatnonzero(names == name), properties.MODELS[name]
+            before = {p.name: rows.column(p.name)[old[at]] for p in model.properties}
+            made.append((at, model, self.complete(on, of[at], model, before, given, keep)))
+        self._put_rows(rows, columns, made, on, given, which)
+        self.changed()
+
+    def _put_rows(
+        self, rows: Rows, columns: Sequence[np.ndarray], made: Sequence[tuple[np.ndarray, Model, np.ndarray]], on: str,
+        given: Mapping[str, Value], which: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Make rows of complete sets of properties, (1, k) for all of these places or one for each, and give each
+        object the one at the place `which` (n,)."""
+        self.before_change()
+        number = np.zeros(sum(len(at) for at, *_ in made), np.int32)
+        for at, model, values in made:
+            number[at] = rows.numbers(model, values)
+        for column, at in zip(columns[0::2], columns[1::2]):
+            column[at] = number[which]
+        for name, value in given.items():
+            if _differs(value) and [on, name] not in self.varied:
+                self.varied.append([on, name])
+
+    def complete(
+        self, on: str, of: np.ndarray, model: Model, before: Mapping[str, np.ndarray], given: Mapping[str, Value],
+        keep: Callable[[dict[str, Any], Mapping[str, Any]], dict[str, Any]] | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        """Complete, checked properties of objects `of` (n,): (n, properties), or (1, properties) if none of them
+        differs from object to object. CommandError names the first object whose value cannot be."""
+        given = self._with_tables(model, given)
+        each = {name: self._spread(on, of, name, v) for name, v in given.items() if not _is_number(v)}
+        new = {name: each.get(name, value) for name, value in given.items()}
+        for name in new:
+            if self.dim not in model.property(name).dims:
+                raise CommandError(f"in {'two' if self.dim == 2 else 'three'} dimensions there is no {name}")
+        wanted: dict[str, Any] = keep(dict(before), new) if keep else model.changed(before, new)
+        if not each and not before:
+            return self._checked_softening(model, np.array([list(model.complete(wanted).values())]))
+        found = model.complete_each(wanted, len(of)) if all(map(_can_be_number, wanted.values())) else None
+        if found is not None:
+            return self._checked_softening(model, found)
+        for i, number in enumerate(of.tolist()):
+            try:
+                model.complete({name: v[i] if isinstance(v, np.ndarray) else v for name, v in wanted.items()})
+            except CommandError as error:
+                if not each:
+                    raise
+                raise CommandError(f"{on} {number}: {error}") from None
+        raise AssertionError("both ways to complete properties agree")
+
+    def _with_tables(self, model: Model, given: Mapping[str, Value]) -> dict[str, Value]:
+        """Properties of which those with a table over plastic strain have their value before any flow, those with one
+        over temperature the largest, and those that can have one the number of their table."""
+        out = dict(given)
+        of_moduli = "young" in given or "shear" in given or "bulk" in given
+        if of_moduli and model.has(temperature_table("young")):
+            out[temperature_table("young")] = 0.0
+        for name, value in given.items():
+            for table in (softening_table(name), temperature_table(name)):
+                if model.has(table):
+                    out[table] = 0.0
+            if isinstance(value, Over) and value.axis == PLASTIC_STRAIN:
+                if not model.property(name).softens:
+                    raise CommandError(f"{name} of {model.name} cannot follow a table over plastic strain")
+                number = self._kept(model, name, value.table)
+                if self.followed[number - 1].times[0] < 0.0:
+                    raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
+                out[name], out[softening_table(name)] = self.followed[number - 1](0.0), float(number)
+            elif isinstance(value, Over) and value.axis >= TEMPERATURE:
+                if not model.has(temperature_table(name)):
+                    raise CommandError(f"{name} of {model.name} cannot follow a table over {AXES[value.axis]}")
+                number = self._kept(model, name, value.table, AXES[value.axis] if value.axis > TEMPERATURE else "")
+                values = self.followed[number - 1].values
+                if name in ("gf1", "gf2") and values.min() == 0.0:
+                    raise CommandError(
+                        f"{name}: table '{value.table}' has a fracture energy of 0; it must be > 0 (N/m)"
+                    )
+                out[name], out[temperature_table(name)] = float(values.max()), float(number)
+        return out
+
+    def _kept(self, model: Model, name: str, table: str, over: str = "") -> int:
+        """The number, from 1 on, of a table as it is now among those that rows follow (over another field than
+        temperature: its name); CommandError if a value of it is
+        none that this property can have."""
+        self._value(name, table)
+        found = replace(self.tables[table], over=over)
+        for one in found.values.tolist():
+            model.property(name).check(one)
+        known = [(one.pairs(), one.over) for one in self.followed]
+        if (found.pairs(), over) not in known:
+            known.append((found.pairs(), over))
+            self.followed.append(found)
+        return 1 + known.index((found.pairs(), over))
+
+    def _checked_softening(self, model: Model, values: np.ndarray) -> np.ndarray:
+        """The complete sets of properties (n, k); CommandError if flow makes dilation larger than friction."""
+        if model.has(softening_table("dilation")):
+            place = {p.name: k for k, p in enumerate(model.properties)}
+            pair = [place[name] for one in ("dilation", "friction") for name in (one, softening_table(one))]
+            for row in np.unique(values[:, pair], axis=0):
+                tables = [self.followed[int(number) - 1] if number else None for number in row[[1, 3]]]
+                if any(tables):
+                    at = np.unique(np.concatenate([one.times for one in tables if one]))
+                    dilation, friction = (one.at(at) if one else value for one, value in zip(tables, row[[0, 2]]))
+                    above = np.flatnonzero(dilation > friction)
+                    if len(above):
+                        raise CommandError(f"dilation is above friction at a plastic strain of {at[above[0]]:g}")
+        return values
+
+    def _spread(self, on: str, of: np.ndarray, name: str, value: Value) -> np.ndarray:
+        """One number for each object."""
+        if isinstance(value, Over):
+            if value.table not in self.tables:
+                self._value(name, value.table)
+            places = self._places(on, of)
+            if value.axis >= self.dim:
+                self._only_in_space(f"{AXES[value.axis]} for table '{value.table}' of {name} to be over", value)
+            return self.tables[value.table].at(places[:, value.axis])
+        if isinstance(value, Drawn):
+            if value.field not in self.fields:
+                known = ", ".join(f"'{n}'" for n in self.fields) or "none"
+                raise CommandError(f"{name}: there is no field '{value.field}' (fields: {known})")
+            mesh = self._mesh()
+            numbers = mesh.of_one(of) if on == ELEMENT else mesh.of_one_side(of)
+            return self.fields[value.field].values(on, numbers, self._places(on, of))
+        numbers = np.asarray(value, np.float64)
+        if numbers.shape != (len(of),):
+            raise CommandError(f"{name}: {len(of)} numbers are needed, one for each {on}, got {numbers.shape}")
+        return numbers
+
+    def _places(self, on: str, of: np.ndarray) -> np.ndarray:
+        """(n, 2), in space (n, 3) [m] in the mesh: centres of elements, middles of faces and joints. Hexahedra and
+        their sides are one object."""
+        return self._mesh().centroids(of) if on == ELEMENT else self._mesh().side_middles(of)
+
+    def initial_stress(
+        self,
+        elements: Numbers,
+        xx: float = 0.0,
+        yy: float = 0.0,
+        xy: float = 0.0,
+        zz: float | None = None,
+        gradient: Mapping[str, tuple[float, ...]] | None = None,
+        xz: float = 0.0,
+        yz: float = 0.0,
+    ) -> None:
+        """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y, in space in z)
+        at the centroid as it lies in the mesh. It is the stress of a strain by the moduli of this moment, and changes
+        with them, see `initial_stresses`. In the plane zz, if nothing is said of it, is that of plane strain, Poisson's
+        ratio times xx + yy, and in space and in plane stress 0."""
+        at = self.numbers_of_elements(elements)
+        mesh = self._mesh()
+        names = COMPONENTS[mesh.dim]
+        if mesh.dim == 2 and (xz != 0.0 or yz != 0.0):
+            raise CommandError("in two dimensions there is no stress xz and yz")
+        given = {"xx": xx, "yy": yy, "xy": xy, "zz": 0.0 if zz is None else zz, "xz": xz, "yz": yz}
+        values = np.tile(finite("initial stress", [given[name] for name in names]), (len(at), 1))
+        for name, slope in (gradient or {}).items():
+            if name not in names:
+                raise CommandError(f"a stress gradient is one of {', '.join(names)}, got {name}")
+            values[:, names.index(name)] += mesh.centroids(at) @ self._vector(f"gradient of {name}", slope)
+        if self.options.plane_stress and (values[:, ACROSS] != 0.0).any():
+            raise CommandError(
+                f"an initial stress zz of {values[values[:, ACROSS] != 0.0, ACROSS][0]:g} Pa cannot be in plane "
+                "stress, where the stress across the plane is 0: leave stress-zz out, or say model plane-strain"
+            )
+        if mesh.dim == 2 and zz is None and "zz" not in (gradient or {}):
+            values[:, ACROSS] = math.nan  # until there are moduli
+        self.before_change()
+        if self.stress0 is None:
+            self.stress0 = np.zeros((len(mesh.cells), len(names)))
+        self.stress0[at] = values
+        self.stress0_row[at] = self.element_row[at]
+        self._note_moduli(at)
+        self.changed()
+
+    def initial_stresses(self, elements: np.ndarray) -> np.ndarray:
+        """Stress [Pa] (n, 4), in space (n, 6), of elements (n,) at zero strain, by their present moduli.
+
+        What was said fixes a strain: mean stress over 3 K and deviator over 2 G with the moduli of that moment. So the
+        mean follows the bulk modulus and the deviator the shear modulus. (In plane stress both are of the plane, and
+        the bulk modulus K_2, see moduli.py.)"""
+        assert self.stress0 is not None
+        out = self.stress0[elements]
+        said, now = self.stress0_row[elements], self.element_row[elements]
+        ratio = np.ones((len(out), 2))
+        of = moduli(self.element_rows, self.options.plane_stress)
+        for c, modulus in enumerate((of.bulk, of.shear)):
+            other = (said > 0) & (modulus[said] != modulus[now])
+            ratio[other, c] = modulus[now[other]] / modulus[said[other]]
+        other = (ratio != 1.0).any(axis=1)  # the rest keeps every bit
+        normal = of.normal
+        mean = out[other][:, normal].mean(axis=1, keepdims=True)
+        scaled = ratio[other, 1:] * (out[other] - np.where(np.isin(np.arange(out.shape[1]), normal), mean, 0.0))
+        scaled[:, normal] += ratio[other, :1] * mean
+        out[other] = scaled
+        return out
+
+    def random_field(self, name: str, field: RandomField) -> None:
+        """Make or replace a random field; properties that were drawn from one of this name stay."""
+        self.fields[name] = field
+
+    def remove_field(self, name: str) -> None:
+        """Delete a random field; properties that were drawn from it stay."""
+        if name not in self.fields:
+            raise CommandError(f"there is no field '{name}'")
+        del self.fields[name]
+
+    def _value(self, what: str, value: Number) -> Number:
+        if isinstance(value, str) and value not in FUNCTIONS:
+            if value not in self.tables:
+                known = ", ".join(f"'{n}'" for n in self.tables) or "none"
+                raise CommandError(f"{what}: there is no table '{value}' (tables: {known})")
+        if isinstance(value, str):
+            return value
+        return float(finite(what, [value])[0])
+
+    def _now(self, value: Number, time: float) -> float:
+        if isinstance(value, str):
+            return 0.0 if value in FUNCTIONS else self.tables[value](time)  # of functions see `Placed`
+        return value
+
+    def table(self, name: str, pairs: Sequence[tuple[float, float]]) -> None:
+        """Make or replace a table of (time [s], value)."""
+        made = Table.of(pairs, name)
+        self.before_change()
+        self.tables[name] = made
+        self.changed(stiffness=False)
+
+
+def _is_number(value: Value) -> bool:
+    return not isinstance(value, (Over, Drawn, np.ndarray))
+
+
+def _differs(value: Value) -> bool:
+    """From object to object."""
+    return isinstance(value, Drawn) or (isinstance(value, Over) and value.axis < PLASTIC_STRAIN)
+
+
+def _can_be_number(value: Any) -> bool:
+    try:
+        np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def _keep_moduli(old: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Which two moduli stay when some are changed: Young's modulus and Poisson's ratio, or shear and bulk modulus."""
+    creeps = "maxwell_shear" in old
+    rigidities = ["maxwell_shear" if creeps else "shear", "bulk"]
+    moduli = ["young", "poisson_ratio", *rigidities]
+    changed = [name for name in moduli if name in given]
+    stays = {name: value for name, value in old.items() if name not in moduli}
+    if not changed:
+        pair = moduli if creeps else ["young", "poisson_ratio"]
+    elif len(changed) == 1:
+        pair = ["young", "poisson_ratio"] if changed[0] in ("young", "poisson_ratio") else rigidities
+    else:
+        pair = []
+    stays.pop("kelvin_strain_zz", None)  # it follows
+    return {**stays, **{name: old[name] for name in pair}, **given}

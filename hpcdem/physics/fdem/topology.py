@@ -1,0 +1,260 @@
+"""What is there in a model of blocks, and what hangs together: elements, open faces, joints, nodes. All of it by the
+numbers of the mesh, equal on all ranks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.memory import sparse_zeros
+from hpcdem.physics.fdem import mesh as meshes
+from hpcdem.physics.fdem import sides
+from hpcdem.physics.fdem.mesh import Mesh
+
+Numbers = np.ndarray | Sequence[int] | None
+"""Numbers of elements, nodes, faces or joints; None: all."""
+AGAIN, CRACK = 2, 3
+"""In `broken`: a joint that broke before, or never was whole, and is a joint again for so long (pressed.py)."""
+
+
+class Topology:
+    """Mesh, and what of it is there and hangs together. Methods raise CommandError, alike on all ranks."""
+
+    mesh: Mesh | None
+    partner: np.ndarray
+    """(4 ne,) the face on the other side of each face, -1: none."""
+    alive: np.ndarray
+    """(ne,) bool: elements that were not taken out."""
+    touches: np.ndarray
+    """(ne,) bool: elements that have contact."""
+    joint_row: np.ndarray
+    """(4 ne,) row of the joint models, of both faces of a joint; 0: none."""
+    open: np.ndarray
+    """(4 ne,) bool: faces that do not hold on to their partner (any more): broken, cracked, or it was taken out."""
+    broken: np.ndarray
+    """(4 ne,) by the lower face: 1 if the joint broke; more, while it is a joint again, see pressed.py."""
+    slid: dict[int, tuple[float, ...]]
+    """By face what broken joints remember of their slip at three points [m], see pressed.py."""
+    born: np.ndarray
+    """Elements that came back after they were taken out, ascending."""
+    birthplace: np.ndarray
+    """Where their corners were then (n, 4, dim) [m]."""
+
+    def clear_topology(self) -> None:
+        """There is no mesh."""
+        self.mesh = None
+        self.born, self.birthplace = np.empty(0, np.int64), np.empty((0, 4, 2))
+        self._reference: Mesh | None = None
+        self._closed: np.ndarray | None = None
+        self._make_topology(0)
+
+    def _make_topology(self, elements: int) -> None:
+        self.partner = np.full(4 * elements, -1, np.int64)
+        self.alive, self.touches = np.ones((2, elements), bool)
+        self.joint_row = sparse_zeros(4 * elements, np.int32)
+        self.open = sparse_zeros(4 * elements, bool)
+        self.broken = sparse_zeros(4 * elements, np.uint8)
+        self.slid = {}
+
+    # What the simulation does when something has changed.
+
+    def before_change(self) -> None:
+        """Assignments are about to change."""
+
+    def changed(self, topology: bool = False, stiffness: bool = True) -> None:
+        """Assignments have changed; topology: also who hangs together with whom; stiffness: perhaps the stable time
+        step too."""
+
+    def note(self, text: str) -> None:
+        """A line for the log."""
+
+    @property
+    def dim(self) -> int:
+        """Dimensions of space; without a mesh 2."""
+        return 2 if self.mesh is None else self.mesh.dim
+
+    def refuse_in_space(self, what: str) -> None:
+        """CommandError for what is there in the plane only."""
+        if self.dim == 3:
+            raise CommandError(f"{what}: this version has it in two dimensions only")
+
+    def _mesh(self) -> Mesh:
+        if self.mesh is None:
+            raise CommandError("there is no mesh yet")
+        return self.mesh
+
+    def _vector(self, what: str, given: Sequence[float]) -> np.ndarray:
+        """One number for each dimension of space. CommandError if there are others."""
+        if len(given) != self.dim:
+            raise CommandError(f"{what}: a vector of {self.dim} numbers is needed, got {len(given)}")
+        return finite(what, list(given))
+
+    def _only_in_space(self, what: str, *values: Any) -> None:
+        if self.dim == 2 and any(value is not None for value in values):
+            raise CommandError(f"in two dimensions there is no {what}")
+
+    def numbers_of_elements(self, elements: Any) -> np.ndarray:
+        """Checked element numbers, ascending; None: all that are there. CommandError for others."""
+        at = self.existing(elements, self.alive, "element")
+        if elements is not None:
+            self.refuse_parts(at)
+        return at
+
+    def refuse_parts(self, at: np.ndarray) -> None:
+        """CommandError if these elements (n,) are some parts of a macro-element, and not the others."""
+        mesh = self._mesh()
+        if len(mesh.macros):
+            of, macro = mesh.macro_of()[at], mesh.macro
+            count = np.bincount(of[of >= 0], minlength=len(mesh.macros))
+            part = np.flatnonzero((count > 0) & (count < macro.parts))
+            if len(part):
+                first = mesh.macros[part[0], -1]
+                raise CommandError(
+                    f"elements {first} to {first + macro.parts - 1} are one {macro.name}: they go together, only "
+                    f"{count[part[0]]} of them were given"
+                )
+
+    def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
+        """Checked numbers of points of the mesh with an element that is there; None: all of them. Of sides (sides.py)
+        their points."""
+        asked = None if nodes is None else np.asarray(nodes)
+        if asked is not None and np.issubdtype(asked.dtype, np.integer):
+            asked = sides.points(self._mesh().cells, asked.reshape(-1))
+        return self.existing(asked, self.node_exists(), "node")
+
+    def corners_of_nodes(self, nodes: Any, whole: bool = False) -> np.ndarray:
+        """(4 ne,) bool: corners at these nodes (sides.py), those of elements that were taken out too; None: all. whole:
+        and those that are one node with them."""
+        mesh = self._mesh()
+        self.numbers_of_nodes(nodes)
+        if nodes is None:
+            return mesh.cells.reshape(-1) >= 0
+        given = np.asarray(nodes, np.int64).reshape(-1)
+        found = sides.corners(mesh.cells, given, len(mesh.points))
+        if whole and sides.are_there(given):
+            found = self.with_nodes(found, self.clusters()[0].reshape(-1))
+        return found
+
+    @staticmethod
+    def with_nodes(corners: np.ndarray, node: np.ndarray) -> np.ndarray:
+        """Corners (4 ne,) bool, and those that are one of the nodes (4 ne,) with them."""
+        of = np.zeros(int(node.max(initial=-1)) + 2, bool)  # the last one: of none
+        of[node[corners]] = True
+        of[-1] = False
+        return corners | of[node]
+
+    def clusters(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes of corners (ne, 4), as faces hang together now, -1 of elements that were taken out, and their lowest
+        corners."""
+        mesh = self._mesh()
+        apart = (self.joint_row > 0) | self.open
+        apart |= np.repeat(~self.alive, 4)
+        node, lead = mesh.corner_clusters(self.partner, apart)
+        node[~self.alive] = -1
+        return node, lead
+
+    def node_exists(self) -> np.ndarray:
+        """(np,) bool."""
+        corners = self._mesh().cells[self.alive]
+        exists = np.zeros(len(self._mesh().points), bool)
+        exists[corners[corners >= 0]] = True
+        return exists
+
+    def numbers_of_faces(self, faces: Any) -> np.ndarray:
+        """Checked face numbers; None: all faces of elements that are there."""
+        return self.existing(faces, self.face_exists(), "face")
+
+    def numbers_of_joints(self, joints: Any) -> np.ndarray:
+        """Checked numbers of inner edges (lower faces); None: all between elements that are there."""
+        return self.existing(joints, self.joint_exists(), "joint (the lower face of an inner edge)")
+
+    def joint_exists(self) -> np.ndarray:
+        """(4 ne,) bool: lower faces of edges between elements that are there."""
+        face = np.arange(len(self.partner))
+        inner = (self.partner > face) & self.alive[face // 4]
+        inner[inner] &= self.alive[self.partner[inner] // 4]
+        inner[inner] = ~self._mesh().inside_macros(face[inner])
+        return inner
+
+    def face_exists(self) -> np.ndarray:
+        """(4 ne,) bool."""
+        exists = np.repeat(self.alive, 4)
+        exists[3::4] &= self._mesh().cells[:, 3] >= 0
+        return exists
+
+    def existing(self, given: Any, there: np.ndarray, what: str) -> np.ndarray:
+        self._mesh()
+        if given is None:
+            return np.flatnonzero(there)
+        asked = np.asarray(given)
+        if asked.dtype == bool or (asked.size and not np.issubdtype(asked.dtype, np.integer)):
+            raise CommandError(f"numbers of {what}s must be integers, got {asked.dtype}")
+        asked = np.unique(asked.astype(np.int64).reshape(-1))
+        bad = asked[(asked < 0) | (asked >= len(there))]
+        gone = ""
+        if not len(bad):
+            bad = asked[~there[asked]]
+            gone = "" if self.alive.all() else "; elements were taken out"
+        if len(bad):
+            raise CommandError(f"there is no {what} {bad[0]}{gone}")
+        return asked
+
+    def _take(self, mesh: Mesh) -> None:
+        try:
+            meshes.check(mesh)
+        except HpcdemError as error:
+            raise CommandError(str(error)) from None
+        self._put(mesh)
+
+    def _put(self, mesh: Mesh) -> None:
+        """The model begins again with this mesh."""
+        raise NotImplementedError
+
+    def open_faces(self, lower: np.ndarray) -> None:
+        for faces in (lower, self.partner[lower]):
+            self.open[faces] = True
+            if self._closed is not None:
+                self._closed[faces] = False
+
+    def closed_faces(self) -> np.ndarray:
+        """(4 ne,) bool: faces that hang together with their partner, by a joint or as one body. Not to be changed."""
+        if self._closed is None:
+            self._closed = (self.partner >= 0) & ~self.open
+        return self._closed
+
+    @property
+    def reference(self) -> Mesh:
+        """Where elements are free of strain: the mesh, and for those that came back where they did, with points of
+        their own there (macro-elements share those of their parts)."""
+        mesh = self._mesh()
+        if self._reference is None:
+            self._reference = mesh.with_own_points(self.born, self.birthplace) if len(self.born) else mesh
+        return self._reference
+
+    def take_births(self, born: np.ndarray, places: np.ndarray) -> None:
+        """Elements (n,) have come back, their corners at places (n, 4, dim) [m]."""
+        stay = ~np.isin(self.born, born)
+        number = np.concatenate([self.born[stay], born])
+        order = np.argsort(number, kind="stable")
+        self.born = number[order]
+        known = self.birthplace[stay].reshape(-1, 4, self.dim)
+        self.birthplace = np.concatenate([known, places])[order]
+        self._reference = None
+
+
+def place(at: np.ndarray) -> str:
+    """As messages say it."""
+    return f"({', '.join(f'{c:g}' for c in at)})"
+
+
+def finite(what: str, values: list) -> np.ndarray:
+    try:
+        numbers = np.array(values, np.float64)
+    except (TypeError, ValueError):
+        raise CommandError(f"{what} must be a number, got {values}") from None
+    if not np.isfinite(numbers).all():
+        raise CommandError(f"{what} must be finite, got {', '.join(f'{v:g}' for v in numbers)}")
+    return numbers
