@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import FINITE, HELP, PATH
-from hpcdem.cli.measure import Formats
+from hpcdem.cli.measure import FORMATS
+from hpcdem.cli.pictures import Formats
 from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ MM = 1e-3
               "angle [1].")  # fmt: skip
 @click.option("--gap", type=FINITE, default=0.03, metavar="G", help="Largest gap between outlines and the discs of "
               "clumps, over the size [0.03].")  # fmt: skip
-@click.option("--format", "formats", type=Formats(), default="png", metavar="LIST",
+@click.option("--format", "formats", type=Formats(FORMATS, none=True), default="png", metavar="LIST",
               help="Figures: png, jpg, pdf, svg, with commas between them, or none [png].")  # fmt: skip
 @click.option("--falling", is_flag=True, help="Grading curve with sizes that fall to the right.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")

@@ -40,34 +40,6 @@ class Numbers(Words):
             self.fail(f"'{value}': whole numbers with commas between them are expected", param, ctx)
 
 
-class Point(click.ParamType):
-    """X,Y"""
-
-    name = "x,y"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if not isinstance(value, str):
-            return value
-        try:
-            x, y = (FINITE.convert(word, param, ctx) for word in value.split(","))
-        except (ValueError, click.BadParameter):
-            self.fail(f"'{value}': two numbers with a comma between them are expected", param, ctx)
-        return x, y
-
-
-class Formats(Words):
-    """Some of FORMATS with commas between them, or none."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        words = [word.lower() for word in super().convert(value, param, ctx)]
-        if words == ["none"]:
-            return []
-        for word in words:
-            if word not in FORMATS:
-                self.fail(f"'{word}' is not one of {', '.join(FORMATS)}, none", param, ctx)
-        return list(dict.fromkeys(words))
-
-
 def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
     names = (name, more) if more else (name,)
     return click.option(*names, type=POSITIVE, metavar=metavar, help=text)
@@ -91,7 +63,7 @@ def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
 @click.option("--xmove", type=FINITE, default=0.0, metavar="X", help="Add X [m] to all x [0].")
 @click.option("--ymove", type=FINITE, default=0.0, metavar="Y", help="Add Y [m] to all y [0].")
 @_length("--width", "W", "Width of the columns of the surface, and of cells for strain, in m [about three radii].")
-@click.option("--format", "formats", type=Formats(), default="png", metavar="LIST",
+@click.option("--format", "formats", type=pictures.Formats(FORMATS, none=True), default="png", metavar="LIST",
               help=f"Figures: {', '.join(FORMATS)}, with commas between them, or none [png].")  # fmt: skip
 @_length("--strain", "E", "faults: threshold of |strain| [0.5 in sections, 0.2 from frame to frame].")
 @_length("--length", "L", "faults: shortest band in m [6 cells].")
@@ -99,8 +71,8 @@ def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
               "than H m to the base and to the wall that pushes [2 cells].")  # fmt: skip
 @click.option("--increment", is_flag=True, help="faults: strain from frame to frame even where there are sections.")
 @click.option("--ids", type=Numbers(), default="", metavar="I,J", help="tracks: particles of these ids.")
-@click.option("--near", "points", type=Point(), multiple=True, metavar="X,Y", help="tracks: the particles nearest to "
-              "this point (m) in the first frame; may be given again.")  # fmt: skip
+@click.option("--near", "points", type=pictures.Numbers(2), multiple=True, metavar="X,Y", help="tracks: the particles "
+              "nearest to this point (m) in the first frame; may be given again.")  # fmt: skip
 @click.option("--number", type=click.IntRange(1), default=1, metavar="N", help="tracks: so many to each point [1].")
 @click.option("--log", type=PATH, metavar="FILE", help="cracks: log of the run, which counts breaks in tension and in "
               "shear.")  # fmt: skip

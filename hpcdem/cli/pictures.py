@@ -29,21 +29,24 @@ class ManualCommand(click.Command):
 
 
 class Formats(click.ParamType):
-    """Words of `known` with commas between them; eps is ps, jpeg is jpg, tif is tiff."""
+    """Words of `known` with commas between them, or `none` if that can be; eps is ps, jpeg is jpg, tif is tiff."""
 
     name = "formats"
 
-    def __init__(self, known: Sequence[str]) -> None:
-        self.known = tuple(known)
+    def __init__(self, known: Sequence[str], none: bool = False) -> None:
+        self.known, self.none = tuple(known), none
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if isinstance(value, tuple):
             return value
         words = str(value).lower().replace(" ", "").replace(".", "").split(",")
         words = [{"eps": "ps", "jpeg": "jpg", "tif": "tiff"}.get(word, word) for word in words]
+        if self.none and words == ["none"]:
+            return ()
         for word in words:
             if word not in self.known:
-                self.fail(f"{word!r} is not a format of pictures; expected some of {', '.join(self.known)}", param, ctx)
+                known = ", ".join(self.known) + ", or none" * self.none
+                self.fail(f"{word!r} is not a format of pictures; expected some of {known}", param, ctx)
         return tuple(dict.fromkeys(words))
 
 
