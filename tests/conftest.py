@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
@@ -173,9 +174,9 @@ _ELSEWHERE = {"browser", "slurm"}
 
 def _leave_some_of_each(items: list[pytest.Item]) -> None:
     """Of a test that is marked so: some cases, which have each value of each parameter, stay quick, others are slow."""
-    tests: dict[str, list[pytest.Function]] = {}
+    tests: dict[str, list[Any]] = {}
     for item in items:
-        if isinstance(item, pytest.Function) and item.get_closest_marker("some_of_each"):
+        if hasattr(item, "callspec") and item.get_closest_marker("some_of_each"):
             if not item.get_closest_marker("slow"):
                 tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
     for cases in tests.values():
@@ -188,21 +189,32 @@ def _leave_some_of_each(items: list[pytest.Item]) -> None:
             item.add_marker("slow")
 
 
+def _spare_hypothesis_the_sources() -> None:
+    """Hypothesis reads all modules that are loaded for numbers to try: seconds of each process, and examples that are
+    said to be always the same would depend on which modules are there."""
+    if "hypothesis" in sys.modules:
+        with contextlib.suppress(ImportError, AttributeError):
+            from hypothesis.internal.conjecture import providers
+
+            none = providers._local_constants
+            providers._get_local_constants = lambda: none
+
+
 @pytest.hookimpl(tryfirst=True)  # before pytest sorts out what `-m` asks for
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """A mark is a promise about the machine: let it check the machine too. And who needs how much of it."""
     _leave_some_of_each(items)
+    _spare_hypothesis_the_sources()
     for item in items:
         if not isinstance(item, pytest.Function):
             continue
-        for mark in ("mpi", "petsc"):
-            if item.get_closest_marker(mark):
-                item.fixturenames.insert(0, f"needs_{mark}")
-        if item.get_closest_marker("slurm") or not _ELSEWHERE.isdisjoint(item.fixturenames):
+        marks = {mark.name for mark in item.iter_markers()}
+        item.fixturenames[:0] = [f"needs_{mark}" for mark in ("petsc", "mpi") if mark in marks]
+        if "slurm" in marks or not _ELSEWHERE.isdisjoint(item.fixturenames):
             item.add_marker("nightly")
-        if item.get_closest_marker("slurm") or not _WATCHES.isdisjoint(item.fixturenames):
+        if "slurm" in marks or not _WATCHES.isdisjoint(item.fixturenames):
             item.add_marker("alone")
-        elif not item.get_closest_marker("alone") and not _RANKS.isdisjoint(item.fixturenames):
+        elif "alone" not in marks and not _RANKS.isdisjoint(item.fixturenames):
             item.add_marker("ranks")
     shared: dict[Path, set[str]] = {}
     for item in items:

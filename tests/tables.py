@@ -20,10 +20,11 @@ def each(
     words = [word.strip() for word in names.split(",")] if isinstance(names, str) else list(names)
     table = [row if len(words) > 1 else (row,) for row in rows]
     name = ids if callable(ids) else repr
-    titles = [", ".join(f"{name(value)!s:.60}" for value in row) for row in table]
-    if ids is not None and not callable(ids):
-        titles = list(ids)
-    assert table and len(titles) == len(table), f"{len(titles)} names of {len(table)} rows"
+    titles = None if ids is None or callable(ids) else list(ids)
+    assert table and (titles is None or len(titles) == len(table)), f"{titles} for {len(table)} rows"
+
+    def title(k: int) -> str:
+        return titles[k] if titles else ", ".join(f"{name(value)!s:.60}" for value in table[k])
 
     def of_all(test: Callable[..., None]) -> Callable[..., None]:
         signature = inspect.signature(test)
@@ -32,11 +33,11 @@ def each(
         @functools.wraps(test)
         def rows_in_turn(*args: Any, **fixtures: Any) -> None:
             failed = []
-            for title, row in zip(titles, table):
+            for k, row in enumerate(table):
                 try:
                     test(*args, **fixtures, **dict(zip(words, row, strict=True)))
                 except (Exception, pytest.fail.Exception) as error:
-                    failed.append(f"{title}: {type(error).__name__}: {error}")
+                    failed.append(f"{title(k)}: {type(error).__name__}: {error}")
             if failed:
                 more = [f"... {len(failed) - SHOWN} more"] * (len(failed) > SHOWN)
                 pytest.fail("\n".join([f"{len(failed)} of {len(table)}", *failed[:SHOWN], *more]), pytrace=False)

@@ -187,7 +187,8 @@ def install() -> None:
         if name.startswith("hpcdem"):
             kernels: list[Any] = [thing for thing in vars(module).values() if isinstance(thing, Dispatcher)]
             for kernel in kernels:
-                if isinstance(kernel._cache, FunctionCache | _OfPackage):
+                there = isinstance(kernel._cache, _OfPackage) and store()[0] in Path(kernel._cache.cache_path).parents
+                if isinstance(kernel._cache, FunctionCache | _OfPackage) and not there:
                     kernel.enable_caching()
 
 
@@ -207,9 +208,10 @@ def _digest(source: Path) -> str:
     return digest.hexdigest()[:12]
 
 
-def _sources(source: Path) -> set[Path]:
+@cache
+def _sources(source: Path) -> frozenset[Path]:
     """What the digest of a module is made of."""
-    return {source, *(_PACKAGE / name for name in _reached(source))}
+    return frozenset({source, *(_PACKAGE / name for name in _reached(source))})
 
 
 @cache

@@ -101,7 +101,7 @@ def test_kernels_are_known_by_what_they_are_made_of(base, tmp_path, monkeypatch,
     source = tmp_path / "kernels_of_a_test.py"
 
     def digest() -> str:
-        for known in (kept._digest, kept._reached, kept._files):
+        for known in (kept._digest, kept._reached, kept._sources, kept._files):
             known.cache_clear()
         return kept._digest(source)
 
@@ -116,7 +116,7 @@ def test_kernels_are_known_by_what_they_are_made_of(base, tmp_path, monkeypatch,
     assert len({first, second, third}) == 3
     (package / "other.py").write_text("C = 3\n")
     assert digest() == third
-    for known in (kept._digest, kept._reached, kept._files):
+    for known in (kept._digest, kept._reached, kept._sources, kept._files):
         known.cache_clear()
 
 
@@ -158,7 +158,7 @@ def test_a_kernel_of_a_factory_is_made_anew_when_a_kernel_that_it_was_given_chan
         return found
 
     def value(factor):
-        for known in (kept._digest, kept._reached):
+        for known in (kept._digest, kept._reached, kept._sources):
             known.cache_clear()
         run = module("factory", factory + "    return run\n").loop(module("law", law.format(factor)).law)
         return run(1.0), sum(run.stats.cache_hits.values())

@@ -126,16 +126,19 @@ def rows() -> tuple[Row, ...]:
     return tuple(found)
 
 
+_keyword = cache(Keyword)
+
+
 def _full(word: str) -> str:
-    return Keyword(word).name if word.isascii() else word
+    return _keyword(word).name if word.isascii() else word
 
 
 def _short(word: str, beside: set[str]) -> str:
     """The compulsory letters of a word, or all where they may mean another word of the same place."""
     if not word.isascii():
         return word
-    short = Keyword(word).shortest()
-    others = (Keyword(one) for one in beside if one.isascii() and _full(one) != _full(word))
+    short = _keyword(word).shortest()
+    others = (_keyword(one) for one in beside if one.isascii() and _full(one) != _full(word))
     return _full(word) if any(one.accepts(short) for one in others) else short
 
 
