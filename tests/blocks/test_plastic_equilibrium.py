@@ -297,7 +297,7 @@ def stamp(kind: str, press: float = 4e-3, **properties: float) -> Blocks:
     return sim
 
 
-@pytest.mark.parametrize("kind", ["cross", "mixed"])
+@pytest.mark.parametrize("kind", ["cross", pytest.param("mixed", marks=pytest.mark.slow)])
 def test_the_same_as_relaxation(kind):
     """A plate that is pressed by a rough stamp, by steps and at once: the way is the same where increments are small
     and relaxation slow, and so is what flows on it; 128 increments and twice the steps come to 0.25 %."""

@@ -32,6 +32,7 @@ def bolt(sim: Blocks, *points: tuple[float, float], **more: object) -> Bolts:
     return bolts
 
 
+@pytest.mark.slow
 def test_a_soft_block_hangs_on_a_bolt_and_a_plate() -> None:
     """A block under a void hangs on one bolt: all of its weight is in the bar where it crosses the void. Per metre of
     thickness; one bolt has the spacing times as much."""

@@ -45,6 +45,7 @@ def test_cantilever_with_a_force_at_its_end() -> None:
     assert abs(liners.values("liner-node", "reaction_moment")[0]) == pytest.approx(200.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_simply_supported_beam_under_its_weight() -> None:
     """Weight lumped at the nodes of 16 elements: 5 q L^4 / (384 E I) but for 1 / n^2, moment q L^2 / 8."""
     sim, liners = beam(16, 4.0, density=2500.0, young=30e9, poisson_ratio=0.0, thickness=0.15)
@@ -131,6 +132,7 @@ def frequency(count: int) -> float:
     return float(1.0 / (np.diff(cross).mean() * 2e-5))
 
 
+@pytest.mark.slow
 def test_natural_frequency_of_a_cantilever() -> None:
     """f = (1.8751 / L)^2 sqrt(E I / (rho A)) / (2 pi) = 11.9 Hz without shear and rotary inertia."""
     exact = (1.8751041 / 2.0) ** 2 * math.sqrt(EI / 240.0) / (2.0 * math.pi)

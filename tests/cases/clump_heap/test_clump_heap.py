@@ -171,6 +171,7 @@ def test_it_is_the_limit_of_stability(tmp_path, factor, n, stable):
 # ---- commands ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_same_bits_on_threads_and_when_looked_at(tmp_path):
     one, three = heap(tmp_path / "1", seconds=2.0), heap(tmp_path / "3", seconds=2.0, threads=3)
     assert diagnostics.fingerprint(one) == diagnostics.fingerprint(three)

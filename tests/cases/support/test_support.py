@@ -28,7 +28,8 @@ def test_bolts_hold(launch, tmp_path):
     assert none.plastic_radius > usual.plastic_radius
 
 
-@pytest.mark.parametrize("yields", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("yields", [False, True])
 def test_a_slice_in_space_is_plane_strain(launch, tmp_path, yields):
     """One ring of bolts in a slice as wide as their spacing, beside bolts that are spread along the tunnel: closure,
     crown and zone that yields within 4 %; the largest force of a bolt, which scatters with the mesh, within 6 %."""
