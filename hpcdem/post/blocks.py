@@ -20,6 +20,7 @@ from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
+from hpcdem.numerics.clusters import spots
 from hpcdem.post import bolts, fluid, liners
 from hpcdem.post.saved import SAVED, save
 
@@ -420,15 +421,9 @@ def cornered(state: MeshState, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
 def smoothed(state: MeshState, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points (n, 2) at which corners meet, triangles (m, 3), and the values (ne,) of elements there: the mean of the
     elements around, weighted by area."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
     cells, points = state.cells, state.points
-    pairs = cKDTree(points).query_pairs(NEAR * _edge(state), output_type="ndarray")
-    n = len(points)
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (n, n))
-    count, place = connected_components(graph, directed=False)
+    lowest, place = np.unique(spots(points, NEAR * _edge(state)), return_inverse=True)
+    count = len(lowest)
     quads = cells[cells[:, 3] >= 0]
     triangles = np.concatenate([cells[:, :3], quads[:, [0, 2, 3]]])
     owner = np.concatenate([np.arange(len(cells)), np.flatnonzero(cells[:, 3] >= 0)])

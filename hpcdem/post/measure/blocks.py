@@ -20,6 +20,7 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.frames import FrameFile, list_mesh_frames
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
+from hpcdem.numerics.clusters import united
 from hpcdem.physics.fdem import tetrahedra
 from hpcdem.physics.fdem.mesh import sizes
 from hpcdem.post.blocks import BROKEN, FREE, YIELDED
@@ -253,9 +254,6 @@ def sides(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
 
 def fragments(state: MeshState, wanted: np.ndarray) -> Pieces:
     """The fragments of the elements that are wanted (ne,)."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     if state.points.shape[1] == 3:
         beside = neighbours(state)
         face = np.flatnonzero(beside > np.arange(len(beside)))
@@ -267,14 +265,9 @@ def fragments(state: MeshState, wanted: np.ndarray) -> Pieces:
         gone = state.of_joints["number"][~holds].astype(np.int64)
         tied, area = ~np.isin(face, gone) & wanted[first] & wanted[second], state.of_elements["area"]
     n = len(state.cells)
-    graph = coo_matrix((np.ones(int(tied.sum())), (first[tied], second[tied])), (n, n))
-    _, label = connected_components(graph, directed=False)
     rows = np.flatnonzero(wanted)
-    _, of = np.unique(label[rows], return_inverse=True)
-    of = of.reshape(-1)
+    lowest, of = np.unique(united(n, first[tied], second[tied])[rows], return_inverse=True)
     areas, count = np.bincount(of, area[rows]), np.bincount(of)
-    lowest = np.full(len(areas), n)
-    np.minimum.at(lowest, of, rows)
     order = np.lexsort((lowest, -areas))  # equal ones by their lowest element
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.numerics.clusters import spots
 from hpcdem.pre.mesh import apart, dxf, optional
 from hpcdem.pre.mesh import occ as shapes
 from hpcdem.pre.mesh.solids import Brep, Shell
@@ -66,9 +67,7 @@ def _shell(path: Path, triangles: np.ndarray) -> Shell:
     size = float(np.ptp(corners, axis=0).max())
     if size <= 0.0:
         raise HpcdemError(f"{path}: all corners lie in one point")
-    from hpcdem.pre.mesh.imported import _merged
-
-    of = _merged(corners, SAME * size).reshape(-1, 3)
+    of = spots(corners, SAME * size).reshape(-1, 3)
     kept = of[(of != np.roll(of, 1, axis=1)).all(axis=1)]  # slivers that merging has made lines of
     kept, pieces = outwards(kept, corners)
     try:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from hpcdem.numerics.clusters import spots
 from hpcdem.physics.fdem.connectivity import bodies
 from hpcdem.physics.fdem.mesh import Mesh
 
@@ -106,20 +105,6 @@ def _near(free: Free, tolerance: float) -> np.ndarray:
     return np.concatenate(out)
 
 
-def spots(points: np.ndarray, among: np.ndarray, tolerance: float) -> np.ndarray:
-    """(np,) the lowest of the points `among` that are nearer to each other than the tolerance; others are alone."""
-    near = among[cKDTree(points[among]).query_pairs(tolerance, output_type="ndarray").reshape(-1, 2)]
-    return united(len(points), near[:, 0], near[:, 1])
-
-
-def united(n: int, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """(n,) lowest member of the set that each of n things is in, when those of one and other (m,) are joined."""
-    _, part = connected_components(coo_array((np.ones(len(one)), (one, other)), shape=(n, n)), directed=False)
-    low = np.full(part.max() + 1, n)
-    np.minimum.at(low, part, np.arange(n))
-    return low[part]
-
-
 def cut_otherwise(free: Free, corners: np.ndarray) -> np.ndarray:
     """(m, 4) rows of faces in space, with these spots of their corners (n, 3): two of them are a quad, and two others,
     back to back with them, the same quad, cut along the other diagonal."""
@@ -184,7 +169,7 @@ def fit(mesh: Mesh, since: int = 0) -> Fit:
     tolerance = free.tolerance()
     if not len(free.faces):
         return Fit(free.bodies, empty, empty, empty)
-    spot = spots(mesh.points, np.unique(free.points), tolerance)
+    spot = spots(mesh.points, tolerance, np.unique(free.points))
     corners = spot[free.points]
     pairs = lying(free, tolerance)
     new = free.faces // 4 >= since

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.numerics import clusters
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.pre.mesh import fit, refine
@@ -96,7 +97,7 @@ def _spots(free: fit.Free, tolerance: float) -> np.ndarray:
     """(np,) the lowest of the surface points nearer to each other than the tolerance; CommandError if two are of one
     element."""
     mesh = free.mesh
-    spot = fit.spots(mesh.points, np.unique(free.points), tolerance)
+    spot = clusters.spots(mesh.points, tolerance, np.unique(free.points))
     corners = np.where(mesh.cells >= 0, spot[mesh.cells], -1)
     order = np.argsort(corners, axis=1, kind="stable")
     ranked = np.take_along_axis(corners, order, axis=1)
@@ -164,7 +165,7 @@ def _merged(
     of = free.points[pairs]  # (m, 2, dim)
     same = spot[of[:, 0, :, None]] == spot[of[:, 1, None, :]]
     k, a, b = np.nonzero(same)
-    lead, number = np.unique(fit.united(len(mesh.points), of[k, 0, a], of[k, 1, b]), return_inverse=True)
+    lead, number = np.unique(clusters.united(len(mesh.points), of[k, 0, a], of[k, 1, b]), return_inverse=True)
     number = number.reshape(-1)
     if not len(mesh.hexes):
         cells = np.where(mesh.cells >= 0, number[mesh.cells], -1)

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.numerics.clusters import spots
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.connectivity import areas, corner_counts
 from hpcdem.physics.fdem.mesh import Mesh, Names, check
@@ -71,7 +71,7 @@ def read(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2)
     between = _straightened(data, notes)
     _refuse_kinds(data, dim)
     points = (data.points if dim == 3 else _plane(data)) * scale
-    number = _merged(points, merge) if merge > 0.0 else np.arange(len(points))
+    number = spots(points, merge) if merge > 0.0 else np.arange(len(points))
     own, place = (_in_space if dim == 3 else _in_plane)(data, points, number, merge)
     return _with_names(data, own, place, between, notes)
 
@@ -360,18 +360,6 @@ def _corners(data: FileMesh, points: np.ndarray, cells: np.ndarray, file: np.nda
             (x, y), what = points[cells[e, 0]], "is flat" if n == 3 else "is flat, folded or concave"
             kind, of = ("triangle" if n == 3 else "quad"), ", ".join(data.point(p) for p in cells[e, :n])
             raise data.refuse(f"element {data.element(file[e])} ({kind} of points {of}, at ({x:g}, {y:g})) {what}")
-
-
-def _merged(points: np.ndarray, distance: float) -> np.ndarray:
-    """(n,) number of the lowest point of each cluster of points nearer than `distance` to each other."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    pairs = cKDTree(points).query_pairs(distance, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (len(points), len(points)))
-    _, label = connected_components(graph, directed=False)
-    _, lowest = np.unique(label, return_index=True)
-    return lowest[label]
 
 
 def _collapsed(data: FileMesh, rows: np.ndarray, file: np.ndarray, merge: float) -> None:

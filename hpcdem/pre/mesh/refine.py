@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import CommandError
+from hpcdem.numerics import clusters
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.tetrahedra import volumes
@@ -146,7 +147,7 @@ class _Cut:
         found = np.concatenate([outline for _, _, outline in self.outlines])
         both = np.concatenate([mesh.points[known], found])
         number = np.concatenate([known, n + np.arange(len(found))])
-        spot = fit.spots(both, np.arange(len(both)), self.tolerance)  # known points come first
+        spot = clusters.spots(both, self.tolerance)  # known points come first
         lead = number[spot[len(known) :]]
         new, at = np.unique(lead[lead >= n], return_inverse=True)
         lead[lead >= n] = n + at
