@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -211,18 +211,9 @@ def from_file(path: Path, options: Mapping[str, Any]) -> dict[str, Any]:
             raise UsageError(f"{path}: '{key}' is unknown; there are {', '.join(_FILE)} and the table [set]")
     if "script" not in given:
         raise UsageError(f"{path}: script = FILE is missing")
-    words: list[str] = []
-    for key, value in given.items():
-        if key == "set":
-            if not isinstance(value, dict):
-                raise UsageError(f"{path}: set is a table: [set], then NAME = VALUES")
-            continue
-        for one in value if key in ("with", "sbatch") and isinstance(value, list) else [value]:
-            if isinstance(one, (dict, bool)) or (isinstance(one, list) and key != "seed"):
-                raise UsageError(f"{path}: {key} = {one!r}: a number or a word is expected")
-            if key != "seed":
-                text = str(path.parent / one) if key in ("with", "output", "script") else str(one)
-                words += [text] if key == "script" else [f"--{key}", text]
+    if not isinstance(given.get("set", {}), dict):
+        raise UsageError(f"{path}: set is a table: [set], then NAME = VALUES")
+    words = [word for key, value in given.items() if key != "set" for word in _as_typed(path, key, value)]
     read = read_command_line(sweep, str(path), words)
     if "seed" in given:
         read["seed"] = _values(path, "seed", given["seed"])
@@ -232,6 +223,16 @@ def from_file(path: Path, options: Mapping[str, Any]) -> dict[str, Any]:
         said = {name for name, _ in over["values"]}
         over["values"] = (*(pair for pair in read["values"] if pair[0] not in said), *over["values"])
     return read | over
+
+
+def _as_typed(path: Path, key: str, value: Any) -> Iterator[str]:
+    """A key of a file as words of the command line; a seed, of which there may be several, as none."""
+    for one in value if key in ("with", "sbatch") and isinstance(value, list) else [value]:
+        if isinstance(one, (dict, bool)) or (isinstance(one, list) and key != "seed"):
+            raise UsageError(f"{path}: {key} = {one!r}: a number or a word is expected")
+        text = str(path.parent / one) if key in ("with", "output", "script") else str(one)
+        if key != "seed":
+            yield from [text] if key == "script" else [f"--{key}", text]
 
 
 def _values(path: Path, name: str, value: Any) -> str | Sequence[Any]:

@@ -97,18 +97,11 @@ def _choice(script: Adjustable, name: str, words: str | Sequence[object], sample
     low, high = (_number(script, name, words, part) for part in parts[:2])
     if not low < high:
         raise UsageError(f"{name}={words}: {low:g} is not below {high:g}")
-    whole = isinstance(script.parameters[name].value, int) and low.is_integer() and high.is_integer()
-    if len(parts) == 2 and sampled:
-        return Range(low, high, whole=whole)
     if len(parts) == 2:
-        if not (low.is_integer() and high.is_integer()):
-            raise UsageError(
-                f"{name}={words}: without sampling a range is of whole numbers; say how many values, as in {words}:5, "
-                "or sample it with --latin N or --sobol N"
-            )
-        if high - low >= MOST:
-            raise UsageError(f"{name}={words}: more than {MOST} values")
-        return [int(low) + k for k in range(int(high - low) + 1)]
+        whole = low.is_integer() and high.is_integer()
+        if sampled:
+            return Range(low, high, whole=whole and isinstance(script.parameters[name].value, int))
+        return _whole_numbers(f"{name}={words}", words, low, high)
     if parts[2] == "log":
         if not sampled:
             raise UsageError(f"{name}={words}: log goes with --latin N or --sobol N")
@@ -119,6 +112,18 @@ def _choice(script: Adjustable, name: str, words: str | Sequence[object], sample
         raise UsageError(f"{name}={words}: '{parts[2]}' is neither log nor a number of values from 2 on")
     even = (float(f"{value:.12g}") for value in np.linspace(low, high, int(parts[2])).tolist())
     return _different(name, [script.value(name, f"{value!r}") for value in even])
+
+
+def _whole_numbers(said: str, words: str, low: float, high: float) -> list[Value]:
+    """From low to high."""
+    if not (low.is_integer() and high.is_integer()):
+        raise UsageError(
+            f"{said}: without sampling a range is of whole numbers; say how many values, as in {words}:5, or sample it "
+            "with --latin N or --sobol N"
+        )
+    if high - low >= MOST:
+        raise UsageError(f"{said}: more than {MOST} values")
+    return [int(low) + k for k in range(int(high - low) + 1)]
 
 
 def _number(script: Adjustable, name: str, words: str, part: str) -> float:

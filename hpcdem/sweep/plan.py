@@ -93,27 +93,14 @@ def make(
     plan = Plan(folder, Path(script.file).name, script.kind, digest, ranks, threads, sampling, dict(wanted))
     if (folder / RECORD).exists():
         before = load(folder)
-        if (before.script, before.digest) != (plan.script, digest):
-            raise UsageError(
-                f"{folder} holds a sweep of another text of {before.script}; choose another folder with -o"
-            )
-        if sampling is not None and (before.sampling, before.wanted) != (sampling, plan.wanted):
-            raise UsageError(f"{folder} holds samples of another kind, number or range; choose another folder with -o")
-        if before.sampling is not None and sampling is None:
-            raise UsageError(f"{folder} holds samples, to which a grid cannot be added; choose another folder with -o")
-        if before.values and set(before.values[0]) != set(values[0]):
-            raise UsageError(
-                f"{folder} holds a sweep over {', '.join(before.values[0])}, not {', '.join(values[0])}; choose "
-                "another folder with -o"
-            )
+        _check_same(before, plan, list(values[0]))
         plan.values = list(before.values)
     elif folder.exists() and any(folder.iterdir()):
         raise UsageError(f"{folder} is not empty and holds no sweep; choose another folder with -o")
     new = [one for one in values if one not in plan.values]
-    for name in (RECORD, STATE, PARAMETERS, LOG, "data", plan.script):
-        if any(link.name == name for link in links):
-            raise UsageError(f"--with {name}: each member has a file of this name of its own")
     for link in links:
+        if link.name in (RECORD, STATE, PARAMETERS, LOG, "data", plan.script):
+            raise UsageError(f"--with {link.name}: each member has a file of this name of its own")
         if not link.exists():
             raise UsageError(f"--with {link}: there is no such file")
     plan.values += new
@@ -129,6 +116,21 @@ def make(
     del about["folder"]
     write_json(folder / RECORD, about)  # last: a sweep whose making was cut off is made again
     return plan, len(new)
+
+
+def _check_same(before: Plan, plan: Plan, names: list[str]) -> None:
+    """UsageError if members of this plan, over parameters of these names, are none of the sweep that was before."""
+    other = ""
+    if (before.script, before.digest) != (plan.script, plan.digest):
+        other = f"a sweep of another text of {before.script}"
+    elif plan.sampling is not None and (before.sampling, before.wanted) != (plan.sampling, plan.wanted):
+        other = "samples of another kind, number or range"
+    elif before.sampling is not None and plan.sampling is None:
+        other = "samples, to which a grid cannot be added"
+    elif before.values and set(before.values[0]) != set(names):
+        other = f"a sweep over {', '.join(before.values[0])}, not {', '.join(names)}"
+    if other:
+        raise UsageError(f"{plan.folder} holds {other}; choose another folder with -o")
 
 
 def load(folder: Path) -> Plan:

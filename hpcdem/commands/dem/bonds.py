@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -62,19 +63,7 @@ def bond(
     -------
     int : how many are new.
     """
-    values = dict(zip(ELASTIC, (ebmod, gbmod, tstrength, sstrength), strict=True))
-    elastic = any(v is not None for v in values.values())
-    if elastic and (n_bond is not None or s_bond is not None):
-        raise CommandError("a bond is either ebmod, gbmod, tstrength, sstrength or n_bond, s_bond, not both")
-    kind = laws.ELASTIC_BOND if elastic else laws.CONTACT_BOND
-    if not elastic:
-        values = {"tstrength": n_bond, "sstrength": s_bond}
-    given = {name: v for name, v in values.items() if v is not None}
-    if not given:
-        raise CommandError("no bond property given: expected ebmod, gbmod, tstrength, sstrength or n_bond, s_bond")
-    for name, value in given.items():
-        if value < 0.0:
-            raise CommandError(f"{name} must not be negative, got {value:g}")
+    kind, given = _law_of((ebmod, gbmod, tstrength, sstrength), (n_bond, s_bond))
     if rubber:
         given["rubber"] = 1.0
         if sim.log is not None:
@@ -85,15 +74,7 @@ def bond(
         raise CommandError(f"bonds are not for a model with a law of the user, {sim.own_laws.titles}")
     gap = TOLERATE if tolerate is None else tolerate
     scale = 1.0 if rext is None else rext
-    if scale <= 0.0:
-        raise CommandError(f"rext must be positive, got {scale:g}")
-    largest = float(sim.comm.max_into(np.array([sim.particles["radius"].max() if len(sim.particles) else 0.0]))[0])
-    reach = max(gap, 2.0 * largest * (scale - 1.0) + gap, 0.0)
-    if reach > FARTHEST * largest > 0.0:
-        raise CommandError(
-            f"tolerate {gap:g} and rext {scale:g} would bond particles {reach:g} m apart; at most {FARTHEST:g} radii "
-            f"of the largest particle, {FARTHEST * largest:g} m"
-        )
+    largest, reach = _reach(sim, gap, scale)
     if fric is not None:
         prop(sim, where, fric=fric)
     if largest == 0.0:
@@ -124,6 +105,36 @@ def bond(
     sim.bonds += total
     _warn_of_overstretched(sim, which)
     return total
+
+
+def _law_of(elastic: Sequence[float | None], contact: Sequence[float | None]) -> tuple[int, dict[str, float]]:
+    """The kind of bond that is meant, and its properties by their names in the table of types. elastic: in the order of
+    ELASTIC; contact: tensile and shear strength [N]."""
+    of_elastic = {name: v for name, v in zip(ELASTIC, elastic, strict=True) if v is not None}
+    of_contact = {name: v for name, v in zip(("tstrength", "sstrength"), contact, strict=True) if v is not None}
+    if of_elastic and of_contact:
+        raise CommandError("a bond is either ebmod, gbmod, tstrength, sstrength or n_bond, s_bond, not both")
+    given = of_elastic or of_contact
+    if not given:
+        raise CommandError("no bond property given: expected ebmod, gbmod, tstrength, sstrength or n_bond, s_bond")
+    for name, value in given.items():
+        if value < 0.0:
+            raise CommandError(f"{name} must not be negative, got {value:g}")
+    return laws.ELASTIC_BOND if of_elastic else laws.CONTACT_BOND, given
+
+
+def _reach(sim: Simulation, gap: float, scale: float) -> tuple[float, float]:
+    """Largest radius, and the distance of surfaces within which pairs are looked for [m]. Collective."""
+    if scale <= 0.0:
+        raise CommandError(f"rext must be positive, got {scale:g}")
+    largest = float(sim.comm.max_into(np.array([sim.particles["radius"].max() if len(sim.particles) else 0.0]))[0])
+    reach = max(gap, 2.0 * largest * (scale - 1.0) + gap, 0.0)
+    if reach > FARTHEST * largest > 0.0:
+        raise CommandError(
+            f"tolerate {gap:g} and rext {scale:g} would bond particles {reach:g} m apart; at most {FARTHEST:g} radii "
+            f"of the largest particle, {FARTHEST * largest:g} m"
+        )
+    return largest, reach
 
 
 def _warn_of_overstretched(sim: Simulation, which: np.ndarray) -> None:

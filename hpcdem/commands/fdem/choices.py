@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -223,60 +224,47 @@ class _Objects:
             raise CommandError(f"{term} makes no sense for {self.kind}s")
         if isinstance(term, _NOT_ELEMENTS) and self.kind == g.ELEMENT:
             raise CommandError(f"{term} makes no sense for elements")
-        match term:
-            case g.InGroup(group, set_name):
-                return self._in(self._members(group, set_name))
-            case g.InSet(set_name):
-                of = self.groups[self.kind].of_set(set_name)
-                return self._in(np.concatenate([np.empty(0, np.int64), *of.values()]))
-            case g.Ids(first, last):
-                return self._ids(first, last)
-            case g.Span(axis, low, high):
-                return self._span(axis, low, high)
-            case g.OnLayer(layer):
-                return self._layer(layer)
-            case g.OnBoundary():
-                return self._boundary()
-            case g.OfElements(group, set_name):
-                return self._of_elements(self.groups[g.ELEMENT].members(group, set_name))
-            case g.OfElement(first, last):
-                if self.kind == g.JOINT:
-                    raise CommandError("element chooses faces and nodes; joints of elements: face-of, with a group")
-                if self.kind == g.ELEMENT:
-                    return self._ids(first, last)
-                elements = np.flatnonzero(_Objects(self.project, g.ELEMENT, self.null_too)._ids(first, last))
-                return self._of_elements(_Objects(self.project, g.ELEMENT, self.null_too).numbers[elements])
-            case g.Between(one, other, set_name):
-                groups = self.groups[g.ELEMENT]
-                a, b = (np.isin(self.sides // 4, groups.members(name, set_name)) for name in (one, other))
-                return (a[:, 0] & b[:, 1]) | (a[:, 1] & b[:, 0])
-            case g.Around(elements):
-                return np.isin(self.sides // 4, elements).any(axis=1)
-            case g.Present() | g.UseHidden():
-                return np.ones(len(self.numbers), bool)
-            case g.Not(of):
-                before = len(self.corners_of_terms)
-                found = ~self.mask(of)
-                # Nodes by what they belong to: the sides of points that are not meant.
-                return self._of_corners(~self.corners_of_terms.pop()) if len(self.corners_of_terms) > before else found
-            case g.Sized(low, high):
-                return self._sized(low, high)
-            case g.InCircle(centre, radius):
-                if len(centre) != self.mesh.dim:
-                    raise CommandError(f"in-circle: a centre of {self.mesh.dim} numbers is needed, got {len(centre)}")
-                away = np.sqrt(((self.places() - np.array(centre)) ** 2).sum(axis=2))
-                return (away <= radius + self._slack()).all(axis=1)
-            case g.Near(layer, within):
-                return (self._away(layer) <= within + self._slack(TOLERANCE)).all(axis=1)
-            case g.Along(layer, distance, angle):
-                return self._along(layer, distance, angle)
-            case g.Crossed(layer, direction, count):
-                crossed = _crossings(self._curves(layer), self.places().mean(axis=1), direction)
-                return (crossed >= count) & ((crossed - count) % 2 == 0)
-            case g.OnCrack():
-                rows = self.mesh.find_edges(self.edges, self.mesh.cracks)
-                return np.isin(self.numbers, self.edges.faces[rows[rows >= 0], 0])
-        raise AssertionError(term)
+        return _MASKS[type(term)](self, *vars(term).values())
+
+    def _around(self, elements: np.ndarray) -> np.ndarray:
+        return np.isin(self.sides // 4, elements).any(axis=1)
+
+    def _of_element(self, first: int, last: int) -> np.ndarray:
+        if self.kind == g.JOINT:
+            raise CommandError("element chooses faces and nodes; joints of elements: face-of, with a group")
+        if self.kind == g.ELEMENT:
+            return self._ids(first, last)
+        elements = _Objects(self.project, g.ELEMENT, self.null_too)
+        return self._of_elements(elements.numbers[elements._ids(first, last)])
+
+    def _between(self, one: str, other: str, set_name: str) -> np.ndarray:
+        groups = self.groups[g.ELEMENT]
+        a, b = (np.isin(self.sides // 4, groups.members(name, set_name)) for name in (one, other))
+        return (a[:, 0] & b[:, 1]) | (a[:, 1] & b[:, 0])
+
+    def _without(self, term: g.Term) -> np.ndarray:
+        before = len(self.corners_of_terms)
+        found = ~self.mask(term)
+        # Nodes by what they belong to: the sides of points that are not meant.
+        return self._of_corners(~self.corners_of_terms.pop()) if len(self.corners_of_terms) > before else found
+
+    def _in_circle(self, centre: tuple[float, ...], radius: float) -> np.ndarray:
+        if len(centre) != self.mesh.dim:
+            raise CommandError(f"in-circle: a centre of {self.mesh.dim} numbers is needed, got {len(centre)}")
+        away = np.sqrt(((self.places() - np.array(centre)) ** 2).sum(axis=2))
+        return (away <= radius + self._slack()).all(axis=1)
+
+    def _crossed(self, layer: str, direction: tuple[float, ...], count: int) -> np.ndarray:
+        crossed = _crossings(self._curves(layer), self.places().mean(axis=1), direction)
+        return (crossed >= count) & ((crossed - count) % 2 == 0)
+
+    def _on_crack(self) -> np.ndarray:
+        rows = self.mesh.find_edges(self.edges, self.mesh.cracks)
+        return np.isin(self.numbers, self.edges.faces[rows[rows >= 0], 0])
+
+    def _of_set(self, set_name: str) -> np.ndarray:
+        of = self.groups[self.kind].of_set(set_name)
+        return self._in(np.concatenate([np.empty(0, np.int64), *of.values()]))
 
     def _members(self, group: str, set_name: str) -> np.ndarray:
         try:
@@ -429,6 +417,30 @@ class _Objects:
             corners[elements] = self.mesh.cells[elements] >= 0
             return self._of_corners(corners.reshape(-1))
         return np.isin(self.numbers // 4, elements)
+
+
+_MASKS: dict[type, Callable[..., np.ndarray]] = {
+    g.InGroup: lambda of, group, set_name: of._in(of._members(group, set_name)),
+    g.InSet: _Objects._of_set,
+    g.Ids: _Objects._ids,
+    g.Span: _Objects._span,
+    g.OnLayer: _Objects._layer,
+    g.OnBoundary: _Objects._boundary,
+    g.OfElements: lambda of, group, set_name: of._of_elements(of.groups[g.ELEMENT].members(group, set_name)),
+    g.OfElement: _Objects._of_element,
+    g.Between: _Objects._between,
+    g.Around: _Objects._around,
+    g.Present: lambda of: np.ones(len(of.numbers), bool),
+    g.UseHidden: lambda of, on: np.ones(len(of.numbers), bool),
+    g.Not: _Objects._without,
+    g.Sized: _Objects._sized,
+    g.InCircle: _Objects._in_circle,
+    g.Near: lambda of, layer, within: (of._away(layer) <= within + of._slack(TOLERANCE)).all(axis=1),
+    g.Along: _Objects._along,
+    g.Crossed: _Objects._crossed,
+    g.OnCrack: _Objects._on_crack,
+}
+"""Which objects a term holds for, from what it says."""
 
 
 def _bare(term: g.Term) -> g.Term:

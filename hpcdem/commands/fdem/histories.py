@@ -63,27 +63,32 @@ def create(
         raise CommandError("object well and well, its name, go together")
     if well:
         needed(project, Flow).well(well)
-    numbers: list[int] = []
-    if kind not in (MODEL, WELL):
-        if ident is not None:
-            found = chosen(project, kind, (Ids(ident, ident),))
-        elif nearest is not None:
-            found = np.array([_nearest(project, kind, nearest)])
-        elif where is not None:
-            found = chosen(project, kind, where)
-        else:
-            found = everything(project, kind, None, null_too=True)  # those count that are there at the moment
-        assert found is not None
-        numbers = found.tolist()
+    numbers = [] if kind in (MODEL, WELL) else _followed(project, kind, ident, nearest, where).tolist()
+    _check_value(project, kind, value)
+    if kind == JOINT and value in diagnostics.QUANTITIES:
+        _warn_of_nothing(project, name, value, numbers)
+    project.histories[name] = History(kind, value, numbers, well or how, every, dim=project.dim)
+
+
+def _followed(
+    project: Project, kind: str, ident: int | None, nearest: tuple[float, ...] | None, where: Range | None
+) -> np.ndarray:
+    """Numbers of the objects that a history follows."""
+    if nearest is not None and ident is None:
+        return np.array([_nearest(project, kind, nearest)])
+    found = chosen(project, kind, where if ident is None else (Ids(ident, ident),))
+    # Without a range: those count that are there at the moment.
+    return everything(project, kind, None, null_too=True) if found is None else found
+
+
+def _check_value(project: Project, kind: str, value: str) -> None:
+    """CommandError if the model has no such quantity."""
     if kind == MODEL and project.dim == 3 and value not in IN_SPACE:
         raise CommandError(f"in three dimensions a history of the model can follow {', '.join(IN_SPACE)}, not {value}")
     if kind in (ELEMENT, NODE, JOINT) and value in diagnostics.QUANTITIES:
         diagnostics.quantity(project.ready(use=False), value)
     if kind in SUPPORTS:
         supports.of(project.ready(use=False), kind).check(kind, value)
-    if kind == JOINT and value in diagnostics.QUANTITIES:
-        _warn_of_nothing(project, name, value, numbers)
-    project.histories[name] = History(kind, value, numbers, well or how, every, dim=project.dim)
 
 
 def _warn_of_nothing(project: Project, name: str, value: str, joints: Sequence[int]) -> None:

@@ -120,21 +120,28 @@ def solve(
     except EquilibriumError as error:
         reason, found, text = "runaway", math.nan, f"no equilibrium: {error}; {_what_moves(project)}"
     project.solved = {"reason": reason, "ratio": found, "steps": project.step - first}
-    if reason == "ratio" and not project.dynamic and project.log is not None:
+    _warn_of_end(project, reason, found, bare)
+    if text and on_failure != CONTINUE:
+        raise EquilibriumError(text)
+    if text and project.log is not None:
+        project.log.warn(text)
+
+
+def _warn_of_end(project: Project, reason: str, found: float, bare: bool) -> None:
+    """What may not be the end that was meant. bare: no aim was given."""
+    if project.log is None:
+        return
+    if reason == "ratio" and not project.dynamic:
         for name in project.blocks.changing_tables():
             project.log.warn(
                 f"{_where(project)}balance was found while table '{name}' of a condition goes on to change with each "
                 "static step: model solve cycles, or model step, goes on to its end"
             )
-    if bare and reason == "cycles" and project.log is not None:
+    if bare and reason == "cycles":
         project.log.warn(
             f"{_where(project)}model solve ended after {CYCLES} cycles, which it does without an aim, at ratio "
             f"{found:.3g}: model solve ratio {RATIO:g} goes on to balance"
         )
-    if text and on_failure != CONTINUE:
-        raise EquilibriumError(text)
-    if text and project.log is not None:
-        project.log.warn(text)
 
 
 def _time_passes(project: Project) -> bool:
@@ -521,13 +528,7 @@ def _advance(
             due = clock.step + 1
         if ratio is not None:
             due = min(due, after(clock.step, look, first))
-        try:
-            request = coupling.advance(project, int(min(due - clock.step, _within(project, end))))
-        except (EquilibriumError, PhysicsError):
-            histories.flush(project)
-            cracks.flush(project)
-            frames.write_last(project)
-            raise
+        request = _to(project, int(min(due - clock.step, _within(project, end))))
         if (clock.step - first) % STRIDE == 0:
             _follow_step_table(project)
         _settle_time_step(project)
@@ -555,6 +556,17 @@ def _advance(
     report.finish(blocks)
     over = "cycles" if clock.step >= last else "function" if progress.get("done") else "time"
     return reason or over, found, watch
+
+
+def _to(project: Project, steps: int) -> int:
+    """So many steps; a request of a function, if there was one. What was recorded is written before an error leaves."""
+    try:
+        return coupling.advance(project, steps)
+    except (EquilibriumError, PhysicsError):
+        histories.flush(project)
+        cracks.flush(project)
+        frames.write_last(project)
+        raise
 
 
 def _no_equilibrium(project: Project, watch: Watch, reason: str, ratio: float, found: float) -> str:

@@ -122,24 +122,24 @@ _GROUPED = {"element": "element", "node": "node", "element-face": "face", "face-
 """Kinds of objects of which a script makes all groups, and how messages call them."""
 
 
+def _groups_of(statement: Statement) -> Iterator[tuple[str, Any, Any]]:
+    """Kind, name and set of the groups that a line makes; None where they come from the bodies or regions of a mesh."""
+    words, given = statement.command.name.split(), statement.arguments
+    if words[-1] == "group" and words[0] in _GROUPED:
+        yield words[0], given["group"], given.get("set", "default")
+    elif words[0] in ("mesh", "element") and words[1] in ("create", "structured", "equilateral"):
+        if "region" in given or "bodies" in given:
+            yield "element", None, None
+        group = given.get("group", {"value": "default"})
+        yield "element", group["value"], group.get("set", "default")
+
+
 def _loose_groups(script: Source) -> list[tuple[int, str]]:
     """Groups and sets that a range names and no line makes, with the line. Nothing is said of a kind of which groups
     have names that are expressions, or come from the bodies or regions of a mesh."""
     made: dict[str, set[tuple[str, str]]] = {kind: set() for kind in _GROUPED}
     unknown: set[str] = set()
-    for statement in script.statements:
-        words, given = statement.command.name.split(), statement.arguments
-        if (words[0] == "mesh" and words[1] in ("create", "structured", "equilateral")) or words[1:2] == ["create"]:
-            if words[0] not in ("mesh", "element"):
-                continue
-            if "region" in given or "bodies" in given:
-                unknown.add("element")
-            kind, group = "element", given.get("group", {"value": "default"})
-        elif words[-1] == "group" and words[0] in made:
-            kind, group = words[0], {"value": given["group"], "set": given.get("set", "default")}
-        else:
-            continue
-        name, set_name = group["value"], group.get("set", "default")
+    for kind, name, set_name in (group for statement in script.statements for group in _groups_of(statement)):
         if isinstance(name, str) and isinstance(set_name, str):
             made[kind].add((name, set_name))
         else:

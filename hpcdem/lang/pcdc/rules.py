@@ -130,17 +130,9 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         raise ValueError(f"{watched[0]} goes with a ratio that steps lead to")
     if "limit" in watched and "cycles" in arguments:
         raise ValueError("limit and cycles exclude each other: a run that reaches its cycles has not failed")
-    for part, more in (("hydraulic", {"auto"}), ("thermal", set())):
+    for part in ("hydraulic", "thermal"):
         if part in arguments:
-            others = arguments.keys() - {part, "time", "dt", "steady", "solver", *more}
-            if others:
-                raise ValueError(f"{part} takes no {min(others)}")
-            if ("steady" in arguments) == ("time" in arguments):
-                raise ValueError(f"{part} takes time or steady, one of them")
-            if "auto" in arguments and "steady" in arguments:
-                raise ValueError("auto goes with time: steady flow is found by implicit steps")
-            if part == "thermal" and {"steady", "dt"} <= arguments.keys():
-                raise ValueError("dt goes with time: the steady state of heat is found at once")
+            _implicit(arguments, part)
             return
     if "auto" in arguments:
         raise ValueError("auto goes with hydraulic")
@@ -150,6 +142,19 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
     for word in ("solver", "steps"):
         if word in arguments and "elastic" not in arguments:
             raise ValueError(f"{word} goes with elastic; a run by steps needs none")
+
+
+def _implicit(arguments: Mapping[str, Any], part: str) -> None:
+    """Of model solve, by implicit steps of fluid or heat."""
+    others = arguments.keys() - {part, "time", "dt", "steady", "solver", *(["auto"] if part == "hydraulic" else [])}
+    if others:
+        raise ValueError(f"{part} takes no {min(others)}")
+    if ("steady" in arguments) == ("time" in arguments):
+        raise ValueError(f"{part} takes time or steady, one of them")
+    if "auto" in arguments and "steady" in arguments:
+        raise ValueError("auto goes with time: steady flow is found by implicit steps")
+    if part == "thermal" and {"steady", "dt"} <= arguments.keys():
+        raise ValueError("dt goes with time: the steady state of heat is found at once")
 
 
 def _creep(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:

@@ -239,34 +239,12 @@ _ROLES = {
 
 def pieces(arguments: Mapping[str, Any]) -> list[Piece]:
     """The pieces of a mesh that the words of `element create` name, in their order."""
-    found = []
-    for word, given in arguments.items():
-        if word not in _ROLES:
-            continue
-        role = _ROLES[word]
-        for one in given if isinstance(given, list) else [given]:
-            layers, role_here = one.get("layer", []), role
-            shape: tuple[Any, ...] = ()
-            if one.get("is-boundary"):
-                role_here = OUTLINE
-            if word == "inner-boundary" and not one.get("filled", False):
-                role_here = HOLE
-            if word == "layer":
-                layers = one["value"]
-            elif word == "circle":
-                shape = ("circle", one["center"], one["radius"])
-            elif word == "arc":
-                shape = ("arc-between", one["center"], one["start-point"], one["end-point"])
-            elif word in ("radius", "inner-radius"):
-                shape = ("circle", arguments["center"], one["value"])
-            elif word in ("boundary", "inner-boundary"):
-                shape = ("polygon", one["value"])
-            elif "array" in one:
-                kind = {"constrain-point": "point", "constrain-polyline": "polyline"}.get(word, "polygon")
-                shape = (kind, one["array"])
-            elif not layers:
-                raise CommandError(f"{word} needs array, points, or layer, names of layers")
-            found.append(Piece(role_here, word, layers, shape, one.get("mesh-size")))
+    found = [
+        _piece(word, one, arguments)
+        for word, given in arguments.items()
+        if word in _ROLES
+        for one in (given if isinstance(given, list) else [given])
+    ]
     if "radius" in arguments and not arguments["inner-radius"]["value"] < arguments["radius"]["value"]:
         raise CommandError("inner-radius is below radius: between them is the ring")
     if not any(piece.role == OUTLINE for piece in found):
@@ -275,6 +253,34 @@ def pieces(arguments: Mapping[str, Any]) -> list[Piece]:
     if all(piece.size is None for piece in found) and "global-mesh-size" not in arguments:
         raise CommandError("mesh-size is missing: of one of the pieces at least")
     return found
+
+
+def _piece(word: str, one: Mapping[str, Any], arguments: Mapping[str, Any]) -> Piece:
+    """One of them. arguments: of the whole command."""
+    role = OUTLINE if one.get("is-boundary") else _ROLES[word]
+    if word == "inner-boundary" and not one.get("filled", False):
+        role = HOLE
+    layers = one["value"] if word == "layer" else one.get("layer", [])
+    shape = _shape_of(word, one, arguments)
+    if not shape and not layers:
+        raise CommandError(f"{word} needs array, points, or layer, names of layers")
+    return Piece(role, word, layers, shape, one.get("mesh-size"))
+
+
+def _shape_of(word: str, one: Mapping[str, Any], arguments: Mapping[str, Any]) -> tuple[Any, ...]:
+    """The shape that a piece is itself; none if it names layers."""
+    match word:
+        case "circle":
+            return "circle", one["center"], one["radius"]
+        case "arc":
+            return "arc-between", one["center"], one["start-point"], one["end-point"]
+        case "radius" | "inner-radius":
+            return "circle", arguments["center"], one["value"]
+        case "boundary" | "inner-boundary":
+            return "polygon", one["value"]
+    if "array" not in one:
+        return ()
+    return {"constrain-point": "point", "constrain-polyline": "polyline"}.get(word, "polygon"), one["array"]
 
 
 def _pieces(arguments: Mapping[str, Any]) -> None:

@@ -124,19 +124,28 @@ class _Follower:
                 self._delete(s.selection)
             case "SET":
                 self.gentry = s.get("gentry", self.gentry)
-            case "WALL" if s.get("nodes"):
-                self.walls[s.get("id")] = sum(x for x, _ in s.get("nodes")) / 2.0, 0.0
+            case "WALL":
+                self._wall(s)
             case "CYC" | "IMPLE":
-                self._settle()
-                self.result.before[index] = self.count()
-                if s.command == "IMPLE":
-                    self._move(s)
-        if s.command == "WALL" and s.get("id") in self.walls:
-            self.walls[s.get("id")] = self.walls[s.get("id")][0], s.get("xv", self.walls[s.get("id")][1])
+                self._step(index, s)
         if s.command in MAKERS:
             self.result.made[index] = made
         here, most = self.count(), self.result.most
         self.result.most = None if here is None or most is None else max(most, here)
+
+    def _step(self, index: int, s: Statement) -> None:
+        self._settle()
+        self.result.before[index] = self.count()
+        if s.command == "IMPLE":
+            self._move(s)
+
+    def _wall(self, s: Statement) -> None:
+        """Its middle and velocity along x."""
+        name = s.get("id")
+        if s.get("nodes"):
+            self.walls[name] = sum(x for x, _ in s.get("nodes")) / 2.0, 0.0
+        if name in self.walls:
+            self.walls[name] = self.walls[name][0], s.get("xv", self.walls[name][1])
 
     def _stand(self, n: int) -> int:
         if self.standing is not None:

@@ -94,69 +94,82 @@ def _without_range(text: str) -> str:
     """The same with the words of RANGE as an expression: all of them must hold."""
     if not re.match(r"range\b", text, re.IGNORECASE):
         return text
-    words = _WORDS.findall(text)[1:]
-    found: list[str] = []
+    return _Range(text).expression()
 
-    def taken(what: str) -> str:
-        if not words:
-            raise refusal(text, f"expected {what} at the end of the range")
-        return words.pop(0)
 
-    def name() -> str:
-        return repr(taken("a name").strip("'\""))
+class _Range:
+    """The words of a RANGE, taken one after the other."""
 
-    negated = False
-    while words:
-        word = taken("a word").lower()
-        before = len(found)
-        if word == "and" and found:
-            rest = re.search(r"\band\b(.*)$", text, re.IGNORECASE | re.DOTALL)
-            assert rest is not None
-            return f"{' and '.join(found)} and ({rest[1].strip()})"
-        if word == "not" and not negated:
-            negated = True
-            continue
-        if word in ("x", "y", "z"):
-            low = taken("a number")
-            high = words.pop(0) if words and _NUMBER.fullmatch(words[0]) else low
-            found.append(f"{low} <= {word} <= {high}")
-        elif word in ("in-circle", "in-c"):
-            numbers = [taken("a centre and a radius") for _ in range(3)]
-            while words and _NUMBER.fullmatch(words[0]):
-                numbers.append(words.pop(0))
-            *centre, radius = numbers
-            if len(numbers) > 4:
-                raise refusal(text, "in-circle takes a centre and a radius")
-            square = " + ".join(f"(({axis}) - ({at})) * (({axis}) - ({at}))" for axis, at in zip("xyz", centre))
-            found.append(f"{square} <= ({radius}) * ({radius})")
-        elif word == "id":
-            low = taken("a number")
-            high = words.pop(0) if words and words[0].isdigit() else low
-            found.append(f"{low} <= id <= {high}")
-        elif word == GROUP:
-            of = name()
-            if words[:1] == ["set"]:
-                words.pop(0)
-                of += f", {name()}"
-            found.append(f"{GROUP}({of})")
-        elif word == "set":
-            found.append(f"group_{taken('a name').strip(chr(39))} >= 0")
-        else:
-            advice = ""
-            if word.startswith("geom"):
-                advice = "; frames have no layers: element group 'name' range geometry-... first, and then group 'name'"
-            raise refusal(
-                text,
-                f"'{word[:30]}' is no word of a range that a frame can answer: x, y, z, in-circle, not, id, group, set"
-                + advice,
-            )
-        if negated and len(found) > before:
-            found[-1], negated = f"not ({found[-1]})", False
-    if negated:
-        raise refusal(text, "expected a term after not")
-    if not found:
-        raise refusal(text, "expected x, y, z, id, group or set after range")
-    return " and ".join(found)
+    def __init__(self, text: str) -> None:
+        self.text, self.words = text, _WORDS.findall(text)[1:]
+
+    def expression(self) -> str:
+        """All terms, as one expression."""
+        found: list[str] = []
+        negated = False
+        while self.words:
+            word = self._taken("a word").lower()
+            if word == "and" and found:
+                rest = re.search(r"\band\b(.*)$", self.text, re.IGNORECASE | re.DOTALL)
+                assert rest is not None
+                return f"{' and '.join(found)} and ({rest[1].strip()})"
+            if word == "not" and not negated:
+                negated = True
+                continue
+            term = self._term(word)
+            found.append(f"not ({term})" if negated else term)
+            negated = False
+        if negated:
+            raise refusal(self.text, "expected a term after not")
+        if not found:
+            raise refusal(self.text, "expected x, y, z, id, group or set after range")
+        return " and ".join(found)
+
+    def _term(self, word: str) -> str:
+        """What this word, and those that belong to it, say."""
+        if word in ("x", "y", "z", "id"):
+            low = self._taken("a number")
+            return f"{low} <= {word} <= {self._number(whole=word == 'id') or low}"
+        if word in ("in-circle", "in-c"):
+            return self._circle()
+        if word == GROUP:
+            of = self._name()
+            if self.words[:1] == ["set"]:
+                self.words.pop(0)
+                of += f", {self._name()}"
+            return f"{GROUP}({of})"
+        if word == "set":
+            return f"group_{self._taken('a name').strip(chr(39))} >= 0"
+        advice = ""
+        if word.startswith("geom"):
+            advice = "; frames have no layers: element group 'name' range geometry-... first, and then group 'name'"
+        known = "x, y, z, in-circle, not, id, group, set"
+        raise refusal(
+            self.text, f"'{word[:30]}' is no word of a range that a frame can answer: {known}{advice}"
+        )  # fmt: skip
+
+    def _circle(self) -> str:
+        numbers = [self._taken("a centre and a radius") for _ in range(3)]
+        while number := self._number():
+            numbers.append(number)
+        *centre, radius = numbers
+        if len(numbers) > 4:
+            raise refusal(self.text, "in-circle takes a centre and a radius")
+        square = " + ".join(f"(({axis}) - ({at})) * (({axis}) - ({at}))" for axis, at in zip("xyz", centre))
+        return f"{square} <= ({radius}) * ({radius})"
+
+    def _taken(self, what: str) -> str:
+        if not self.words:
+            raise refusal(self.text, f"expected {what} at the end of the range")
+        return self.words.pop(0)
+
+    def _name(self) -> str:
+        return repr(self._taken("a name").strip("'\""))
+
+    def _number(self, whole: bool = False) -> str:
+        """The next word if it is a number, else none."""
+        there = self.words and (self.words[0].isdigit() if whole else _NUMBER.fullmatch(self.words[0]))
+        return self.words.pop(0) if there else ""
 
 
 def refusal(text: str, why: str) -> HpcdemError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -271,70 +271,87 @@ def _with_origin(moment: Moment, path: Path) -> Moment:
     return moment
 
 
-def of_particles(frame: Frame) -> Moment:
-    """A whole frame of particles."""
-    tables: dict[str, Mapping[str, np.ndarray]] = {name: table.columns for name, table in frame.tables.items()}
-    p = tables["particles"]
-    memory: dict[str, Any] = {}
+def _walls(walls: Mapping[str, Any]) -> Objects:
+    ends = np.stack([np.asarray(walls[k], float).reshape(-1, 2) for k in ("p1", "p2")], axis=1)
+    flat = {name: np.asarray(values) for name, values in walls.items() if np.asarray(values).ndim == 1}
+    both = {"velocity": "v", "force": "force"}
+    across = {name: np.asarray(walls[k]) for name, k in both.items() if k in walls}
+    return Objects(LINES, len(ends), lambda: (ends,), flat, across, number="id")
 
-    def once(name: str, make: Callable[[], Any]) -> Any:
-        if name not in memory:
-            memory[name] = make()
-        return memory[name]
 
-    def centres() -> np.ndarray:
-        return once("centres", lambda: pair(p, "x", "y")(slice(None)))
+class _Particles:
+    """Columns of a whole frame of particles, each made once."""
 
-    def pair(table: Mapping[str, np.ndarray], a: str, b: str) -> _Reader:
+    def __init__(self, frame: Frame) -> None:
+        self.frame = frame
+        self.tables: dict[str, Mapping[str, np.ndarray]] = {name: one.columns for name, one in frame.tables.items()}
+        self.rows = self.tables["particles"]
+
+    def pair(self, name: str, a: str, b: str) -> _Reader:
+        """Two columns of a table beside each other."""
+        table = self.tables[name]
         return lambda rows: np.stack([part(table, a, rows), part(table, b, rows)], axis=1)
 
-    def stress(name: str, rows: slice) -> np.ndarray:
-        return once("stress", lambda: _stresses(frame))[name][rows]
+    @cached_property
+    def centres(self) -> np.ndarray:
+        return self.pair("particles", "x", "y")(slice(None))
 
-    def kinetic_energy(rows: slice) -> np.ndarray:
-        mass, vx, vy = (part(p, name, rows) for name in ("mass", "vx", "vy"))
+    @cached_property
+    def stresses(self) -> dict[str, np.ndarray]:
+        return _stresses(self.frame)
+
+    def stress(self, name: str, rows: slice) -> np.ndarray:
+        return self.stresses[name][rows]
+
+    def kinetic_energy(self, rows: slice) -> np.ndarray:
+        mass, vx, vy = (part(self.rows, name, rows) for name in ("mass", "vx", "vy"))
         return 0.5 * mass * (vx**2 + vy**2)
 
-    count = frame.tables["particles"].total
-    more: dict[str, _Reader] = {name: partial(part, p, name) for name in p}
-    if "angle" in p:
-        more["rotation"] = partial(part, p, "angle")
-    if "mass" in p and "vx" in p:
-        more["kinetic_energy"] = kinetic_energy
-    if "fx" in tables["contacts"]:
-        more |= {name: partial(stress, name) for name in STRESSES}
-    vectors = {
-        name: pair(p, a, b) for name, (a, b) in {"velocity": ("vx", "vy"), "force": ("fx", "fy")}.items() if a in p
-    }
-    objects = {
-        "particles": Objects(
-            DISCS, count, lambda: (centres(), p["radius"]), Columns(more, KEPT), Columns(vectors, KEPT),
-            {"group": frame.group_names}, "gid", STRESSES,
-        )
-    }  # fmt: skip
-    if "clump" in p and len(some := np.flatnonzero(part(p, "clump", slice(None)) >= 0)):
-        objects["clumps"] = _clumps(p, some, lambda: (centres()[some], p["radius"][some]))
-    if len(frame.walls.get("id", ())):
-        ends = np.stack([np.asarray(frame.walls[k], float).reshape(-1, 2) for k in ("p1", "p2")], axis=1)
-        flat = {name: np.asarray(values) for name, values in frame.walls.items() if np.asarray(values).ndim == 1}
-        both = {"velocity": "v", "force": "force"}
-        across = {name: np.asarray(frame.walls[k]) for name, k in both.items() if k in frame.walls}
-        objects["walls"] = Objects(LINES, len(ends), lambda: (ends,), flat, across, number="id")
-    for name in ("contacts", "bonds"):
-        table = tables[name]
-        if not frame.tables[name].total:
-            continue
+    @cached_property
+    def _ends(self) -> dict[str, np.ndarray]:
+        return {}
 
-        def ends_of(table: Mapping[str, np.ndarray] = table) -> np.ndarray:
-            ids, every = part(p, "gid", slice(None)), pair(table, "id1", "id2")(slice(None))
-            return centres()[np.minimum(np.searchsorted(ids, every), count - 1)]
+    def ends(self, name: str) -> tuple[np.ndarray]:
+        """Centres of both particles of contacts or bonds (n, 2, 2)."""
+        if name not in self._ends:
+            ids, every = part(self.rows, "gid", slice(None)), self.pair(name, "id1", "id2")(slice(None))
+            self._ends[name] = self.centres[np.minimum(np.searchsorted(ids, every), len(ids) - 1)]
+        return (self._ends[name],)
 
-        def lines(name: str = name, make: Callable[[], np.ndarray] = ends_of) -> tuple[np.ndarray]:
-            return (once(name, make),)
-
-        pulls = {"force": pair(table, "fx", "fy")} if "fx" in table else {}
+    def lines(self, name: str) -> Objects:
+        """Contacts or bonds."""
+        table = self.tables[name]
+        pulls = {"force": self.pair(name, "fx", "fy")} if "fx" in table else {}
         columns = Columns({column: partial(part, table, column) for column in table}, KEPT)
-        objects[name] = Objects(LINES, frame.tables[name].total, lines, columns, Columns(pulls, KEPT), number="")
+        total = self.frame.tables[name].total
+        return Objects(LINES, total, partial(self.ends, name), columns, Columns(pulls, KEPT), number="")
+
+    def discs(self) -> Objects:
+        p = self.rows
+        more: dict[str, _Reader] = {name: partial(part, p, name) for name in p}
+        if "angle" in p:
+            more["rotation"] = partial(part, p, "angle")
+        if "mass" in p and "vx" in p:
+            more["kinetic_energy"] = self.kinetic_energy
+        if "fx" in self.tables["contacts"]:
+            more |= {name: partial(self.stress, name) for name in STRESSES}
+        both = {"velocity": ("vx", "vy"), "force": ("fx", "fy")}
+        vectors = {name: self.pair("particles", a, b) for name, (a, b) in both.items() if a in p}
+        return Objects(
+            DISCS, self.frame.tables["particles"].total, lambda: (self.centres, p["radius"]), Columns(more, KEPT),
+            Columns(vectors, KEPT), {"group": self.frame.group_names}, "gid", STRESSES,
+        )  # fmt: skip
+
+
+def of_particles(frame: Frame) -> Moment:
+    """A whole frame of particles."""
+    of = _Particles(frame)
+    p, objects = of.rows, {"particles": of.discs()}
+    if "clump" in p and len(some := np.flatnonzero(part(p, "clump", slice(None)) >= 0)):
+        objects["clumps"] = _clumps(p, some, lambda: (of.centres[some], p["radius"][some]))
+    if len(frame.walls.get("id", ())):
+        objects["walls"] = _walls(frame.walls)
+    objects |= {name: of.lines(name) for name in ("contacts", "bonds") if frame.tables[name].total}
     return Moment(frame.step, frame.time, objects, units=str(frame.settings.get("units", "")))
 
 

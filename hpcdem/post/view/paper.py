@@ -120,18 +120,9 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
         if shown.turn is None:
             _draw(axes, layer, place)
         handles += _handles(layer) if view.legend else []
-    for place, layer in enumerate(bars):
-        at = left + width + k * (0.3 + _BAR * place)
-        assert layer.scale is not None
-        colour_bar(figure, figure.add_axes((at / page[0], bottom / page[1], 0.3 * k / page[0], height / page[1])),
-             layer.scale, paper.font)  # fmt: skip
+    _bars(figure, bars, (left + width, bottom, height), k, paper.font, page)
     if handles:
-        axes.legend(
-            [patches for _, patches in handles], [word for word, _ in handles], loc="lower left",
-            bbox_to_anchor=(0.0, 1.0 + arrow_row / height), ncols=4, frameon=False, fontsize=0.9 * paper.font,
-            borderaxespad=0.15, handlelength=max(1.2, *(SWATCH * len(patches) for _, patches in handles)),
-            columnspacing=1.0, handletextpad=0.4, handler_map={tuple: _swatches()},
-        )  # fmt: skip
+        _legend(axes, handles, 1.0 + arrow_row / height, 0.9 * paper.font)
     end = left + width
     for reference in references:
         end -= _arrow(figure, reference, width / seen.width, (end, bottom + height + 0.25 * k), paper.font, page)
@@ -141,6 +132,27 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
             parse_math=False,
         )  # fmt: skip
     return figure
+
+
+def _bars(
+    figure: Any, layers: list[Any], place: tuple[float, float, float], k: float, font: float, page: tuple[float, float]
+) -> None:
+    """Bars of colours. place: right side, bottom and height of the axes [cm]; k: size of letters over the usual one."""
+    right, bottom, height = place
+    for which, layer in enumerate(layers):
+        at = right + k * (0.3 + _BAR * which)
+        box = at / page[0], bottom / page[1], 0.3 * k / page[0], height / page[1]
+        colour_bar(figure, figure.add_axes(box), layer.scale, font)
+
+
+def _legend(axes: Any, handles: list[tuple[str, Any]], bottom: float, font: float) -> None:
+    """Words and their patches, over the axes."""
+    axes.legend(
+        [patches for _, patches in handles], [word for word, _ in handles], loc="lower left",
+        bbox_to_anchor=(0.0, bottom), ncols=4, frameon=False, fontsize=font, borderaxespad=0.15,
+        handlelength=max(1.2, *(SWATCH * len(patches) for _, patches in handles)), columnspacing=1.0,
+        handletextpad=0.4, handler_map={tuple: _swatches()},
+    )  # fmt: skip
 
 
 def _body(axes: Any, shown: Scene, pixels: float, dpi: float) -> None:

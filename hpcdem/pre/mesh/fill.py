@@ -126,25 +126,7 @@ def _main(into: str) -> None:
     ):  # fmt: skip
         gmsh.option.setNumber(name, value)
     occ = gmsh.model.occ
-
-    def bodies(given: list[Any]) -> shapes.Tags:
-        return [tag for one in restored(given) for tag in shapes.body(occ, one, middle, unit)]
-
-    body = bodies(said["outline"])
-    if len(body) > 1:
-        body, _ = occ.fuse(body[:1], body[1:])
-    holes = bodies(said["holes"])
-    if holes:
-        body, _ = occ.cut(body, holes)
-    number = {tag: 0 for _, tag in body}
-    for k, given in enumerate(said["regions"]):
-        tools = bodies(given)
-        pieces = [(3, tag) for tag in number]
-        _, parents = occ.fragment(pieces, tools)
-        inside = {tag for of in parents[len(pieces) :] for _, tag in of}
-        was = {tag: number[old] for (_, old), of in zip(pieces, parents) for _, tag in of}
-        occ.remove([(3, tag) for tag in inside - was.keys()], recursive=True)
-        number = {tag: k + 1 if tag in inside else old for tag, old in was.items()}
+    number = _regions(occ, said, middle, unit)
     if not number:
         raise SystemExit("nothing is left of the body")
     number, cuts = _cut(occ, said, number, middle, unit)
@@ -178,6 +160,30 @@ def _main(into: str) -> None:
     faces, of_layer = np.searchsorted(used, faces[~lost]), of_layer[~lost]
     points = xyz.reshape(-1, 3)[used] * unit + middle
     np.savez(into, points=points, cells=numbers.reshape(-1, 4), region=region, faces=faces, of_layer=of_layer)
+
+
+def _regions(occ: Any, said: dict[str, Any], middle: np.ndarray, unit: float) -> dict[int, int]:
+    """The volumes (tag: region, 0 where it is none) of the outline without its holes."""
+
+    def bodies(given: list[Any]) -> shapes.Tags:
+        return [tag for one in restored(given) for tag in shapes.body(occ, one, middle, unit)]
+
+    body = bodies(said["outline"])
+    if len(body) > 1:
+        body, _ = occ.fuse(body[:1], body[1:])
+    holes = bodies(said["holes"])
+    if holes:
+        body, _ = occ.cut(body, holes)
+    number = {tag: 0 for _, tag in body}
+    for k, given in enumerate(said["regions"]):
+        tools = bodies(given)
+        pieces = [(3, tag) for tag in number]
+        _, parents = occ.fragment(pieces, tools)
+        inside = {tag for of in parents[len(pieces) :] for _, tag in of}
+        was = {tag: number[old] for (_, old), of in zip(pieces, parents) for _, tag in of}
+        occ.remove([(3, tag) for tag in inside - was.keys()], recursive=True)
+        number = {tag: k + 1 if tag in inside else old for tag, old in was.items()}
+    return number
 
 
 def _cut(

@@ -167,7 +167,30 @@ def _with_names(data: FileMesh, own: _Own, place: np.ndarray, between: np.ndarra
         notes.append(f"sets without an element that is read: {listed(empty)}")
     for name, rows in data.node_sets.items():
         nodes.setdefault(name, []).append(rows[~np.isin(rows, between)])
-    edges = mesh.edges()
+    layers, faces = _on_sides(data, mesh, sides, place, notes)
+    at_nodes = {name: place[np.unique(np.concatenate(rows))] for name, rows in nodes.items()}
+    for name, rows in at_nodes.items():
+        if (rows < 0).any():
+            notes.append(f"{int((rows < 0).sum())} points of the set '{name}', which are of no element")
+    at_nodes = {name: np.unique(rows[rows >= 0]) for name, rows in at_nodes.items() if (rows >= 0).any()}
+    groups = _in_sets(elements, len(mesh.cells))
+    whole = {name: _parts(own, numbers[kinds[numbers] == dim]) for name, numbers in data.instances.items()}
+    if whole:
+        groups[INSTANCES] = {**groups.get(INSTANCES, {}), **{name: rows for name, rows in whole.items() if len(rows)}}
+    return Imported(
+        Mesh.of(mesh.points, mesh.cells, groups, layers, macros=mesh.macros),
+        _in_sets(at_nodes, len(mesh.points)),
+        _in_sets(faces, 4 * len(mesh.cells)),
+        notes,
+        data.files,
+    )
+
+
+def _on_sides(
+    data: FileMesh, mesh: Mesh, sides: dict[str, list[np.ndarray]], place: np.ndarray, notes: list[str]
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Lines, in space surfaces, of the file as layers, and the faces of elements on them, by their names."""
+    edges, dim = mesh.edges(), mesh.dim
     layers: dict[str, np.ndarray] = {}
     faces: dict[str, np.ndarray] = {}
     for name, of in sides.items():
@@ -186,22 +209,7 @@ def _with_names(data: FileMesh, own: _Own, place: np.ndarray, between: np.ndarra
             layers[name] = given[~lost]
             both = edges.faces[rows[~lost]].ravel()
             faces[name] = np.unique(both[both >= 0])
-    at_nodes = {name: place[np.unique(np.concatenate(rows))] for name, rows in nodes.items()}
-    for name, rows in at_nodes.items():
-        if (rows < 0).any():
-            notes.append(f"{int((rows < 0).sum())} points of the set '{name}', which are of no element")
-    at_nodes = {name: np.unique(rows[rows >= 0]) for name, rows in at_nodes.items() if (rows >= 0).any()}
-    groups = _in_sets(elements, len(mesh.cells))
-    whole = {name: _parts(own, numbers[kinds[numbers] == dim]) for name, numbers in data.instances.items()}
-    if whole:
-        groups[INSTANCES] = {**groups.get(INSTANCES, {}), **{name: rows for name, rows in whole.items() if len(rows)}}
-    return Imported(
-        Mesh.of(mesh.points, mesh.cells, groups, layers, macros=mesh.macros),
-        _in_sets(at_nodes, len(mesh.points)),
-        _in_sets(faces, 4 * len(mesh.cells)),
-        notes,
-        data.files,
-    )
+    return layers, faces
 
 
 def _parts(own: _Own, numbers: np.ndarray) -> np.ndarray:
