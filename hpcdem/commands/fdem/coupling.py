@@ -102,8 +102,10 @@ def _warn(both: Coupled) -> None:
 
 def _warn_of_walls(both: Coupled) -> None:
     """Once per wall: a block that is in or behind a wall, which holds particles only. Collective."""
+    from hpcdem.physics.coupling.beyond import beyond
+
     log = both.particles.log
-    for wall, element, x, y in both.beyond_walls():
+    for wall, element, x, y in beyond(both):
         if log is not None:
             walls = both.particles.walls
             side = walls.side_of(walls.find(wall) or 0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from hpcdem.core.cells import keys
 from hpcdem.core.comm import Comm
-from hpcdem.core.errors import CommandError
+from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import GID, RADIUS, X, Y
 from hpcdem.physics.coupling.kernels import disc_faces
 from hpcdem.physics.coupling.kernels.disc_faces import ENDS, SCRATCH
@@ -78,6 +78,17 @@ class Link:
         self._make_slots(faces, pairs)
         self._make_messages(faces, sources)
         self._remember(known)
+
+    def stop_on_breakthrough(self, gid: int) -> None:
+        """PhysicsError: the centre of this disc, on some rank, has gone into an element."""
+        p = self.particles.particles
+        rows = np.flatnonzero(p.ihot[p.owned, GID] == gid) + p.owned.start
+        mine = [(float(p.hot[i, X]), float(p.hot[i, Y])) for i in rows]
+        ((x, y),) = [place for part in self.comm.allgather(mine) for place in part]
+        raise PhysicsError(
+            f"step {self.blocks.clock.step}: the centre of particle {gid}, now at ({x:g}, {y:g}), went through the "
+            "surface of an element; its stiffness is too small for this load, or the time step too large"
+        )
 
     # ---- search ------------------------------------------------------------------------------------------------------
 

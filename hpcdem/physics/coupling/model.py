@@ -16,21 +16,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hpcdem.core.account import closed
-from hpcdem.core.errors import CommandError, PhysicsError
-from hpcdem.core.fields import GID, X, Y
+from hpcdem.core.errors import CommandError
 from hpcdem.engine.rebuild import AT_A_GLANCE, CheckInterval
 from hpcdem.halo.migrate import Trail
-from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, exact_sum, from_integer
+from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.coupling.kernels import disc_faces
 from hpcdem.physics.coupling.links import Link, Touching, face_frictions
+from hpcdem.physics.coupling.work import Work
 from hpcdem.physics.dem import diagnostics
-from hpcdem.physics.dem.budget import EMPTIED
 from hpcdem.physics.dem.kernels import laws, motion
 from hpcdem.physics.dem.kernels.neighbours import NO_ROWS
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.fdem import build
-from hpcdem.physics.fdem import diagnostics as of_blocks
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 
@@ -71,10 +68,7 @@ class Coupled(SurfaceLoad):
         self._stepping = False
         self._inside = -1
         self._check_interval = CheckInterval()
-        self._bins = np.zeros((2, *BINS_SHAPE), np.int64)
-        self._done = [0, 0]
-        self._booked = 0
-        self._stored_at_start: float | None = None
+        self._work = Work(self)
         self._settled = 0.0, 0.0, 0.0
         self._law_key: Any = None
         blocks.open_model()
@@ -90,7 +84,7 @@ class Coupled(SurfaceLoad):
         while done < steps and not request:
             request = self._step()
             done += 1
-        self._empty()
+        self._work.empty()
         self.particles.timers.count(done, len(self.particles.particles))
         self.blocks.timers.count(done, len(self.blocks.number[self.blocks.owned]))
         return request
@@ -99,14 +93,14 @@ class Coupled(SurfaceLoad):
         """Advance both by one dt. Returns what the outside asked for (0: nothing), agreed by all ranks."""
         particles, blocks = self.particles, self.blocks
         self._close()
-        books = self.accounted
-        if books:
-            self._book_discs(kick=True)
+        work = self._work if self.accounted else None
+        if work is not None:
+            work.book_discs(kick=True)
         self._stepping = True
         request = particles.step()
         request = max(request, blocks.step())
-        if books:
-            self._book_faces()
+        if work is not None:
+            work.book_faces()
         particles.close()
         blocks.close_model()
         self._stepping = False
@@ -116,12 +110,10 @@ class Coupled(SurfaceLoad):
         elif due and self._check_rebuild(due == AT_A_GLANCE):
             self._connect()
         self._interact()
-        if books:
-            self._book_discs(kick=False)
-            self._book_faces()
-            self._booked += 1
-            if self._booked >= EMPTIED:
-                self._empty()
+        if work is not None:
+            work.book_discs(kick=False)
+            work.book_faces()
+            work.step_done()
         return request
 
     def prepare(self) -> None:
@@ -138,11 +130,10 @@ class Coupled(SurfaceLoad):
         self._check()
         self.blocks.check_start()
         self._connect()
-        self._link().refuse_discs_inside()
+        self.links().refuse_discs_inside()
         self._replay()
         self._changed = False
-        if self._stored_at_start is None:
-            self._stored_at_start = self._stored()
+        self._work.begin()
 
     def _check_options(self) -> None:
         """CommandError for options of the blocks that do not go with particles."""
@@ -169,7 +160,8 @@ class Coupled(SurfaceLoad):
         if self.accounted and self.particles.clumps:
             raise CommandError("there is no account of energy for clumps that touch blocks: leave it off")
 
-    def _link(self) -> Link:
+    def links(self) -> Link:
+        """The contacts that can come about now."""
         assert self.link is not None
         return self.link
 
@@ -197,7 +189,7 @@ class Coupled(SurfaceLoad):
         """How far has anyone gone since the search? Sets the step of the next look; a glance does so only if somebody
         has sped up too much for it. Returns whether it is time for a search. PhysicsError if a disc went through a
         face."""
-        particles, blocks, link = self.particles, self.blocks, self._link()
+        particles, blocks, link = self.particles, self.blocks, self.links()
         p, mesh, dt = particles.particles, blocks.the_mesh(), particles.clock.dt
         of_discs, of_blocks = np.zeros(4), np.zeros(4)
         with particles.timers("search"):
@@ -210,7 +202,7 @@ class Coupled(SurfaceLoad):
         with particles.timers("reduce"):
             self.comm.max_into(found)
         if found[4] >= 0.0:
-            self._stop_on_breakthrough(int(found[4]))
+            link.stop_on_breakthrough(int(found[4]))
         path_d, speed_d, path_b, speed_b = np.sqrt(found[:4]).tolist()
         room, stride = link.room - path_d - path_b, (speed_d + speed_b) * dt
         if glance and not self._check_interval.is_too_late(room - 2.0 * stride, stride):
@@ -223,7 +215,7 @@ class Coupled(SurfaceLoad):
 
     def _interact(self) -> None:
         """Forces between the two at the present positions; friction moves on by dt."""
-        link, particles = self._link(), self.particles
+        link, particles = self.links(), self.particles
         link.fetch()
         with particles.timers("couple"):
             self._inside = max(self._inside, self._forces(False))
@@ -235,14 +227,14 @@ class Coupled(SurfaceLoad):
 
     def _replay(self) -> None:
         """The forces on the blocks as they were; those on the particles are stored with them."""
-        link = self._link()
+        link = self.links()
         link.fetch()
         with self.particles.timers("couple"):
             self._forces(True)
         link.deliver()
 
     def _forces(self, again: bool) -> int:
-        link, particles = self._link(), self.particles
+        link, particles = self.links(), self.particles
         p = particles.particles
         return int(
             disc_faces.forces(
@@ -251,17 +243,6 @@ class Coupled(SurfaceLoad):
                 particles.clock.dt, link.seen, link.disc_force, link.slot_force,
             )
         )  # fmt: skip
-
-    def _stop_on_breakthrough(self, gid: int) -> None:
-        """PhysicsError: the centre of this disc, on some rank, has gone into an element."""
-        p = self.particles.particles
-        rows = np.flatnonzero(p.ihot[p.owned, GID] == gid) + p.owned.start
-        mine = [(float(p.hot[i, X]), float(p.hot[i, Y])) for i in rows]
-        ((x, y),) = [place for part in self.comm.allgather(mine) for place in part]
-        raise PhysicsError(
-            f"step {self.blocks.clock.step}: the centre of particle {gid}, now at ({x:g}, {y:g}), went through the "
-            "surface of an element; its stiffness is too small for this load, or the time step too large"
-        )
 
     def _renew_laws(self) -> bool:
         """The table of laws: kinds of faces by element models by materials, see `law_table`. Whether it is another
@@ -392,7 +373,7 @@ class Coupled(SurfaceLoad):
         """Contacts between discs and faces on all ranks, in the order of gid and face: id (of the disc), face, fn, fs
         [N] (their part of the load), x, y of the contact [m], overlap [m], energy [J]."""
         self.prepare()
-        link, p = self._link(), self.particles.particles
+        link, p = self.links(), self.particles.particles
         out, at = np.zeros((len(link.slot_on), 6)), np.zeros((len(link.slot_on), 2), np.int64)
         n = disc_faces.contacts(
             link.disc_row, link.disc_begin, p.hot, p.ihot, link.slot_face, link.slot_before, link.slot_after,
@@ -406,83 +387,13 @@ class Coupled(SurfaceLoad):
         names = ("fn", "fs", "x", "y", "overlap", "energy")
         return {"id": gid[order], "face": face[order], **dict(zip(names, rows[order].T))}
 
-    def beyond_walls(self) -> list[tuple[int, int, float, float]]:
-        """Walls of the particles that cut an element, or BOX sides beyond which one is: their ids, the first such
-        element, and its first corner [m]. Collective."""
-        self.blocks.close_model()
-        walls, blocks = self.particles.walls, self.blocks
-        own = blocks.owned
-        number = blocks.number[own]
-        keep = blocks.alive[number]
-        number, x = number[keep], blocks.x[own][keep][:, :8]
-        # The first corner of a triangle stands twice, which makes its fourth edge one without length.
-        ends = np.stack([x.reshape(-1, 4, 2), np.roll(x.reshape(-1, 4, 2), -1, axis=1)], axis=2)
-        low, high = x.reshape(-1, 4, 2).min(axis=1), x.reshape(-1, 4, 2).max(axis=1)
-        found = []
-        box = walls.box()
-        sides = {} if box is None else {
-            "left": low[:, 0] < box[0], "right": high[:, 0] > box[1], "bottom": low[:, 1] < box[2],
-            "top": high[:, 1] > box[3],
-        }  # fmt: skip
-        for k in range(len(walls)):
-            wall = int(walls.id[k])
-            side = walls.side_of(k)
-            hit = sides[side] if side in sides else _cuts(ends, walls.p1[k], walls.p2[k])
-            first = int(number[hit].min(initial=np.iinfo(np.int64).max))
-            at = x[number == first][:1, :2]
-            found.append((wall, first, *(at[0].tolist() if len(at) else (0.0, 0.0))))
-        return [min(each) for each in zip(*self.comm.allgather(found)) if min(each)[1] < np.iinfo(np.int64).max]
-
     def force_on_blocks(self) -> tuple[float, float]:
         """Sum of the forces of all discs on the blocks [N]."""
         self.prepare()
-        force = self._link().face_force
+        force = self.links().face_force
         return tuple(exact_sum(force[:, [c, c + 2]], self.comm) for c in range(2))  # type: ignore[return-value]
 
-    def _stored(self) -> float:
-        """Elastic energy of the contacts between the two [J]."""
-        return math.fsum(self.contacts()["energy"])
-
     # ---- energy ------------------------------------------------------------------------------------------------------
-
-    def _book_discs(self, kick: bool) -> None:
-        """Half a step's work of the present forces on the discs; kick: with the velocities of the coming half step."""
-        particles, link, s = self.particles, self._link(), self.particles.settings
-        p = particles.particles
-        forces = particles.lists.owned_forces() if kick else np.empty((0, 3))
-        with particles.timers("energy"):
-            disc_faces.work_on_discs(
-                kick, link.disc_row, link.disc_force, p.hot, p.n_left, particles.body, forces, s.gx, s.gy, s.lsm,
-                particles.clock.dt, self._bins[ON_DISCS],
-            )  # fmt: skip
-
-    def _book_faces(self) -> None:
-        """The same on the blocks, whose velocities are those after the kick once they have stepped."""
-        blocks, link = self.blocks, self._link()
-        e = link.face_number // 4
-        if link.made_for[1] == blocks.rebuilds and blocks.closed:
-            rows = link.face_row
-        else:  # storage was left at the end of the step
-            order = np.argsort(blocks.number)
-            rows = order[np.searchsorted(blocks.number, e, sorter=order)] if len(e) else e
-        with blocks.timers("energy"):
-            disc_faces.work_on_faces(
-                link.face_force, rows, link.face_k, link.face_k2, blocks.v, blocks.clock.dt, self._bins[ON_FACES]
-            )
-
-    def _empty(self) -> None:
-        """What was booked in the steps since then, to the accounts."""
-        if not self._booked:
-            return
-        self._booked = 0
-        for side in (ON_DISCS, ON_FACES):
-            value = as_integer(self._bins[side]) or 0
-            self._done[side] += value
-            if side == ON_DISCS and self.particles.energy is not None:
-                self.particles.energy.add_from_blocks(value)
-            if side == ON_FACES and self.blocks.budget is not None and self.blocks.budget.start is not None:
-                self.blocks.budget.add_from_discs(value)
-        self._bins[:] = 0
 
     @property
     def accounted(self) -> bool:
@@ -490,23 +401,9 @@ class Coupled(SurfaceLoad):
         return self.particles.energy is not None or self.blocks.budget is not None
 
     def energies(self) -> dict[str, float]:
-        """Energy that went across the contacts since the account began [J]: work_on_particles, work_on_blocks; stored:
-        elastic energy of the contacts now, stored_before: at the beginning; lost: by their friction, and by errors of
-        the time step. With accounts of both models also closing: what does not add up in all, and relative: that over
-        the largest flow."""
+        """See `Work.energies`."""
         self.prepare()
-        parts = self.comm.allgather(tuple(self._done))
-        discs, faces = (from_integer(sum(part[side] for part in parts)) for side in (ON_DISCS, ON_FACES))
-        stored = self._stored()
-        before = self._stored_at_start or 0.0
-        found = {"work_on_particles": discs, "work_on_blocks": faces, "stored": stored, "stored_before": before}
-        found["lost"] = -(discs + faces) - (stored - before)
-        if self.particles.energy is not None and self.blocks.budget is not None:
-            one, other = self.particles.energy.look(self.particles), of_blocks.energies(self.blocks)
-            flows = [abs(v) for name, v in vars(one).items() if name not in ("closing", "relative")]
-            flows += [abs(v) for name, v in other.items() if name not in ("closing", "relative")]
-            return closed(found, one.closing + other["closing"], flows)
-        return found
+        return self._work.energies()
 
     # ---- state -------------------------------------------------------------------------------------------------------
 
@@ -516,9 +413,8 @@ class Coupled(SurfaceLoad):
 
     def state(self) -> dict[str, Any]:
         """What else is saved, as JSON values."""
-        done = [sum(part[side] for part in self.comm.allgather(tuple(self._done))) for side in (ON_DISCS, ON_FACES)]
         friction = None if math.isinf(self.friction) else self.friction
-        return {"friction": friction, "done": [hex(v) for v in done], "start": self._stored_at_start, "late": self.late}
+        return {"friction": friction, **self._work.state(), "late": self.late}
 
     def begin_restore(self) -> None:
         """Both models are about to be replaced."""
@@ -527,11 +423,9 @@ class Coupled(SurfaceLoad):
 
     def end_restore(self, state: Mapping[str, Any], known: Touching) -> None:
         """They have been."""
-        first = self.comm.rank == 0
         self.friction = math.inf if state["friction"] is None else float(state["friction"])
-        self._done = [int(v, 16) if first else 0 for v in state["done"]]
-        self._stored_at_start, self.late = state["start"], int(state["late"])
-        self._bins[:] = 0
+        self._work.restore(state)
+        self.late = int(state["late"])
         self._law_key = None
         self._known, self._changed, self._asleep = known, True, False
         self._settled = self._said()
@@ -542,18 +436,6 @@ class Coupled(SurfaceLoad):
         self.blocks.surface_loads.remove(self)
         self.particles.coupled = False
         self.particles.trail = Trail()
-
-
-def _cuts(ends: np.ndarray, p1: np.ndarray, p2: np.ndarray) -> np.ndarray:
-    """(n,) bool: elements, ends (n, 4, 2, 2) of their edges [m], of which an edge crosses the line from p1 to p2."""
-
-    def side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-        u, w = b - a, c - a
-        return u[..., 0] * w[..., 1] - u[..., 1] * w[..., 0]
-
-    a, b = ends[:, :, 0], ends[:, :, 1]
-    across = side(p1, p2, a) * side(p1, p2, b) < 0.0
-    return (across & (side(a, b, p1) * side(a, b, p2) < 0.0)).any(axis=1)
 
 
 def law_table(shear: np.ndarray, poisson: np.ndarray, materials: np.ndarray, frictions: np.ndarray) -> np.ndarray:
