@@ -36,7 +36,7 @@ def test_forces(tmp_path, kind: str, hertz: bool) -> None:
     rock = body(mesh)
     both = together(sim, rock)
     both.prepare()
-    link, p = both._link(), sim.particles
+    link, p = both.links(), sim.particles
     for column in (VX, VY, SPIN):
         p.hot[:, column] = rng.normal(size=len(p.hot))
     rock.v[:] = 0.5 * rng.normal(size=rock.v.shape)
