@@ -130,7 +130,8 @@ class Interval(Selection):
 
     def mask(self, p: Particles) -> np.ndarray:
         c = p[self.axis]
-        return (c >= _plain(self.low)) & (c < _plain(self.high))
+        inside: np.ndarray = (c >= _plain(self.low)) & (c < _plain(self.high))
+        return inside
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,8 @@ class Ellipse(Selection):
         a, b = _plain(self.a), _plain(self.b)
         if a <= 0.0 or b <= 0.0:
             return np.zeros(np.shape(p["x"]), dtype=bool)
-        return ((p["x"] - _plain(self.x0)) / a) ** 2 + ((p["y"] - _plain(self.y0)) / b) ** 2 <= 1.0
+        inside: np.ndarray = ((p["x"] - _plain(self.x0)) / a) ** 2 + ((p["y"] - _plain(self.y0)) / b) ** 2 <= 1.0
+        return inside
 
 
 @dataclass(frozen=True, init=False)
@@ -198,7 +200,8 @@ class Ids(Selection):
     last: int
 
     def mask(self, p: Particles) -> np.ndarray:
-        return (p["gid"] >= self.first) & (p["gid"] <= self.last)
+        inside: np.ndarray = (p["gid"] >= self.first) & (p["gid"] <= self.last)
+        return inside
 
     def resolve(self, extents: Mapping[str, float]) -> Selection:
         return self

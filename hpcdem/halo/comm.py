@@ -168,4 +168,5 @@ def _unpickled(payload: np.ndarray, counts: np.ndarray) -> list:
 
 
 def _starts(counts: np.ndarray) -> np.ndarray:
-    return np.cumsum(counts) - counts
+    starts: np.ndarray = np.cumsum(counts) - counts
+    return starts

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from hpcdem.core.comm import Comm, SerialComm
 from hpcdem.core.errors import EXIT_USAGE, HpcdemError, UsageError
@@ -65,7 +65,7 @@ def on_first(comm: Comm, action: Callable[[], _T]) -> _T:
     result, error = comm.bcast((result, error))
     if error is not None:
         raise (UsageError if error[1] == EXIT_USAGE else HpcdemError)(error[0])
-    return result
+    return cast(_T, result)
 
 
 def make_folder(path: str | os.PathLike, comm: Comm) -> None:

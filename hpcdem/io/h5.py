@@ -316,7 +316,8 @@ def columns(path: str | os.PathLike, places: Mapping[str, tuple[str, Any]]) -> C
                 try:
                     first, *others = whole if isinstance(whole, tuple) else (whole,)
                     every = range(*first.indices(len(file[place])))[rows]
-                    return file[place][(slice(every.start, every.stop), *others)]
+                    found: np.ndarray = file[place][(slice(every.start, every.stop), *others)]
+                    return found
                 except (KeyError, OSError, ValueError, RuntimeError) as problem:
                     raise HpcdemError(f"cannot read {os.fspath(path)}: {place}: {problem}") from None
 

@@ -58,7 +58,8 @@ def to_slabs(
 
 def _taken(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """values[rows]; a column of a wide table is made compact first, if that is worth it: jumps are then shorter."""
-    return (np.ascontiguousarray(values) if 2 * len(rows) > len(values) else values)[rows]
+    taken: np.ndarray = (np.ascontiguousarray(values) if 2 * len(rows) > len(values) else values)[rows]
+    return taken
 
 
 _DIGIT = 11  # bits: their counters fit the first-level cache
@@ -120,7 +121,8 @@ def _targets(comm: Comm, keys: np.ndarray) -> np.ndarray:
     counts = comm.sum_into(np.bincount(index, minlength=bins).astype(np.int64))
     before = np.cumsum(counts) - counts
     owner = before * comm.size // max(1, int(counts.sum()))
-    return owner[index]
+    found: np.ndarray = owner[index]
+    return found
 
 
 def by_ranges(comm: Comm, key: str, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -160,7 +162,8 @@ def holders(comm: Comm, mine: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     ranks = np.flatnonzero(comm.max_into(np.where(np.arange(comm.size) == comm.rank, len(mine), 0)) > 0)
     if not len(ranks):
         return np.full(len(wanted), comm.rank)
-    return ranks[np.maximum(np.searchsorted(starts[ranks], wanted, side="right") - 1, 0)]
+    found: np.ndarray = ranks[np.maximum(np.searchsorted(starts[ranks], wanted, side="right") - 1, 0)]
+    return found
 
 
 def ask(
@@ -191,6 +194,7 @@ def _local_rows(mine: np.ndarray, asked: np.ndarray, offset: int) -> np.ndarray:
     if span <= 4 * n + 1024:  # as good as all numbers from the first on: a table of them is quicker than a search
         rows = np.full(span + 2, -1, dtype=np.int64)
         rows[mine - (first - 1)] = np.arange(offset, offset + n)
-        return rows[np.clip(asked, first - 1, first + span) - (first - 1)]
+        found: np.ndarray = rows[np.clip(asked, first - 1, first + span) - (first - 1)]
+        return found
     at = np.minimum(np.searchsorted(mine, asked), len(mine) - 1)
     return np.where(mine[at] == asked, at + offset, -1)
