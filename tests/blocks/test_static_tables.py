@@ -3,6 +3,7 @@ switched on. Relaxation, the solve at once, creep; the plane and space; checkpoi
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium, saved_state, user_functions
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tables import Table
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.implicit import Implicit
@@ -21,6 +23,15 @@ from tests.flow.support import WATER, inner
 from tests.space import support as space
 
 ROCK = {"density": 2000.0, "young": 1e8, "poisson_ratio": 0.2}
+
+
+@pytest.mark.parametrize(
+    "rows, told",
+    [([(0, 1), (2, 1), (1, 3)], "1 follows 2 (pair 3)"), ([(5, 1), (5, 2)], "5 follows 5 (pair 2)")],
+)
+def test_times_that_do_not_ascend_are_told_with_their_place(rows, told):
+    with pytest.raises(CommandError, match=rf"table 't': times must ascend, but {re.escape(told)}$"):
+        Table.of(rows, "t")
 
 
 def block(kind: str = "cross", law: str = "mech_iso_elastic", **properties: float) -> Blocks:

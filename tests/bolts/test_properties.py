@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hpcdem.core.errors import CommandError
 from hpcdem.physics.bolts import kernels
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.bolts.properties import BOLT
@@ -46,6 +47,12 @@ def shaken(properties: dict[str, float], condition: dict[str, float] | None = No
 @pytest.fixture(scope="module")
 def usual() -> np.ndarray:
     return shaken(USUAL)
+
+
+def test_a_bolt_is_tensioned_up_to_its_strength_at_most() -> None:
+    BOLT.derive({**USUAL, "pretension_force": 3e3})
+    with pytest.raises(CommandError, match=r"above tensile_yield_force \(3000 N\), got 3001"):
+        BOLT.derive({**USUAL, "pretension_force": 3001.0})
 
 
 def test_all_of_them_are_here() -> None:

@@ -12,11 +12,21 @@ from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import changes, creep
 from hpcdem.physics.flow import kernels, reference
 from hpcdem.physics.flow.model import Flow
-from hpcdem.physics.flow.network import Network, at_nodes
+from hpcdem.physics.flow.network import Network, around, at_nodes
 from hpcdem.pre.mesh import structured
 from tests.blocks.support import model, rectangle, shaken
 from tests.flow import exact
 from tests.flow.support import WATER, at, hold, inner, line, run, standing, until
+
+
+def test_faces_around_points_are_those_of_all_faces_that_a_search_finds() -> None:
+    mesh = rectangle(3, 2, 3.0, 2.0, kind="mixed")
+    points = np.array([0, 3, 4, 7])
+    faces = np.flatnonzero(np.arange(4 * len(mesh.cells)) % 4 < np.repeat((mesh.cells >= 0).sum(axis=1), 4))
+    inside = np.isin(mesh.face_points(faces), points)
+    whole, touched = around(mesh, points)
+    assert whole.tolist() == faces[inside.all(axis=1)].tolist() and len(whole) > 3
+    assert touched.tolist() == faces[inside.any(axis=1)].tolist()
 
 
 def test_channels_of_a_node_stand_in_their_order() -> None:

@@ -44,6 +44,17 @@ def usual() -> np.ndarray:
     return shaken(USUAL)
 
 
+def test_a_thickness_gives_the_section() -> None:
+    """A = 0.2, I = 0.2^3 / 12, M = (2 + 30 MPa) 0.2^2 / 8; and back from I and A."""
+    values = {"thickness": 0.2, "tensile_strength": 2e6, "compressive_strength": 30e6}
+    LINER.derive(values)
+    found = [values[name] for name in ("area", "inertia", "plastic_moment")]
+    assert found == pytest.approx([0.2, 6.6666667e-4, 160e3], rel=1e-7)
+    values = {"area": 0.2, "inertia": 6.6666667e-4, "tensile_strength": np.inf, "compressive_strength": np.inf}
+    LINER.derive(values)
+    assert values["thickness"] == pytest.approx(0.2, rel=1e-7)
+
+
 def test_all_of_them_are_here() -> None:
     assert set(USUAL) == set(OTHER) == {one.name for one in LINER.properties}
 

@@ -41,7 +41,7 @@ CHAINS: dict[str, dict[str, str | None]] = {
 QUICK = {("push_add_del", 2)}
 """Chains and numbers of ranks of the quick tests."""
 
-OTHERS = {"push", *(chain for chain, _ in QUICK)}
+OTHERS = {chain for chain, _ in QUICK}
 """Chains that quick tests of several ranks are compared with: what looks at their run on one rank runs beside them, and
 what looks at other chains is slow."""
 
@@ -107,7 +107,7 @@ def test_same_files_on_more_ranks(
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", ways({"2 ranks x 2 threads"}))
+@pytest.mark.parametrize("case", ways(()))
 def test_same_push_however_it_is_run(
     on_one_rank: Callable[[str], Path], manual_scripts: Path, resident: Resident, tmp_path: Path, case: str
 ) -> None:

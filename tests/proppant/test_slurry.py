@@ -11,6 +11,7 @@ from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant import kernels as own
 from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant
+from hpcdem.physics.proppant.properties import PROPPANT
 from hpcdem.physics.proppant.reference import sub_step
 from tests.flow.support import at, hold, over, until
 from tests.proppant.support import OIL, SAND, nodes_up, profile, slot
@@ -33,6 +34,14 @@ def flowing(
 
 def bring(sim: Blocks, proppant: Proppant, c: float | str, kind: str = CONCENTRATION) -> None:
     proppant.prescribe(nodes_up(sim)[:1], kind, c)
+
+
+def test_the_power_of_the_viscosity_has_two_bounds() -> None:
+    for power in (-3.0, -1.0):
+        PROPPANT.derive({"viscosity_power": power})
+    for power in (-3.01, -0.99, 0.5):
+        with pytest.raises(CommandError, match=rf"between -3 and -1, got {power:g}"):
+            PROPPANT.derive({"viscosity_power": power})
 
 
 def test_a_front_goes_with_the_slurry() -> None:
