@@ -230,6 +230,7 @@ KINDS = {
     "proppant-space": Kernels("physics.proppant.warm_up", "in_space", after=("proppant", "flow-space")),
     "heat": Kernels("physics.heat.warm_up"),
     "heat-space": Kernels("physics.heat.warm_up", "in_space", after=("space", "heat")),
+    "six-nodes": Kernels("physics.fdem.warm_up", "six_nodes"),
     "yielding": Kernels("physics.fdem.warm_up", "yielding"),
     "creep": Kernels("physics.fdem.warm_up", "creeping"),
     "tangent": Kernels("physics.fdem.warm_up", "tangent"),

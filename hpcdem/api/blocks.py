@@ -105,6 +105,7 @@ class Mesh(Words):
     add_element = Row("model add element", "*corners")
     scale = Row("model scale", "factors")
     translate = Row("model translate", "way")
+    quadratic = Row("mesh quadratic")
     quality = Row("mesh quality", doc="Say in the log how good the mesh is: angles, sizes.")
 
 

@@ -619,6 +619,12 @@ class Mesh(Words):
         ----------
         way : where to [m].
         """
+    def quadratic(self) -> None:
+        """In the plane: each triangle of the mesh becomes a six-node triangle, in which displacements are quadratic: a
+        beam bends with one of them through its height. It is stored as four elements, which go together; joints,
+        contact and loads act on the halves of its sides. Elastic. The mesh has triangles only; comes before the
+        first model or condition.
+        """
     def quality(self) -> None:
         """Say in the log how good the mesh is: angles, sizes."""
 

@@ -12,6 +12,7 @@ from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from hpcdem.physics.fdem.water import Water
+from hpcdem.pre.mesh.quadratic import quadratic
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
 from tests.parallel.model import Found, Model
 
@@ -46,6 +47,23 @@ def impact(sim: Blocks, shape: str = "cross") -> None:
     sim.joint_model(inner[:, 0], COHESIVE, WEAK)
     sim.velocity_condition(np.arange(len(block.points), len(sim.mesh.points)), vx=0.0, vy=0.0)
     changes.set_velocity(sim, np.arange(len(block.points)), vx=0.5, vy=-2.0)
+    sim.rayleigh(0.002, 400.0)
+    sim.gravity(0.0, -9.81)
+    diagnostics.account_energy(sim)
+
+
+def six_nodes(sim: Blocks) -> None:
+    """The same of six-node triangles, with stress from the beginning."""
+    block, plate = shaken(rectangle(8, 4, 1.6, 0.8), 0.2), rectangle(8, 1, 2.4, 0.2, x0=-0.4, y0=-0.201)
+    mesh = quadratic(joined(block, plate)).mesh
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
+    joints = sim.numbers_of_joints(None)
+    sim.joint_model(joints[joints < 16 * len(block.cells)], COHESIVE, WEAK)
+    on_plate = mesh.points[:, 1] < -1e-4
+    sim.velocity_condition(np.flatnonzero(on_plate), vx=0.0, vy=0.0)
+    changes.set_velocity(sim, np.flatnonzero(~on_plate), vx=0.5, vy=-4.0)
+    sim.initial_stress(None, xx=-1e5, yy=-2e5)
     sim.rayleigh(0.002, 400.0)
     sim.gravity(0.0, -9.81)
     diagnostics.account_energy(sim)
@@ -482,6 +500,7 @@ def the_ground_shakes(found: Found) -> None:
 # that stay; else they follow the load.
 MODELS = {
     "impact": Model(impact, result, much_breaks, slow=True),
+    "six nodes": Model(six_nodes, result, much_breaks, slow=True),
     "mixed": Model(mixed, result, much_breaks, slow=True),
     "flight": Model(flight, result, much_breaks, balance=False, come=10),
     "yielding": Model(yielding, result, much_yields, yield_more, come=10),

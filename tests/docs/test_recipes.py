@@ -90,6 +90,16 @@ class Decay:
     def advance(self, sim): sim.particles["activity"][:] *= 1.0 - self.rate * sim.clock.dt
 """
 
+PLIANT = """
+from hpcdem.physics.fdem.six import kernels
+from hpcdem.physics.fdem.six.elements import SixNodes
+
+class Pliant(SixNodes):
+    def _make_constants(self, points):
+        super()._make_constants(points)
+        self.c[:, [kernels.LAMBDA, kernels.TWO_MU]] *= 0.5
+"""
+
 WIND = '''
 import numpy as np
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
@@ -343,6 +353,30 @@ salt = sim.nodes["salt"]
 assert salt.min() == 0.1 < salt.max() < 0.2, salt
 """,
         {"physics/salt/__init__.py": "", "physics/salt/properties.py": SALT, "physics/salt/model.py": SALTY},
+    ),
+    "an element of blocks": Recipe(
+        [
+            (
+                "physics/fdem/local.py",
+                "WHOLES = {SIX_NODE_TRIANGLE.name: SixNodes}",
+                "=from hpcdem.physics.fdem.pliant.elements import Pliant\n\nWHOLES = {SIX_NODE_TRIANGLE.name: Pliant}",
+            )
+        ],
+        """
+import hpcdem
+sim = hpcdem.Simulation()
+sim.mesh.structured((0, 0), (1.0, 1.0), (1, 1))
+sim.mesh.quadratic()
+sim.option(dynamic=False, large_strain=False)
+sim.elements.model("mech-iso-elastic", density=2000, young=1e9, poisson_ratio=0.0)
+sim.nodes.velocity(vx=0, vy=0, where="y 0 0")
+sim.faces.stress(normal=-1e6, where="y 1 1")
+sim.solve(elastic=True)
+top = sim.nodes["displacement-y"].min()
+assert abs(top / -2e-3 - 1.0) < 1e-6, top
+assert abs(sim.elements["stress-yy"] / -1e6 - 1.0).max() < 1e-6
+""",
+        {"physics/fdem/pliant/__init__.py": "", "physics/fdem/pliant/elements.py": PLIANT},
     ),
     "physics on particles": Recipe(
         [

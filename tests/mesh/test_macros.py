@@ -15,7 +15,7 @@ from tests.blocks.support import rectangle
 def mesh(request):
     if request.param == "hexahedra":
         return hexes([np.linspace(0.0, 1.0, 3)] * 3)
-    return quadratic(rectangle(2, 2, 1.0, 1.0))
+    return quadratic(rectangle(2, 2, 1.0, 1.0)).mesh
 
 
 def test_parts_fill_the_whole_and_share_its_number(mesh):
@@ -66,7 +66,7 @@ def test_layers_groups_and_cracks_of_triangles_stay_where_they_are():
         before.points, before.cells, {"s": {"a": [0, 3]}}, {"all": edges.points[~edges.inner]},
         edges.points[edges.inner][:2], [0, 1],
     )  # fmt: skip
-    mesh = quadratic(before)
+    mesh = quadratic(before).mesh
     check(mesh)
     assert mesh.groups["s"]["a"].tolist() == [0, 1, 2, 3, 12, 13, 14, 15]
     found = mesh.edges()

@@ -17,7 +17,7 @@ from hpcdem.physics.flow.model import Flow
 from hpcdem.session import Session
 from tests.property import two_ways
 
-ELEMENTS = ("tri", "quad", "tet", "hex")
+ELEMENTS = ("tri", "six", "quad", "tet", "hex")
 MOTIONS = ("dynamic", "static", "at once")
 PHYSICS = ("dry", "flow", "heat")
 MIDDLES = ("restore", "autosave")
@@ -46,13 +46,14 @@ class Combination:
         dim = 3 if self.space else 2
         place = "({},0,0) ({},0.5,0.5)" if self.space else "({},0) ({},0.5)"
         cells = "2 1 1" if self.space else "3 2"
-        kind = {"tet": "", "hex": " type hex"}.get(self.element, f" type {self.element}")
+        kind = {"tet": "", "hex": " type hex", "six": " type tri"}.get(self.element, f" type {self.element}")
         up, across = (
             ("z", "velocity-x 0 velocity-y 0 velocity-z 0") if self.space else ("y", "velocity-x 0 velocity-y 0")
         )
         lines = [
             f"model new dim {dim}",
             f"mesh structured {place.format(0, 1)} cells {cells}{kind}",
+            *(["mesh quadratic"] if self.element == "six" else []),
             f"model option large-strain {_switch(self.large)}",
             "element c-model mech-iso-e property density 2500 young 1e8 poisson-r 0.2 damp-f 0.1",
             "face-joint c-model c-i-c-i property friction 30 cohesion 1e5 tensile-strength 5e4 gf1 5 gf2 20 "

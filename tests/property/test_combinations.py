@@ -20,7 +20,7 @@ def test_the_quick_ones_have_some_of_each() -> None:
     assert [set(column) for column in zip(*map(astuple, QUICK))] == [
         set(ELEMENTS), {True, False}, {True, False}, set(MOTIONS), set(PHYSICS)
     ]  # fmt: skip
-    assert len(ALL) == 4 * 2 * (2 + 1 + 1) * 3
+    assert len(ALL) == 5 * 2 * (2 + 1 + 1) * 3
 
 
 @pytest.mark.parametrize(

@@ -157,6 +157,7 @@ SAME: list[tuple[str, str]] = [
      "sim.mesh.import_file('a.msh', group='rock', set='d', merge=1e-3, scale=0.5)"),
     ("pcdc mesh intersect layer 'l' follow", "sim.mesh.intersect('l', follow=True)"),
     ("pcdc mesh glue tolerance 1e-3 between 'a' 'b' set 'd'", "sim.mesh.glue(1e-3, ('a', 'b'), set='d')"),
+    ("pcdc mesh quadratic", "sim.mesh.quadratic()"),
     ("pcdc mesh quality", "sim.mesh.quality()"),
     ("pcdc node mechanical-damp local 0.5 range x 0 1", "sim.nodes.damp(0.5, where='x 0 1')"),
     ("pcdc element-face boundary m-s-b-c dip 1e5 range x 0 1", "sim.faces.stress(dip=1e5, where='x 0 1')"),

@@ -27,6 +27,7 @@ from hpcdem.pre.mesh import (
     fractures,
     geometry,
     imported,
+    quadratic,
     quadtree,
     quality,
     remade,
@@ -358,6 +359,22 @@ def densify(project: Project, pattern: tuple[int, int], most: tuple[float, float
     made = made_once(project.comm, lambda: quadtree.densified(mesh, elements, pattern, most))
     project.refit(made)
     _say(project, f"element densify: {len(made.parent) - len(mesh.cells)} more elements, {len(made.parent)} in all")
+
+
+def six_nodes(project: Project) -> None:
+    """Each triangle becomes a six-node triangle: four elements with quadratic displacements together. A node between
+    two of a group of nodes is in the group. Collective."""
+    project.refuse_in_use("elements get more nodes")
+    mesh = project.whole_mesh()
+    made = made_once(project.comm, lambda: quadratic.quadratic(mesh))
+    project.refit(made)
+    ends = mesh.edges().points
+    for sets in project.groups[NODE].sets.values():
+        for name, members in sets.items():
+            between = len(mesh.points) + np.flatnonzero(np.isin(ends, members).all(axis=1))
+            sets[name] = np.unique(np.concatenate([members, between]))
+    count, points = len(made.mesh.macros), len(made.mesh.points)
+    _say(project, f"mesh quadratic: {count} six-node triangles of 4 elements each, {points} points")
 
 
 def add_nodes(project: Project, points: Sequence[tuple[float, ...]]) -> None:

@@ -617,6 +617,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     ),
     "mesh intersect": lambda c: fdem.meshes.intersect(c.project, c["layer"], c.get("follow", False)),
     "mesh glue": _mesh_glue,
+    "mesh quadratic": lambda c: fdem.meshes.six_nodes(c.project),
     "mesh quality": lambda c: fdem.meshes.tell_quality(c.project),
     "element create brick": _brick,
     "element create geometry": _patch,

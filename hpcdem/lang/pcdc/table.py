@@ -1141,6 +1141,10 @@ _MESH = (
                             "a thousandth of the shortest edge"),
                      Option("betw{een}", (STRING, STRING), "only faces between the elements of these two groups",
                             more=(SET,))), ranged="element", dims=BOTH, also=("e{lement} glue",)),
+    Command("mesh quad{ratic}", "Each triangle of the mesh becomes a six-node triangle, in which displacements are "
+            "quadratic: a beam bends with one of them through its height. It is stored as four elements, which go "
+            "together; joints, contact and loads act on the halves of its sides. Elastic. The mesh has triangles only; "
+            "comes before the first model or condition.", ("pcdc mesh quadratic",)),
     Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",), dims=BOTH),
 )  # fmt: skip
 

@@ -875,5 +875,6 @@ def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
         plastic_stiffness.quads(quad_rows, sim.x, local.q, local.quad_s0, local.quad_law, table, small, quads)
     of_triangles, of_quads = number[rows], number[local.quad_rows]
     return [
-        Pieces(of_triangles, sim.node[of_triangles, :3], triangles), Pieces(of_quads, sim.node[of_quads], quads)
+        Pieces(of_triangles, sim.node[of_triangles, :3], triangles), Pieces(of_quads, sim.node[of_quads], quads),
+        *([] if local.whole is None else [local.whole.pieces()]),
     ]  # fmt: skip

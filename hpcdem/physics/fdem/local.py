@@ -31,6 +31,7 @@ from hpcdem.physics.fdem.kernels import (
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joint_law import HISTORY
 from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE
+from hpcdem.physics.fdem.macros import SIX_NODE_TRIANGLE
 from hpcdem.physics.fdem.moduli import moduli
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
 from hpcdem.physics.fdem.principal import principal
@@ -45,6 +46,7 @@ from hpcdem.physics.fdem.properties import (
     softening_table,
     temperature_table,
 )
+from hpcdem.physics.fdem.six.elements import SixNodes
 from hpcdem.physics.fdem.tables import Table
 from hpcdem.physics.fdem.user_functions import Placed
 
@@ -54,8 +56,8 @@ if TYPE_CHECKING:
 
 ALPHA = 0.8
 """Local damping of the static mode."""
-
-
+WHOLES = {SIX_NODE_TRIANGLE.name: SixNodes}
+"""Of macro-elements of the plane, what has forces in place of their parts."""
 JOINT_LAWS = {COULOMB_JOINT.name: joint_law.COULOMB, BARTON_BANDIS.name: joint_law.BARTON_BANDIS}
 _WARM_JOINT = tuple(one.name for one in COHESIVE.properties if one.warms)
 
@@ -177,6 +179,7 @@ class Local:
 
     dim, force_width, stride = 2, elements.FORCE, 2
     without_moduli: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]] = ()
+    whole: SixNodes | None = None
     pulled: tuple[np.ndarray, np.ndarray] | None = None
     """In place of node_begin and node_corner: corners with forces, where some have none."""
 
@@ -237,6 +240,7 @@ class Local:
         self.c[count:] = self.c[count - 1] if count else 1.0
         self.warms = any(bool(one.any()) for one in sim.warms())
         self.stiff, self.stiff_q = (self.c.copy(), self.q.copy()) if self.warms else (self.c, self.q)
+        self.whole = WHOLES[mesh.macro.name](self) if len(mesh.macros) else None
         self.plastic, self.creeps = "plastic" in sim.cold, "creep" in sim.cold
         self.yields = bool(sim.yielding().any())
         rows = self.triangle_rows[:count]
@@ -354,6 +358,8 @@ class Local:
         )  # fmt: skip
         if sim.options.plane_stress:
             self.s0[:, 3] = self.quad_s0[:, 3::4] = 0.0
+        if self.whole is not None:
+            self.whole.take_stress(self.s0)
         self._relieve()
         return heat is not None
 
@@ -635,6 +641,8 @@ class Local:
         self.special[real] |= sim.shared_nodes[node[real]] | (sim.corner_row.reshape(-1, 4)[number][real] > 0)
         if self.dim == 2:  # quads
             self.special[cells[:, 3] >= 0] = True
+            if self.whole is not None:
+                self.special[self.whole.rows - sim.n_left] = True
         self.special &= real
         self.some_special = bool(self.special.any())
         nothing = np.empty(0, np.int64)
@@ -880,6 +888,8 @@ class Local:
             loop(args[0], one.obeying(self, memory, False), *args[1:], self.tally)
         else:
             self._triangles(*args, self.tally)
+        if self.whole is not None:
+            self.whole.add_forces(sim.v, 1.0, force)
         if not len(self.quad_rows):
             return
         args = *self._quad_args, force, of_joints, *what, step
@@ -1270,6 +1280,8 @@ class Local:
         if energies and (memory is not None or crept is not None):
             more = self.remembered_energy(memory, crept)
             energy += more if at is None else more[at]
+        if self.whole is not None:
+            self.whole.put_stresses(at, stress, energy)
         if self.heated and energies:
             energy += self._energy_of_heat() if at is None else self._energy_of_heat()[at]
         if self.laws and energies:  # what such a law stores is not known
@@ -1356,6 +1368,8 @@ class Local:
             not o.large_strain, sim.x, before, after, a, b, of_joints, self.true_mass, o.gx, o.gy, o.mass_damping,
             o.stiffness_damping, dt, work,
         )  # fmt: skip
+        if self.whole is not None:
+            self.whole.book(before, a * before + b * after, dt, work[:, energy.VISCOUS])
         energy.book_contact(pairs.rows, sim.n_left, pairs.corners, pushed, before, after, a, b, dt, work)
         energy.book_nodes(
             self.node_begin, self.node_place, felt, outside, before, after, a, b, dt, sim.n_left, sim.n_own,

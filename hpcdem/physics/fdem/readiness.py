@@ -8,6 +8,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import by_temperature, user_laws
 from hpcdem.physics.fdem.properties import temperature_table
 from hpcdem.physics.fdem.settings import DISTANCE
+from hpcdem.physics.fdem.six import elements as six_nodes
 from hpcdem.physics.fdem.state import State
 from hpcdem.physics.fields import kinds
 
@@ -26,6 +27,7 @@ def check(sim: State) -> None:
     if not sim.alive.any():
         raise CommandError("there are no elements left")
     _check_warmth(sim)
+    six_nodes.check(sim)
     if sim.options.plane_stress:
         user_laws.check_plane_stress(sim)
     if sim.options.stiffness_damping and user_laws.in_use(sim):

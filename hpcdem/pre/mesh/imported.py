@@ -68,7 +68,7 @@ def read(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2)
     if len(bad):
         raise data.refuse(f"point {data.point(bad[0])} is not finite: {data.points[bad[0]].tolist()}")
     notes = list(data.notes)
-    between = _straightened(data, notes)
+    between = _straightened(data, notes, dim)
     _refuse_kinds(data, dim)
     points = (data.points if dim == 3 else _plane(data)) * scale
     number = spots(points, merge) if merge > 0.0 else np.arange(len(points))
@@ -297,7 +297,7 @@ def _by_meshio(path: Path) -> FileMesh:
     return made
 
 
-def _straightened(data: FileMesh, notes: list[str]) -> np.ndarray:
+def _straightened(data: FileMesh, notes: list[str], dim: int) -> np.ndarray:
     """Elements of second order keep their corners. The points (rows) that only they had between them."""
     count: dict[str, int] = {}
     between, corners = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
@@ -312,6 +312,8 @@ def _straightened(data: FileMesh, notes: list[str]) -> np.ndarray:
     notes += [
         f"points between the corners of {n} elements ({kind}): their edges are straight" for kind, n in count.items()
     ]
+    if dim == 2 and any(block.label in count and block.kind == "triangle" for block in data.blocks):
+        notes[-1] += "; mesh quadratic makes six-node triangles of a mesh of triangles"
     return np.setdiff1d(np.concatenate(between), np.concatenate(corners))
 
 

@@ -57,6 +57,15 @@ def _omega_triangle(c):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def omegas2(c):
+    """The same of triangles (n,)."""
+    out = np.empty(len(c))
+    for i in range(len(c)):
+        out[i] = _omega_triangle(c[i])
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _omega_quad(c):
     """The same: the largest of the four triangles (the mean volume strain of an overlay stores less energy)."""
     area = mass = worst = 0.0

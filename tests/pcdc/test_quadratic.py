@@ -1,0 +1,48 @@
+"""`mesh quadratic`: what becomes of groups and faces, when it is refused, what an import says of it."""
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import HpcdemError
+from hpcdem.physics.fdem import groups as g
+from hpcdem.pre.mesh import imported
+
+MESH = """
+pcdc mesh structured (0,0) (2,1) cells 2 1 diagonal left group 'rock'
+pcdc node group 'left' range x 0 0
+pcdc element-face group 'top' range y 1 1
+pcdc mesh quadratic
+"""
+
+
+def test_groups_take_what_is_new_on_them(bench):
+    bench(MESH)
+    project = bench.project
+    mesh, groups = project.mesh, project.groups
+    assert len(mesh.macros) == 4 and len(mesh.points) == 6 + 9
+    left = groups[g.NODE].members("left", g.DEFAULT)
+    assert left.tolist() == np.flatnonzero(mesh.points[:, 0] == 0.0).tolist() and len(left) == 3
+    top = groups[g.FACE].members("top", g.DEFAULT)
+    assert len(top) == 4 and (mesh.points[mesh.face_points(top)][:, :, 1] == 1.0).all()
+    assert len(groups[g.ELEMENT].members("rock", g.DEFAULT)) == 16
+    assert any("4 six-node triangles of 4 elements each, 15 points" in line for line in bench.blocks.log.lines)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ("mesh quadratic", "six-node triangles come from a mesh of triangles alone"),
+        ("element c-model mech-iso-elastic property den 2500 young 1e9 poisson-r 0.2\npcdc mesh quadratic", "before"),
+    ],
+)
+def test_twice_and_late_are_refused(bench, more, message):
+    with pytest.raises(HpcdemError, match=message):
+        bench(f"{MESH}pcdc {more}\n")
+
+
+def test_an_import_of_second_order_names_the_command(tmp_path):
+    nodes = "1,0,0\n2,1,0\n3,0,1\n4,.5,0\n5,.5,.5\n6,0,.5\n"
+    (tmp_path / "a.inp").write_text(f"*NODE\n{nodes}*ELEMENT, TYPE=CPE6\n1,1,2,3,4,5,6\n")
+    found = imported.read(tmp_path / "a.inp")
+    assert len(found.mesh.points) == 3
+    assert any("their edges are straight; mesh quadratic makes six-node triangles" in note for note in found.notes)
