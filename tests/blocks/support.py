@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from hpcdem.physics.fdem import changes as changes_
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 
+EVERY_KIND = pytest.mark.parametrize(
+    "kind", ["mixed", *(pytest.param(k, marks=pytest.mark.slow) for k in ("cross", "quad"))]
+)
+"""Of elements in the plane; `mixed` has both."""
 ROCK = {"density": 2700.0, "young": 50e9, "poisson_ratio": 0.25}
 
 

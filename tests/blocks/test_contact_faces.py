@@ -11,7 +11,7 @@ import pytest
 from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.kernels import contact
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks.support import JOINT, joined, near, rectangle, shaken
+from tests.blocks.support import EVERY_KIND, JOINT, joined, near, rectangle, shaken
 
 SOFT = {"density": 2700.0, "young": 1e9, "poisson_ratio": 0.25, "damp_factor": 1.0}
 MODEL = {"friction": 25.0, "penalty_normal": 1e10, "penalty_shear": 4e9, "damping_t": 4e6, "damping_b": 2.0}
@@ -50,7 +50,7 @@ def pressed(
 
 
 @pytest.mark.some_of_each
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 @pytest.mark.parametrize(
     "name, value",
     [("friction", 0.0), ("penalty_normal", 5e9), ("penalty_shear", 1e9), ("damping_t", 1e6), ("damping_b", 6.0),

@@ -10,7 +10,7 @@ from hpcdem.engine import rebuild
 from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.kernels import detect
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks.support import joined, jointed, model, rectangle
+from tests.blocks.support import EVERY_KIND, joined, jointed, model, rectangle
 
 
 def partners(sim: Blocks) -> set[tuple[int, int]]:
@@ -28,7 +28,7 @@ def upright(sim: Blocks, x: float, low: float, high: float) -> np.ndarray:
     return edges.faces[edges.inner][on & (ends[:, :, 1] < high).all(axis=1), 0]
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 @pytest.mark.parametrize("with_joints", [False, True])
 def test_faces_of_a_crack_are_paired_up_to_its_tips(kind, with_joints):
     """A crack inside a body, its ends closed: each face is listed with the one across, those at the ends too."""

@@ -16,7 +16,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.kernels import creep as kernels
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks.support import JOINT, joined, near, rectangle, shaken
+from tests.blocks.support import EVERY_KIND, JOINT, joined, near, rectangle, shaken
 
 BURGERS = "mech_burgers"
 SALT = {
@@ -30,7 +30,6 @@ ROCK = {
 MAXWELL = {**SALT, "kelvin_shear": 0.0}
 STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress_zz")
 LOAD = 5e6
-every_kind = pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 
 
 def body(kind: str = "cross", **other: float) -> Blocks:
@@ -120,7 +119,7 @@ def after_step(n: np.poly1d, d: np.poly1d, t: float) -> float:
 
 
 @pytest.mark.some_of_each
-@every_kind
+@EVERY_KIND
 @pytest.mark.parametrize(
     ("time", "strain"), [(1e4, 8.98469e-4), (2e4, 1.142121e-3), (5e4, 1.442915e-3), (1e5, 1.543262e-3)]
 )
@@ -146,7 +145,7 @@ def test_the_order_is_two():
 
 
 @pytest.mark.some_of_each
-@every_kind
+@EVERY_KIND
 @pytest.mark.parametrize("time", [2e4, 1e5])
 def test_uniaxial_stress_in_plane_strain(time, kind):
     """sigma_yy = p alone, plane strain: with 1 / G in the place of s J(s) the elastic strain is
@@ -161,7 +160,7 @@ def test_uniaxial_stress_in_plane_strain(time, kind):
 
 
 @pytest.mark.some_of_each
-@every_kind
+@EVERY_KIND
 @pytest.mark.parametrize("gradient", [[[1.0, 1e-4], [1e-4, 1.0]], [[1.0 - 2e-4, 0.0], [0.0, 1.0 + 1e-4]]])
 def test_relaxation_at_fixed_strain(gradient, kind):
     """S(t) = 2 e D / N after a step, the mean stress stays; second order in the creep step."""
@@ -204,7 +203,7 @@ def test_units_that_are_not_there(none):
     assert compliance(4e4, {**SALT, **none}) < 0.99 * compliance(4e4)
 
 
-@every_kind
+@EVERY_KIND
 def test_elastic_as_long_as_creep_is_off(kind):
     """The bits of an elastic element, in motion."""
     ends = []
@@ -221,7 +220,7 @@ def test_elastic_as_long_as_creep_is_off(kind):
     assert np.array_equal(*ends)
 
 
-@every_kind
+@EVERY_KIND
 def test_a_turn_changes_nothing(kind):
     """Stress, creep strain and Kelvin strain turn with the body."""
     turn = np.array([[math.cos(1.0), -math.sin(1.0)], [math.sin(1.0), math.cos(1.0)]])
@@ -306,7 +305,7 @@ def test_friction_of_its_surfaces_is_its_own():
     assert paths[0] > 5.0 * paths[1]
 
 
-@every_kind
+@EVERY_KIND
 def test_in_motion_every_step_is_a_creep_step(kind):
     """Held nodes: the stress relaxes with the time of the model; density and damping count in motion."""
     fast = {"maxwell_viscosity": 2e6, "kelvin_viscosity": 1e6}
@@ -334,7 +333,7 @@ def test_in_motion_every_step_is_a_creep_step(kind):
     assert not np.array_equal(ends[0], ends[1]) and not np.array_equal(ends[0], ends[2])
 
 
-@every_kind
+@EVERY_KIND
 def test_the_energy_budget_closes(kind):
     """A bar is thrown against a wall and creeps: what its dashpots lose and what is stored add up to what it had, also
     when its Kelvin strain is taken away on the way, and when creep ends."""
@@ -366,7 +365,7 @@ def test_the_energy_budget_closes(kind):
     assert lost[-1] <= diagnostics.total(sim, "creep_work")
 
 
-@every_kind
+@EVERY_KIND
 def test_reset_of_the_kelvin_strain(kind):
     """Stress and shape stay; the unit creeps as from the beginning."""
     sim = loaded(LOAD, -LOAD, kind)
@@ -378,7 +377,7 @@ def test_reset_of_the_kelvin_strain(kind):
     assert 2.0 * (width(sim) - at)[0] == pytest.approx(LOAD * (compliance(1e4) - compliance(0.0)), rel=1e-3)
 
 
-@every_kind
+@EVERY_KIND
 def test_kelvin_strain_of_an_initial_stress(kind):
     """With the strain S / (2 G_K) of an initial stress the Kelvin unit is at rest: only the dashpot flows."""
     strain = LOAD / (2.0 * SALT["kelvin_shear"])
@@ -395,7 +394,7 @@ def test_kelvin_strain_of_an_initial_stress(kind):
         assert 2.0 * width(sim)[0] == pytest.approx(LOAD * expected, rel=1e-3)
 
 
-@every_kind
+@EVERY_KIND
 def test_another_model_keeps_what_has_crept(kind):
     """Elastic from here on, the creep strain stays when the load goes; plastic before, the stress stays."""
     sim = loaded(LOAD, -LOAD, kind)
@@ -421,7 +420,7 @@ def test_another_model_keeps_what_has_crept(kind):
     assert np.array_equal(stresses(sim), once) and np.abs(once[:, 1]).max() < np.abs(before[:, 1]).max()
 
 
-@every_kind
+@EVERY_KIND
 def test_relaxation_to_a_ratio_is_as_good_as_at_once(kind):
     sims = [loaded(0.0, -LOAD, kind, **ROCK) for _ in range(2)]
     crept(sims[0], 2e4, 4)
@@ -490,7 +489,7 @@ def test_delayed_failure():
     assert times[0] > 1e4 and times[1] == 2.0 * times[0] and np.array_equal(*ends)
 
 
-@every_kind
+@EVERY_KIND
 def test_looking_changes_nothing(kind):
     """In motion and in a creep step."""
     ends = []
@@ -514,7 +513,7 @@ def test_looking_changes_nothing(kind):
     assert np.array_equal(*ends) and ends[0][-len(sim.alive) :].min() > 0.0
 
 
-@every_kind
+@EVERY_KIND
 def test_a_step_that_finds_no_balance_is_forgotten(kind, tmp_path):
     """Creep time and creep strain are those of the step before; what is saved in mid-creep goes on as it was."""
     sim = loaded(LOAD, -LOAD, kind)

@@ -16,7 +16,7 @@ from hpcdem.physics.fdem import changes, convergence, creep, diagnostics
 from hpcdem.physics.fdem.kernels.joint_law import SOFTENING_AREA, softening
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks import models
-from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
+from tests.blocks.support import EVERY_KIND, ROCK, jointed, model, rectangle, shaken
 
 E = ROCK["young"]
 
@@ -152,7 +152,7 @@ def test_the_account_does_not_change_the_run():
 
 @pytest.mark.some_of_each
 @pytest.mark.parametrize("damping", ["viscous", "rayleigh", "creep"])
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 def test_small_strains_close_to_rounding(kind, damping):
     """Their forces are those of an energy, on the shape of the mesh: of a soft cantilever that swings far, all that
     damping does not take is there."""

@@ -12,7 +12,7 @@ from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, 
 from hpcdem.physics.fdem import equilibrium as equilibrium_
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks.support import JOINT, ROCK, joined, jointed, model, rectangle, shaken
+from tests.blocks.support import EVERY_KIND, JOINT, ROCK, joined, jointed, model, rectangle, shaken
 from tests.blocks.test_patch import LAMBDA, MU, STRAIN, boundary
 from tests.blocks.test_static import leaning
 
@@ -46,7 +46,7 @@ def on_floor(mesh: Mesh, **options) -> Blocks:
 
 
 @pytest.mark.some_of_each
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 @pytest.mark.parametrize("large, within", [(False, 1e-7), (True, 2e-3)])
 def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within):
     """By central differences along random ways, from a state of strains of 1e-4 under an initial stress of 1e-4 E: with
@@ -184,7 +184,7 @@ def test_what_was_taken_out_and_left_forces_behind():
 # ---- closed forms --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 def test_patch(kind):
     """A linear displacement of the surface, prescribed in one go and in units of time: uniform stress to 1e-10 E."""
     sim = model(shaken(rectangle(5, 4, 1.0, 0.8, kind=kind), 0.25))

@@ -11,7 +11,7 @@ from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.groups import Span
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
+from tests.blocks.support import EVERY_KIND, ROCK, jointed, model, rectangle, shaken
 from tests.space.support import box, hexes
 
 COMPONENTS = ("xx", "yy", "xy", "zz")
@@ -30,7 +30,7 @@ def stresses(sim: Blocks) -> np.ndarray:
     return np.array([diagnostics.values(sim, f"stress_{c}") for c in COMPONENTS])
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 def test_it_goes_down_with_the_modulus(kind):
     """Held everywhere: f times the stress for f times E, with its gradient; bit for bit the old one for the old E."""
     sim = held(kind)

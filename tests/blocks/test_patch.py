@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.physics.fdem import changes, convergence, diagnostics
-from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
+from tests.blocks.support import EVERY_KIND, ROCK, jointed, model, rectangle, shaken
 
 LAMBDA, MU = 20e9, 20e9  # E = 50 GPa, nu = 0.25
 STRAIN = np.array([[2e-4, 1e-4], [1e-4, -3e-4]])
@@ -30,7 +30,7 @@ def prescribe(sim, gradient: np.ndarray, steps: int = 100) -> None:
     sim.velocity_condition(outside, vx=0.0, vy=0.0)
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 def test_linear_displacement_gives_uniform_stress(kind):
     """sigma = lambda tr(e) + 2 mu e with e = U - 1 of F = 1 + gradient, to 1e-10 of E."""
     sim = model(shaken(rectangle(5, 4, 1.0, 0.8, kind=kind), 0.25))
@@ -48,7 +48,7 @@ def test_linear_displacement_gives_uniform_stress(kind):
         )
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 def test_rigid_rotation_leaves_no_stress(kind):
     """A free body turned by 360 degrees in 36 turns: stress below 1e-9 E throughout."""
     sim = model(shaken(rectangle(3, 3, 1.0, 1.0, kind=kind), 0.2))

@@ -13,7 +13,7 @@ from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equili
 from hpcdem.physics.fdem.kernels import plastic_stiffness, plasticity
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks.support import ROCK, model, near, rectangle, shaken
+from tests.blocks.support import EVERY_KIND, ROCK, model, near, rectangle, shaken
 from tests.blocks.test_creep import SALT, compliance, crept, width
 from tests.blocks.test_creep import body as salt
 from tests.blocks.test_plasticity import FLOWS, MohrCoulomb, constants
@@ -21,7 +21,6 @@ from tests.blocks.test_user_laws import law
 from tests.blocks.test_yielding import SOIL, deform, stresses
 
 E, NU = ROCK["young"], ROCK["poisson_ratio"]
-every_kind = pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 
 
 def plane(rock: MohrCoulomb) -> tuple[float, ...]:
@@ -123,7 +122,7 @@ def pulled(sim: Blocks, xx: float = 0.0, yy: float = 0.0) -> Blocks:
 
 
 @pytest.mark.some_of_each
-@every_kind
+@EVERY_KIND
 @pytest.mark.parametrize("name", ["mech_iso_elastic", "mech_mohr_coulomb", "mech_burgers"])
 def test_uniaxial_stress(kind, name):
     """E along it, -nu across it, nothing across the plane; the energy is that of the work."""
@@ -137,7 +136,7 @@ def test_uniaxial_stress(kind, name):
     assert diagnostics.total(sim, "strain_energy") == pytest.approx(0.5e12 / E, rel=2e-5)
 
 
-@every_kind
+@EVERY_KIND
 def test_strength_of_a_plate(kind):
     """Squeezed along both axes it bears 2 c sqrt(N) along each, whatever the dilation; pulled so 2 c / sqrt(N)."""
     n, root = 3.0, math.sqrt(3.0)
@@ -181,7 +180,7 @@ def test_a_footing_at_rest_is_that_of_relaxation(kind):
 
 
 @pytest.mark.some_of_each
-@every_kind
+@EVERY_KIND
 @pytest.mark.parametrize("time", [2e4, 1e5])
 def test_uniaxial_creep(kind, time):
     """p (1 / (9 K) + J(t) / 3) along the stress, p (1 / (9 K) - J(t) / 6) across it."""
@@ -267,7 +266,7 @@ def test_a_bar_rings_at_the_speed_of_a_plate():
 
 
 @pytest.mark.some_of_each
-@every_kind
+@EVERY_KIND
 @pytest.mark.parametrize("name", ["mech_mohr_coulomb", "mech_burgers"])
 def test_the_energy_account_closes(kind, name):
     """A plate swings and flows, or creeps, with small strains."""

@@ -17,7 +17,7 @@ from hpcdem.physics.fdem.kernels.plasticity import SHEAR_NOW, principal_return
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
-from tests.blocks.support import model, near, rectangle, shaken
+from tests.blocks.support import EVERY_KIND, model, near, rectangle, shaken
 from tests.blocks.test_equilibrium import farthest, refused, state
 from tests.blocks.test_yielding import MOHR_COULOMB, SOIL, STRESSES, A, B, K, N, soil
 from tests.cases.plastic_hole import test_plastic_hole as ring
@@ -69,7 +69,7 @@ def test_slopes_of_the_return():
 
 
 @pytest.mark.some_of_each
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 @pytest.mark.parametrize("large, within", [(False, 2e-5), (True, 2e-2)])
 @pytest.mark.parametrize("plate", [False, True], ids=["plane strain", "plane stress"])
 def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within, plate):
@@ -111,7 +111,7 @@ def walls(sim: Blocks, speed: float) -> None:
 
 
 @pytest.mark.some_of_each
-@pytest.mark.parametrize("kind", ["cross", "mixed", "quad"])
+@EVERY_KIND
 @pytest.mark.parametrize("steps", [1, 7])
 def test_uniaxial_strain(kind, steps, newton):
     """The closed form of test_yielding.test_uniaxial_strain, on an edge of the surface, in one solve."""
@@ -276,7 +276,7 @@ def test_what_flows_in_balance_is_that_of_the_strength_of_now(kind):
 # ---- convergence ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["cross", "mixed", "quad"])
+@EVERY_KIND
 def test_convergence_is_quadratic(kind, newton):
     """A plate under a rough stamp: once the elements that flow are known each iteration squares the ratio, up to a
     factor and rounding; with the elastic matrix alone it is far from there."""

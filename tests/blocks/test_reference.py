@@ -9,7 +9,7 @@ from hpcdem.physics.fdem import changes, reference
 from hpcdem.physics.fdem.kernels import elements, joint_law, joints
 from hpcdem.physics.fdem.local import ALPHA, Evaluation
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks.support import JOINT, ROCK, jointed, model, rectangle, shaken
+from tests.blocks.support import EVERY_KIND, JOINT, ROCK, jointed, model, rectangle, shaken
 
 MU2 = ROCK["young"] / (1.0 + ROCK["poisson_ratio"])
 LAME = MU2 * ROCK["poisson_ratio"] / (1.0 - 2.0 * ROCK["poisson_ratio"])
@@ -119,7 +119,7 @@ def rows_of(sim: Blocks, found: Evaluation) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.some_of_each
 @pytest.mark.parametrize("large", [True, False])
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 def test_elements_and_nodes(kind: str, large: bool) -> None:
     """Stress, viscosity, gravity; nodes of several corners are kicked by the sum of their forces."""
     for dynamic, part in ((True, None), (True, "mass"), (True, "stiffness"), (False, None)):
@@ -152,7 +152,7 @@ def check_kick(sim: Blocks, force: np.ndarray, after: np.ndarray, tied: bool) ->
 
 @pytest.mark.some_of_each
 @pytest.mark.parametrize("large", [True, False])
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 def test_joints(kind: str, large: bool) -> None:
     """Joints before their peak, past it for the first time, and past it with a history, in three random states."""
     sim = disturbed(kind, True, large_strain=large)

@@ -45,6 +45,7 @@ def test_fluid_between_two_blocks_in_space() -> None:
     assert found["relative"] < 2e-3
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_pumped_open() -> None:
     """In the plane: what joints took is G and what they store at their peak, per length; what does not add up is of
     second order in the mesh."""

@@ -11,7 +11,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, diagnostics, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.heat.model import Heat
-from tests.blocks.support import ROCK, joined, rectangle
+from tests.blocks.support import EVERY_KIND, ROCK, joined, rectangle
 
 MU, PRESSURE, SPEED = 0.5, 1e6, 2.0
 UPPER = {"conductivity": 2.5, "capacity": 1000.0}
@@ -64,7 +64,7 @@ def stored(sim: Blocks) -> tuple[float, float]:
     return float(each[upper].sum()), float(each[~upper].sum())
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+@EVERY_KIND
 def test_the_work_of_friction_becomes_heat(kind: str) -> None:
     """mu p L v t, in the ratio of the effusivities, 1 to 2; what contact takes of the energy is that and what its
     springs store."""

@@ -121,6 +121,7 @@ def twisted(mesh: Mesh, per_metre: float) -> Blocks:
     return sim
 
 
+@pytest.mark.slow
 def test_torsion_of_a_square_bar() -> None:
     """Side 0.1 m: 3.5567e-3 of a metre under 1 kN m, and 4.8039 MPa in the middle of a side (Saint-Venant)."""
     n = 14

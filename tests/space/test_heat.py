@@ -519,6 +519,7 @@ def test_properties_by_temperature(shape: Any, name: str, at: tuple[float, float
     assert np.abs(found - run(at[1])).max() > 1e-6
 
 
+@pytest.mark.some_of_each
 @BOTH
 @pytest.mark.parametrize("law", ["elastic", "creeping", "soft"])
 def test_a_restart_knows_heat_and_its_stress(law: str, of: Any, tmp_path) -> None:

@@ -100,7 +100,9 @@ def test_overlaps_are_seen() -> None:
     assert closest(made.body, made.reach, x, made.y, made.angle) < 0.0
 
 
-@pytest.mark.parametrize("shape", ["circle", "triangle", "quadrilateral"])
+@pytest.mark.parametrize(
+    "shape", ["circle", *(pytest.param(one, marks=pytest.mark.slow) for one in ("triangle", "quadrilateral"))]
+)
 def test_too_dense_raises_the_box(shape: str) -> None:
     """A void ratio that cannot be had: grains still do not overlap, and the room says what was possible (discs of
     random close packing, 0.84 of the area, have 0.19; some 20 grains across a box with hard walls, a little more)."""

@@ -187,7 +187,7 @@ print(kernels.late, len(list(folder.rglob("*.nbc"))), sum(one.is_end for _, one 
 @pytest.mark.parametrize(
     "kinds",
     [
-        ("shared",),
+        pytest.param(("shared",), marks=pytest.mark.slow),
         pytest.param(("shared", ""), marks=pytest.mark.slow),
         pytest.param(("shared", "blocks"), marks=pytest.mark.slow),
         pytest.param(("shared", "", *OF_PARTICLES), marks=pytest.mark.slow),
@@ -291,7 +291,7 @@ def compiled(apart):
 """
 
 
-@pytest.mark.parametrize("apart", [True, False])
+@pytest.mark.parametrize("apart", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_kernels_of_two_processes_are_told_apart(tmp_path, apart):
     """Without names of their own they are not: then this precaution is no longer needed."""
     (tmp_path / "factory.py").write_text(FACTORY)
@@ -355,7 +355,7 @@ def compiled(process: subprocess.Popen[str]) -> int:
     return int(out.rsplit(maxsplit=1)[-1])
 
 
-@pytest.mark.parametrize("after", [0, 1, 4])
+@pytest.mark.parametrize("after", [pytest.param(0, marks=pytest.mark.slow), 1, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_process_that_is_killed_leaves_what_it_has_compiled(many, tmp_path, after):
     first, waiting = many(), None
     while len(files(tmp_path / "cache")) < after:
