@@ -16,17 +16,15 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core import units
-from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.io.agreed import atomic_path
+from hpcdem.core.errors import UsageError
 from hpcdem.io.axes import CM, View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.numerics.clusters import spots
 from hpcdem.post import bolts, fluid, liners
-from hpcdem.post.saved import SAVED, save
+from hpcdem.post.saved import write
 
 CRACKS, STRESS, PLASTIC, TEMPERATURE = "cracks", "stress", "plastic", "temperature"
 PANELS = (CRACKS, STRESS, PLASTIC, TEMPERATURE, *fluid.PICTURES)
-FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
 FREE, YIELDED, BROKEN = 0.0, 2.0, 3.0
 """States of joints, as frames have them; free: cracks that were there from the beginning."""
 TENSION, MIXED, SHEAR = "#c81e1e", "#d98c00", "#1e3cb4"
@@ -170,21 +168,8 @@ def panels_of(state: MeshState) -> tuple[str, ...]:
 
 
 def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: View | None = None) -> Path:
-    """Write the picture of a frame: JPG, PNG, PDF or SVG by the suffix of `path`. Serial. Raises HpcdemError."""
-    path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise HpcdemError(f"cannot draw {path}: pictures end in {', '.join(FORMATS)}")
-    try:
-        import matplotlib
-    except ImportError:
-        raise HpcdemError(f"cannot draw {path}: matplotlib is not installed") from None
-    kind = path.suffix.lower().removeprefix(".")
-    kind = "jpg" if kind == "jpeg" else kind
-    with matplotlib.rc_context(SAVED):
-        figure = draw(state, looks, seen)
-        with atomic_path(path) as temporary:
-            save(figure, temporary, kind, looks.dpi, path)
-    return path
+    """Write the picture of a frame, see `saved.write`."""
+    return write(lambda: draw(state, looks, seen), path, looks.dpi)
 
 
 def plot_file(source: Path, path: Path, looks: Looks, seen: View | None = None) -> None:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core import units
-from hpcdem.core.errors import HpcdemError
 from hpcdem.io.vtkhdf_mesh import MeshState
 from hpcdem.post.saved import save
 
@@ -35,10 +34,8 @@ def draw(
 ) -> None:
     """Draw (label, "line" or "points", points) into a file of this kind: png, pdf or svg. model: blocks that are drawn
     beside the diagram, as one of hpcdem.post.blocks.PANELS."""
-    try:
-        import matplotlib
-    except ImportError:
-        raise HpcdemError("a figure needs the package matplotlib, which is not installed") from None
+    import matplotlib
+
     matplotlib.use("Agg")
     from matplotlib.figure import Figure
 

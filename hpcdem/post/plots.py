@@ -11,14 +11,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.errors import UsageError
 from hpcdem.core.units import stamped
-from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, Ticks, View, particle_extent, view
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import read_frame
 from hpcdem.post.layers import USUAL, Look, coloured
-from hpcdem.post.saved import FORMATS, save
+from hpcdem.post.saved import write
 
 PAGE_WIDTH = 17.0
 """Width of a figure [cm]: that of a printed page."""
@@ -180,19 +179,7 @@ def plot_frame(
     what: words of `layers.LAYERS`; dpi: dots per inch of JPG, PNG and TIFF; the figure is 17 cm wide unless
     `style` says otherwise. Serial. Raises HpcdemError.
     """
-    path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise HpcdemError(f"cannot draw {path}: pictures end in {', '.join(FORMATS)}")
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise HpcdemError(f"cannot draw {path}: matplotlib is not installed") from None
-    figure = frame_figure(frame, what, style, seen)
-    kind = path.suffix.lower().removeprefix(".")
-    kind = {"jpeg": "jpg", "tif": "tiff"}.get(kind, kind)
-    with atomic_path(path) as temporary:
-        save(figure, temporary, kind, dpi, path)
-    return path
+    return write(lambda: frame_figure(frame, what, style, seen), path, dpi)
 
 
 def plot_file(source: Path, path: Path, style: Style, seen: View | None = None) -> None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import warnings
+from collections.abc import Callable
+from pathlib import Path
 from typing import IO, Any
 
 from hpcdem.core.errors import HpcdemError
+from hpcdem.io.agreed import atomic_path
 from hpcdem.post.lettering import lettered
 
 FORMATS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".svg")
@@ -16,6 +20,22 @@ LONGEST_SIDE = 65535
 """Pixels of a picture along a side: the most a JPEG can have."""
 MOST_PIXELS = 250e6
 """Of them in all: a gigabyte while it is drawn; a sheet A0 at 300 dots per inch has 140 million."""
+
+
+def write(make: Callable[[], Any], path: str | os.PathLike, dpi: float) -> Path:
+    """Write the figure that `make` gives: JPG, PNG, TIFF, PDF or SVG by the suffix of `path`. Serial. HpcdemError."""
+    import matplotlib
+
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in FORMATS:
+        raise HpcdemError(f"cannot draw {path}: pictures end in {', '.join(FORMATS)}")
+    kind = {".jpeg": "jpg", ".tif": "tiff"}.get(kind, kind[1:])
+    with matplotlib.rc_context(SAVED):
+        figure = make()
+        with atomic_path(path) as temporary:
+            save(figure, temporary, kind, dpi, path)
+    return path
 
 
 def save(figure: Any, target: str | IO[bytes], kind: str, dpi: float, picture: object = "the picture") -> None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from hpcdem.core.units import scale
 from hpcdem.io import colours
-from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, View, view
 from hpcdem.post import plots
 from hpcdem.post.layers import Look
@@ -20,7 +19,7 @@ from hpcdem.post.measure.kinds import WEDGE_HEAD, Done, cracking, layer_series, 
 from hpcdem.post.measure.kinds import drawn as last_drawn
 from hpcdem.post.measure.scene import Plan, Stamp
 from hpcdem.post.measure.walls import Curve
-from hpcdem.post.saved import save as save_figure
+from hpcdem.post.saved import write
 
 LEFT, RIGHT, TOP, BOTTOM, GAP = 1.75, 0.45, 0.55, 1.1, 0.45
 """Margins of a page and space between panels with a common x axis [cm]."""
@@ -55,10 +54,7 @@ def page(heights: Sequence[float], gaps: Sequence[float] | None = None, right: f
 
 def save(figure: Any, path: Path, dpi: float = 300.0) -> Path:
     """Write a figure, the same bytes every time; the kind by the suffix."""
-    kind = path.suffix.lower().removeprefix(".")
-    with atomic_path(path) as temporary:
-        save_figure(figure, temporary, "jpg" if kind == "jpeg" else kind, dpi, path)
-    return path
+    return write(lambda: figure, path, dpi)
 
 
 def length_unit(extent: float) -> tuple[float, str]:

@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.errors import UsageError
 from hpcdem.core.looks import COLOURS
-from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, View, number
 from hpcdem.post import blocks
-from hpcdem.post.saved import FORMATS, SAVED, save
+from hpcdem.post.saved import write
 from hpcdem.post.view import space
 from hpcdem.post.view.model import ModelView
 from hpcdem.post.view.moment import DISCS, POLYGONS, Moment, read_moment
@@ -63,21 +62,12 @@ def draw(
 ) -> Path:
     """Draw a view of a frame, in a file or as `read_moment` gave it: PNG, JPG, TIFF, PDF or SVG by the suffix of
     `picture`. seen, only: see `scene`. Serial. Raises HpcdemError."""
-    picture = Path(picture)
-    kind = picture.suffix.lower().removeprefix(".")
-    kind = {"jpeg": "jpg", "tif": "tiff"}.get(kind, kind)
-    if picture.suffix.lower() not in FORMATS:
-        raise HpcdemError(f"cannot draw {picture}: pictures end in {', '.join(FORMATS)}")
-    try:
-        import matplotlib
-    except ImportError:
-        raise HpcdemError(f"cannot draw {picture}: matplotlib is not installed") from None
-    moment = source if isinstance(source, Moment) else read_moment(source)
-    with matplotlib.rc_context(SAVED):
-        figure = figure_of(scene(moment, view, seen, only), paper)
-        with atomic_path(picture) as temporary:
-            save(figure, temporary, kind, paper.dpi, picture)
-    return picture
+
+    def figure() -> Any:
+        moment = source if isinstance(source, Moment) else read_moment(source)
+        return figure_of(scene(moment, view, seen, only), paper)
+
+    return write(figure, picture, paper.dpi)
 
 
 def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
