@@ -38,12 +38,11 @@ def check(sim: State) -> None:
 
 
 class SixNodes:
-    """rows (n, 4): storage rows of their parts; parts (n, 4): of these in the table of triangles; row, corner (n, 6):
-    where the forces of each node go, the first corner at it; c (n, 35), s0 (n, 4): constants and stress without strain
-    [Pa], see kernels.py."""
+    """Of the `Local` that makes it. rows (n, 4): storage rows of their parts; parts (n, 4): of these in the table of
+    triangles; row, corner (n, 6): where the forces of each node go, the first corner at it; c (n, 35), s0 (n, 4):
+    constants and stress without strain [Pa], see kernels.py."""
 
     def __init__(self, local: Any) -> None:
-        """local: the `Local` whose part it is, with its constants and masses."""
         self.local, self.sim = local, local.sim
         sim, mesh, own = self.sim, self.sim.reference, self.sim.owned
         sim.prepare_kernels("six-nodes")
@@ -100,11 +99,12 @@ class SixNodes:
 
     def _fastest(self, mass: np.ndarray, c: np.ndarray) -> np.ndarray:
         """Largest eigenvalue (n,) of M^-1 K in the mesh, with these masses of corners (rows, 4) and constants."""
+        if not c[:, kernels.TWO_MU].any():  # without viscosity
+            return np.zeros(len(c))
         at_nodes = np.zeros(self.row.shape)
         np.add.at(at_nodes, (np.arange(len(at_nodes))[:, None], self._node), mass[self.rows].reshape(-1, 16))
         scale = 1.0 / np.sqrt(np.repeat(at_nodes, 2, axis=1))
-        k = self._stiffness(c, True)
-        return np.asarray(np.linalg.eigvalsh(k * scale[:, :, None] * scale[:, None, :])[:, -1])
+        return np.asarray(np.linalg.eigvalsh(self._stiffness(c, True) * scale[:, :, None] * scale[:, None, :])[:, -1])
 
     def pieces(self) -> Pieces:
         """Their stiffness at the present positions."""
