@@ -69,7 +69,9 @@ def test_bar_in_tension_and_the_section_of_steel_sets() -> None:
     assert liners.values("liner-element", "axial_force") == pytest.approx(8e5, rel=1e-6)
 
 
-@pytest.mark.parametrize("turns", [pytest.param(0.25, marks=pytest.mark.slow), 1.0])
+@pytest.mark.parametrize(
+    "turns", [pytest.param(0.25, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.slow)]
+)
 def test_a_cantilever_rolls_up(turns) -> None:
     """A moment M = E I theta / L at the end makes an arc of the beam, of radius L / theta; stretching is 0. Chords of
     20 elements: theta is exact, the end lies on the polygon of the arc."""

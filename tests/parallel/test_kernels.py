@@ -143,7 +143,7 @@ def test_particles(late, tmp_path: Path, ranks: int) -> None:
 @pytest.mark.parametrize(
     ("ranks", "first"),
     [
-        (1, "particles"),
+        pytest.param(1, "particles", marks=SLOW),
         pytest.param(1, "blocks", marks=SLOW),
         pytest.param(2, "particles", marks=[MPI, SLOW]),
         pytest.param(2, "blocks", marks=MPI),

@@ -64,6 +64,7 @@ def slide(slope: float, friction: float, turn: float, **options: str) -> tuple[n
     return half, way(sim, block)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("slope", "friction", "turn", "expected"), [
         (30.0, 20.0, 0.0, 0.226602),

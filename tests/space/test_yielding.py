@@ -190,7 +190,7 @@ def test_flow_as_the_plain_loop(large: bool, threads: int) -> None:
     sim.x[:] = start
 
 
-@pytest.mark.parametrize("large", [False, True])
+@pytest.mark.parametrize("large", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_flow_of_hexahedra_as_the_plain_loop(large: bool) -> None:
     """Of more than a block of them, some elastic, on several threads: stresses and forces follow."""
     mesh = hexes((4, 3, 3), (1.0, 1.0, 1.0), 0.2)
@@ -364,7 +364,7 @@ def test_before_it_yields_it_is_the_elastic_element(make) -> None:
     assert np.array_equal(*ends)
 
 
-@pytest.mark.parametrize("mesh", ["cube", "hexahedra"])
+@pytest.mark.parametrize("mesh", [pytest.param("cube", marks=pytest.mark.slow), "hexahedra"])
 def test_energy_of_flow(mesh: str) -> None:
     """Work of the walls = what is stored and what flow has lost, of proportional strain in small parts."""
     sim = soil(meshed(mesh), dilation=20.0)

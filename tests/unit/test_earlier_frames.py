@@ -206,6 +206,7 @@ def test_every_program_takes_the_frames_of_the_run_and_says_so(
     assert facts["frames"] == "3, steps 0 to 2000" and said in facts["older_frames"]
 
 
+@pytest.mark.slow
 def test_sections_and_pages_of_the_run_before_are_left_out(folder: Path) -> None:
     """Of `hpcdem -s` and zdemss after the longer run, nothing of which was made again."""
     record = folder / "run.json"

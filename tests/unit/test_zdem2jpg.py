@@ -421,7 +421,7 @@ def test_the_same_bytes_by_two_ranks_and_errors_on_both(three: Path, tmp_path: P
     assert done.returncode == 2 and "broken.txt:1:" in done.stderr
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
 def test_a_broken_frame_is_named_and_the_others_are_drawn(three: Path, workers: str) -> None:
     (three / "all_0000001000.vtkhdf").write_bytes(b"not HDF5")
     with pytest.raises(HpcdemError, match=r"all_0000001000\.vtkhdf"):

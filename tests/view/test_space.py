@@ -225,6 +225,7 @@ WORDS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_each_option_alone_changes_the_picture(tmp_path: Path):
     path = frames.write_body(tmp_path)
     found = []

@@ -54,6 +54,7 @@ def test_coarse_elastic_disc(launch, tmp_path):
                   0.003, 0.03)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_coarse_disc_splits(launch, tmp_path):
     check_split(study(launch, tmp_path, "brazilian", size=0.003, transits=12), 0.003)
 
