@@ -17,7 +17,7 @@ from inspect import Parameter
 from pathlib import Path
 from typing import Any, TypeVar
 
-from hpcdem.api.methods import bound, tokens
+from hpcdem.api.methods import bound, dressed, tokens
 from hpcdem.api.program import carried_out, place, spelt
 from hpcdem.commands import dem
 from hpcdem.core.errors import CommandError, ScriptError
@@ -179,14 +179,7 @@ class Function:
             return getattr(getattr(dem, module), function)(engine, **given)
 
         returned = ast.unparse(self.node.returns) if self.node.returns is not None else "None"
-        call.__name__, call.__qualname__, call.__module__ = name, f"{owner.__qualname__}.{name}", owner.__module__
-        call.__doc__ = self.docstring
-        call.__annotations__ = {one.name: one.annotation for one in parameters} | {"return": returned}
-        first = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
-        signature = inspect.Signature([first, *parameters], return_annotation=returned)
-        call.__signature__ = signature  # type: ignore[attr-defined]
-        call.made_by = self  # type: ignore[attr-defined]
-        return call
+        return dressed(call, owner, name, self, parameters, returned)
 
 
 def _optional(kind: str) -> str:

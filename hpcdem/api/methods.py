@@ -224,8 +224,7 @@ class Row:
             chosen = kind if isinstance(kind, str) else kind(given)
             self_._do(self.command, self.packed(given), given.get("where"), chosen, self.model or None)
 
-        call.made_by = self  # type: ignore[attr-defined]
-        return _dressed(call, owner, name, parameters, self.docstring)
+        return dressed(call, owner, name, self, parameters)
 
     @property
     def docstring(self) -> str:
@@ -265,9 +264,12 @@ class Models:
             model, where = given.pop("name"), given.pop("where", None)
             self_._do(self.command, given, where, getattr(owner, "kind", ""), model)
 
-        call.made_by = self  # type: ignore[attr-defined]
+        return dressed(call, owner, name, self, parameters)
+
+    @property
+    def docstring(self) -> str:
         rows = [("where", WHERE), *((one.keyword.name, ", ".join(_of(one))) for one in self.row.models)]
-        return _dressed(call, owner, name, parameters, _docstring(self.doc, rows))
+        return _docstring(self.doc, rows)
 
 
 def _of(model: Model) -> Iterator[str]:
@@ -353,15 +355,17 @@ def _told(method: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def _dressed(
-    call: Callable[..., None], owner: type, name: str, parameters: list[Parameter], text: str
-) -> Callable[..., None]:
-    """With name, signature and text of a method."""
+def dressed(
+    call: Callable[..., Any], owner: type, name: str, made_by: Any, parameters: list[Parameter], returned: str = "None"
+) -> Callable[..., Any]:
+    """With name, signature and text of a method. made_by: its row, whose docstring it has."""
     own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
     call.__name__, call.__qualname__, call.__module__ = name, f"{owner.__qualname__}.{name}", owner.__module__
-    call.__doc__ = text
-    call.__annotations__ = {one.name: one.annotation for one in parameters} | {"return": "None"}
-    call.__signature__ = inspect.Signature([own, *parameters], return_annotation="None")  # type: ignore[attr-defined]
+    call.__doc__ = made_by.docstring
+    call.__annotations__ = {one.name: one.annotation for one in parameters} | {"return": returned}
+    signature = inspect.Signature([own, *parameters], return_annotation=returned)
+    for attribute, value in (("__signature__", signature), ("made_by", made_by)):
+        setattr(call, attribute, value)
     return call
 
 
