@@ -68,6 +68,7 @@ def test_an_error_stops_all_ranks_before_the_run(launch, tmp_path):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_resume_takes_the_law_of_the_script(launch, tmp_path):
     """The law is compiled before the checkpoint is read; with another text the run stops."""

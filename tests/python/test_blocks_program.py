@@ -930,7 +930,7 @@ open(f"end_{sim.rank}.txt", "w").write(" ".join(float(v).hex() for v in sim.node
 def test_stopped_in_the_middle_and_taken_up(resident: Resident, tmp_path: Path) -> None:
     for name in ("whole", "cut"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "study.py").write_text(STOPPED.replace("STEPS", "150000"))
+        (tmp_path / name / "study.py").write_text(STOPPED.replace("STEPS", "60000"))
     done = resident(1, "study.py", "--no-figure", cwd=tmp_path / "whole")
     assert done.returncode == 0, done.stdout + done.stderr
     cut = resident(1, "study.py", "--no-figure", "--", "stop", cwd=tmp_path / "cut")
