@@ -10,7 +10,8 @@ from scipy.optimize import nnls
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium
-from hpcdem.physics.fdem.kernels import plastic_stiffness, plasticity
+from hpcdem.physics.fdem.elements.tangent import plane_slopes
+from hpcdem.physics.fdem.kernels import plasticity
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import EVERY_KIND, ROCK, model, near, rectangle, shaken
@@ -86,7 +87,7 @@ def test_slopes_of_the_return(rock):
     k, t, a, b = k / 1e6, t / 1e6, (lame + two_mu) / 1e9, lame / 1e9
     rng, slopes, met = np.random.default_rng(2), np.empty((3, 3)), set()
     for low, high in np.sort(rng.normal(size=(600, 2)) * 8.0, axis=1):
-        met.add(plastic_stiffness._plane_slopes(low, high, n, m, k, t, a, b, slopes)[2])
+        met.add(plane_slopes(low, high, n, m, k, t, a, b, slopes)[2])
         for j, (d_low, d_high) in enumerate(((1e-7, 0.0), (0.0, 1e-7))):
             ends = [
                 plasticity.plane_stress_return(low + s * d_low, high + s * d_high, n, m, k, min(t, k / n), a, b)[:2]

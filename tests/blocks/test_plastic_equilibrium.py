@@ -12,7 +12,7 @@ import pytest
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium, saved_state
-from hpcdem.physics.fdem.kernels.plastic_stiffness import principal_slopes
+from hpcdem.physics.fdem.elements.tangent import principal_slopes
 from hpcdem.physics.fdem.kernels.plasticity import SHEAR_NOW, principal_return
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
@@ -66,37 +66,6 @@ def test_slopes_of_the_return():
         if np.diff(s).min() > 1e-5:
             assert slopes == pytest.approx(by, abs=1e-6)
     assert len(met) >= 8
-
-
-@pytest.mark.some_of_each
-@EVERY_KIND
-@pytest.mark.parametrize("large, within", [(False, 2e-5), (True, 2e-2)])
-@pytest.mark.parametrize("plate", [False, True], ids=["plane strain", "plane stress"])
-def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within, plate):
-    """By central differences along random ways where most elements flow, in shear and in tension, from an unequal
-    initial stress; with large strains terms of the order of the strain (some 1e-3) are left out."""
-    rng = np.random.default_rng(3)
-    sim = soil(kind, tensile=0.5e6)
-    sim.option(large_strain=large, plane_stress=plate)
-    sim.initial_stress(None, xx=-1e6, yy=-7e6, xy=1e6, zz=0.0 if plate else -3e6)
-    sim.close_model()
-    nodes = equilibrium.all_nodes(sim)
-    x = nodes.x + rng.uniform(-4e-4, 4e-4, nodes.x.shape)
-    unknowns = equilibrium.unknowns_of(sim, nodes, 1)
-    equilibrium.place_corners(sim, x)
-    pieces, _ = equilibrium.tangent(sim)
-    elastic, _ = equilibrium.tangent(sim, flows=False)
-    changed = [np.abs(a.stiffness - b.stiffness).max(axis=(1, 2)) > 0.0 for a, b in zip(pieces[:2], elastic)]
-    assert np.concatenate(changed).mean() > 0.5
-    ways = rng.uniform(-1.0, 1.0, (*nodes.x.shape, 3))
-    product = np.zeros((*nodes.x.shape, 3))
-    for one in pieces:
-        local = ways[one.node].reshape(*one.stiffness.shape[:2], 3)
-        np.add.at(product, one.node, (one.stiffness @ local).reshape(*one.node.shape, 2, 3))
-    for k in range(3):
-        ends = [equilibrium.unbalanced(sim, nodes, unknowns, x + h * ways[:, :, k])[0] for h in (1e-9, -1e-9)]
-        slope = (ends[1] - ends[0]) / 2e-9
-        assert np.abs(product[:, :, k] - slope).max() < within * np.abs(slope).max()
 
 
 # ---- closed forms --------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """The static solve: equilibrium of blocks at once, by Newton's method with the tangent of the forces.
 
 The unbalanced forces are those of the kernels that step, so the answer is a state of the explicit code at rest; only
-the tangent is of its own (physics/fdem/kernels/stiffness.py, plastic_stiffness.py; in space tangent_space.py).
+the tangent is of its own (physics/fdem/elements/tangent.py, kernels/joint_tangents.py).
 Positions of all nodes are known to every rank meanwhile. Below dim is 2, in space 3; forces are in N/m, in space in N.
 
 What elements that yield remember is that of the last balance while Newton's method looks for the next one, whatever it
@@ -16,6 +16,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,15 +28,17 @@ from hpcdem.physics.fdem import (
     connectivity,
     diagnostics,
     floors,
-    tangent_space,
     user_functions,
     user_laws,
 )
 from hpcdem.physics.fdem.by_temperature import TEMPERATURE
+from hpcdem.physics.fdem.elements import tangent as tangent_kernels
+from hpcdem.physics.fdem.elements.block import ElementBlock
 from hpcdem.physics.fdem.histories import Histories
+from hpcdem.physics.fdem.kernels import joint_tangents, space
 from hpcdem.physics.fdem.kernels import nodes as moving
-from hpcdem.physics.fdem.kernels import plastic_stiffness, space, stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
+from hpcdem.physics.fdem.kernels.plasticity import STRENGTH
 from hpcdem.physics.fdem.linear import (
     MANY,
     MANY_IN_SPACE,
@@ -47,6 +50,7 @@ from hpcdem.physics.fdem.linear import (
     rigid_movements,
 )
 from hpcdem.physics.fdem.local import Evaluation
+from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.simulation import Blocks
 
 AIM = 1e-12
@@ -77,6 +81,12 @@ BEFORE, AFTER = "temperature before", "temperature after"
 """Columns of elements during a solve: temperatures of the last balance, and those of this one."""
 PASSES = 100
 """Most balances at one load, each after the flow of the one before."""
+TANGENT = {2: "tangent", 3: "tangent-space"}
+JOINTS: dict[int, tuple[Any, Any]] = {
+    2: (joint_tangents.intact_edges, joint_tangents.yielded_edges),
+    3: (joint_tangents.intact_triangles, joint_tangents.yielded_triangles),
+}
+"""Kernels of their stiffness, before their peak and behind it."""
 SOLVERS = ("auto", "direct", "petsc")
 
 
@@ -827,54 +837,66 @@ def tangent(
 def of_joints(sim: Blocks, softening: bool = False) -> tuple[list[Pieces], int]:
     """Stiffness of the owned joints at the present positions, and how many are behind their peak; with softening, those
     that pass it now."""
-    slots = _lower_slots(sim)
-    if sim.dim == 3:
-        return tangent_space.of_joints(sim, slots, softening)
-    sim.prepare_kernels("tangent")
-    local, cells = sim.local, sim.the_mesh().cells
-    joints, left = np.empty((len(slots), 8, 8)), np.empty(len(slots))
-    stiffness.intact_joints(
-        slots, local.slot_face, local.slot_at, local.slot_kind, local.slot_state, sim.where, cells, sim.x,
-        local.joint_table, joints, left,
-    )  # fmt: skip
-    behind = left < 0.0
-    slides = local.slot_state[slots] > BROKEN
-    past = int((behind & ~slides & ~(softening & (local.slot_state[slots] >= YIELDED))).sum())
-    behind &= softening | slides
-    if behind.any():
-        soft = np.empty((int(behind.sum()), 8, 8))
-        stiffness.yielded_joints(
-            slots[behind], local.slot_face, local.slot_at, local.slot_kind, local.slot_history, sim.where, cells, sim.x,
-            local.joint_table, local.joint_beyond, soft,
-        )  # fmt: skip
-        joints[behind] = soft
-    face = local.slot_face[slots]
-    ends = []
-    for f in (face, sim.partner[face]):
-        e, k = f // 4, f % 4
-        after = np.where(k + 1 < np.where(cells[e, 3] >= 0, 4, 3), k + 1, 0)
-        ends += [sim.node[e, k], sim.node[e, after]]
-    return [Pieces(face, np.column_stack(ends), joints)], past
+    sim.prepare_kernels(TANGENT[sim.dim])
+    intact, yielded = JOINTS[sim.dim]
+    local, slots = sim.local, _lower_slots(sim)
+    found: list[Pieces] = []
+    past = 0
+    for which, joints in local.joints(slots):
+        (at, face, *of), size = joints, 2 * sim.dim * sim.dim
+        made, left, laws = np.empty((len(at), size, size)), np.empty(len(at)), (local.joint_table, local.joint_beyond)
+        intact(at, face, *of, *laws, made, left)
+        behind, state = left < 0.0, joints.state[at]
+        slides = state > BROKEN
+        past += int((behind & ~slides & ~(softening & (state >= YIELDED))).sum())
+        behind &= softening | slides
+        if behind.any():
+            soft = np.empty((int(behind.sum()), size, size))
+            yielded(at[behind], face, *of, *laws, soft)
+            made[behind] = soft
+        ends, way = local.joint_ends(slots[which], of_sides=len(found) > 0)
+        if way is not None:
+            made = np.einsum("nai,nab,nbj->nij", way, made, way, optimize=True)
+        found.append(Pieces(local.slot_face[slots[which]], sim.node.reshape(-1)[ends], made))
+    return found, past
 
 
 def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
-    """Stiffness of the owned triangles and quads at the present positions. flows: less what flow takes from it."""
-    if sim.dim == 3:
-        return tangent_space.of_elements(sim, flows)
-    sim.prepare_kernels("tangent")
-    local, small, number = sim.local, not sim.options.large_strain, sim.number
-    rows, quad_rows = local.triangle_rows[: local.count], local.quad_rows
-    triangles, quads = np.empty((len(rows), 6, 6)), np.empty((len(quad_rows), 8, 8))
-    (c, s0), (q, quad_s0) = local.linear()
-    stiffness.triangles(rows, sim.x, c, s0, small, triangles)
-    stiffness.quads(quad_rows, sim.x, q, quad_s0, small, quads)
-    if local.yields and flows:
+    """Stiffness of the owned elements at the present positions. flows: less what flow takes from it."""
+    sim.prepare_kernels(TANGENT[sim.dim])
+    if sim.local.yields:
         sim.prepare_kernels("plastic-tangent")
-        table = local.yield_table
-        plastic_stiffness.triangles(rows, sim.x, local.c, local.s0, local.law, table, small, triangles)
-        plastic_stiffness.quads(quad_rows, sim.x, local.q, local.quad_s0, local.quad_law, table, small, quads)
-    of_triangles, of_quads = number[rows], number[local.quad_rows]
-    return [
-        Pieces(of_triangles, sim.node[of_triangles, :3], triangles), Pieces(of_quads, sim.node[of_quads], quads),
-        *([] if local.whole is None else [local.whole.pieces()]),
-    ]  # fmt: skip
+    local, small = sim.local, not sim.options.large_strain
+    found: list[Pieces] = []
+    for of, (c, s0) in zip(local.solids, local.linear()):
+        kind, who, (row, at) = of.kind, of.alone, np.divmod(of.places()[of.alone], sim.x.shape[1])
+        made = np.empty((len(who), kind.dim * kind.corners, kind.dim * kind.corners))
+        tangent_kernels.elastic(of.tables._replace(c=c), who, of.of_parts(s0, c), small, made)
+        if local.yields and flows:
+            _soften(sim, of, made)
+        found.append(Pieces(sim.number[of.rows[who]], sim.node[sim.number[row], at // sim.stride], made))
+    return found if local.whole is None else [*found, local.whole.pieces()]
+
+
+def _soften(sim: Blocks, of: ElementBlock, out: np.ndarray) -> None:
+    """Take from the stiffness out (n, m, m) of elements what their flow, from the stress before it, takes from it."""
+    table, small, count = sim.local.yield_table, not sim.options.large_strain, len(of.kind.parts)
+    can = np.flatnonzero(np.isfinite(table[of.law[of.alone], STRENGTH]).any(axis=1))
+    if not len(can):
+        return
+    who, part = of.alone[can], out[can]
+    stress, turn = np.empty((len(who), count, 3, 3)), np.empty((len(who), count, 3, 3))
+    tangent_kernels.trials(of.tables, who, of.s0, small, stress, turn)
+    values, axes = principal(stress.reshape(-1, 3, 3))
+    if sim.options.plane_stress:  # the stress across the plane stands between the other two
+        across = np.argmax(np.abs(axes[:, 2]), axis=1)
+        order = np.array([[1, 0, 2], [0, 1, 2], [0, 2, 1]])[across]
+        values, axes = np.take_along_axis(values, order, axis=1), np.take_along_axis(axes, order[:, None], axis=2)
+    axes = _product(turn.reshape(-1, 3, 3), axes).reshape(turn.shape)
+    tangent_kernels.soften(of.tables, who, values.reshape(-1, count, 3), axes, of.law, table, small, part)
+    out[can] = part
+
+
+def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products (n, 3, 3) of matrices, with the same bits wherever they stand."""
+    return a[:, :, 0, None] * b[:, 0, None] + (a[:, :, 1, None] * b[:, 1, None] + a[:, :, 2, None] * b[:, 2, None])

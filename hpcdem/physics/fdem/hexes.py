@@ -122,7 +122,7 @@ class Hexes:
         return stress, energy
 
     def histories(self, memory: np.ndarray) -> np.ndarray:
-        """What each of their tetrahedra remembers (count, 10, n) in rows of owned elements, see plastic_hexes.py."""
+        """What each of their tetrahedra remembers (count, 10, n) in rows of owned elements, see elements/kind.py."""
         rows = memory[self.begin[:, None] + np.arange(PARTS)]
         return rows.reshape(self.count, hexes.IN_ROW * PARTS, memory.shape[1] // hexes.IN_ROW)[:, : hexes.PARTS]
 
@@ -163,13 +163,6 @@ class Hexes:
             whole = self.sim.areas[self.number[which, None] + np.arange(PARTS)].sum(axis=1)
             energy[here] = stored[back] * volume / whole[back]
 
-    def stiffness(self, h: np.ndarray, s0: np.ndarray) -> np.ndarray:
-        """K (count, 24, 24) [N/m] with these constants and this stress without strain."""
-        found = np.empty((self.count, 24, 24))
-        small = not self.sim.options.large_strain
-        hexes.stiffness(self.count, self.place, self.sim.x, self.parts, h, self.remember, s0, small, found)
-        return found
-
     def at_corners(self, of_rows: np.ndarray) -> np.ndarray:
         """(count, 8) sums at the corners of what owned elements (n_own, 4) have."""
         out = np.zeros((self.count, 8))
@@ -185,17 +178,9 @@ class Hexes:
             self.at_corners(dashpots), o.mass_damping, o.stiffness_damping, self.sim.safety(), target, mass,
         )  # fmt: skip
 
-    def static_masses(self, h: np.ndarray, springs: np.ndarray, alpha: float, mass: np.ndarray) -> None:
-        """Fictitious masses by the largest row of the stiffness in the mesh, with these constants, see
+    def static_masses(self, k: np.ndarray, springs: np.ndarray, alpha: float, mass: np.ndarray) -> None:
+        """Fictitious masses by the largest row of the stiffness k (count, 24, 24) [N/m] in the mesh, see
         `space.static_masses`."""
-        x = np.zeros_like(self.sim.x)
-        flat = x.reshape(-1)
-        for axis in range(3):
-            flat[self.place[: self.count] + axis] = self.sim.reference.points[self.nodes, axis]
-        k = np.empty((self.count, 24, 24))
-        h = h.copy()
-        h[:, :6] = 0.0
-        hexes.stiffness(self.count, self.place, x, self.parts, h, False, np.zeros((0, 10, 8)), True, k)
         rows = np.abs(k).sum(axis=2).reshape(self.count, 8, 3).max(axis=2)
         place = self.place[: self.count]
         mass[self.rows.reshape(-1)] = 0.0

@@ -1,9 +1,9 @@
-"""Tetrahedra and hexahedra that yield or obey a law of the user: what `Local` does for the elements of the plane, by
-plastic_tets.py and plastic_hexes.py."""
+"""Tetrahedra and hexahedra that yield, creep or obey a law of the user: what `Local` does for the elements of the
+plane."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +16,6 @@ from hpcdem.physics.fdem.hexahedra import PARTS
 from hpcdem.physics.fdem.hexes import Hexes
 from hpcdem.physics.fdem.kernels import (
     hexes,
-    plastic_hexes,
-    plastic_tets,
-    plasticity,
     space,
     tets,
 )
@@ -65,29 +62,26 @@ class LawsSpace(Local):
             ElementBlock(sim, TETRAHEDRON, self.rows, self.c, self.s0, every, np.ones(every.shape)),
             ElementBlock(sim, HEXAHEDRON, *self._of_hexes()),
         ]
+        alone = np.ones(count, bool)
+        if of_hexes is not None:
+            alone[of_hexes.rows - sim.n_left] = False
+        self.solids[0].alone = np.flatnonzero(alone)
         self._make_laws()
         if not (self.plastic or self.creeps):
             self._begin_warm()
             return
-        number, alone = sim.number[self.rows[:count]], np.ones(count, bool)
+        number = sim.number[self.rows[:count]]
         self.law = np.zeros(count + 3, np.int32)
         self.law[:count] = sim.element_row[number]
-        yields, apart = sim.yielding()[number], np.empty(0, np.int32)
+        apart = np.empty(0, np.int32)
         self.quad_law = np.zeros((many, hexes.PARTS), np.int32)
         if of_hexes is not None:
             apart = of_hexes.rows[:, 0]
-            parts = (apart - sim.n_left)[:, None] + np.arange(PARTS)
-            self.law[parts] = 0
+            self.law[of_hexes.rows - sim.n_left] = 0
             self.quad_law[: len(apart)] = of_hexes.model[:, None]
-            self.hexes_yield = yields[parts[:, 0]]
-            yields[parts] = False
-            alone[parts] = False
         self._make_creep()
         self.solids[0].creeping = np.flatnonzero(alone & sim.creeping()[number])
         if self.plastic:
-            yielding = np.flatnonzero(yields)
-            self.yielding, fill = len(yielding), np.repeat(yielding[-1:], 3)
-            self.who_yields = np.concatenate([yielding, fill]).astype(np.int32)
             self._make_strength(self.rows[:count], apart)
         self._begin_warm()
 
@@ -178,20 +172,6 @@ class LawsSpace(Local):
         self._relieve()
         return heat is not None
 
-    def _relieve_flowed(self, of: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
-        memory, (base, s0), (quad_base, quad_s0) = self.sim.cold["plastic"], *of
-        plastic_tets.relieve_all(self.rows[: self.count], self.sim.n_left, self.c, base[:, 0], memory, s0[:, 0])
-        if self.hexes is not None:
-            plastic_hexes.relieve_all(self.hexes.count, self.hexes.begin, self.hexes.h, quad_base, memory, quad_s0)
-
-    def _renew_strength(self) -> None:
-        if len(self.strength.history):
-            rows = self.rows[: self.count]
-            plastic_tets.renew_all(rows, self.sim.n_left, self.law, self.strength, self.yield_table)
-            if self.hexes is not None:
-                own = self.hexes
-                plastic_hexes.renew_all(own.count, own.begin, self.quad_law, self.strength, self.yield_table)
-
     def obey(self) -> None:
         """Elements flow and creep, as those of this step do before its forces."""
         sim = self.sim
@@ -235,51 +215,3 @@ class LawsSpace(Local):
             mean = (own.shares()[:, :, None] * own.histories(memory[:, 1:])).sum(axis=1)
             found[own.rows - sim.n_left, 1:] = mean[:, None]
         return found
-
-    def flow(self, state: tuple[np.ndarray, ...], step: int) -> None:
-        memory, s0, quad_s0, table, history = state
-        sim, small, own = self.sim, not self.sim.options.large_strain, self.hexes
-        kernel: Any = plastic_tets.flows if sim.threads == 1 else plastic_tets.flows_threaded
-        kernel(
-            sim.threads, self.yielding, self.who_yields, self.rows, sim.n_left, sim.x, self.c, self.initial, self.law,
-            self.strength._replace(history=history), small, step, memory, s0, table,
-        )  # fmt: skip
-        if own is not None:
-            kernel = plastic_hexes.flows if sim.threads == 1 else plastic_hexes.flows_threaded
-            kernel(
-                sim.threads, own.count, own.begin, own.place, sim.x, own.parts, own.h, self.quad_initial, self.quad_law,
-                self.hexes_yield, self.strength._replace(history=history), small, step, memory, quad_s0, table,
-            )  # fmt: skip
-
-    def _surfaces(self) -> np.ndarray:
-        """As in the plane; of parts of a hexahedron that of its first tetrahedron."""
-        of = self.law[: self.count].astype(np.int64)
-        if (own := self.hexes) is not None:
-            of[own.rows - self.sim.n_left] = self.quad_law[: own.count, :1]
-        return of
-
-    def plastic_columns(self, at: slice | np.ndarray) -> np.ndarray:
-        """As in the plane; parts of a hexahedron have the mean of its tetrahedra, and of their work the part of their
-        volume."""
-        memory = self.flowed()[0]
-        found = memory[:, : plasticity.MEMORY].copy()
-        if (own := self.hexes) is not None:
-            parts = own.histories(memory)[:, :, : plasticity.MEMORY]
-            share = own.shares()[:, :, None]
-            mean = (share * parts).sum(axis=1)
-            latest = [plasticity.IN_SHEAR, plasticity.IN_TENSION]
-            mean[:, latest] = parts[:, :, latest].max(axis=1)
-            work = parts[:, :, plasticity.WORK].sum(axis=1)
-            found[own.rows - self.sim.n_left] = mean[:, None]
-            found[own.rows - self.sim.n_left, plasticity.WORK] = work[:, None] * own.part_of_volume()
-        return found[at]
-
-    def _add_locked_in(self, initial: Sequence[np.ndarray], plastic: np.ndarray, more: np.ndarray) -> None:
-        (base, of_hexes), rows = initial, self.rows[: self.count]
-        found = np.zeros(self.sim.n_own)
-        plastic_tets.locked_in(rows, self.sim.n_left, self.c, base[:, 0], plastic, found)
-        if (own := self.hexes) is not None:
-            energy = np.zeros(own.count)
-            plastic_hexes.locked_in(np.arange(own.count), own.begin, own.parts, own.h, of_hexes, plastic, energy)
-            self.solids[1].share_out(energy, found)
-        more += found

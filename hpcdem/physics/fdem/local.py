@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,9 @@ from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, by_temperature, connectivity, user_laws
 from hpcdem.physics.fdem.conditions import TRACTIONS
+from hpcdem.physics.fdem.elements import flow as plastic_flow
 from hpcdem.physics.fdem.elements.block import ElementBlock
-from hpcdem.physics.fdem.elements.kind import QUAD, TRIANGLE
+from hpcdem.physics.fdem.elements.kind import QUAD, TETRAHEDRON, TRIANGLE
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
 from hpcdem.physics.fdem.kernels import (
     creep,
@@ -148,6 +149,21 @@ class Evaluation:
     """Velocities after this moment's kick (n, w) [m/s]."""
 
 
+class Edges(NamedTuple):
+    """What the kernels ask of joints (n,): slot, and by slots face and where the other side begins, corners of the
+    elements, row of the law, state, history; storage rows by element, and positions."""
+
+    slots: np.ndarray
+    face: np.ndarray
+    at: np.ndarray
+    cells: np.ndarray
+    kind: np.ndarray
+    state: np.ndarray
+    history: np.ndarray
+    where: np.ndarray
+    x: np.ndarray
+
+
 @dataclass(frozen=True)
 class LawHere:
     """A law of the user on this rank: its table of properties, which blocks of triangles have an element with it, how
@@ -248,9 +264,7 @@ class Local:
         if self.plastic or self.creeps:
             self.law = np.zeros(count + 3, np.int32)
             self.law[:count] = sim.element_row[sim.number[rows]]
-        if self.plastic:
-            self.quad_law = np.repeat(quad_law[:, None], 4, axis=1)
-            self._make_strength(rows, self.quad_rows)
+        self.quad_law = np.repeat(quad_law[:, None], 4, axis=1)
         quads = len(self.quad_rows)
         self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((quads, 16))
         self.solids: list[ElementBlock] = []
@@ -260,6 +274,8 @@ class Local:
             stored = of[:n, None].astype(np.int64) - sim.n_left
             self.solids.append(ElementBlock(sim, kind, of, c, s0, stored, np.ones(stored.shape)))
         self._make_creep()
+        if self.plastic:
+            self._make_strength(rows, self.quad_rows)
         self._of_initial = np.zeros((count, 4)), np.zeros((quads, 4))
         if sim.stress0 is not None:
             self._of_initial = sim.initial_stresses(sim.number[rows]), sim.initial_stresses(sim.number[self.quad_rows])
@@ -389,13 +405,10 @@ class Local:
                 creep.relieve_all(who, one.tables, base, self.sim.cold["creep"] if memory is None else memory, s0)
 
     def _relieve_flowed(self, of: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
-        """Stress without strain of all triangles, of all quads: that of their plastic strain less than base, both
-        (n, parts, 4) [Pa]."""
-        sim, memory, rows = self.sim, self.sim.cold["plastic"], self.triangle_rows[: self.count]
-        (base, s0), (quad_base, quad_s0) = (map(_by_rows, both) for both in of)
-        plasticity.relieve_all(rows, sim.n_left, self.c[: self.count], base, memory, s0)
-        if len(self.quad_rows):
-            plastic_quads.relieve_all(self.quad_rows, sim.n_left, self.q, quad_base, memory, quad_s0)
+        """Stress without strain of `solids`: that of their plastic strain less than base, both (n, parts, k) [Pa]."""
+        for one, (base, s0) in zip(self.solids, of):
+            if one.count:
+                plastic_flow.relieve_all(one.tables, one.count, base, self.sim.cold["plastic"], s0)
 
     def _make_strength(self, rows: np.ndarray, quad_rows: np.ndarray) -> None:
         """The table of yield surfaces; triangles whose strength follows tables have a row of their own. rows: storage
@@ -415,14 +428,19 @@ class Local:
         self.strength = strength_tables(sim.element_rows, np.concatenate(of), sim.followed, history)
         self.yield_table = np.concatenate([of_models, np.zeros((first - len(of_models), plasticity.YIELD))])
         self.strength_element = np.concatenate(element)
+        self.solids[0].law, self.solids[1].law = self.law[:, None], self.quad_law
         self._renew_strength()
+        for one in self.solids:
+            can = np.isfinite(self.yield_table[one.law[one.alone], plasticity.STRENGTH]).any(axis=1)
+            # Only tetrahedra are gathered from anywhere, the others in the order of storage.
+            who = one.alone[can] if one.kind is TETRAHEDRON else one.alone[: one.count * bool(can.any())]
+            one.flowing = np.concatenate([who, np.repeat(who[-1:], 3)])
 
     def _renew_strength(self) -> None:
-        """The yield surfaces of triangles that have one of their own."""
-        sim, law, rows = self.sim, self.law[: self.count, None], self.triangle_rows[: self.count]
+        """The yield surfaces of parts of elements that have one of their own."""
         if len(self.strength.history):
-            strength.renew_all(rows, sim.n_left, 1, law, self.strength, self.yield_table)
-            strength.renew_all(self.quad_rows, sim.n_left, 4, self.quad_law, self.strength, self.yield_table)
+            for of in self.solids:
+                plastic_flow.renew_all(of.tables, of.count, of.law, self.strength, self.yield_table)
 
     def _make_laws(self) -> None:
         """Elements with a law of the user have no moduli in the tables of forces, see kernels/user_laws.py; stiff,
@@ -875,7 +893,7 @@ class Local:
         sim, o = self.sim, self.sim.options
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
         if self.yields:
-            self._flow_triangles(self.plastic_state(), step)
+            self.flow(self.plastic_state(), step, quads=False)
         if self._creeps_now():
             self.creep(sim.cold["creep"], [of.s0 for of in self.solids], keep=o.dynamic)
         if self.laws:
@@ -928,29 +946,19 @@ class Local:
         (count + 3, 4) and of quads (quads, 16) [Pa], yield surfaces (rows, 4), strains that strength follows."""
         return self.sim.cold["plastic"], self.s0, self.quad_s0, self.yield_table, self.strength.history
 
-    def flow(self, state: tuple[np.ndarray, ...], step: int) -> None:
+    def flow(self, state: tuple[np.ndarray, ...], step: int, quads: bool = True) -> None:
         """Elements outside their yield surface at the present positions flow: the arrays of `plastic_state`, or copies
-        of them, become those after it. step: in which they do."""
-        self._flow_triangles(state, step)
-        memory, _, s0, table, history = state
-        sim = self.sim
-        if len(self.quad_rows):
-            kernel = plastic_quads.flows if sim.threads == 1 else plastic_quads.flows_threaded
-            kernel(
-                sim.threads, len(self.quad_rows), self.quad_rows, sim.n_left, sim.x, self.q, self.quad_initial,
-                self.quad_law, self.strength._replace(history=history), not sim.options.large_strain, step, memory, s0,
-                table,
-            )  # fmt: skip
-
-    def _flow_triangles(self, state: tuple[np.ndarray, ...], step: int) -> None:
-        """The triangles among them. (In a step quads flow in the loop over their forces.)"""
-        memory, s0, _, table, history = state
-        sim = self.sim
-        kernel = plasticity.flows if sim.threads == 1 else plasticity.flows_threaded
-        kernel(
-            sim.threads, self.count, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c, self.initial, self.law,
-            self.strength._replace(history=history), not sim.options.large_strain, step, memory, s0, table,
-        )  # fmt: skip
+        of them, become those after it. step: in which they do; quads: these too, which within a step flow in the loop
+        over their forces."""
+        memory, *after, table, history = state
+        sim, soft = self.sim, self.strength._replace(history=history)
+        kernel = plastic_flow.flows if sim.threads == 1 else plastic_flow.flows_threaded
+        for of, s0 in zip(self.solids if quads else self.solids[:1], after):
+            if len(of.flowing):
+                kernel(
+                    sim.threads, of.tables, len(of.flowing) - 3, of.flowing, of.initial, of.law, soft,
+                    not sim.options.large_strain, step, memory, s0.reshape(of.s0.shape), table,
+                )  # fmt: skip
 
     def _obey(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, every: bool) -> None:
         """Laws of the user at the present positions: memory, see `user_laws.begin`, becomes that after it, s0
@@ -1034,7 +1042,7 @@ class Local:
         return found
 
     def linear(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Constants and stress without strain [Pa], a row each, of the elastic elements that those of `solids` are at
+        """Constants and stress without strain (n, parts, k) [Pa] of the elastic elements that those of `solids` are at
         this moment: those that creep within this creep step, others after the flow of this moment. Not to be
         changed."""
         sim = self.sim
@@ -1050,7 +1058,18 @@ class Local:
                 (c, s0), flowed = found[k], flowed.reshape(of.s0.shape)
                 flowed[of.creeping] = s0[of.creeping]
                 found[k] = c, flowed
-        return [(c, s0.reshape(old.shape)) for (c, s0), old in zip(found, (self.s0, self.quad_s0))]
+        return found
+
+    def joints(self, slots: np.ndarray) -> list[tuple[np.ndarray, Any]]:
+        """Joints (n,) by their shape: which of them, and what they are."""
+        of = self.slot_face, self.slot_at, self.sim.the_mesh().cells, self.slot_kind, self.slot_state
+        return [(np.arange(len(slots)), Edges(slots, *of, self.slot_history, self.sim.where, self.sim.x))]
+
+    def joint_ends(self, slots: np.ndarray, of_sides: bool) -> tuple[np.ndarray, np.ndarray | None]:
+        """Corners (n, k), element * 4 + k, that the stiffness of these joints is of, and how their movements become
+        those that its kernel knows, if they are not the same. of_sides: they are the second of `joints`."""
+        face, corners = self.slot_face[slots], self.sim.the_mesh().face_corners
+        return np.column_stack([corners(faces) for faces in (face, self.sim.partner[face])]), None
 
     def creep_strains(self) -> np.ndarray:
         """Creep strain and strain of the Kelvin unit, xx, yy, xy, in space zz, xz, yz besides, each (n_own, 6 or 12),
@@ -1096,24 +1115,24 @@ class Local:
         return np.maximum(shear, high - surface[:, plasticity.TENSILE]), stress
 
     def _surfaces(self) -> np.ndarray:
-        """(n_own,) rows of the table of yield surfaces, of quads that of their first triangle."""
-        of, first = np.zeros(self.sim.n_own, np.int64), self.sim.n_left
-        of[self.triangle_rows[: self.count] - first] = self.law[: self.count]
-        of[self.quad_rows - first] = self.quad_law[:, 0]
-        return of
+        """(n_own,) rows of the table of yield surfaces, of elements of several parts that of the first one."""
+        found = np.zeros(self.sim.n_own, np.int64)
+        for of in self.solids:
+            of.spread(of.law[: of.count, 0], found)
+        return found
 
     def plastic_columns(self, at: slice | np.ndarray) -> np.ndarray:
         """Columns `plasticity.MEMORY` (n, 9) of what owned elements remember of yielding, after the flow of this
-        moment: of quads the mean of the strains of their triangles by area, the latest steps, the sum of the work."""
-        memory = self.flowed()[0]
-        found = memory[:, : plasticity.MEMORY].copy()
-        quads = self.quad_rows - self.sim.n_left
-        if len(quads):
-            parts = memory[quads].reshape(len(quads), 4, plasticity.MEMORY)
-            found[quads] = self._mean_of_parts(parts)
-            latest = [plasticity.IN_SHEAR, plasticity.IN_TENSION]
-            found[np.ix_(quads, latest)] = parts[:, :, latest].max(axis=1)
-            found[quads, plasticity.WORK] = parts[:, :, plasticity.WORK].sum(axis=1)
+        moment: means over their parts by volume, the latest steps, the sum of the work."""
+        sim, memory = self.sim, self.flowed()[0]
+        found, latest = np.zeros((sim.n_own, plasticity.MEMORY)), [plasticity.IN_SHEAR, plasticity.IN_TENSION]
+        for of in self.solids:
+            if of.count:
+                parts = of.histories(memory, sim.memory("plastic"))[:, :, : plasticity.MEMORY]
+                mean = of.mean(parts)
+                mean[:, latest] = parts[:, :, latest].max(axis=1)
+                of.spread(mean, found)
+                of.share_out(parts[:, :, plasticity.WORK].sum(axis=1), found[:, plasticity.WORK])
         return found[at]
 
     def move_nodes(self) -> None:
@@ -1325,11 +1344,14 @@ class Local:
         return more
 
     def _add_locked_in(self, initial: Sequence[np.ndarray], plastic: np.ndarray, more: np.ndarray) -> None:
-        """What plastic strain means for it, see `plasticity.locked_in`; initial: stress without it of `solids`."""
-        sim, (base, quad_base) = self.sim, map(_by_rows, initial)
-        plasticity.locked_in(self.triangle_rows[: self.count], sim.n_left, self.c, base, plastic, more)
-        if len(self.quad_rows):
-            plastic_quads.locked_in(self.quad_rows, sim.n_left, self.q, quad_base, plastic, more)
+        """What plastic strain means for it, see elements/flow.py; initial: stress without it of `solids`."""
+        found = np.zeros(self.sim.n_own)
+        for of, base in zip(self.solids, initial):
+            if of.count:
+                energy = np.zeros(of.count)
+                plastic_flow.locked_in(of.tables, np.arange(of.count), base, plastic, energy)
+                of.share_out(energy, found)
+        more += found
 
     def _energy_of_heat(self) -> np.ndarray:
         """Elastic energy (n_own,) [J/m] that thermal stress p means where there is no strain, beside the mean m of the

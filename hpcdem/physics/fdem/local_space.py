@@ -9,6 +9,7 @@ import numpy as np
 from hpcdem.core.memory import sparse_zeros
 from hpcdem.physics.fdem import user_laws
 from hpcdem.physics.fdem.conditions import TRACTIONS
+from hpcdem.physics.fdem.elements import tangent
 from hpcdem.physics.fdem.hexes import Hexes, place_masses
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
 from hpcdem.physics.fdem.joints_hexes import Faces, HexJoints
@@ -276,7 +277,10 @@ class LocalSpace(LawsSpace):
         rows, c = self._tetrahedra()
         space.static_masses(c, rows, self.sim.n_left, springs, ALPHA, mass)
         if self.hexes is not None:
-            self.hexes.static_masses(self.stiff_hexes, springs, ALPHA, mass)
+            of = self.solids[1]
+            k = np.empty((of.count, 24, 24))
+            tangent.elastic(of.tables._replace(c=self.stiff_hexes), of.alone, of.s0[:0], True, k)
+            self.hexes.static_masses(k, springs, ALPHA, mass)
 
     def _set_kicks(self, dt: float) -> None:
         mass = self.mass[self.sim.owned]
@@ -503,13 +507,14 @@ class LocalSpace(LawsSpace):
     def _edges(self, slots: np.ndarray) -> np.ndarray:
         """See `joints_space.faces_now`."""
         out = np.zeros((len(slots), 22))
-        for which, joints in self.triangles(slots):
+        kernel: Any = joints_space.faces_now
+        for which, joints in self.joints(slots):
             found = np.zeros((len(which), 22))
-            joints_space.faces_now(*joints, self.joint_table, self.joint_beyond, found)
+            kernel(*joints, self.joint_table, self.joint_beyond, found)
             out[which] = found
         return out
 
-    def triangles(self, slots: np.ndarray) -> list[tuple[np.ndarray, Faces]]:
+    def joints(self, slots: np.ndarray) -> list[tuple[np.ndarray, Any]]:
         """Joints (n,) as those of triangles: which of them, and what they are; last those on sides of hexahedra."""
         sim, which = self.sim, np.arange(len(slots))
         tables = self.slot_face, self.slot_link, self.slot_size, self.slot_kind, self.slot_state, self.slot_history
@@ -521,6 +526,12 @@ class LocalSpace(LawsSpace):
             (which[~on_side], Faces(slots[~on_side], *tables, sim.where, sim.x)),
             (which[on_side], self.sides.moved(of_sides)),
         ]
+
+    def joint_ends(self, slots: np.ndarray, of_sides: bool) -> tuple[np.ndarray, np.ndarray | None]:
+        if not of_sides or self.sides is None:
+            return super().joint_ends(slots, of_sides)
+        of = np.searchsorted(self.sides.slot, slots)
+        return self.sides.corners(of), self.sides.ways(of)
 
     def corner_forces(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As in the plane; beside hexahedra of four corners, -1 for the fourth of a triangle."""

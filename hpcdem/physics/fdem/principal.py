@@ -1,5 +1,5 @@
 """Principal stresses in space, by operations that give the same bits wherever a stress stands in memory (those of
-LAPACK do not): Jacobi's rotations, as in kernels/plastic_tets.py."""
+LAPACK do not): Jacobi's rotations, as in kernels/plasticity.py."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.conditions import Relaxation
 from hpcdem.physics.fdem.definition import ModelDefinition
 from hpcdem.physics.fdem.histories import Histories
-from hpcdem.physics.fdem.kernels import creep, plastic_tets, plasticity
+from hpcdem.physics.fdem.kernels import creep, plasticity
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.surface_loads import SurfaceLoads
 
@@ -174,14 +174,16 @@ class State(ModelDefinition, Model):
     @property
     def element_parts(self) -> int:
         """Triangles for which a row of what elements remember has columns: quads have four. In space tetrahedra: the
-        six that store a hexahedron remember what its ten do, see plastic_hexes.py."""
+        six that store a hexahedron remember what its ten do, see elements/kind.py."""
         if self.dim == 3:
             return 2 if self.mesh is not None and len(self.mesh.hexes) else 1
         return 4 if self.wide else 1
 
     def memory(self, name: str) -> int:
         """Columns of what an element, of a quad each triangle, remembers of yielding ("plastic") or of "creep"."""
-        return creep.MEMORY[self.dim] if name == "creep" else (plasticity, plastic_tets)[self.dim == 3].MEMORY
+        if name == "creep":
+            return creep.MEMORY[self.dim]
+        return plasticity.MEMORY if self.dim == 2 else plasticity.MEMORY_IN_SPACE
 
     def the_mesh(self) -> Mesh:
         """The mesh; CommandError if there is none."""

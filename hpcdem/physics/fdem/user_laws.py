@@ -78,7 +78,7 @@ NORMAL = {2: (0, 1), 3: (0, 1, 3)}
 COLUMN = "law"
 """Of `State.cold`: 1 + the place of the element's law in `of_rows`, then its state variables; where there are quads,
 those of each of their four triangles, triangles have the first; where there are hexahedra those of two of their ten
-tetrahedra, see plastic_hexes.py."""
+tetrahedra, see elements/kind.py."""
 OWN = "own"
 """Of the tables of properties, see kernels/user_laws.py."""
 ACROSS = 1e-9

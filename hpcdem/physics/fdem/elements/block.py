@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hpcdem.physics.fdem.elements import flow
 from hpcdem.physics.fdem.elements.kind import Kind, Tables
 
 if TYPE_CHECKING:
@@ -18,7 +19,9 @@ class ElementBlock:
     (count, k): the part of its volume that each of these has; place, parts: see `Tables`.
 
     said, uncrept, initial, like s0: without plastic and creep strain, without creep strain alone, without plastic
-    strain. model (count,): row of the model of elements; creeping (m,): which can creep.
+    strain. model (count,): row of the model of elements; creeping (m,): which can creep. law (n, parts): rows of the
+    table of yield surfaces; flowing (m + 3,): which can yield, see `flow.flows`; alone: which are elements of their
+    own, no parts of others.
     """
 
     def __init__(
@@ -29,7 +32,8 @@ class ElementBlock:
         self.s0 = s0.reshape(-1, len(kind.parts), kind.stresses)
         self.stored, self.volume, self.count = stored, volume, len(stored)
         self.said, self.uncrept, self.initial = (np.zeros((0, *self.s0.shape[1:])) for _ in range(3))
-        self.creeping = self.model = np.zeros(0, np.int64)
+        self.creeping = self.model = self.flowing = np.zeros(0, np.int64)
+        self.law, self.alone = np.zeros((0, len(kind.parts)), np.int32), np.arange(self.count)
 
     def remember(self) -> None:
         """Some elements of the model yield or creep."""
@@ -46,6 +50,26 @@ class ElementBlock:
         part = np.arange(len(self.kind.parts))
         rows = memory.reshape(len(memory), -1, width)
         return rows[self.stored[:, :1] + part // self.kind.in_row, part % self.kind.in_row]
+
+    def places(self) -> np.ndarray:
+        """(count, corners) where corners begin in x."""
+        g = self.tables
+        if len(g.place):
+            return g.place[: self.count]
+        return g.width * g.rows[: self.count, None] + self.kind.stride * np.arange(self.kind.corners)
+
+    def of_parts(self, s0: np.ndarray, c: np.ndarray) -> np.ndarray:
+        """Stress without strain (n, parts, k) [Pa], also where hexahedra have one each, in their constants c."""
+        kind = self.kind
+        return s0 if len(s0) else np.repeat(c[:, None, : kind.stresses], len(kind.parts), axis=1)
+
+    def mean(self, values: np.ndarray) -> np.ndarray:
+        """Means by volume (count, k) of what their parts have (count, parts, k)."""
+        if values.shape[1] == 1:
+            return values[:, 0].copy()
+        weight = np.empty((self.count, values.shape[1], 1))
+        flow.weights(self.tables, self.count, weight)
+        return (weight * values).sum(axis=1) / weight.sum(axis=1)
 
     def spread(self, values: np.ndarray, out: np.ndarray) -> None:
         """Values (count, ...) of elements into those of owned elements (n_own, ...)."""

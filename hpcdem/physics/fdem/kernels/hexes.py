@@ -22,7 +22,6 @@ from hpcdem.numerics.lanes import U, four_columns, lane, put_four_columns
 from hpcdem.physics.fdem.hexahedra import OVERLAYS
 from hpcdem.physics.fdem.kernels import tets
 from hpcdem.physics.fdem.kernels.limits import corner_step
-from hpcdem.physics.fdem.kernels.tet_stiffness import gradients, trial
 from hpcdem.physics.fdem.kernels.tets import ETA, LAMBDA, ROW, STRIDE, TET, TWO_MU
 
 BLOCK = 32
@@ -442,7 +441,7 @@ def stresses(which, place, x, parts, h, own, s0, small, stress, energy):
                 shifted[k] = s0[i, j, k] if own else h[i, k]
             for k in (0, 1, 3):
                 shifted[k] += (q[LAMBDA] + q[TWO_MU] / 3.0) * shift
-            r = trial(rows[j], q, shifted, small, lanes, s)
+            r = tets.trial(rows[j], q, shifted, small, lanes, s)
             found = tets.turned(s[0], s[1], s[2], s[3], s[4], s[5], r)
             for k in range(6):
                 stress[n, k] += q[VOLUME] * found[k]
@@ -457,55 +456,6 @@ def stresses(which, place, x, parts, h, own, s0, small, stress, energy):
             energy[n] += 0.25 * q[VOLUME] * (normal + 2.0 * shear)
         for k in range(6):
             stress[n, k] /= whole
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def stiffness(count, place, x, parts, h, own, s0, small, out):
-    """K (count, 24, 24) [N/m] of hexahedra, see tet_stiffness.py: deviators tetrahedron by tetrahedron, the volume by
-    overlays."""
-    rows, traces, lanes, shifted, s = (
-        np.zeros((PARTS, ROW)), np.empty(PARTS), np.zeros(tets.LANES * np.int64(_PER)), np.zeros(8), np.empty(6)
-    )  # fmt: skip
-    constants = np.zeros((PARTS, TET))
-    g, whole = np.empty((4, 3)), np.empty(24)
-    for i in range(count):
-        mean = traces_of(i, place, x, parts, h, small, rows, constants, traces, lanes)
-        k = out[i]
-        k[:] = 0.0
-        for overlay in range(2):
-            whole[:] = 0.0
-            total = 0.0
-            for j in range(5 * overlay, 5 * overlay + 5):
-                q = constants[j]
-                volume = 0.5 * gradients(rows[j], q, small, g)
-                for m in range(6):
-                    shifted[m] = s0[i, j, m] if own else h[i, m]
-                for m in (0, 1, 3):
-                    shifted[m] += (q[LAMBDA] + q[TWO_MU] / 3.0) * (mean[overlay] - traces[j])
-                r = trial(rows[j], q, shifted, small, lanes, s)
-                xx, yy, xy, zz, xz, yz = tets.turned(s[0], s[1], s[2], s[3], s[4], s[5], r)
-                mu = 0.5 * q[TWO_MU]
-                total += volume
-                for a in range(4):
-                    at = 3 * OVERLAYS[j, a]
-                    tx = xx * g[a, 0] + xy * g[a, 1] + xz * g[a, 2]
-                    ty = xy * g[a, 0] + yy * g[a, 1] + yz * g[a, 2]
-                    tz = xz * g[a, 0] + yz * g[a, 1] + zz * g[a, 2]
-                    for b in range(4):
-                        to = 3 * OVERLAYS[j, b]
-                        both = mu * (g[a, 0] * g[b, 0] + g[a, 1] * g[b, 1] + g[a, 2] * g[b, 2])
-                        if not small:
-                            both += tx * g[b, 0] + ty * g[b, 1] + tz * g[b, 2]
-                        for m in range(3):
-                            for n in range(3):
-                                value = mu * (g[b, m] * g[a, n] - 2.0 / 3.0 * g[a, m] * g[b, n])
-                                k[at + m, to + n] += volume * (value + both if m == n else value)
-                    for m in range(3):
-                        whole[at + m] += volume * g[a, m]
-            bulk = (h[i, H_LAMBDA] + h[i, H_TWO_MU] / 3.0) / total
-            for m in range(24):
-                for n in range(24):
-                    k[m, n] += bulk * whole[m] * whole[n]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -28,14 +28,11 @@ from hpcdem.physics.fdem.kernels.elements import (
     PARTS,
     Q_AREA,
     Q_C,
-    Q_FREE,
     Q_FREED,
     Q_LAM,
-    Q_LAMBDA,
     Q_MU2,
     Q_OUTSIDE,
     Q_S0,
-    Q_TWO_MU,
     Q_YIELD,
     QUAD_ROW,
     YIELDING_LANES,
@@ -48,10 +45,6 @@ from hpcdem.physics.fdem.kernels.elements import (
     overlay_loop_1,
 )
 from hpcdem.physics.fdem.kernels.plasticity import (
-    E11,
-    E12,
-    E22,
-    E33,
     HOW,
     MEMORY,
     OUTSIDE,
@@ -61,9 +54,9 @@ from hpcdem.physics.fdem.kernels.plasticity import (
     P33,
     P_LAM,
     P_MU2,
-    P_PER_AREA,
     P_PHI,
     P_SHEAR,
+    P_SIZE,
     P_STRENGTH,
     P_TENSILE,
     P_VOLUME,
@@ -88,17 +81,6 @@ LANES = plasticity.LANES + 16 + 4 * MEMORY
 def _pressure(e11, e22, e33, lame, two_mu, free):
     """(s11 + s22) / 2 [Pa] of a strain; free: as of `laws.hooke`."""
     return lame * (e11 + e22 + (e33 - free * e33)) + 0.5 * two_mu * (e11 + e22)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _relieve(i, j, p, q, base, memory, s0):
-    """Into row i of s0 the stress [Pa] of triangle p without strain: its initial stress less D e_p; j: its row of
-    memory."""
-    o, to = p * MEMORY, 4 * p
-    e11, e22, e12, e33 = memory[j, o + E11], memory[j, o + E22], memory[j, o + E12], memory[j, o + E33]
-    s11, s22, s12, s33 = laws.hooke(e11, e22, e12, e33, q[i, Q_LAMBDA], q[i, Q_TWO_MU], q[i, Q_FREE])
-    s0[i, to], s0[i, to + 1] = base[i, to] - s11, base[i, to + 1] - s22
-    s0[i, to + 2], s0[i, to + 3] = base[i, to + 2] - s12, base[i, to + 3] - s33
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -180,10 +162,9 @@ def _try_overlay(overlay):
             f, g = first + e, second + e
             a, b, c, d = block[c1 + e], block[c1 + _NEXT + e], block[c1 + _SECOND + e], block[c1 + _THIRD + e]
             _, _, _, _, _, _, a11, a22, a12 = _part(x1, y1, x2, y2, x3, y3, a, b, c, d, small)
-            lanes[P_PER_AREA + f] = 4.0 * (a * d - b * c)
             a, b, c, d = block[c2 + e], block[c2 + _NEXT + e], block[c2 + _SECOND + e], block[c2 + _THIRD + e]
             _, _, _, _, _, _, b11, b22, b12 = _part(x1, y1, x3, y3, x4, y4, a, b, c, d, small)
-            lanes[P_PER_AREA + g] = 4.0 * (a * d - b * c)
+            lanes[P_SIZE + f], lanes[P_SIZE + g] = 0.5 * block[one + e], 0.5 * block[two + e]
             lame, two_mu = block[Q_LAM + e], block[Q_MU2 + e]
             mean = (block[one + e] * (a11 + a22) + block[two + e] * (b11 + b22)) / (block[one + e] + block[two + e])
             pressure = lame * mean
@@ -301,8 +282,9 @@ def _weaken(n, item, row, first_row, law, soft, table, lanes):
             f, own = U(p * BLOCK + e), law[item[e], p]
             how = np.int64(lanes[HOW + f])
             if how > 0 and own >= soft.first:
+                history = soft.history[row[e] - first_row, 2 * p : 2 * p + 2]
                 strength.flowed(
-                    own, row[e] - first_row, p, how, lanes[P11 + f], lanes[P22 + f], lanes[P12 + f], lanes[P33 + f],
+                    own, history, how, lanes[P11 + f], lanes[P22 + f], lanes[P12 + f], lanes[P33 + f],
                     lanes[P_SHEAR + f], lanes[P_VOLUME + f], soft, table,
                 )  # fmt: skip
 
@@ -361,40 +343,22 @@ def _flow_block(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _flow(t, threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table):
+def flow(g, t, threads, count, who, base, law, soft, small, step, memory, s0, table):
+    """Let quads flow before the loop over their forces, as looks do, see elements/flow.py."""
     block, lanes = np.zeros(YIELDING_LANES * CAPACITY), np.zeros(LANES * CAPACITY)
     item, row = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
-    flat_x, flat_q, flat_base = x.reshape(x.size), q.reshape(q.size), base.reshape(base.size)
+    flat_q, flat_base = g.c.reshape(g.c.size), base.reshape(base.size)
     flat_memory, flat_s0 = memory.reshape(memory.size), s0.reshape(s0.size)
     begin, end = count * t // threads, count * (t + 1) // threads
     filled = np.int64(-1)
     for first in range(begin, end, BLOCK):
         n = min(BLOCK, end - first)
-        name_quads(first, n, rows, item, row)
-        gather_quads((n + 3) // 4 * 4, item, row, flat_x, flat_x, flat_q, flat_s0, True, block)
+        name_quads(first, n, g.rows, item, row)
+        gather_quads((n + 3) // 4 * 4, item, row, g.x, g.x, flat_q, flat_s0, True, block)
         _, filled = _flow_block(
-            n, item, row, first_row, flat_base, law, soft, small, step, flat_memory, flat_s0, table, filled, block,
+            n, item, row, g.first, flat_base, law, soft, small, step, flat_memory, flat_s0, table, filled, block,
             lanes,
         )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def flows(threads, *args):
-    """Let the triangles of quads that are outside their yield surface at the present positions flow.
-
-    Arguments as for `plasticity.flows`: count: quads; rows (count,) i4: their rows of x (n, 12); q (count, 32), see
-    `elements.QUAD`; base (count, 16) [Pa], law (count, 4): of each of their triangles; memory (n_own, 36): the nine
-    columns of each of them; s0 (count, 16) [Pa].
-    """
-    for t in range(threads):
-        _flow(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def flows_threaded(threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table):
-    """The same on several threads."""
-    for t in prange(threads):
-        _flow(t, threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table)
 
 
 _look_0, _look_1 = elements.overlay_loop(0, looks=True), elements.overlay_loop(1, looks=True)
@@ -471,7 +435,7 @@ def _yielding(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def yielding(threads, *args):
-    """`elements.quads` for quads some of which can yield, after their `flows`. Arguments of both, in this order; of the
+    """`elements.quads` for quads some of which can yield, after their `flow`. Arguments of both, in this order; of the
     second: first_row, base (as initial), law (as yields), soft, memory, table (as surfaces)."""
     for t in range(threads):
         _yielding(t, threads, *args)
@@ -490,26 +454,3 @@ def yielding_threaded(
             beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally, first_row, initial,
             yields, soft, memory, surfaces,
         )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def relieve_all(rows, first, q, base, memory, s0):
-    """Stresses [Pa] of quads without strain: s0 (count, 16); arguments as for `flows`."""
-    for i in range(len(rows)):
-        for p in range(4):
-            _relieve(i, rows[i] - first, p, q, base, memory, s0)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def locked_in(rows, first, q, base, memory, out):
-    """`plasticity.locked_in` for quads: the triangles count half."""
-    for i in range(len(rows)):
-        j = rows[i] - first
-        for p in range(4):
-            out[j] += (
-                0.5
-                * q[i, Q_AREA + p]
-                * plasticity.kept_energy(
-                    j, p * MEMORY, base[i], 4 * p, q[i, Q_LAMBDA], q[i, Q_TWO_MU], q[i, Q_FREE], memory
-                )
-            )

@@ -43,13 +43,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numba import njit, prange
+from numba import njit
 
-from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
-from hpcdem.physics.fdem.kernels import laws, strength
-from hpcdem.physics.fdem.kernels.elements import BLOCK, FREE, LAMBDA, TWO_MU
-from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW, TENSION_NOW
+from hpcdem.numerics.lanes import U, lane
+from hpcdem.physics.fdem.kernels import laws
+from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW as SHEAR_NOW
+from hpcdem.physics.fdem.kernels.strength import TENSION_NOW as TENSION_NOW
 
 SHEAR_PAST, TENSION_PAST = 4, 8
 """Bits of the state of an element, besides SHEAR_NOW, TENSION_NOW."""
@@ -58,21 +57,26 @@ SHEAR_PAST, TENSION_PAST = 4, 8
 # strength: this model does not yield.
 N_PHI, N_PSI, STRENGTH, TENSILE = range(4)
 YIELD = 4
-# Columns of what an element remembers (n, 9), or (n, 36) where there are quads: for each of their four triangles
-# (plastic_quads.py), triangles have the first nine; plastic strain 11, 22, 12, 33 in the frame that turns with it;
-# shear and volume of the plastic strain along the way; 1 + the last step in which it yielded in shear, in tension (0:
-# never); plastic work [J/m].
-E11, E22, E12, E33, SHEAR, VOLUME, IN_SHEAR, IN_TENSION, WORK = range(9)
+# Columns of what a part of an element remembers (elements/kind.py), 9 of the plane, 11 in space: plastic strain 11, 22,
+# 12, 33 in the frame that turns with it; shear and volume of the plastic strain along the way; 1 + the last step in
+# which it yielded in shear, in tension (0: never); plastic work [J], in the plane [J/m]; in space the plastic strain
+# 13, 23.
+E11, E22, E12, E33, SHEAR, VOLUME, IN_SHEAR, IN_TENSION, WORK, E13, E23 = range(11)
 MEMORY = 9
+MEMORY_IN_SPACE = 11
+SWEEPS = 5
+"""Each of three rotations; the rest falls with its square at least, and is rounding after four."""
 
-(
-    X1, Y1, X2, Y2, X3, Y3, CA, CB, CC, CD, LAM, MU2, S11, S22, S12, S33, L_PHI, L_PSI, L_STRENGTH, L_TENSILE, OUTSIDE,
-    T11, T22, T12, T33, P_PHI, P_PSI, P_STRENGTH, P_TENSILE, P_LAM, P_MU2, P_PER_AREA,
-    P11, P22, P12, P33, HOW, P_SHEAR, P_VOLUME, P_WORK,
-) = (lane(k) for k in range(40))  # fmt: skip
-"""Of all triangles of a block; then of those that are outside: trial stress, law, moduli, 1 / area; what flows."""
-LANES = 40
-_1, _2, _3, _FOUR, _TWELVE = U(1), U(2), U(3), U(4), U(12)
+# A tile: of the parts that are tried their stress, yield surface, and by how much they are outside (at most); then of
+# those that are outside stress, surface, moduli, and volume; in space axes of the stress, by columns, which becomes
+# diagonal; what flows: plastic strain, how, and its measures.
+S11, S22, S12, S33, S13, S23, L_PHI, L_PSI, L_STRENGTH, L_TENSILE, OUTSIDE = (lane(k) for k in range(11))
+T11, T22, T12, T33, T13, T23, P_PHI, P_PSI, P_STRENGTH, P_TENSILE, P_LAM, P_MU2, P_SIZE = (
+    lane(11 + k) for k in range(13)
+)
+X1, Y1, Z1, X2, Y2, Z2, X3, Y3, Z3 = (lane(24 + k) for k in range(9))
+P11, P22, P12, P33, P13, P23, HOW, P_SHEAR, P_VOLUME, P_WORK, P_SHORT = (lane(33 + k) for k in range(11))
+LANES = 44
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -189,81 +193,15 @@ def plane_stress_strain(s11, s22, s12, s33, n, m, k, t, lame, two_mu):
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
-def relieve(i, j, c, base, memory, s0):
-    """Into row i of s0 the stress [Pa] of a triangle without strain: its initial stress less D e_p; j: its row of
-    memory."""
-    e11, e22, e12, e33 = memory[j, E11], memory[j, E22], memory[j, E12], memory[j, E33]
-    s11, s22, s12, s33 = laws.hooke(e11, e22, e12, e33, c[i, LAMBDA], c[i, TWO_MU], c[i, FREE])
-    s0[i, 0], s0[i, 1] = base[i, 0] - s11, base[i, 1] - s22
-    s0[i, 2], s0[i, 3] = base[i, 2] - s12, base[i, 3] - s33
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _gather(n, first, rows, wide, x, c, s0, law, table, lanes):
-    """Corners, moduli, stress without strain and yield surfaces of the triangles first : first + n into lanes."""
-    wx = U(12 if wide else 8)
-    for e in range(U(0), U(n), _FOUR):
-        i = U(first) + e
-        at = U(rows[i]) * wx, U(rows[i + _1]) * wx, U(rows[i + _2]) * wx, U(rows[i + _3]) * wx
-        four_columns(lanes, X1 + e, x, at)
-        two_columns(lanes, X3 + e, x, (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR))
-        q0 = i * _TWELVE
-        q1, q2, q3 = q0 + _TWELVE, q0 + U(24), q0 + U(36)
-        four_columns(lanes, CA + e, c, (q0, q1, q2, q3))
-        two_columns(lanes, LAM + e, c, (q0 + _FOUR, q1 + _FOUR, q2 + _FOUR, q3 + _FOUR))
-        q0 = i * _FOUR
-        four_columns(lanes, S11 + e, s0, (q0, q0 + _FOUR, q0 + U(8), q0 + _TWELVE))
-        four_columns(
-            lanes, L_PHI + e, table,
-            (U(law[i]) * _FOUR, U(law[i + _1]) * _FOUR, U(law[i + _2]) * _FOUR, U(law[i + _3]) * _FOUR),
-        )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _try(n, small, free, lanes):
-    """Trial stresses, in the place of those without strain, and by how much they are outside."""
-    for e in range(U(n)):
-        x1, y1 = lanes[X1 + e], lanes[Y1 + e]
-        ux, uy, wx, wy = lanes[X2 + e] - x1, lanes[Y2 + e] - y1, lanes[X3 + e] - x1, lanes[Y3 + e] - y1
-        a, b, c, d = lanes[CA + e], lanes[CB + e], lanes[CC + e], lanes[CD + e]
-        f11, f12, f21, f22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
-        cs, sn = laws.rotation(f11, f12, f21, f22)
-        cs, sn = (1.0 if small else cs), (0.0 if small else sn)
-        e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
-        p, m = lanes[LAM + e] * (e11 + e22), lanes[MU2 + e]
-        s11, s22 = lanes[S11 + e] + (p + m * e11), lanes[S22 + e] + (p + m * e22)
-        s12, s33 = lanes[S12 + e] + m * e12, lanes[S33 + e] + (p - free * p)
-        lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e] = s11, s22, s12, s33
-        lanes[OUTSIDE + e] = laws.outside(
-            s11, s22, s12, s33, lanes[L_PHI + e], lanes[L_STRENGTH + e], lanes[L_TENSILE + e]
-        )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _all_inside(n, lanes):
-    """Negative if no stress is outside."""
-    bits = lanes.view(np.int64)
-    found = np.int64(-1)
-    for e in range(U(n)):
-        found &= bits[OUTSIDE + e]
-    return found
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _choose(n, lanes, who):
-    """Those that are outside, side by side; who (BLOCK,) i8: which they are. Returns their number."""
-    m = 0
-    for k in range(n):
-        e, at = U(k), U(m)
-        if lanes[OUTSIDE + e] > 0.0:
-            for c in range(U(8)):  # stress and law
-                lanes[T11 + c * U(CAPACITY) + at] = lanes[S11 + c * U(CAPACITY) + e]
-            lanes[P_LAM + at], lanes[P_MU2 + at] = lanes[LAM + e], lanes[MU2 + e]
-            lanes[P_PER_AREA + at] = 2.0 * (lanes[CA + e] * lanes[CD + e] - lanes[CB + e] * lanes[CC + e])
-            who[m] = k
-            m += 1
-    return m
+@njit(cache=True, error_model="numpy", forceinline=True)
+def most_outside(s11, s22, s12, s33, s13, s23, n_phi, k, tensile):
+    """By how much [Pa] a stress is outside the yield surface at most; not above zero: it is inside."""
+    p = (s11 + (s22 + s33)) / 3.0
+    d11, d22, d33 = s11 - p, s22 - p, s33 - p
+    squares = 0.5 * (d11 * d11 + (d22 * d22 + d33 * d33)) + (s12 * s12 + (s13 * s13 + s23 * s23))
+    size = 2.0 * math.sqrt(squares / 3.0)
+    shear, tension = (n_phi - 1.0) * p + size * math.sqrt(1.0 + n_phi + n_phi * n_phi) - k, p + size - tensile
+    return shear if shear > tension else tension
 
 
 def _return_loop(strain):
@@ -306,100 +244,96 @@ def measure(m, free, lanes):
         work += 2.0 * (lanes[T12 + e] - s12) * e12 + (lanes[T33 + e] - s33) * e33
         lanes[P_SHEAR + e] = math.sqrt(0.5 * (d11 * d11 + d22 * d22 + d33 * d33 + 2.0 * e12 * e12))
         lanes[P_VOLUME + e] = volume
-        lanes[P_WORK + e] = work / lanes[P_PER_AREA + e]
+        lanes[P_WORK + e] = work * lanes[P_SIZE + e]
+
+
+def _rotation(pp, qq, pq, rp, rq, p, q):
+    """The loop that makes the stress component pq zero by a turn of two axes. pp ...: lanes of the stress; p, q: first
+    of the three lanes of these axes. One function each: distances between lanes must be constants."""
+    p2, p3, q2, q3 = p + lane(1), p + lane(2), q + lane(1), q + lane(2)
+
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def loop(n, lanes):
+        for e in range(U(n)):
+            d, b = lanes[qq + e] - lanes[pp + e], 2.0 * lanes[pq + e]
+            whole = abs(d) + math.sqrt(d * d + b * b)
+            t = (b if d >= 0.0 else -b) / (whole if whole > 0.0 else 1.0)
+            cs = 1.0 / math.sqrt(1.0 + t * t)
+            sn, more = t * cs, 0.5 * t * b
+            lanes[pp + e], lanes[qq + e], lanes[pq + e] = lanes[pp + e] - more, lanes[qq + e] + more, 0.0
+            u, w = lanes[rp + e], lanes[rq + e]
+            lanes[rp + e], lanes[rq + e] = cs * u - sn * w, sn * u + cs * w
+            u, w = lanes[p + e], lanes[q + e]
+            lanes[p + e], lanes[q + e] = cs * u - sn * w, sn * u + cs * w
+            u, w = lanes[p2 + e], lanes[q2 + e]
+            lanes[p2 + e], lanes[q2 + e] = cs * u - sn * w, sn * u + cs * w
+            u, w = lanes[p3 + e], lanes[q3 + e]
+            lanes[p3 + e], lanes[q3 + e] = cs * u - sn * w, sn * u + cs * w
+
+    return loop
+
+
+_rotate_12 = _rotation(T11, T22, T12, T13, T23, X1, X2)
+_rotate_13 = _rotation(T11, T33, T13, T12, T23, X1, X3)
+_rotate_23 = _rotation(T22, T33, T23, T12, T13, X2, X3)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _remember(m, first, first_row, rows, who, lanes, c, base, law, table, soft, step, memory, s0):
-    """Add what has flowed to memory and s0."""
-    for k in range(m):
-        e, i = U(k), first + who[k]
-        j, bits = rows[i] - first_row, np.int64(lanes[HOW + U(k)])
-        memory[j, E11] += lanes[P11 + e]
-        memory[j, E22] += lanes[P22 + e]
-        memory[j, E12] += lanes[P12 + e]
-        memory[j, E33] += lanes[P33 + e]
-        memory[j, SHEAR] += lanes[P_SHEAR + e]
-        memory[j, VOLUME] += lanes[P_VOLUME + e]
-        if bits & SHEAR_NOW:
-            memory[j, IN_SHEAR] = step + 1.0
-        if bits & TENSION_NOW:
-            memory[j, IN_TENSION] = step + 1.0
-        memory[j, WORK] += lanes[P_WORK + e]
-        if law[i] >= soft.first:
-            strength.flowed(
-                law[i], j, 0, bits, lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e],
-                lanes[P_SHEAR + e], lanes[P_VOLUME + e], soft, table,
-            )  # fmt: skip
-        relieve(i, j, c, base, memory, s0)
+def find_axes(n, lanes):
+    """Principal stresses of the first n, in the place of the diagonal of the stress, and their axes."""
+    for e in range(U(n)):
+        lanes[X1 + e], lanes[Y1 + e], lanes[Z1 + e] = 1.0, 0.0, 0.0
+        lanes[X2 + e], lanes[Y2 + e], lanes[Z2 + e] = 0.0, 1.0, 0.0
+        lanes[X3 + e], lanes[Y3 + e], lanes[Z3 + e] = 0.0, 0.0, 1.0
+    for _ in range(SWEEPS):
+        _rotate_12(n, lanes)
+        _rotate_13(n, lanes)
+        _rotate_23(n, lanes)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _in_order(s, x, y, z, t, u, v, w):
+    """Two stresses, each with its axis, the smaller one first."""
+    turn = s > t
+    return (
+        t if turn else s, u if turn else x, v if turn else y, w if turn else z,
+        s if turn else t, x if turn else u, y if turn else v, z if turn else w,
+    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, soft, small, step, memory, s0, table):
-    lanes = np.zeros(LANES * CAPACITY)
-    who = np.zeros(BLOCK, np.int64)
-    flat_x, flat_c, flat_s0 = x.reshape(x.size), c.reshape(c.size), s0.reshape(s0.size)
-    flat_table, free = table.reshape(table.size), c[0, FREE]
-    blocks = -(-count // BLOCK)
-    for b in range(blocks * t // threads, blocks * (t + 1) // threads):
-        first = b * BLOCK
-        n = min(BLOCK, count - first)
-        _gather(n, first, rows, wide, flat_x, flat_c, flat_s0, law, flat_table, lanes)
-        _try(n, small, free, lanes)
-        if _all_inside(n, lanes) < 0:
-            continue
-        m = _choose(n, lanes, who)
-        if m > 0:
-            return_all(m, free, lanes)
-            measure(m, free, lanes)
-            _remember(m, first, first_row, rows, who, lanes, c, base, law, table, soft, step, memory, s0)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def flows(threads, *args):
-    """Let the triangles that are outside their yield surface at the present positions flow.
-
-    count: triangles; rows (count + 3,) i4: their rows of x, of which the first owned one is `first_row`; wide: x is
-    (n, 12); c (count + 3, 12), see `elements.TRIANGLE`; base (count, 4) [Pa]: initial stress; law (count + 3,): row of
-    `table`; soft: see strength.py; small: small strains; step: number of this step. They become those after the flow:
-    memory (n_own, 9), see `MEMORY`; s0 (count + 3, 4) [Pa]: stress without strain; table (rows, 4) of yield surfaces,
-    see `YIELD`.
-    """
-    for t in range(threads):
-        _flow(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def flows_threaded(threads, count, rows, first_row, wide, x, c, base, law, soft, small, step, memory, s0, table):
-    """The same on several threads."""
-    for t in prange(threads):
-        _flow(t, threads, count, rows, first_row, wide, x, c, base, law, soft, small, step, memory, s0, table)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def relieve_all(rows, first, c, base, memory, s0):
-    """`relieve` for triangles: s0 (count, 4) [Pa]; arguments as for `flows`."""
-    for i in range(len(rows)):
-        relieve(i, rows[i] - first, c, base, memory, s0)
-
-
-@njit(cache=True, error_model="numpy")
-def kept_energy(j, o, base, b, lame, two_mu, free, memory):
-    """Of `locked_in` per volume [J/m3]; o, b: first columns of memory (row j) and of base (a row)."""
-    e11, e22, e12, e33 = memory[j, o + E11], memory[j, o + E22], memory[j, o + E12], memory[j, o + E33]
-    e33 = e33 - free * e33
-    trace = e11 + e22 + e33
-    squares = e11 * e11 + e22 * e22 + 2.0 * e12 * e12 + e33 * e33
-    own = base[b] * e11 + base[b + 1] * e22 + 2.0 * base[b + 2] * e12 + base[b + 3] * e33
-    return 0.5 * (lame * trace * trace + two_mu * squares) - own
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def locked_in(rows, first, c, base, memory, out):
-    """Add to out (n_own,) what the elastic energy [J/m] differs by from that of an element with the initial stress s0:
-    with e = U - 1 it is A [(e - e_p) : D (e - e_p) / 2 + base : (e - e_p)] = A [e : D e / 2 + s0 : e] +
-    A [e_p : D e_p / 2 - base : e_p], s0 = base - D e_p."""
-    for i in range(len(rows)):
-        j = rows[i] - first
-        area = 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2])
-        out[j] += area * kept_energy(j, 0, base[i], 0, c[i, LAMBDA], c[i, TWO_MU], c[i, FREE], memory)
+def return_in_space(n, lanes):
+    """Plastic strains of n principal stresses, how they flow, and shear, volume and work of the flow."""
+    for e in range(U(n)):
+        s1, x1, y1, z1, s2, x2, y2, z2 = _in_order(
+            lanes[T11 + e], lanes[X1 + e], lanes[Y1 + e], lanes[Z1 + e],
+            lanes[T22 + e], lanes[X2 + e], lanes[Y2 + e], lanes[Z2 + e],
+        )  # fmt: skip
+        s2, x2, y2, z2, s3, x3, y3, z3 = _in_order(
+            s2, x2, y2, z2, lanes[T33 + e], lanes[X3 + e], lanes[Y3 + e], lanes[Z3 + e]
+        )
+        s1, x1, y1, z1, s2, x2, y2, z2 = _in_order(s1, x1, y1, z1, s2, x2, y2, z2)
+        lame, two_mu = lanes[P_LAM + e], lanes[P_MU2 + e]
+        r1, r2, r3, how = principal_return(
+            s1, s2, s3, lanes[P_PHI + e], lanes[P_PSI + e], lanes[P_STRENGTH + e], lanes[P_TENSILE + e], lame + two_mu,
+            lame,
+        )  # fmt: skip
+        d1, d2, d3 = s1 - r1, s2 - r2, s3 - r3
+        common, per = lame / (3.0 * lame + two_mu) * (d1 + d2 + d3), 1.0 / two_mu
+        flows = how > 0.0
+        e1, e2, e3 = (d1 - common) * per, (d2 - common) * per, (d3 - common) * per
+        e1, e2, e3 = e1 if flows else 0.0, e2 if flows else 0.0, e3 if flows else 0.0
+        lanes[P11 + e] = e1 * (x1 * x1) + e2 * (x2 * x2) + e3 * (x3 * x3)
+        lanes[P22 + e] = e1 * (y1 * y1) + e2 * (y2 * y2) + e3 * (y3 * y3)
+        lanes[P12 + e] = e1 * (x1 * y1) + e2 * (x2 * y2) + e3 * (x3 * y3)
+        lanes[P33 + e] = e1 * (z1 * z1) + e2 * (z2 * z2) + e3 * (z3 * z3)
+        lanes[P13 + e] = e1 * (x1 * z1) + e2 * (x2 * z2) + e3 * (x3 * z3)
+        lanes[P23 + e] = e1 * (y1 * z1) + e2 * (y2 * z2) + e3 * (y3 * z3)
+        lanes[HOW + e] = how
+        volume = e1 + e2 + e3
+        third = volume / 3.0
+        g1, g2, g3 = e1 - third, e2 - third, e3 - third
+        lanes[P_SHEAR + e] = math.sqrt(0.5 * (g1 * g1 + g2 * g2 + g3 * g3))
+        lanes[P_VOLUME + e] = volume
+        lanes[P_WORK + e] = (r1 * e1 + r2 * e2 + r3 * e3) * lanes[P_SIZE + e]
+        lanes[P_SHORT + e] = -((e1 if e1 < 0.0 else 0.0) + (e2 if e2 < 0.0 else 0.0) + (e3 if e3 < 0.0 else 0.0))

@@ -61,11 +61,11 @@ def _at(strain, number, otherwise, begin, points):
 
 
 @njit(cache=True, error_model="numpy")
-def renew(row, j, part, strength, table):
-    """The row of a triangle in the table of yield surfaces (rows, 4) as it is after its flow; j, part: row of the
-    history and which triangle of the element it is."""
+def renew(row, history, strength, table):
+    """The row of a part of an element in the table of yield surfaces (rows, 4) as it is after its flow; history (2,):
+    of this part."""
     of = strength.of[row - strength.first]
-    shear, tension = strength.history[j, 2 * part], strength.history[j, 2 * part + 1]
+    shear, tension = history[0], history[1]
     values, number, begin, points = strength.values, strength.number, strength.begin, strength.points
     own = row - strength.first
     cohesion = _at(shear, number[of, COHESION], values[own, COHESION], begin, points)
@@ -78,29 +78,20 @@ def renew(row, j, part, strength, table):
     table[row, 3] = min(tensile, cohesion / math.tan(friction)) if friction > 0.0 else tensile
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def renew_all(rows, first, parts, law, strength, table):
-    """`renew` for elements in these storage rows (n,); first: storage row of the first owned one; law (n, parts)."""
-    for i in range(len(rows)):
-        for part in range(parts):
-            if law[i, part] >= strength.first:
-                renew(law[i, part], rows[i] - first, part, strength, table)
-
-
 @njit(cache=True, error_model="numpy")
-def flowed(row, j, part, bits, e11, e22, e12, e33, shear, volume, strength, table):
-    """A triangle has flowed by this plastic strain, `shear` and `volume` of it: its strength afterwards."""
+def flowed(row, history, bits, e11, e22, e12, e33, shear, volume, strength, table):
+    """A part has flowed by this plastic strain, `shear` and `volume` of it: its strength afterwards."""
     shortened = 0.0
     if bits != SHEAR_NOW and bits != TENSION_NOW:
         mean, half = 0.5 * (e11 + e22), 0.5 * (e11 - e22)
         radius = math.sqrt(half * half + e12 * e12)
         low, high = mean - radius, mean + radius
         shortened = -(min(low, 0.0) + min(high, 0.0) + min(e33, 0.0))
-    grown(row, j, part, bits, shear, volume, shortened, strength, table)
+    grown(row, history, bits, shear, volume, shortened, strength, table)
 
 
 @njit(cache=True, error_model="numpy")
-def grown(row, j, part, bits, shear, volume, shortened, strength, table):
+def grown(row, history, bits, shear, volume, shortened, strength, table):
     """The same from `shear` and `volume` of the plastic strain and, where it flowed in both ways, what its negative
     principal values sum up to, without sign."""
     if bits == SHEAR_NOW:
@@ -111,6 +102,6 @@ def grown(row, j, part, bits, shear, volume, shortened, strength, table):
         m = table[row, 1]
         l_s = shortened
         shear, tension = l_s * math.sqrt((1.0 + m + m * m) / 3.0), max(volume - (m - 1.0) * l_s, 0.0)
-    strength.history[j, 2 * part] += shear
-    strength.history[j, 2 * part + 1] += tension
-    renew(row, j, part, strength, table)
+    history[0] += shear
+    history[1] += tension
+    renew(row, history, strength, table)

@@ -149,6 +149,18 @@ def per_volume(c11, c12, c13, c21, c22, c23, c31, c32, c33):
     return 6.0 * _product(c11, c12, c13, c22 * c33 - c23 * c32, c23 * c31 - c21 * c33, c21 * c32 - c22 * c31)
 
 
+@njit(cache=True, error_model="numpy")
+def trial(x, c, s0, small, lanes, stress):
+    """Stress (6,) [Pa] of an elastic tetrahedron in the frame that turns with it, and that frame."""
+    for k in range(ROW):
+        lanes[X + U(k) * _PER_LANE] = x[k]
+    e11, e22, e12, e33, e13, e23, r = strain(lanes, X, c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], small)
+    p, m = c[LAMBDA] * (e11 + (e22 + e33)), c[TWO_MU]
+    stress[0], stress[1], stress[2] = s0[0] + (p + m * e11), s0[1] + (p + m * e22), s0[2] + m * e12
+    stress[3], stress[4], stress[5] = s0[3] + (p + m * e33), s0[4] + m * e13, s0[5] + m * e23
+    return r
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def stress_forces(n, small, beta, lanes):
     """Corner forces of stress, viscous parts included: f_l = -V sigma grad N_l, with the present shape functions, or
