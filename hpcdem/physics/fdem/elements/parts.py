@@ -23,7 +23,7 @@ SHARED = 1e-12
 
 
 def _constant(number: int) -> Any:
-    return njit(error_model="numpy")(lambda g: number)
+    return njit(error_model="numpy", forceinline=True)(lambda g: number)
 
 
 def _by_kind(make: Callable[[Kind], Any]) -> Any:
@@ -50,8 +50,8 @@ components = _by_kind(lambda kind: _constant(len(kind.components)))
 def _corner(kind: Kind) -> Any:
     stride = kind.stride
     if kind.corners == 8:
-        return njit(error_model="numpy")(lambda g, i, k: np.int64(g.place[i, k]))
-    return njit(error_model="numpy")(lambda g, i, k: np.int64(g.rows[i]) * g.width + stride * k)
+        return njit(error_model="numpy", forceinline=True)(lambda g, i, k: np.int64(g.place[i, k]))
+    return njit(error_model="numpy", forceinline=True)(lambda g, i, k: np.int64(g.rows[i]) * g.width + stride * k)
 
 
 corner = _by_kind(_corner)
@@ -61,17 +61,17 @@ corner = _by_kind(_corner)
 def _inverse(kind: Kind) -> Any:
     size = hexes.BLOCK
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def plane(g, i, p):
         c, o = g.c, 4 * p
         return c[i, o], c[i, o + 1], c[i, o + 2], c[i, o + 3]
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def tetrahedron(g, i, p):
         c = g.c
         return c[i, 0], c[i, 1], c[i, 2], c[i, 3], c[i, 4], c[i, 5], c[i, 6], c[i, 7], c[i, 8]
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def of_hexahedron(g, i, p):
         c, b, m = g.parts, i // size, i % size
         return (
@@ -89,20 +89,20 @@ inverse = _by_kind(_inverse)
 def _volume(kind: Kind) -> Any:
     column, five, size, share = kind.volume, kind.each, hexes.BLOCK, hexes.SHARE
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def triangle(g, i, p):
         a, b, c, d = inverse(g, i, p)
         return 0.5 / (a * d - b * c)
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def of_quad(g, i, p):
         return g.c[i, column + p]
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def tetrahedron(g, i, p):
         return 1.0 / tets.per_volume(*inverse(g, i, p))
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def of_hexahedron(g, i, p):
         return g.c[i, column + p // five] * g.parts[i // size, p, share, i % size]
 
@@ -116,7 +116,7 @@ volume = _by_kind(_volume)
 
 def _weight(kind: Kind) -> Any:
     counts = 1.0 / kind.overlays
-    return njit(error_model="numpy")(lambda g, i, p: counts * volume(g, i, p))
+    return njit(error_model="numpy", forceinline=True)(lambda g, i, p: counts * volume(g, i, p))
 
 
 weight = _by_kind(_weight)
@@ -126,8 +126,8 @@ weight = _by_kind(_weight)
 def _moduli(kind: Kind) -> Any:
     lame, two_mu, free = kind.lame, kind.two_mu, kind.free
     if free < 0:
-        return njit(error_model="numpy")(lambda g, i: (g.c[i, lame], g.c[i, two_mu], 0.0))
-    return njit(error_model="numpy")(lambda g, i: (g.c[i, lame], g.c[i, two_mu], g.c[i, free]))
+        return njit(error_model="numpy", forceinline=True)(lambda g, i: (g.c[i, lame], g.c[i, two_mu], 0.0))
+    return njit(error_model="numpy", forceinline=True)(lambda g, i: (g.c[i, lame], g.c[i, two_mu], g.c[i, free]))
 
 
 moduli = _by_kind(_moduli)
@@ -137,7 +137,7 @@ moduli = _by_kind(_moduli)
 def _put_moduli(kind: Kind) -> Any:
     of_lame, of_two_mu = kind.lame, kind.two_mu
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def put(g, i, lame, two_mu, c):
         c[i, of_lame], c[i, of_two_mu] = lame, two_mu
 
@@ -151,7 +151,7 @@ put_moduli = _by_kind(_put_moduli)
 def _memory(kind: Kind) -> Any:
     each = kind.in_row
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def memory(g, i, p, of, first, width):
         o = first + width * (p % each)
         return of[g.rows[i] - g.first + p // each, o : o + width]
@@ -167,7 +167,7 @@ columns from `first` on this begins."""
 def _strain(kind: Kind) -> Any:
     ends = np.array(kind.parts)
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def plane(g, i, p, small):
         x, a, b, c = g.x, corner(g, i, ends[p, 0]), corner(g, i, ends[p, 1]), corner(g, i, ends[p, 2])
         r11, r12, r21, r22 = inverse(g, i, p)
@@ -176,7 +176,7 @@ def _strain(kind: Kind) -> Any:
         )
         return (e11, e22, e12, 0.0), (cs, sn)
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def space(g, i, p, small):
         x, a, b = g.x, corner(g, i, ends[p, 0]), corner(g, i, ends[p, 1])
         c, d = corner(g, i, ends[p, 2]), corner(g, i, ends[p, 3])
@@ -205,39 +205,39 @@ frame: cosine and sine, in space the rotation by rows."""
 
 def _trace(kind: Kind) -> Any:
     if kind.dim == 2:
-        return njit(error_model="numpy")(lambda g, s: s[0] + s[1])
-    return njit(error_model="numpy")(lambda g, s: s[0] + s[1] + s[3])
+        return njit(error_model="numpy", forceinline=True)(lambda g, s, p: s[p, 0] + s[p, 1])
+    return njit(error_model="numpy", forceinline=True)(lambda g, s, p: s[p, 0] + s[p, 1] + s[p, 3])
 
 
 trace = _by_kind(_trace)
-"""trace(g, s): of stress or strain (4 or 6,), as far as the parts of an overlay share it: in the plane of 11 and 22."""
+"""trace(g, s, p): of row p of stresses or strains, as far as parts of an overlay share it: in the plane 11 and 22."""
 
 
 def _swell(kind: Kind) -> Any:
-    @njit(error_model="numpy")
-    def plane(g, s, more):
+    @njit(error_model="numpy", forceinline=True)
+    def plane(g, s, p, more):
         more = 0.5 * more
-        s[0] += more
-        s[1] += more
+        s[p, 0] += more
+        s[p, 1] += more
 
-    @njit(error_model="numpy")
-    def space(g, s, more):
+    @njit(error_model="numpy", forceinline=True)
+    def space(g, s, p, more):
         more = more / 3.0
-        s[0] += more
-        s[1] += more
-        s[3] += more
+        s[p, 0] += more
+        s[p, 1] += more
+        s[p, 3] += more
 
     return plane if kind.dim == 2 else space
 
 
 swell = _by_kind(_swell)
-"""swell(g, s, more): adds to the trace of stress or strain."""
+"""swell(g, s, p, more): adds to it."""
 
 
 def _strains(kind: Kind) -> Any:
     overlays, each, width, words = kind.overlays, kind.each, len(kind.components), kind.frame
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def strains(g, i, small, e, frames):
         for overlay in range(overlays):
             first = each * overlay
@@ -250,12 +250,12 @@ def _strains(kind: Kind) -> Any:
                     frames[p, k] = frame[k]
                 if each > 1:
                     part = volume(g, i, p)
-                    mean += part * trace(g, e[p])
+                    mean += part * trace(g, e, p)
                     whole += part
             if each > 1:
                 mean /= whole
                 for p in range(first, first + each):
-                    swell(g, e[p], mean - trace(g, e[p]))
+                    swell(g, e, p, mean - trace(g, e, p))
 
     return strains
 
@@ -268,18 +268,18 @@ or 6), and their frames into (parts, 2 or 9)."""
 def _share(kind: Kind) -> Any:
     overlays, each, normal = kind.overlays, kind.each, kind.normal
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def nothing(g, i, s):
         return
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def share(g, i, s):
         for overlay in range(overlays):
             first = each * overlay
-            low = high = trace(g, s[first])
+            low = high = trace(g, s, first)
             mean = whole = size = 0.0
             for p in range(first, first + each):
-                part, own = volume(g, i, p), trace(g, s[p])
+                part, own = volume(g, i, p), trace(g, s, p)
                 low, high = min(low, own), max(high, own)
                 mean += part * own
                 whole += part
@@ -288,7 +288,7 @@ def _share(kind: Kind) -> Any:
             if high - low > len(normal) * SHARED * size:
                 mean /= whole
                 for p in range(first, first + each):
-                    swell(g, s[p], mean - trace(g, s[p]))
+                    swell(g, s, p, mean - trace(g, s, p))
 
     return share if each > 1 else nothing
 
@@ -299,12 +299,12 @@ stresses. What is rounding stays."""
 
 
 def _turned(kind: Kind) -> Any:
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def plane(g, s, frame):
         xx, yy, xy = laws.turned(s[0], s[1], s[2], frame[0], frame[1])
         return xx, yy, xy, s[3]
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def space(g, s, frame):
         return tets.turned(s[0], s[1], s[2], s[3], s[4], s[5], frame)
 
@@ -317,7 +317,7 @@ turned = _by_kind(_turned)
 
 def _room(kind: Kind) -> Any:
     n, width, words = len(kind.parts), len(kind.components), kind.frame
-    return njit(error_model="numpy")(lambda g: (np.zeros((n, width)), np.zeros((n, words))))
+    return njit(error_model="numpy", forceinline=True)(lambda g: (np.zeros((n, width)), np.zeros((n, words))))
 
 
 room = _by_kind(_room)

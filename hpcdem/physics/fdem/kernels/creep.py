@@ -48,13 +48,13 @@ MEMORY = {2: 10, 3: 16}
 """Columns of a part, by dimensions; where they are: `parts.memory`."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _memory(g, i, p, memory):
     """What part p of element i remembers."""
     return parts.memory(g, i, p, memory, 0, 3 * parts.components(g) - 2)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def squares(a):
     """a : a of a deviator (3 or 5,)."""
     a33, shear = a[0] + a[1], a[2] * a[2]
@@ -63,7 +63,7 @@ def squares(a):
     return a[0] * a[0] + a[1] * a[1] + a33 * a33 + 2.0 * shear
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def factors(dt, two_mu, kelvin, per_kelvin, per_maxwell):
     """B / A - 1, dt / (4 A eta_K), dt / (4 eta_M), X of the formulas above, and B / A."""
     half = 0.5 * dt * kelvin * per_kelvin
@@ -73,14 +73,14 @@ def factors(dt, two_mu, kelvin, per_kelvin, per_maxwell):
     return ratio - 1.0, of_kelvin, of_maxwell, 1.0 / two_mu + (of_kelvin + of_maxwell), ratio
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def stress_then(e, start, creep, kelvin, s, two_mu, back, of_both, x):
     """One component of S+ [Pa]; e: of the strain then, start: of s_0; creep, kelvin, s: of e_c, e_K, S;
     back = B / A - 1, of_both = c."""
     return (e + start / two_mu - creep - back * kelvin - of_both * s) / x
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _deviator(s, out):
     """Of a stress or strain (4 or 6,); returns its mean."""
     mean = (s[0] + s[1] + s[3]) / 3.0
@@ -90,14 +90,14 @@ def _deviator(s, out):
     return mean
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _columns(of, memory, out):
     """Components (3 or 5,) of what a part remembers."""
     for k in range(len(out)):
         out[k] = memory[of[k]]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def relieve(moduli, base, crept, s0):
     """Into s0 the stress [Pa] of a part without strain: base less D e_c, which is 2 G_M e_c unless the strain across
     the plane is free."""
@@ -108,24 +108,24 @@ def relieve(moduli, base, crept, s0):
         s0[PLACES[k]] = base[PLACES[k]] - two_mu * crept[k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _bulk(lame, two_mu):
     """K of lambda' and 2 G."""
     return lame * two_mu / (two_mu - lame) + two_mu / 3.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _across(trace, mean, h11, h22, weight, bulk):
     """z of the formulas above; h11, h22: S+ without strain, weight: 1 / X."""
     return -((mean - (h11 + h22)) + (bulk - weight / 3.0) * trace) / (bulk + 2.0 / 3.0 * weight)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def creep_part(e, base, law, moduli, dt, keep, memory, s0, room):
-    """Let a part creep by its rows of all tables, see `creep`; e (4 or 6,): its strain, law (3,): of its model, room
-    (5, 3 or 5): is filled. Returns what it loses [J/m3]."""
+    """Let a part creep by its rows of all tables, see `creep`; e (4 or 6,): its strain, law (3,): of its model, room:
+    five of (3 or 5,), are filled. Returns what it loses [J/m3]."""
     lame, two_mu, free = moduli
-    start, now, crept, way, both_ends = room[0], room[1], room[2], room[3], room[4]
+    start, now, crept, way, both_ends = room
     back, kelvin, maxwell, div, ratio = factors(dt, two_mu, law[KELVIN], law[PER_KELVIN], law[PER_MAXWELL])
     both, mean = kelvin + maxwell, _deviator(base, start)
     if free != 0.0:
@@ -163,15 +163,17 @@ def creep_part(e, base, law, moduli, dt, keep, memory, s0, room):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _creep(t, threads, who, g, base, law, table, small, dt, keep, memory, s0):
-    (e, frames), room, n = parts.room(g), np.empty((5, parts.components(g) - 1)), len(who)
+    (e, frames), n, size = parts.room(g), len(who), parts.components(g) - 1
+    room = np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size)
     for m in range(n * t // threads, n * (t + 1) // threads):
         i = who[m]
         parts.strains(g, i, small, e, frames)
-        moduli = parts.moduli(g, i)
+        moduli, of_model = parts.moduli(g, i), table[law[i]]
         for p in range(len(e)):
             own = _memory(g, i, p, memory)
-            lost = creep_part(e[p], base[i, p], table[law[i]], moduli, dt, keep, own, s0[i, p], room)
-            own[LOST] += lost * parts.weight(g, i, p)
+            lost = creep_part(e[p], base[i, p], of_model, moduli, dt, keep, own, s0[i, p], room)
+            if keep:
+                own[LOST] += lost * parts.weight(g, i, p)
         parts.share(g, i, s0[i])
 
 
