@@ -122,7 +122,7 @@ def trial(g, i, s0, small, s, frames):
     lame, two_mu, free = parts.moduli(g, i)
     parts.strains(g, i, small, s, frames)
     for p in range(len(s)):
-        pressure = lame * parts.trace(g, s[p])
+        pressure = lame * parts.trace(g, s, p)
         for k in range(s.shape[1]):
             s[p, k] = s0[p, k] + two_mu * s[p, k]
         s[p, 0] += pressure
