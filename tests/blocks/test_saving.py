@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -72,6 +73,13 @@ def test_looking_and_saving_change_nothing(tmp_path):
         ends.append(state(sim))
     assert np.nanmax(ends[0]["damage"]) == 1.0
     same(*ends)
+
+
+def test_the_time_limit_hears_how_long_a_checkpoint_took(tmp_path):
+    sim = Blocks(stop=SimpleNamespace(saved=(took := []).append))
+    models.impact(sim)
+    saved_state.save(sim, tmp_path / "a.sav")
+    assert len(took) == 1 and took[0] > 0.0
 
 
 def test_variables_alone_can_be_saved(tmp_path):

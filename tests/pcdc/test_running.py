@@ -200,8 +200,6 @@ def test_physics_that_breaks_down_leaves_the_histories(bench, monkeypatch):
 class Asked(StopRequests):
     """Requests of the outside: a stop."""
 
-    took: float | None = None
-
     def __init__(self) -> None:
         super().__init__()
         self.reason = "SIGTERM"
@@ -211,9 +209,6 @@ class Asked(StopRequests):
 
     def decide(self, code: int) -> str:
         return "stop" if code == STOP else "none"
-
-    def saved(self, seconds: float) -> None:
-        self.took = seconds
 
 
 def test_a_stop_leaves_a_checkpoint_with_the_names_of_the_script(bench, monkeypatch):
@@ -225,7 +220,7 @@ def test_a_stop_leaves_a_checkpoint_with_the_names_of_the_script(bench, monkeypa
     ):
         bench("m_a = 4\n" + BOX + "pcdc history create 't' model value time\npcdc model step 100\n")
     assert len(rows(bench, "data/history_t.csv")) == 14
-    assert bench.blocks.stop.took >= 0.0 and bench.project.progress is None
+    assert bench.project.progress is None
     from tests.pcdc.fake import Bench
 
     again = Bench(bench.project.directory)("pcdc model restore 'data/0000000013.sav'\n")
