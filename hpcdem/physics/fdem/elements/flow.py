@@ -89,15 +89,19 @@ def width(kind: Kind) -> int:
 def _relieve(kind: Kind) -> Any:
     count, wide, space = len(kind.parts), width(kind), kind.dim == 3
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def relieve(g, i, base, memory, s0):
         lame, two_mu, free = parts.moduli(g, i)
         for p in range(count):
-            m, b, s = parts.memory(g, i, p, memory, 0, wide), base[i, p], s0[i, p]
-            s11, s22, s12, s33 = laws.hooke(m[E11], m[E22], m[E12], m[E33], lame, two_mu, free)
-            s[0], s[1], s[2], s[3] = b[0] - s11, b[1] - s22, b[2] - s12, b[3] - s33
+            j, o = parts.place(g, i, p, wide)
+            s11, s22, s12, s33 = laws.hooke(
+                memory[j, o + E11], memory[j, o + E22], memory[j, o + E12], memory[j, o + E33], lame, two_mu, free
+            )
+            s0[i, p, 0], s0[i, p, 1] = base[i, p, 0] - s11, base[i, p, 1] - s22
+            s0[i, p, 2], s0[i, p, 3] = base[i, p, 2] - s12, base[i, p, 3] - s33
             if space:
-                s[4], s[5] = b[4] - two_mu * m[E13], b[5] - two_mu * m[E23]
+                s0[i, p, 4] = base[i, p, 4] - two_mu * memory[j, o + E13]
+                s0[i, p, 5] = base[i, p, 5] - two_mu * memory[j, o + E23]
 
     return relieve
 
@@ -128,7 +132,7 @@ def renew_all(g, count, law, soft, table):
     for i in range(count):
         for p in range(law.shape[1]):
             if law[i, p] >= soft.first:
-                history = parts.memory(g, i, p, soft.history, 0, strength.HISTORY)
+                history = parts.memory(g, i, p, soft.history, strength.HISTORY)
                 strength.renew(law[i, p], history, soft, table)
 
 
@@ -141,7 +145,7 @@ def _locked_in(kind: Kind) -> Any:
             i = who[n]
             lame, two_mu, free = parts.moduli(g, i)
             for p in range(count):
-                m, b = parts.memory(g, i, p, memory, 0, wide), base[i, p]
+                m, b = parts.memory(g, i, p, memory, wide), base[i, p]
                 e11, e22, e12, e33 = m[E11], m[E22], m[E12], m[E33] - free * m[E33]
                 trace, squares = e11 + e22 + e33, e11 * e11 + e22 * e22 + 2.0 * e12 * e12 + e33 * e33
                 own = b[0] * e11 + b[1] * e22 + 2.0 * b[2] * e12 + b[3] * e33
@@ -177,12 +181,12 @@ def _of_triangles() -> tuple[int, int, int, Any, Any]:
 
     @njit(nogil=True, error_model="numpy")
     def gather(b, n, first, who, g, s0, law, table, lanes, tile):
-        w, wide = U(g.width), g.c.reshape(g.c.size)
+        rows, x, w, wide = g.rows, g.x, U(g.width), g.c.reshape(g.c.size)
         for e in range(U(0), U(n), _4):
             i = U(first) + e
-            r = U(g.rows[i]) * w, U(g.rows[i + _1]) * w, U(g.rows[i + _2]) * w, U(g.rows[i + _3]) * w
-            four_columns(tile, x1 + e, g.x, r)
-            two_columns(tile, x3 + e, g.x, (r[0] + _4, r[1] + _4, r[2] + _4, r[3] + _4))
+            r = U(rows[i]) * w, U(rows[i + _1]) * w, U(rows[i + _2]) * w, U(rows[i + _3]) * w
+            four_columns(tile, x1 + e, x, r)
+            two_columns(tile, x3 + e, x, (r[0] + _4, r[1] + _4, r[2] + _4, r[3] + _4))
             q0 = i * _12
             q = q0, q0 + _12, q0 + U(24), q0 + U(36)
             four_columns(tile, ca + e, wide, q)
@@ -269,6 +273,8 @@ def _of_hexahedra() -> tuple[int, int, int, Any, Any]:
         for i in range(first, first + n):
             for j in range(count):
                 some |= table[4 * law[i, j] + STRENGTH] < np.inf
+            if some:
+                break
         if some:
             hexes.gather(n, first, g.place, g.x, g.x, g.c.reshape(g.c.size), lanes)
             for e in range(U(size)):
@@ -328,20 +334,21 @@ def _all_inside(n, to, tile):
 
 
 def _pressure(kind: Kind) -> Any:
-    @njit(error_model="numpy")
-    def plane(g, m, lame, two_mu, free):
-        return lame * (m[E11] + m[E22] + (m[E33] - free * m[E33])) + 0.5 * two_mu * (m[E11] + m[E22])
+    @njit(error_model="numpy", forceinline=True)
+    def plane(g, j, o, memory, lame, two_mu, free):
+        e11, e22, e33 = memory[j, o + E11], memory[j, o + E22], memory[j, o + E33]
+        return lame * (e11 + e22 + (e33 - free * e33)) + 0.5 * two_mu * (e11 + e22)
 
-    @njit(error_model="numpy")
-    def space(g, m, lame, two_mu, free):
-        return (lame + two_mu / 3.0) * (m[E11] + (m[E22] + m[E33]))
+    @njit(error_model="numpy", forceinline=True)
+    def space(g, j, o, memory, lame, two_mu, free):
+        return (lame + two_mu / 3.0) * (memory[j, o + E11] + (memory[j, o + E22] + memory[j, o + E33]))
 
     return plane if kind.dim == 2 else space
 
 
 pressure = by_kind(_pressure)
-"""pressure(g, m, lame, two_mu, free): mean of the normal stresses [Pa], in the plane of 11 and 22, of a plastic
-strain."""
+"""pressure(g, j, o, memory, lame, two_mu, free): mean of the normal stresses [Pa], in the plane of 11 and 22, of a
+plastic strain, see `parts.place`."""
 
 
 def _share(kind: Kind) -> Any:
@@ -353,15 +360,15 @@ def _share(kind: Kind) -> Any:
         lame, two_mu, free = parts.moduli(g, i)
         mean = whole = 0.0
         for p in range(each * overlay, each * overlay + each):
-            volume = parts.volume(g, i, p)
-            mean += volume * pressure(g, parts.memory(g, i, p, memory, 0, wide), lame, two_mu, free)
+            volume, (j, o) = parts.volume(g, i, p), parts.place(g, i, p, wide)
+            mean += volume * pressure(g, j, o, memory, lame, two_mu, free)
             whole += volume
         mean, per = mean / whole, 1.0 / (dim * lame + two_mu)
         for p in range(each * overlay, each * overlay + each):
-            m = parts.memory(g, i, p, memory, 0, wide)
-            more = (mean - pressure(g, m, lame, two_mu, free)) * per
+            j, o = parts.place(g, i, p, wide)
+            more = (mean - pressure(g, j, o, memory, lame, two_mu, free)) * per
             for k in normal:
-                m[k] += more
+                memory[j, o + k] += more
 
     return share
 
@@ -397,32 +404,32 @@ def _flow(kind: Kind) -> Any:
         return m
 
     @njit(nogil=True, error_model="numpy")
-    def remember(m, first, overlay, who, g, which, tile, law, table, soft, step, memory, flows):
-        """Add what has flowed to memory; flows (block, overlays) bool: of which some has."""
+    def remember(m, first, overlay, who, g, which, tile, base, law, table, soft, step, memory, s0, flows):
+        """Add what has flowed to memory, of elements of one part also to s0; flows (block, overlays) bool: of which
+        others some has."""
         for k in range(m):
             at, bits = U(k), np.int64(tile[HOW + U(k)])
             if bits == 0:
                 continue
             e, p = which[k] % block, each * overlay + which[k] // block
             i = who[first + e]
-            flows[e, overlay] = True
-            own = parts.memory(g, i, p, memory, 0, wide)
-            own[E11] += tile[P11 + at]
-            own[E22] += tile[P22 + at]
-            own[E12] += tile[P12 + at]
-            own[E33] += tile[P33 + at]
+            j, o = parts.place(g, i, p, wide)
+            memory[j, o + E11] += tile[P11 + at]
+            memory[j, o + E22] += tile[P22 + at]
+            memory[j, o + E12] += tile[P12 + at]
+            memory[j, o + E33] += tile[P33 + at]
             if space:
-                own[E13] += tile[P13 + at]
-                own[E23] += tile[P23 + at]
-            own[SHEAR] += tile[P_SHEAR + at]
-            own[VOLUME] += tile[P_VOLUME + at]
+                memory[j, o + E13] += tile[P13 + at]
+                memory[j, o + E23] += tile[P23 + at]
+            memory[j, o + SHEAR] += tile[P_SHEAR + at]
+            memory[j, o + VOLUME] += tile[P_VOLUME + at]
             if bits & SHEAR_NOW:
-                own[IN_SHEAR] = step + 1.0
+                memory[j, o + IN_SHEAR] = step + 1.0
             if bits & TENSION_NOW:
-                own[IN_TENSION] = step + 1.0
-            own[WORK] += tile[P_WORK + at]
+                memory[j, o + IN_TENSION] = step + 1.0
+            memory[j, o + WORK] += tile[P_WORK + at]
             if law[i, p] >= soft.first:
-                history = parts.memory(g, i, p, soft.history, 0, strength.HISTORY)
+                history = parts.memory(g, i, p, soft.history, strength.HISTORY)
                 if space:
                     strength.grown(
                         law[i, p], history, bits, tile[P_SHEAR + at], tile[P_VOLUME + at], tile[P_SHORT + at], soft,
@@ -433,6 +440,10 @@ def _flow(kind: Kind) -> Any:
                         law[i, p], history, bits, tile[P11 + at], tile[P22 + at], tile[P12 + at], tile[P33 + at],
                         tile[P_SHEAR + at], tile[P_VOLUME + at], soft, table,
                     )  # fmt: skip
+            if each > 1:
+                flows[e, overlay] = True
+            else:
+                relieve(g, i, base, memory, s0)
 
     @njit(nogil=True, error_model="numpy")
     def work(g, t, threads, count, who, base, law, soft, small, step, memory, s0, table):
@@ -463,18 +474,17 @@ def _flow(kind: Kind) -> Any:
                     free = parts.moduli(g, who[first])[2]
                     plasticity.return_all(m, free, tile)
                     plasticity.measure(m, free, tile)
-                if not some:
+                if each > 1 and not some:
                     flows[:] = False
                     some = True
-                remember(m, first, overlay, who, g, which, tile, law, table, soft, step, memory, flows)
+                remember(m, first, overlay, who, g, which, tile, base, law, table, soft, step, memory, s0, flows)
             if some:
                 for e in range(n):
                     flowed = False
                     for overlay in range(overlays):
                         if flows[e, overlay]:
                             flowed = True
-                            if each > 1:
-                                share(g, who[first + e], overlay, memory)
+                            share(g, who[first + e], overlay, memory)
                     if flowed:
                         relieve(g, who[first + e], base, memory, s0)
 

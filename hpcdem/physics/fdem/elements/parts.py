@@ -33,7 +33,7 @@ def _by_kind(make: Callable[[Kind], Any]) -> Any:
     def function(g, *args):
         return of[type(g)](g, *args)
 
-    @overload(function)
+    @overload(function, jit_options={"forceinline": True})
     def chosen(g, *args):
         one = of[g.instance_class]
         return lambda g, *args: one(g, *args)
@@ -148,20 +148,26 @@ put_moduli = _by_kind(_put_moduli)
 """put_moduli(g, i, lame, two_mu, c): into a copy of the constants."""
 
 
-def _memory(kind: Kind) -> Any:
+def _place(kind: Kind) -> Any:
     each = kind.in_row
 
     @njit(error_model="numpy", forceinline=True)
-    def memory(g, i, p, of, first, width):
-        o = first + width * (p % each)
-        return of[g.rows[i] - g.first + p // each, o : o + width]
+    def place(g, i, p, width):
+        return np.int64(g.rows[i]) - g.first + p // each, width * (p % each)
 
-    return memory
+    return place
 
 
-memory = _by_kind(_memory)
-"""memory(g, i, p, of, first, width): what a part remembers (width,), of the rows `of` of owned elements, in whose
-columns from `first` on this begins."""
+place = _by_kind(_place)
+"""place(g, i, p, width): row, of those of owned elements, and first of the `width` columns that a part remembers.
+(Views are counted, which takes longer than what a loop over elements does with one.)"""
+
+
+@njit(error_model="numpy", forceinline=True)
+def memory(g, i, p, of, width):
+    """A view (width,) of them, of the rows `of` of owned elements."""
+    j, o = place(g, i, p, width)
+    return of[j, o : o + width]
 
 
 def _strain(kind: Kind) -> Any:
@@ -274,6 +280,7 @@ def _share(kind: Kind) -> Any:
 
     @njit(error_model="numpy", forceinline=True)
     def share(g, i, s):
+        s = s[i]
         for overlay in range(overlays):
             first = each * overlay
             low = high = trace(g, s, first)
@@ -294,7 +301,7 @@ def _share(kind: Kind) -> Any:
 
 
 share = _by_kind(_share)
-"""share(g, i, s): the parts of an overlay get one pressure, the mean of theirs by volume; s (parts, 4 or more): their
+"""share(g, i, s): the parts of an overlay get one pressure, the mean of theirs by volume; s (n, parts, 4 or more):
 stresses. What is rounding stays."""
 
 

@@ -45,22 +45,26 @@ CREPT, IN_KELVIN, BEFORE, LOST = (0, 1, 2, 10, 11), (3, 4, 5, 12, 13), (6, 7, 8,
 """Columns of what a part of an element remembers, by these components, in the frame that turns with it: creep strain,
 strain of the Kelvin unit, stress [Pa] at the beginning of the creep step; and what was lost [J], in the plane [J/m]."""
 MEMORY = {2: 10, 3: 16}
-"""Columns of a part, by dimensions; where they are: `parts.memory`."""
+"""Columns of a part, by dimensions; where they are: `parts.place`."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _memory(g, i, p, memory):
-    """What part p of element i remembers."""
-    return parts.memory(g, i, p, memory, 0, 3 * parts.components(g) - 2)
+def _place(g, i, p):
+    """Row and first column of what part p of element i remembers."""
+    return parts.place(g, i, p, 3 * parts.components(g) - 2)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def squares(a):
-    """a : a of a deviator (3 or 5,)."""
-    a33, shear = a[0] + a[1], a[2] * a[2]
-    for k in range(3, len(a)):
-        shear += a[k] * a[k]
-    return a[0] * a[0] + a[1] * a[1] + a33 * a33 + 2.0 * shear
+def _added(k, a, sums):
+    """Component k of a deviator a joins the sums of which `_square` makes a : a."""
+    normal, across, shear = sums
+    return (normal + a * a, across + a, shear) if k < 2 else (normal, across, shear + a * a)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _square(sums):
+    normal, across, shear = sums
+    return normal + across * across + 2.0 * shear
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -81,31 +85,20 @@ def stress_then(e, start, creep, kelvin, s, two_mu, back, of_both, x):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _deviator(s, out):
-    """Of a stress or strain (4 or 6,); returns its mean."""
-    mean = (s[0] + s[1] + s[3]) / 3.0
-    out[0], out[1] = s[0] - mean, s[1] - mean
-    for k in range(2, len(out)):
-        out[k] = s[PLACES[k]]
-    return mean
+def _mean(s, i, p):
+    return (s[i, p, 0] + s[i, p, 1] + s[i, p, 3]) / 3.0
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _columns(of, memory, out):
-    """Components (3 or 5,) of what a part remembers."""
-    for k in range(len(out)):
-        out[k] = memory[of[k]]
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def relieve(moduli, base, crept, s0):
-    """Into s0 the stress [Pa] of a part without strain: base less D e_c, which is 2 G_M e_c unless the strain across
-    the plane is free."""
+def _relieve(size, i, p, moduli, base, s0):
+    """Into s0, where its creep strain is, the stress [Pa] of a part without strain: base less D e_c, which is 2 G_M e_c
+    unless the strain across the plane is free."""
     lame, two_mu, free = moduli
-    s11, s22, _, s33 = laws.hooke(crept[0], crept[1], crept[2], -(crept[0] + crept[1]), lame, two_mu, free)
-    s0[0], s0[1], s0[3] = base[0] - s11, base[1] - s22, base[3] - s33
-    for k in range(2, len(crept)):
-        s0[PLACES[k]] = base[PLACES[k]] - two_mu * crept[k]
+    e11, e22 = s0[i, p, 0], s0[i, p, 1]
+    s11, s22, _, s33 = laws.hooke(e11, e22, 0.0, -(e11 + e22), lame, two_mu, free)
+    s0[i, p, 0], s0[i, p, 1], s0[i, p, 3] = base[i, p, 0] - s11, base[i, p, 1] - s22, base[i, p, 3] - s33
+    for k in range(2, size):
+        s0[i, p, PLACES[k]] = base[i, p, PLACES[k]] - two_mu * s0[i, p, PLACES[k]]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -121,60 +114,71 @@ def _across(trace, mean, h11, h22, weight, bulk):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def creep_part(e, base, law, moduli, dt, keep, memory, s0, room):
-    """Let a part creep by its rows of all tables, see `creep`; e (4 or 6,): its strain, law (3,): of its model, room:
-    five of (3 or 5,), are filled. Returns what it loses [J/m3]."""
+def _creep_part(size, i, p, j, o, e, base, moduli, unit, per_kelvin, dt, keep, memory, s0):
+    """Let a part creep, see `creep`: rows i, p of base and s0, p of e (parts, 4 or 6), its strains, j of memory, from
+    column o on. size: components of a deviator; unit: its `factors`. Returns what it loses [J/m3]."""
     lame, two_mu, free = moduli
-    start, now, crept, way, both_ends = room
-    back, kelvin, maxwell, div, ratio = factors(dt, two_mu, law[KELVIN], law[PER_KELVIN], law[PER_MAXWELL])
-    both, mean = kelvin + maxwell, _deviator(base, start)
+    back, kelvin, maxwell, div, ratio = unit
+    both, mean, across = kelvin + maxwell, _mean(base, i, p), e[p, 3]
     if free != 0.0:
-        for k in range(2):
-            before, stress, old = memory[IN_KELVIN[k]], memory[BEFORE[k]], memory[CREPT[k]]
-            way[k] = stress_then(0.0, start[k], old, before, stress, two_mu, back, both, div)
-        e[3] = _across(e[0] + e[1], mean, way[0], way[1], 1.0 / div, _bulk(lame, two_mu))
-    _deviator(e, now)
-    for k in range(len(crept)):
-        before, stress, old = memory[IN_KELVIN[k]], memory[BEFORE[k]], memory[CREPT[k]]
-        both_ends[k] = stress + stress_then(now[k], start[k], old, before, stress, two_mu, back, both, div)
-        then = ratio * before + both_ends[k] * kelvin
-        way[k] = then - before
-        crept[k] = old + (way[k] + both_ends[k] * maxwell)
+        h11 = stress_then(
+            0.0, base[i, p, 0] - mean, memory[j, o + CREPT[0]], memory[j, o + IN_KELVIN[0]], memory[j, o + BEFORE[0]],
+            two_mu, back, both, div,
+        )  # fmt: skip
+        h22 = stress_then(
+            0.0, base[i, p, 1] - mean, memory[j, o + CREPT[1]], memory[j, o + IN_KELVIN[1]], memory[j, o + BEFORE[1]],
+            two_mu, back, both, div,
+        )  # fmt: skip
+        across = _across(e[p, 0] + e[p, 1], mean, h11, h22, 1.0 / div, _bulk(lame, two_mu))
+    third, nothing = (e[p, 0] + e[p, 1] + across) / 3.0, (0.0, 0.0, 0.0)
+    of_stress, of_kelvin = nothing, nothing
+    for k in range(size):
+        now, start = e[p, PLACES[k]] - (third if k < 2 else 0.0), base[i, p, PLACES[k]] - (mean if k < 2 else 0.0)
+        before, stress, old = memory[j, o + IN_KELVIN[k]], memory[j, o + BEFORE[k]], memory[j, o + CREPT[k]]
+        ends = stress + stress_then(now, start, old, before, stress, two_mu, back, both, div)
+        then = ratio * before + ends * kelvin
+        way = then - before
+        crept = old + (way + ends * maxwell)
+        s0[i, p, PLACES[k]] = crept
         if keep:
-            memory[CREPT[k]], memory[IN_KELVIN[k]] = crept[k], then
-    relieve(moduli, base, crept, s0)
+            memory[j, o + CREPT[k]], memory[j, o + IN_KELVIN[k]] = crept, then
+            of_stress, of_kelvin = _added(k, ends, of_stress), _added(k, way, of_kelvin)
+    _relieve(size, i, p, moduli, base, s0)
     if not keep:
         return 0.0
     # By its spring, so that asking again at these positions (dt = 0) finds the same bits.
     if free != 0.0:
-        h11 = stress_then(0.0, start[0], crept[0], 0.0, 0.0, two_mu, 0.0, 0.0, 1.0 / two_mu)
-        h22 = stress_then(0.0, start[1], crept[1], 0.0, 0.0, two_mu, 0.0, 0.0, 1.0 / two_mu)
-        e[3] = _across(e[0] + e[1], mean, h11, h22, 1.0 / (1.0 / two_mu), _bulk(lame, two_mu))
-        _deviator(e, now)
-    for k in range(len(crept)):
-        memory[BEFORE[k]] = start[k] + two_mu * (now[k] - crept[k])
+        c11, c22, soft = memory[j, o + CREPT[0]], memory[j, o + CREPT[1]], 1.0 / two_mu
+        h11 = stress_then(0.0, base[i, p, 0] - mean, c11, 0.0, 0.0, two_mu, 0.0, 0.0, soft)
+        h22 = stress_then(0.0, base[i, p, 1] - mean, c22, 0.0, 0.0, two_mu, 0.0, 0.0, soft)
+        across = _across(e[p, 0] + e[p, 1], mean, h11, h22, 1.0 / soft, _bulk(lame, two_mu))
+        third = (e[p, 0] + e[p, 1] + across) / 3.0
+    for k in range(size):
+        now, start = e[p, PLACES[k]] - (third if k < 2 else 0.0), base[i, p, PLACES[k]] - (mean if k < 2 else 0.0)
+        memory[j, o + BEFORE[k]] = start + two_mu * (now - memory[j, o + CREPT[k]])
     if dt == 0.0:
         return 0.0
-    lost = 0.5 * squares(both_ends) * maxwell
-    if law[PER_KELVIN] > 0.0:
-        lost += 2.0 * squares(way) / (law[PER_KELVIN] * dt)
+    lost = 0.5 * _square(of_stress) * maxwell
+    if per_kelvin > 0.0:
+        lost += 2.0 * _square(of_kelvin) / (per_kelvin * dt)
     return lost
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _creep(t, threads, who, g, base, law, table, small, dt, keep, memory, s0):
     (e, frames), n, size = parts.room(g), len(who), parts.components(g) - 1
-    room = np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size)
     for m in range(n * t // threads, n * (t + 1) // threads):
         i = who[m]
         parts.strains(g, i, small, e, frames)
-        moduli, of_model = parts.moduli(g, i), table[law[i]]
-        for p in range(len(e)):
-            own = _memory(g, i, p, memory)
-            lost = creep_part(e[p], base[i, p], of_model, moduli, dt, keep, own, s0[i, p], room)
+        moduli, row = parts.moduli(g, i), law[i]
+        per_kelvin = table[row, PER_KELVIN]
+        unit = factors(dt, moduli[1], table[row, KELVIN], per_kelvin, table[row, PER_MAXWELL])
+        for p in range(parts.count(g)):
+            j, o = _place(g, i, p)
+            lost = _creep_part(size, i, p, j, o, e, base, moduli, unit, per_kelvin, dt, keep, memory, s0)
             if keep:
-                own[LOST] += lost * parts.weight(g, i, p)
-        parts.share(g, i, s0[i])
+                memory[j, o + LOST] += lost * parts.weight(g, i, p)
+        parts.share(g, i, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -199,33 +203,36 @@ def creep_threaded(threads, who, g, base, law, table, small, dt, keep, memory, s
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def relieve_all(who, g, base, memory, s0):
-    """`relieve` for the elements `who` (m,)."""
-    crept = np.empty(parts.components(g) - 1)
+    """Into s0 [Pa] the stress without strain of the elements `who` (m,)."""
+    size = parts.components(g) - 1
     for i in who:
         moduli = parts.moduli(g, i)
         for p in range(parts.count(g)):
-            _columns(CREPT, _memory(g, i, p, memory), crept)
-            relieve(moduli, base[i, p], crept, s0[i, p])
-        parts.share(g, i, s0[i])
+            j, o = _place(g, i, p)
+            for k in range(size):
+                s0[i, p, PLACES[k]] = memory[j, o + CREPT[k]]
+            _relieve(size, i, p, moduli, base, s0)
+        parts.share(g, i, s0)
 
 
-@njit(cache=True, error_model="numpy")
-def _elastic(moduli, base, law, dt, memory, s0, room):
-    """Stress [Pa] without strain of a part within this creep step, into s0, and its lambda and 2 G."""
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _elastic(size, i, p, j, o, base, moduli, unit, memory, s0):
+    """Stress [Pa] without strain of a part within this creep step, into s0; its lambda and 2 G. See `_creep_part`."""
     lame, two_mu, free = moduli
-    back, kelvin, maxwell, div, _ = factors(dt, two_mu, law[KELVIN], law[PER_KELVIN], law[PER_MAXWELL])
-    weight, mean = 1.0 / div, _deviator(base, room)
-    for k in range(len(room)):
-        before, stress, old = memory[IN_KELVIN[k]], memory[BEFORE[k]], memory[CREPT[k]]
-        s0[PLACES[k]] = stress_then(0.0, room[k], old, before, stress, two_mu, back, kelvin + maxwell, div)
+    back, kelvin, maxwell, div, _ = unit
+    weight, mean = 1.0 / div, _mean(base, i, p)
+    for k in range(size):
+        before, stress, old = memory[j, o + IN_KELVIN[k]], memory[j, o + BEFORE[k]], memory[j, o + CREPT[k]]
+        start = base[i, p, PLACES[k]] - (mean if k < 2 else 0.0)
+        s0[i, p, PLACES[k]] = stress_then(0.0, start, old, before, stress, two_mu, back, kelvin + maxwell, div)
     if free != 0.0:
         own = _bulk(lame, two_mu) - weight / 3.0
-        mean += own * _across(0.0, mean, s0[0], s0[1], weight, _bulk(lame, two_mu))
-        s0[3], lame = 0.0, own * weight / (own + weight)
+        mean += own * _across(0.0, mean, s0[i, p, 0], s0[i, p, 1], weight, _bulk(lame, two_mu))
+        s0[i, p, 3], lame = 0.0, own * weight / (own + weight)
     else:
-        s0[3], lame = mean - (s0[0] + s0[1]), lame + (two_mu - weight) / 3.0
-    s0[0] += mean
-    s0[1] += mean
+        s0[i, p, 3], lame = mean - (s0[i, p, 0] + s0[i, p, 1]), lame + (two_mu - weight) / 3.0
+    s0[i, p, 0] += mean
+    s0[i, p, 1] += mean
     return lame, weight
 
 
@@ -233,32 +240,35 @@ def _elastic(moduli, base, law, dt, memory, s0, room):
 def as_elastic(who, g, base, law, table, dt, memory, like, s0):
     """The elastic element that one is within this creep step: into like, a copy of its constants, its moduli, into s0
     [Pa] its stress without strain; other arguments as for `creep`."""
-    room = np.empty(parts.components(g) - 1)
+    size = parts.components(g) - 1
     for i in who:
-        moduli, lame, two_mu = parts.moduli(g, i), 0.0, 0.0
+        moduli, row, lame, two_mu = parts.moduli(g, i), law[i], 0.0, 0.0
+        unit = factors(dt, moduli[1], table[row, KELVIN], table[row, PER_KELVIN], table[row, PER_MAXWELL])
         for p in range(parts.count(g)):
-            own = _memory(g, i, p, memory)
-            lame, two_mu = _elastic(moduli, base[i, p], table[law[i]], dt, own, s0[i, p], room)
+            j, o = _place(g, i, p)
+            lame, two_mu = _elastic(size, i, p, j, o, base, moduli, unit, memory, s0)
         parts.put_moduli(g, i, lame, two_mu, like)
-        parts.share(g, i, s0[i])
+        parts.share(g, i, s0)
 
 
-@njit(cache=True, error_model="numpy")
-def _stored(moduli, base, law, memory, a):
-    """What `stored` adds for a part [J/m3]; a (3 or 5,): is filled."""
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _stored(size, i, p, j, o, base, moduli, kelvin, memory):
+    """What `stored` adds for a part [J/m3]; kelvin: G_K, 0: there is no Kelvin unit."""
     lame, two_mu, free = moduli
-    _columns(CREPT, memory, a)
-    density = 0.5 * two_mu * squares(a)
+    crept = in_kelvin = (0.0, 0.0, 0.0)
+    normal = shear = 0.0
+    for k in range(size):
+        a = memory[j, o + CREPT[k]]
+        crept, in_kelvin = _added(k, a, crept), _added(k, memory[j, o + IN_KELVIN[k]], in_kelvin)
+        if k < 2:
+            normal += base[i, p, PLACES[k]] * a
+        else:
+            shear += base[i, p, PLACES[k]] * a
+    density = 0.5 * two_mu * _square(crept)
     if free != 0.0:  # the strain across the plane stores nothing
-        density += 0.5 * (lame - two_mu) * (a[0] + a[1]) * (a[0] + a[1])
-    normal, shear = base[0] * a[0] + base[1] * a[1], 0.0
-    for k in range(2, len(a)):
-        shear += base[PLACES[k]] * a[k]
-    density -= normal + 2.0 * shear - base[3] * (a[0] + a[1])
-    if law[PER_KELVIN] > 0.0:
-        _columns(IN_KELVIN, memory, a)
-        density += law[KELVIN] * squares(a)
-    return density
+        density += 0.5 * (lame - two_mu) * crept[1] * crept[1]
+    density -= normal + 2.0 * shear - base[i, p, 3] * crept[1]
+    return density + kelvin * _square(in_kelvin)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -266,32 +276,32 @@ def stored(who, g, base, law, table, memory, out):
     """Add to out (m,) what the elastic energy [J], in the plane [J/m], of these elements differs by from that of
     elements with the initial stress s0 = base - 2 G_M e_c (see `plasticity.locked_in`), and what the springs of the
     Kelvin units store; base [Pa]: initial stress."""
-    a = np.empty(parts.components(g) - 1)
+    size = parts.components(g) - 1
     for m in range(len(who)):
         i = who[m]
-        moduli = parts.moduli(g, i)
+        moduli, row = parts.moduli(g, i), law[i]
+        kelvin = table[row, KELVIN] if table[row, PER_KELVIN] > 0.0 else 0.0
         for p in range(parts.count(g)):
-            own = _memory(g, i, p, memory)
-            out[m] += parts.weight(g, i, p) * _stored(moduli, base[i, p], table[law[i]], own, a)
+            j, o = _place(g, i, p)
+            out[m] += parts.weight(g, i, p) * _stored(size, i, p, j, o, base, moduli, kelvin, memory)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def strains(n, g, small, memory, out):
     """Creep strain and Kelvin strain, xx, yy, xy each, in space zz, xz, yz besides, along the axes of space: means over
     the parts of elements by volume, into out (n, 6 or 12)."""
-    a, s, each = np.empty(parts.components(g) - 1), np.zeros(parts.components(g)), out.shape[1] // 2
+    size, s, each = parts.components(g) - 1, np.zeros(parts.components(g)), out.shape[1] // 2
     for i in range(n):
         out[i], whole = 0.0, 0.0
         for p in range(parts.count(g)):
             whole += parts.volume(g, i, p)
         for p in range(parts.count(g)):
             _, frame = parts.strain(g, i, p, small)
-            share, own = parts.volume(g, i, p) / whole, _memory(g, i, p, memory)
+            share, (j, o) = parts.volume(g, i, p) / whole, _place(g, i, p)
             for m in range(2):
-                _columns(IN_KELVIN if m else CREPT, own, a)
-                s[3] = -(a[0] + a[1])
-                for k in range(len(a)):
-                    s[PLACES[k]] = a[k]
+                for k in range(size):
+                    s[PLACES[k]] = memory[j, o + (IN_KELVIN[k] if m else CREPT[k])]
+                s[3] = -(s[0] + s[1])
                 found = parts.turned(g, s, frame)
                 for k in range(each):
                     out[i, each * m + k] += share * found[k]
