@@ -71,7 +71,7 @@ def serve(options: dict[str, Any]) -> None:
         options["number"] = NUMBER
     usual = {param.name: param.default for param in on_paper.grade.params}
     style = {name: options[name] for name in ("angle_factor", "gap", "falling") if options[name] != usual[name]}
-    if options["formats"] != ["png"]:
+    if options["formats"] != ("png",):
         style["formats"] = options["formats"]
     on_paper._factor(options)
     serve_page(
