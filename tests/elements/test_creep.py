@@ -87,3 +87,13 @@ def test_a_creep_step_is_the_plain_one(kind: Kind) -> None:
         assert found[0][1][i, :, :used] == pytest.approx(free[:, :used], abs=1e-3)
     unmoved = np.setdiff1d(np.arange(of.count), who)
     assert np.array_equal(new[unmoved], old[unmoved]) and len(unmoved)
+
+
+@every_kind
+def test_a_rank_that_owns_no_element_has_no_histories(kind: Kind) -> None:
+    sim = deformed(kind)
+    sim.close_model()
+    of, memory = block(sim, kind), sim.cold["creep"]
+    of.stored = of.stored[:0]
+    width = kernels.MEMORY[kind.dim]
+    assert of.histories(memory[:0], width).shape == (0, len(kind.parts), width)

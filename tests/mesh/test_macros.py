@@ -5,8 +5,12 @@ import pytest
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.physics.fdem.mesh import Mesh, check
+from hpcdem.pre.mesh import cracks
+from hpcdem.pre.mesh.fractures import Fractures
+from hpcdem.pre.mesh.geometry import polyline
 from hpcdem.pre.mesh.quadratic import quadratic
 from hpcdem.pre.mesh.remade import without
+from hpcdem.pre.mesh.solids import Plane
 from hpcdem.pre.mesh.structured_space import hexes
 from tests.blocks.support import rectangle
 
@@ -77,5 +81,28 @@ def test_layers_groups_and_cracks_of_triangles_stay_where_they_are():
         np.linalg.norm(np.diff(before.points[before.cracks], axis=1), axis=2).sum()
     )
     assert len(mesh.crack_sets) == 4
-    with pytest.raises(CommandError, match="mesh of triangles alone"):
+    with pytest.raises(CommandError, match="six-node triangles in the mesh already"):
         quadratic(mesh)
+    with pytest.raises(CommandError, match="mesh of triangles alone"):
+        quadratic(rectangle(1, 1, 1.0, 1.0, kind="quad"))
+
+
+def test_cracks_on_a_line_keep_to_the_sides_of_macros():
+    """y = 1/4 runs along edges inside the six-node triangles of squares of 1/2, y = 1/2 along their sides."""
+    mesh = quadratic(rectangle(2, 2, 1.0, 1.0)).mesh
+    assert len(cracks.edges_on(mesh, [polyline([(0.0, 0.25), (1.0, 0.25)])])) == 0
+    assert len(cracks.edges_on(mesh, [polyline([(0.0, 0.5), (1.0, 0.5)])])) == 4
+    line = Fractures(np.array([[[0.0, 0.25], [1.0, 0.25]]]), np.array([1]))
+    cracked = cracks.follow(mesh, line)
+    rows = mesh.find_edges(edges := mesh.edges(), cracked.cracks)
+    assert len(rows) and not mesh.inside_macros(edges.faces[rows, 0]).any()
+    check(cracked)
+
+
+def test_faces_on_a_plane_are_sides_of_hexahedra():
+    """The diagonal plane of a cube runs along faces between the tetrahedra that store it, and none of its sides."""
+    mesh = hexes([np.linspace(0.0, 1.0, 2)] * 3)
+    inner = mesh.edges()
+    at = mesh.points[inner.points[inner.inner]]
+    plane = next(Plane(tuple(a), tuple(np.cross(b - a, c - a))) for a, b, c in at)
+    assert len(cracks.faces_on(mesh, [plane])) == 0

@@ -25,13 +25,20 @@ STRAYING = 4.0
 """How the cost of a path along edges grows with the square of its distance from the trace, in edge lengths."""
 
 
+def _sides(mesh: Mesh) -> Edges:
+    """The edges, in space faces, along which elements can part: none inside a macro-element."""
+    edges = mesh.edges()
+    sides = ~mesh.inside_macros(edges.faces[:, 0])
+    return Edges(edges.faces[sides], edges.points[sides])
+
+
 def edges_on(mesh: Mesh, curves: Sequence[Curve], tolerance: float | None = None) -> np.ndarray:
     """(k, 2) i8 end points of the edges that lie on curves: both ends do, and for straight segments the middle too.
 
     tolerance [m]; None: TOLERANCE times the length of the edge. The chord of an arc lies on it if its ends do and it is
-    the chord of the short way between them.
+    the chord of the short way between them. Edges inside a six-node triangle lie on none.
     """
-    edges = mesh.edges()
+    edges = _sides(mesh)
     a, b = mesh.points[edges.points[:, 0]], mesh.points[edges.points[:, 1]]
     length = np.hypot(*(b - a).T)
     near = TOLERANCE * length if tolerance is None else np.full(len(length), tolerance)
@@ -91,8 +98,8 @@ def with_cracks(mesh: Mesh, pairs: np.ndarray, number: int) -> Mesh:
 
 
 def faces_on(mesh: Mesh, surfaces: Sequence[Any]) -> np.ndarray:
-    """(k, 3) i8 points of the faces that lie on surfaces or those of bodies, in space."""
-    edges = mesh.edges()
+    """(k, 3) i8 points of the faces that lie on surfaces or those of bodies, in space; of hexahedra their sides."""
+    edges = _sides(mesh)
     slack = TOLERANCE * float(np.ptp(mesh.points, axis=0).max())
     at = mesh.points[edges.points]
     on = np.any([on_surface(one, at, slack) for one in surfaces], axis=0)
@@ -128,10 +135,9 @@ def follow(mesh: Mesh, fractures: Fractures) -> Mesh:
 
     A trace runs from the point of the mesh nearest to its beginning to that nearest to its end, by the way along edges
     that costs least: the length of each edge times 1 + STRAYING (distance of its middle from the trace / its length)2.
-    Traces shorter than the edges about them leave no crack.
+    Traces shorter than the edges about them leave no crack. Edges inside a six-node triangle are no way.
     """
-    edges = mesh.edges()
-    way = _Ways(mesh, edges)
+    way = _Ways(mesh, _sides(mesh))
     pairs, sets = [], []
     for (start, end), number in zip(fractures.ends, fractures.sets):
         path = way.along(start, end)

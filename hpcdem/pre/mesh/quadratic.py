@@ -14,6 +14,8 @@ def quadratic(mesh: Mesh) -> Remade:
     """The mesh with a six-node triangle in place of each triangle, its sides straight. The four parts of triangle e are
     the elements 4 e to 4 e + 3, the point between the ends of edge k is that behind all others before, plus k; groups,
     layers and cracks stay where they are. CommandError for other elements."""
+    if mesh.dim == 2 and len(mesh.macros):
+        raise CommandError("there are six-node triangles in the mesh already")
     if mesh.dim == 3 or (mesh.cells[:, 3] >= 0).any() or len(mesh.macros):
         raise CommandError("six-node triangles come from a mesh of triangles alone")
     edges, n = mesh.edges(), len(mesh.points)

@@ -48,7 +48,7 @@ class ElementBlock:
     def histories(self, memory: np.ndarray, width: int) -> np.ndarray:
         """What their parts remember (count, parts, width), of the rows of owned elements."""
         part = np.arange(len(self.kind.parts))
-        rows = memory.reshape(len(memory), -1, width)
+        rows = memory.reshape(len(memory), memory.shape[1] // width, width)  # a rank may own none
         return rows[self.stored[:, :1] + part // self.kind.in_row, part % self.kind.in_row]
 
     def places(self) -> np.ndarray:
