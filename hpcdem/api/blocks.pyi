@@ -1889,7 +1889,7 @@ class Nodes(Moved):
     ) -> None:
         """Fluid at nodes, one of the three at each; times of tables are those of flow. With a range, pressure and
         flow_surface wet the free faces whose nodes all lie in it: water stands before them and pushes on them,
-        whether channels end there or not. Without one they are said of the fluid in joints alone.
+        whether channels end there or not. Without a range they apply to the fluid in joints only.
 
         Parameters
         ----------

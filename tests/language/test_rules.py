@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import output
 from hpcdem.commands.dem.bonds import _slots
 from hpcdem.core.errors import ScriptError
 from hpcdem.physics.dem.simulation import Simulation
@@ -575,15 +574,6 @@ def test_hist_and_plot(play, tmp_path):
     drawn = pytest.importorskip("matplotlib.image").imread(data / "hist_1_vs_2.png")
     inside = drawn[200:-200, 300:-100, :3]
     assert drawn.shape[0] > 500 and (inside.max(axis=-1) - inside.min(axis=-1)).max() > 0.3  # a coloured line
-
-
-def test_plot_without_matplotlib_says_so(play, tmp_path, monkeypatch):
-    monkeypatch.setattr(output, "find_spec", lambda name: None)
-    _, log = play(
-        "BALL id 0 x 0 y 0 rad 1", "PROP density 2", "HIST ID 1 INTERVAL 1, step", "PLOT 1 1", "CYC 2", "STOP"
-    )
-    assert "hist_1_vs_1.png is not drawn: matplotlib is not installed" in log
-    assert (tmp_path / "data" / "hist_1_vs_1.txt").exists()
 
 
 def test_draw_is_noted(play):

@@ -40,6 +40,18 @@ def test_twice_and_late_are_refused(bench, more, message):
         bench(f"{MESH}pcdc {more}\n")
 
 
+def test_a_line_inside_them_cracks_nothing_unless_it_is_followed(bench):
+    """The middle of a row of six-node triangles is a line of edges inside them."""
+    line = "pcdc geometry create polyline (0,0.25) (2,0.25) as-layer 'l'\npcdc mesh intersect layer 'l'"
+    mesh = "pcdc mesh structured (0,0) (2,1) cells 4 2 diagonal right\npcdc mesh quadratic\n"
+    with pytest.raises(HpcdemError, match="no joint lies on layer 'l'; with follow"):
+        bench(f"{mesh}{line}\n")
+    bench(f"pcdc model new\n{mesh}{line} follow\n")
+    made = bench.project.mesh
+    rows = made.find_edges(edges := made.edges(), made.cracks)
+    assert len(rows) and not made.inside_macros(edges.faces[rows, 0]).any()
+
+
 def test_an_import_of_second_order_names_the_command(tmp_path):
     nodes = "1,0,0\n2,1,0\n3,0,1\n4,.5,0\n5,.5,.5\n6,0,.5\n"
     (tmp_path / "a.inp").write_text(f"*NODE\n{nodes}*ELEMENT, TYPE=CPE6\n1,1,2,3,4,5,6\n")

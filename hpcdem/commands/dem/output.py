@@ -16,7 +16,6 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -379,11 +378,7 @@ def finish(sim: Simulation) -> None:
 
 
 def _draw_curve(sim: Simulation, path: Path, names: list[str], points: list[tuple[float, float]]) -> None:
-    """The picture of PLOT, on one rank; a run without matplotlib says that it has none."""
-    if find_spec("matplotlib") is None:
-        if sim.log is not None:
-            sim.log.warn(f"{path.name} is not drawn: matplotlib is not installed")
-        return
+    """The picture of PLOT, on one rank."""
     from hpcdem.post import charts
 
     units = [unit_of(sim, name) for name in names]

@@ -38,7 +38,7 @@ def set_option(sim: Simulation, name: str, value: Any) -> None:
         if not holds(value):
             raise CommandError(f"SET {wanted}, got {value if isinstance(value, int) else format(value, 'g')}")
         setattr(s, name, kind(value))
-        if name in STEPS:  # the one that was said last counts
+        if name in STEPS:  # the last of the two that is set holds
             setattr(s, STEPS[name], 0.0)
     elif name in CHOICES:
         if value not in CHOICES[name]:

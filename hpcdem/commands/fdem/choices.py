@@ -103,7 +103,7 @@ class _Objects:
         if kind in g.FLOW:
             flow = Flow.there(project.blocks)
             if flow is None:
-                raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
+                raise CommandError("there are no channels yet: assign face-joint c-model hydraulic-porous-medium first")
             some, null_too = flow.numbers(kind), False
             self.kind = kind = g.FLOW[kind]
         self.there = there = np.ones(len(mesh.cells), bool) if null_too else project.alive

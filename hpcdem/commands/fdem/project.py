@@ -342,8 +342,7 @@ def joined(one: Mesh, other: Mesh) -> Mesh:
     layers = dict(one.layers)
     for name, pairs in other.layers.items():
         layers[name] = np.concatenate([layers.get(name, np.empty((0, one.dim), np.int64)), pairs + n_points])
-    sets, width = one.crack_sets.max(initial=-1) + 1, one.macro.nodes + 1
-    behind = np.append(np.full(width - 1, n_points), n_cells)
+    sets, behind = one.crack_sets.max(initial=-1) + 1, np.append(np.full(one.macro.nodes, n_points), n_cells)
     return Mesh.of(
         np.concatenate([one.points, other.points]),
         np.concatenate([one.cells, np.where(other.cells >= 0, other.cells + n_points, -1)]),
@@ -351,5 +350,5 @@ def joined(one: Mesh, other: Mesh) -> Mesh:
         layers,
         np.concatenate([one.cracks, other.cracks + n_points]),
         np.concatenate([one.crack_sets, other.crack_sets + sets]),
-        np.concatenate([one.macros.reshape(-1, width), other.macros.reshape(-1, width) + behind]),
+        np.concatenate([one.macros, other.macros + behind]),
     )

@@ -406,7 +406,7 @@ FLOW_CONDITION = Model(
     "hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11",
     "Fluid at nodes, one of the three at each; times of tables are those of flow. With a range, pressure and "
     "flow-surface wet the free faces whose nodes all lie in it: water stands before them and pushes on them, whether "
-    "channels end there or not. Without one they are said of the fluid in joints alone.",
+    "channels end there or not. Without a range they apply to the fluid in joints only.",
     (Option("p{ressure}", (TABLED,), "pressure, not negative", "Pa"),
      Option("f{low}-s{urface}", (LEVEL,), "level of water that stands at the nodes, against gravity, or a point of "
             "its surface: hydrostatic pressure below it; above it water can leave (seepage)", "m",

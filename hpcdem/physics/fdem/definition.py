@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.numerics.random_field import RandomField
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem import node_conditions
@@ -36,6 +37,14 @@ class ModelDefinition(Conditions):
         self.clear_topology()
         self.clear_assignments()
         self.clear_conditions()
+
+    def _take(self, mesh: Mesh) -> None:
+        """The model begins again with this mesh. CommandError if a simulation cannot take it."""
+        try:
+            meshes.check(mesh)
+        except HpcdemError as error:
+            raise CommandError(str(error)) from None
+        self._put(mesh)
 
     def _put(self, mesh: Mesh) -> None:
         kept = self.options, self.tables, self.fields

@@ -1085,13 +1085,8 @@ class Local:
         return out
 
     @property
-    def initial(self) -> np.ndarray:
-        """Stress [Pa] of triangles without plastic strain, a row each."""
-        return self.solids[0].initial.reshape(-1, self.s0.shape[1])
-
-    @property
     def quad_initial(self) -> np.ndarray:
-        """The same of quads, of hexahedra (n, 10, 8)."""
+        """Stress [Pa] of quads without plastic strain, a row each."""
         return self.solids[1].initial.reshape(-1, *self.quad_s0.shape[1:])
 
     def flowed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

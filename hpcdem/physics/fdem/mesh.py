@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from hpcdem.core.errors import HpcdemError
 from hpcdem.physics.fdem import connectivity, hexahedra, tetrahedra
 from hpcdem.physics.fdem.connectivity import Edges, areas, centroids, edges_of, find_edges
-from hpcdem.physics.fdem.macros import OF_DIMENSION, SIX_INSIDE, Macro
+from hpcdem.physics.fdem.macros import HEXAHEDRON, OF_DIMENSION, SIX_INSIDE, Macro
 
 FLAT = 1e-9
 """A corner spans less than this much of the square of the longest edge: the element is flat."""
@@ -30,10 +30,6 @@ SAME = 1e-9
 
 def _no_pairs() -> np.ndarray:
     return np.empty((0, 2), np.int64)
-
-
-def _no_hexes() -> np.ndarray:
-    return np.empty((0, 9), np.int64)
 
 
 @dataclass(frozen=True)
@@ -53,9 +49,12 @@ class Mesh:
     """(k, 2) i8 end points of the inner edges that carry a crack from the beginning."""
     crack_sets: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     """(k,) i8 number of the fracture set of each crack edge."""
-    macros: np.ndarray = field(default_factory=_no_hexes)
+    macros: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     """(n, nodes + 1) i8 of macro-elements (macros.py), in space hexahedra, in the plane six-node triangles: their
     points, and the first of the elements that store each."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "macros", self.macros.reshape(-1, self.macro.nodes + 1))
 
     @property
     def macro(self) -> Macro:
@@ -65,7 +64,7 @@ class Mesh:
     @property
     def hexes(self) -> np.ndarray:
         """(nh, 9) i8 of hexahedra: their points, and the first of their six elements."""
-        return self.macros if self.dim == 3 else _no_hexes()
+        return self.macros if self.dim == 3 else np.empty((0, HEXAHEDRON.nodes + 1), np.int64)
 
     @staticmethod
     def of_hexes(points: Any, hexes: Any, layers: Any = None, more: Any = None) -> Mesh:
@@ -108,9 +107,7 @@ class Mesh:
             {name: _sorted_pairs(given, dim) for name, given in (layers or {}).items()},
             pairs,
             sets,
-            _no_hexes()
-            if macros is None
-            else np.ascontiguousarray(macros, np.int64).reshape(-1, OF_DIMENSION[dim].nodes + 1),
+            np.ascontiguousarray([] if macros is None else macros, np.int64),
         )
 
     def macro_of(self) -> np.ndarray:

@@ -174,7 +174,7 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
             np.array(about["crack_sets"], np.int64),
             np.column_stack([tables["mesh_hexes"][f"p{k}"] for k in range(len(tables["mesh_hexes"]))]).astype(np.int64)
             if "mesh_hexes" in tables
-            else np.empty((0, 9), np.int64),
+            else np.empty(0, np.int64),
         )
         sim.place_mesh(mesh)
         for kind, names in ARRAYS.items():

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.errors import CommandError
 from hpcdem.core.memory import sparse_zeros
-from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem import sides
 from hpcdem.physics.fdem.mesh import Mesh
 
@@ -201,17 +200,6 @@ class Topology:
         if len(bad):
             raise CommandError(f"there is no {what} {bad[0]}{gone}")
         return asked
-
-    def _take(self, mesh: Mesh) -> None:
-        try:
-            meshes.check(mesh)
-        except HpcdemError as error:
-            raise CommandError(str(error)) from None
-        self._put(mesh)
-
-    def _put(self, mesh: Mesh) -> None:
-        """The model begins again with this mesh."""
-        raise NotImplementedError
 
     def open_faces(self, lower: np.ndarray) -> None:
         for faces in (lower, self.partner[lower]):

@@ -355,7 +355,7 @@ class Flow(Assigned, Travelling, Field):
         """Those of these points (None: all) that are flow nodes."""
         there = self.network.there
         if not len(self.network.channels):
-            raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
+            raise CommandError("there are no channels yet: assign face-joint c-model hydraulic-porous-medium first")
         asked = np.flatnonzero(there) if points is None else self.blocks.numbers_of_nodes(points)
         found = asked[there[asked]]
         if not len(found):

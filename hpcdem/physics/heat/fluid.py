@@ -96,7 +96,7 @@ class FluidHeat(Assigned, Travelling):
         dry = at[self.flow.row[at] == 0]
         if len(dry) or not len(at):
             which = f"joint {dry[0]} is no channel" if len(dry) else "there are no channels yet"
-            raise CommandError(f"{which}: face-joint c-model hydraulic-porous-medium comes first")
+            raise CommandError(f"{which}: assign face-joint c-model hydraulic-porous-medium first")
         super().assign(at, given)
 
     def prescribe(self, nodes: np.ndarray | None, row: int) -> None:

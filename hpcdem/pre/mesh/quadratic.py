@@ -16,7 +16,7 @@ def quadratic(mesh: Mesh) -> Remade:
     layers and cracks stay where they are. CommandError for other elements."""
     if mesh.dim == 2 and len(mesh.macros):
         raise CommandError("there are six-node triangles in the mesh already")
-    if mesh.dim == 3 or (mesh.cells[:, 3] >= 0).any() or len(mesh.macros):
+    if mesh.dim == 3 or (mesh.cells[:, 3] >= 0).any():
         raise CommandError("six-node triangles come from a mesh of triangles alone")
     edges, n = mesh.edges(), len(mesh.points)
     between = np.zeros(4 * len(mesh.cells), np.int64)
