@@ -17,7 +17,7 @@ from tests.docs.pages import DOCS, blocks
 
 SHORTER = {
     "thrust_belt": {
-        "way = 2500.0": "way = 60.0",
+        "shortening = 2500.0": "shortening = 60.0",
         "print 250": "print 30",
         "CYC 6000": "CYC 200",
         "CYC 2000": "CYC 100",
