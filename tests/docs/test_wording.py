@@ -1,0 +1,138 @@
+"""Wording: phrases that docs/writing.md replaces are absent from the pages, and become fewer in the package."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from pathlib import Path
+
+from tests.conftest import sources
+from tests.docs.pages import PAGES, ROOT, prose
+from tests.tables import each
+
+PHRASES = {
+    r"(?:is|are|was|were|be|been) told": "reports, is reported",
+    r"answered with the nearest": "suggests the nearest",
+    r"asked for|(?:is|are|was|were) asked": "requested, required",
+    r"bears? (?:\d|the load|load|nothing|more|less)": "carries, supports, fails at",
+    r"behind (?:its|their|the) (?:peak|strength)": "past its peak",
+    r"beside (?:the|its|their|a|that|those) (?:closed|published|exact|formula|theory)": "compared with",
+    r"comes? first": "must precede",
+    r"drawn apart": "pulled in tension",
+    r"go(?:es|ing|ne)? on": "continues, resumes",
+    r"hangs? together": "connected",
+    r"(?:held|holds?) against": "compared with, checked against",
+    r"in the place of": "instead of",
+    r"knows? (?:of )?(?:nothing|no)": "does not support, ignores",
+    r"laws? of (?:the |a )?users?": "user law",
+    r"looked (?:at|for)": "checked, searched for",
+    r"(?:may|can|was|were|is|are|be) said": "assigned, given, reported",
+    r"Mohr and Coulomb": "Mohr-Coulomb",
+    r"passed over": "skipped",
+    r"rubs?|rubbed": "frictional contact",
+    r"sags?": "deflection, settlement",
+    r"stands? still|stood still": "is at rest, is fixed",
+    r"swings?": "oscillates",
+    r"taken out|takes? out": "excavated, removed",
+    r"that there (?:is|are)|there is none|there are none": "available, none is given",
+    r"the way (?:it|they) (?:broke|breaks?)": "mode",
+    r"throws? (?:\w+ ){0,3}apart": "repels",
+    r"warms|warmed": "heats, heated",
+}
+"""What is always wrong here, as an expression, and what to write."""
+
+GENERATED = ("pcdc_reference", "zdem_reference", "pcdc_online", "python_reference", "options", "fields")
+"""Pages made of strings of the package, which are counted there."""
+
+ALLOWED = {"Stopping and going on": "heading to which generated pages link"}
+
+SOURCES = {
+    r"(?:held|holds?) against": 7,
+    r"(?:is|are|was|were|be|been) told": 43,
+    r"(?:may|can|was|were|is|are|be) said": 97,
+    r"Mohr and Coulomb": 10,
+    r"asked for|(?:is|are|was|were) asked": 145,
+    r"bears? (?:\d|the load|load|nothing|more|less)": 9,
+    r"behind (?:its|their|the) (?:peak|strength)": 33,
+    r"beside (?:the|its|their|a|that|those) (?:closed|published|exact|formula|theory)": 10,
+    r"comes? first": 58,
+    r"drawn apart": 6,
+    r"go(?:es|ing|ne)? on": 145,
+    r"hangs? together": 38,
+    r"in the place of": 26,
+    r"knows? (?:of )?(?:nothing|no)": 25,
+    r"laws? of (?:the |a )?users?": 64,
+    r"looked (?:at|for)": 50,
+    r"passed over": 17,
+    r"rubs?|rubbed": 30,
+    r"stands? still|stood still": 22,
+    r"swings?": 8,
+    r"taken out|takes? out": 64,
+    r"that there (?:is|are)|there is none|there are none": 120,
+    r"the way (?:it|they) (?:broke|breaks?)": 9,
+    r"throws? (?:\w+ ){0,3}apart": 2,
+    r"warms|warmed": 34,
+}
+"""How often the sources of the package still have a phrase. Lower a number when some are gone."""
+
+_ANY = re.compile(rf"\b(?:{'|'.join(f'({phrase})' for phrase in PHRASES)})\b")
+
+
+def found(text: str) -> Counter[str]:
+    """Phrases in a text."""
+    names = list(PHRASES)
+    return Counter(names[match.lastindex - 1] for match in _ANY.finditer(" ".join(text.split())) if match.lastindex)
+
+
+def written(page: Path) -> str:
+    """The prose of a page, without the glossary of words to avoid."""
+    text = prose(page)
+    for words in ALLOWED:
+        text = text.replace(words, "")
+    return re.sub(r"^## Glossary\n.*?(?=^## )", "", text, flags=re.MULTILINE | re.DOTALL)
+
+
+WAITING = (
+    "ARCHITECTURE",
+    "CONTRIBUTING",
+    "benchmarks",
+    "from_pcdc",
+    "glossary",
+    "measure",
+    "notebooks",
+    "physics",
+    "reliability",
+    "scaling",
+    "stress_strain",
+    "sweep",
+    "validation",
+    "view",
+    "wishes",
+)
+"""Pages that have not been rewritten yet."""
+
+OURS = [p for p in PAGES if not p.name.endswith(".zh.md") and p.stem not in (*GENERATED, *WAITING)]
+
+
+@each("page", OURS, ids=[str(page.relative_to(ROOT)) for page in OURS])
+def test_pages_use_the_words_of_the_field(page: Path) -> None:
+    text = written(page)
+    wrong = [f"{re.findall(rf'.*(?:{phrase}).*', text)[:1]}: write {PHRASES[phrase]}" for phrase in found(text)]
+    assert not wrong, wrong
+
+
+def test_sources_lose_their_private_words() -> None:
+    """Messages, docstrings, comments and names; counted over all files, as code moves between them."""
+    count: Counter[str] = Counter()
+    for path in sources("hpcdem", "**/*.py"):
+        count += found(path.read_text(encoding="utf-8"))
+    more = {phrase: (n, SOURCES.get(phrase, 0)) for phrase, n in count.items() if n > SOURCES.get(phrase, 0)}
+    assert not more, f"found, allowed: {more}; docs/writing.md has better words"
+
+
+def test_what_the_expressions_find() -> None:
+    assert found("a joint behind its peak is told; the way they broke") == Counter(
+        {r"behind (?:its|their|the) (?:peak|strength)": 1, r"(?:is|are|was|were|be|been) told": 1,
+         r"the way (?:it|they) (?:broke|breaks?)": 1}
+    )  # fmt: skip
+    assert not found("in this way the joint told us nothing; a ruby; a stand; go one by one")
