@@ -100,7 +100,6 @@ WAITING = (
     "glossary",
     "measure",
     "notebooks",
-    "physics",
     "reliability",
     "scaling",
     "stress_strain",
