@@ -95,10 +95,7 @@ def written(page: Path) -> str:
     return re.sub(r"^## Glossary\n.*?(?=^## )", "", text, flags=re.MULTILINE | re.DOTALL)
 
 
-WAITING: tuple[str, ...] = ()
-"""Pages that have not been rewritten yet."""
-
-OURS = [p for p in PAGES if not p.name.endswith(".zh.md") and p.stem not in (*GENERATED, *WAITING)]
+OURS = [p for p in PAGES if not p.name.endswith(".zh.md") and p.stem not in GENERATED]
 
 
 @each("page", OURS, ids=[str(page.relative_to(ROOT)) for page in OURS])
