@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import shutil
 import signal
@@ -55,6 +56,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
 os.environ.setdefault("NUMBA_THREADING_LAYER", "omp" if openmp_runtime_found() else "workqueue")
 kept.install()
+
+gc.disable()  # collecting tests makes a million objects that stay
 
 # --- what this machine has -------------------------------------------------------------------------------------
 
@@ -232,6 +235,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if GREEN.is_file():
         passed = set(GREEN.read_text().splitlines())
         items[:] = [item for item in items if item.nodeid not in passed]
+
+
+def pytest_collection_finish() -> None:
+    """From here on there is garbage; what was collected is none of it, and is looked through no more."""
+    gc.freeze()
+    gc.enable()
 
 
 def _made_once(item: pytest.Item) -> set[str]:

@@ -97,7 +97,7 @@ def on_slope(kind: str, top: float | None = None, joint: bool = False, of_faces:
     return float(diagnostics.values(sim, "displacement_x", np.arange(n)).mean())
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad"])
+@pytest.mark.parametrize("kind", ["cross", pytest.param("quad", marks=pytest.mark.slow)])
 def test_a_slippery_top_or_joint_does_not_let_a_block_slide(kind):
     """Free sliding would be 17 mm; elastic movement is below a micrometre."""
     assert abs(on_slope(kind)) < 1e-6

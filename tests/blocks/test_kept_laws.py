@@ -47,6 +47,7 @@ def stresses(law: user_laws.UserLaw) -> np.ndarray:
     return np.stack([diagnostics.values(sim, name) for name in ("stress_xx", "stress_yy", "stress_xy", "law_most")])
 
 
+@pytest.mark.slow
 def test_a_law_is_compiled_once(tmp_path, monkeypatch):
     """The next run takes it from the folder, to the same bits. A file that is damaged or of somebody else is not
     taken."""

@@ -283,7 +283,7 @@ def test_the_same_as_relaxation(kind):
     assert farthest(sim, slow, (*STRESSES, "displacement_x", "displacement_y", *MEMORY)) < 0.01
 
 
-@pytest.mark.parametrize("end, within", [(12e6, 2e-4), (1.5e6, 1e-5)])
+@pytest.mark.parametrize("end, within", [(12e6, 2e-4), pytest.param(1.5e6, 1e-5, marks=pytest.mark.slow)])
 def test_strength_that_follows_tables(end, within):
     """Cohesion that grows or falls to `end` over a plastic strain of 0.01, under uniaxial strain in 200 increments: the
     stress is on the surface of the strength that belongs to the strain of each element, and the plastic strain that of
@@ -328,6 +328,7 @@ def test_increments_count():
     assert gaps[0] > 2.0 * gaps[1] > 2.0 * gaps[2] > 0.0
 
 
+@pytest.mark.slow
 def test_one_stage_after_the_other_and_a_file_between(tmp_path):
     """Loaded in two stages and taken back: the same bits after a checkpoint; what has flowed stays."""
 
@@ -405,6 +406,7 @@ def test_more_than_the_rock_can_bear(kind):
     assert equilibrium.solve_elastic(sim).ratio < 1e-8
 
 
+@pytest.mark.slow
 def test_what_yielded_before_is_as_it_was_after_a_refusal():
     """An answer that is refused because surfaces touch in it leaves what elements remember, too."""
     sim = stamp("mixed", 3e-4)
@@ -424,6 +426,7 @@ def test_refusals():
     refused(sim, "steps must be positive, got 0", steps=0)
 
 
+@pytest.mark.slow
 def test_what_creeps_beside_what_yields():
     """A column under a load that it just bears; its lower half creeps, spreads and draws the upper one apart, which
     begins to yield: the same in creep steps at once as by relaxation."""

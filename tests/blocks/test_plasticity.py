@@ -99,7 +99,7 @@ def test_corners(trial, end, bits):
 
 @pytest.mark.parametrize(
     "name",
-    [n if n in ("usual", "up to the apex", "no tension") else pytest.param(n, marks=pytest.mark.slow) for n in FLOWS],
+    [n if n == "usual" else pytest.param(n, marks=pytest.mark.slow) for n in FLOWS],
 )
 def test_as_the_plain_loop(name):
     """Against Koiter's rule with every choice of planes, in all regions."""

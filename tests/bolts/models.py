@@ -144,7 +144,7 @@ def in_pieces(found: Found) -> None:
 
 # Checkpoints after rupture, excavation, and the change to motion.
 MODELS = {
-    "bolts torn": Model(breaking, result, bars_rupture, more, steps=1400, middle=1101),
-    "bolts in space": Model(in_space, result, in_pieces, more_in_space, steps=900, middle=601),
+    "bolts torn": Model(breaking, result, bars_rupture, more, steps=1400, middle=1101, slow=True),
+    "bolts in space": Model(in_space, result, in_pieces, more_in_space, steps=900, middle=601, slow=True),
     "bolts at rest": Model(relaxing, result, grout_slips, excavate, steps=1400, middle=1101, slow=True),
 }

@@ -18,7 +18,7 @@ with open('results.json', 'w') if pcdc.rank == 0 else open('/dev/null', 'w') as 
 """
 
 
-def results(launch: Any, folder: Path, case: Case, ranks: int = 1, more: str = "", timeout: float = 1800.0) -> Any:
+def results(resident: Any, folder: Path, case: Case, ranks: int = 1, more: str = "", timeout: float = 1800.0) -> Any:
     """The results of a case, as attributes; more: further lines, which may make further `results` of the script."""
     if case.needs:
         for name in ("gmsh", "shapely"):
@@ -29,7 +29,7 @@ def results(launch: Any, folder: Path, case: Case, ranks: int = 1, more: str = "
     pairs = ", ".join(f"'{name}': {name}" for name in names)
     text = case.script() + "\nmore = {}\n" + more + STORE.replace("NAMES", f"{pairs}, **more")
     (folder / f"{case.name}.sc").write_text(text)
-    done = launch(ranks, "--no-figure", f"{case.name}.sc", cwd=folder, timeout=timeout)
+    done = resident(ranks, "--no-figure", f"{case.name}.sc", cwd=folder, timeout=timeout)
     assert done.returncode == 0, done.stderr
     return Results(json.loads((folder / "results.json").read_text()))
 

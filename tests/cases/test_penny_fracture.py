@@ -62,9 +62,9 @@ def test_joints_that_snap_are_refused() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("given", [{}, THICK], ids=["toughness", "viscosity"])
-def test_the_closed_forms(launch, tmp_path, given) -> None:
+def test_the_closed_forms(resident, tmp_path, given) -> None:
     """Radius and opening 5 %, net pressure 8 %, means over the last fifth."""
-    done = results(launch, tmp_path, PennyFracture(**given), timeout=7200.0)
+    done = results(resident, tmp_path, PennyFracture(**given), timeout=7200.0)
     print(vars(done))
     assert abs(done.radius_error) < 0.05 and abs(done.opening_error) < 0.05 and abs(done.pressure_error) < 0.08
     assert done.balance < 1e-9 and done.steps > 80
@@ -72,10 +72,10 @@ def test_the_closed_forms(launch, tmp_path, given) -> None:
 
 
 @pytest.mark.slow
-def test_two_ranks_come_to_the_same(launch, tmp_path) -> None:
+def test_two_ranks_come_to_the_same(resident, tmp_path) -> None:
     """A coarse one, to 1e-9; its pictures."""
     small = PennyFracture(size=0.2, reach=1.2, time=0.1, far=6.0)
-    one, two = (results(launch, tmp_path / str(ranks), small, ranks) for ranks in (1, 2))
+    one, two = (results(resident, tmp_path / str(ranks), small, ranks) for ranks in (1, 2))
     assert np.allclose(one.curve, two.curve, rtol=1e-9) and one.steps == two.steps
     for name in ("penny-fracture", "penny-radius"):
         assert (tmp_path / "1" / "data" / f"{name}.png").stat().st_size > 5000

@@ -14,7 +14,7 @@ from tests.conftest import ROOT
 EXAMPLE = ROOT / "examples" / "rock_into_sand.sc"
 
 
-def test_shortened(launch, tmp_path):
+def test_shortened(resident, tmp_path):
     """Less time to settle, a tenth of the fall: frames of both, the boulder has moved down."""
     text = EXAMPLE.read_text()
     for long, short in (("cycle(40000)", "cycle(4000)"), ("step 8000", "step 400"), ("every 8000", "every 400"),
@@ -22,7 +22,7 @@ def test_shortened(launch, tmp_path):
         assert text.count(long) == 1
         text = text.replace(long, short)
     (tmp_path / EXAMPLE.name).write_text(text)
-    done = launch(1, EXAMPLE.name, "--no-figure", cwd=tmp_path)
+    done = resident(1, EXAMPLE.name, "--no-figure", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.count("force of the sand") == 4
     rocks = [read_mesh_frame(frame.path) for frame in list_mesh_frames(tmp_path / "data", "boulder")]

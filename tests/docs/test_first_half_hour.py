@@ -118,6 +118,7 @@ def test_the_first_commands_in_a_terminal(terminal: Terminal, tmp_path: Path) ->
     assert "data is a folder: hpcdem view data shows results" in terminal.end(2)
 
 
+@pytest.mark.slow
 def test_the_end_of_a_run_says_what_comes_next(terminal: Terminal, tmp_path: Path) -> None:
     (tmp_path / "push.py").write_text(SHORT)
     terminal.types("hpcdem push.py --outdir out")

@@ -472,11 +472,19 @@ def copy_of_the_package(folder: Path) -> Path:
     return folder / PACKAGE.name
 
 
-SLOW = "a pair law", "a property of the material"
-"""Kernels of particles are compiled again."""
+QUICK = "a command of PCDC", "a field on blocks"
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in RECIPES])
+def test_the_places_exist() -> None:
+    """Of all recipes: the lines that are changed."""
+    for name, recipe in RECIPES.items():
+        for file, line, _ in recipe.edits:
+            assert (PACKAGE / file).read_text().count(f"{line}\n") == 1, f"{name}: {file}: {line}"
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in RECIPES]
+)
 def test_a_recipe_is_complete(tmp_path: Path, name: str) -> None:
     recipe, package = RECIPES[name], copy_of_the_package(tmp_path)
     for file, line, text in recipe.edits:

@@ -91,7 +91,7 @@ WANTED = {
 }  # fmt: skip
 
 
-QUICK = ("thrust_belt", "water")
+QUICK = ("thrust_belt",)
 
 
 @pytest.mark.parametrize(

@@ -63,6 +63,7 @@ def account(sim: Blocks, small: bool, **stress: float) -> np.ndarray:
     return np.array(rows)
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("small", [False, True], ids=["large", "small"])
 @pytest.mark.parametrize("what", ["plain", "stressed", "softens"])
 def test_one_path_comes_to_the_same_in_all_kinds(what: str, small: bool) -> None:

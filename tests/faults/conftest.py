@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.property.workers import Resident
+
 PILE = """\
 # A small bed settles and is then squeezed from the left
 START
@@ -44,12 +46,11 @@ def script(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def undisturbed(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The last frame of the run when nothing happens to it."""
     folder = tmp_path_factory.mktemp("undisturbed")
     (folder / "pile.py").write_text(PILE)
-    command = [sys.executable, "-m", "hpcdem", "pile.py", "--no-figure"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    done = resident(1, "pile.py", "--no-figure", cwd=folder)
     assert done.returncode == 0, done.stderr
     return (folder / "data" / LAST_FRAME).read_bytes()
 

@@ -27,9 +27,9 @@ def checkpoints(folder) -> list[str]:
     return sorted(p.name for p in folder.glob("*.sav"))
 
 
-def finish(launch, n, script, undisturbed, *options):
+def finish(resident, n, script, undisturbed, *options):
     """Resume on n ranks and compare the end."""
-    done = launch(n, script, "--resume", "--no-figure", *options, cwd=script.parent)
+    done = resident(n, script, "--resume", "--no-figure", *options, cwd=script.parent)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "going on from" in done.stdout
     folder = script.parent / (options[1] if options else "data")
@@ -47,7 +47,7 @@ def end_of(process):
 
 
 @pytest.mark.mpi
-def test_one_rank_is_killed(launch, script, undisturbed, wait_until, rank_process):
+def test_one_rank_is_killed(launch, resident, script, undisturbed, wait_until, rank_process):
     """A temporary file may stay behind; it is neither taken for a checkpoint nor in the way."""
     data = script.parent / "data"
     job = launch.start(2, script, "--no-figure", cwd=script.parent)
@@ -56,12 +56,12 @@ def test_one_rank_is_killed(launch, script, undisturbed, wait_until, rank_proces
     code, *_ = end_of(job)
     assert code != 0
     (data / "0000005999.sav.tmp").write_bytes(b"half a file")
-    finish(launch, 1, script, undisturbed)
+    finish(resident, 1, script, undisturbed)
 
 
 @SLOW
 @pytest.mark.mpi
-def test_all_ranks_are_killed_while_they_write(launch, script, undisturbed, wait_until, rank_process):
+def test_all_ranks_are_killed_while_they_write(launch, resident, script, undisturbed, wait_until, rank_process):
     data = script.parent / "data"
     job = launch.start(2, script, "--no-figure", cwd=script.parent)
     wait_until(lambda: checkpoints(data), "the first checkpoint")
@@ -70,43 +70,43 @@ def test_all_ranks_are_killed_while_they_write(launch, script, undisturbed, wait
     code, *_ = end_of(job)
     assert code != 0
     (data / "0000005999.sav.tmp").write_bytes(b"half a file")
-    finish(launch, 2, script, undisturbed)
+    finish(resident, 2, script, undisturbed)
 
 
 @pytest.mark.parametrize("n", [1, pytest.param(3, marks=pytest.mark.mpi)])
-def test_a_bad_word_on_line_17(launch, script, n):
+def test_a_bad_word_on_line_17(resident, script, n):
     script.write_text(PILE.replace("IMPLE wall", "IMPEL wall"))
-    done = launch(n, script.name, cwd=script.parent)
+    done = resident(n, script.name, cwd=script.parent)
     assert done.returncode == 2
     assert done.stderr.count("pile.py:17:") == 1 and "IMPEL" in done.stderr
     assert not (script.parent / "data").exists()
 
 
 @pytest.mark.parametrize("n", [pytest.param(1, marks=SLOW), pytest.param(2, marks=pytest.mark.mpi)])
-def test_the_disk_is_full(launch, script, undisturbed, small_disk, n):
+def test_the_disk_is_full(resident, script, undisturbed, small_disk, n):
     disk = small_disk("1m")
-    done = launch(n, script, "--no-figure", "--outdir", disk, cwd=script.parent, timeout=120)
+    done = resident(n, script, "--no-figure", "--outdir", disk, cwd=script.parent, timeout=120)
     assert done.returncode == 1
     assert done.stderr.count("no space left on the disk") == 1 and "Traceback" not in done.stderr
     assert checkpoints(disk) and not list(disk.glob("*.tmp"))
     small_disk("64m")
-    finish(launch, n, script, undisturbed, "--outdir", disk)
+    finish(resident, n, script, undisturbed, "--outdir", disk)
 
 
 @pytest.mark.parametrize("n", [1, pytest.param(3, marks=pytest.mark.mpi)])
-def test_the_output_folder_cannot_be_made(launch, script, n):
+def test_the_output_folder_cannot_be_made(resident, script, n):
     """Which is told before anything runs, with --check too."""
     (script.parent / "data").write_text("a file has the name of the folder")
     for more in ([], ["--check"] * (n == 1)):
-        done = launch(n, script, *more, cwd=script.parent)
+        done = resident(n, script, *more, cwd=script.parent)
         assert done.returncode == 2 and "step" not in done.stdout
         assert done.stderr.count("cannot make the folder") == 1 and "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("n", [pytest.param(1, marks=SLOW), pytest.param(2, marks=pytest.mark.mpi)])
-def test_particles_run_away(launch, script, n):
+def test_particles_run_away(resident, script, n):
     script.write_text(PILE.replace("SET dt 0.04", "SET dt 0.4"))
-    done = launch(n, script, "--no-figure", cwd=script.parent, timeout=120)
+    done = resident(n, script, "--no-figure", cwd=script.parent, timeout=120)
     assert done.returncode == 1
     assert "over half its radius per step" in done.stderr or "not finite" in done.stderr
     assert "particle " in done.stderr and " at (" in done.stderr
@@ -115,11 +115,12 @@ def test_particles_run_away(launch, script, n):
     assert len(frames) > 1, "the state that made no sense is there to be looked at"
 
 
+@SLOW
 @pytest.mark.mpi
-def test_more_ranks_than_fit(launch, script):
+def test_more_ranks_than_fit(resident, script):
     text = PILE.replace("5000.0", "900.0").replace("right 5500.0", "right 1000.0").replace("left -500.0", "left -10.0")
     script.write_text(text)
-    done = launch(8, script, cwd=script.parent, timeout=120)
+    done = resident(8, script, cwd=script.parent, timeout=120)
     assert done.returncode == 2
     assert done.stderr.count("8 ranks are too many") == 1 and "ranks fit" in done.stderr
 
@@ -127,8 +128,8 @@ def test_more_ranks_than_fit(launch, script):
 # -- requests ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["SIGTERM", pytest.param("SIGUSR1", marks=SLOW), "SIGINT"])
-def test_a_signal_saves_and_stops(launch, script, undisturbed, wait_until, name):
+@pytest.mark.parametrize("name", ["SIGTERM", *(pytest.param(name, marks=SLOW) for name in ("SIGUSR1", "SIGINT"))])
+def test_a_signal_saves_and_stops(launch, resident, script, undisturbed, wait_until, name):
     data = script.parent / "data"
     job = launch.start(1, script, "--no-figure", cwd=script.parent)
     wait_until(lambda: checkpoints(data), "the first checkpoint")
@@ -137,11 +138,11 @@ def test_a_signal_saves_and_stops(launch, script, undisturbed, wait_until, name)
     assert code == 85, err
     assert "--resume" in err and ("Ctrl-C" if name == "SIGINT" else name) in err
     assert "steps/s" in out.splitlines()[-1]
-    finish(launch, 1, script, undisturbed)
+    finish(resident, 1, script, undisturbed)
 
 
 @pytest.mark.mpi
-def test_a_signal_to_one_rank_stops_all(launch, script, undisturbed, wait_until, rank_process):
+def test_a_signal_to_one_rank_stops_all(launch, resident, script, undisturbed, wait_until, rank_process):
     data = script.parent / "data"
     job = launch.start(2, script, "--no-figure", cwd=script.parent)
     wait_until(lambda: checkpoints(data), "the first checkpoint")
@@ -151,11 +152,12 @@ def test_a_signal_to_one_rank_stops_all(launch, script, undisturbed, wait_until,
     assert code == 85, err
     assert err.count("go on with --resume") == 1
     assert len(checkpoints(data)) > len(before) or int(checkpoints(data)[-1][:10]) % 400 == 0
-    finish(launch, 2, script, undisturbed)
+    finish(resident, 2, script, undisturbed)
 
 
+@SLOW
 @pytest.mark.mpi
-def test_a_signal_to_the_launcher_reaches_the_ranks(launch, script, undisturbed, wait_until):
+def test_a_signal_to_the_launcher_reaches_the_ranks(launch, resident, script, undisturbed, wait_until):
     data = script.parent / "data"
     job = launch.start(2, script, "--no-figure", cwd=script.parent)
     wait_until(lambda: checkpoints(data), "the first checkpoint")
@@ -163,7 +165,7 @@ def test_a_signal_to_the_launcher_reaches_the_ranks(launch, script, undisturbed,
     job.send_signal(signal.SIGUSR1)
     code, _, err = end_of(job)
     assert code == 85, err
-    finish(launch, 2, script, undisturbed)
+    finish(resident, 2, script, undisturbed)
 
 
 @pytest.mark.mpi
@@ -180,7 +182,7 @@ def test_sigusr2_saves_and_goes_on(launch, script, undisturbed, wait_until, rank
 
 
 @pytest.mark.mpi
-def test_a_second_sigterm_ends_ranks_that_hang(launch, script, undisturbed, wait_until, rank_process):
+def test_a_second_sigterm_ends_ranks_that_hang(launch, resident, script, undisturbed, wait_until, rank_process):
     """Rank 1 has stopped for good; rank 0 waits for it inside MPI, where no handler of Python runs."""
     data = script.parent / "data"
     job = launch.start(2, script, "--no-figure", cwd=script.parent)
@@ -195,16 +197,17 @@ def test_a_second_sigterm_ends_ranks_that_hang(launch, script, undisturbed, wait
     code, _, err = end_of(job)
     assert code not in (0, 85)
     assert "SIGTERM" in err and "nothing was saved" in err and "Traceback" not in err
-    finish(launch, 2, script, undisturbed)
+    finish(resident, 1, script, undisturbed)
 
 
-@pytest.mark.parametrize("n", [pytest.param(1, marks=SLOW), pytest.param(2, marks=pytest.mark.mpi)])
-def test_a_chain_of_jobs_with_a_time_limit(launch, script, undisturbed, n):
+@SLOW
+@pytest.mark.parametrize("n", [1, pytest.param(2, marks=pytest.mark.mpi)])
+def test_a_chain_of_jobs_with_a_time_limit(resident, script, undisturbed, n):
     """As a queue would run it: always the same command line, until it says that it is done."""
     codes = []
     while not codes or (codes[-1] == 85 and len(codes) < 30):
         limit = AT_ONCE if len(codes) < 2 else f"00:00:{3 + len(codes) // 4:02}"  # the start alone may take 3 s
-        done = launch(n, script, "--resume", "--time-limit", limit, "--no-figure", cwd=script.parent, timeout=120)
+        done = resident(n, script, "--resume", "--time-limit", limit, "--no-figure", cwd=script.parent, timeout=120)
         codes.append(done.returncode)
     assert codes[-1] == 0 and codes[:2] == [85, 85] and set(codes) == {0, 85}, done.stderr
     assert (script.parent / "data" / LAST_FRAME).read_bytes() == undisturbed
@@ -220,7 +223,7 @@ def stopped(stopped_run, script):
 
 
 @pytest.mark.parametrize("damage", ["changed", *(pytest.param(one, marks=SLOW) for one in ("cut", "empty", "foreign"))])
-def test_a_damaged_checkpoint_is_passed_over(launch, script, undisturbed, stopped, damage):
+def test_a_damaged_checkpoint_is_passed_over(resident, script, undisturbed, stopped, damage):
     newest = max(stopped.glob("*.sav"), key=lambda p: p.stat().st_mtime_ns)
     whole = newest.read_bytes()
     middle = len(whole) // 2
@@ -232,29 +235,29 @@ def test_a_damaged_checkpoint_is_passed_over(launch, script, undisturbed, stoppe
             "foreign": b"no checkpoint at all",
         }[damage]
     )
-    done = finish(launch, 1, script, undisturbed)
+    done = finish(resident, 1, script, undisturbed)
     assert done.stdout.count("warning:") >= 1 and newest.name in done.stdout
     assert f"going on from {newest}" not in done.stdout
 
 
-def test_a_script_changed_in_what_was_done_is_refused(launch, script, stopped):
+def test_a_script_changed_in_what_was_done_is_refused(resident, script, stopped):
     script.write_text(PILE.replace("fric 0.1 shear", "fric 0.2 shear"))
-    done = launch(1, script.name, "--resume", cwd=script.parent, timeout=120)
+    done = resident(1, script.name, "--resume", cwd=script.parent, timeout=120)
     assert done.returncode == 2
     assert "pile.py:9:" in done.stderr and "must not be changed" in done.stderr
 
 
-def test_resume_without_a_checkpoint_begins_at_the_beginning(launch, script, undisturbed):
-    done = launch(1, script, "--resume", "--no-figure", cwd=script.parent)
+def test_resume_without_a_checkpoint_begins_at_the_beginning(resident, script, undisturbed):
+    done = resident(1, script, "--resume", "--no-figure", cwd=script.parent)
     assert done.returncode == 0 and "starting at the beginning" in done.stdout
     assert (script.parent / "data" / LAST_FRAME).read_bytes() == undisturbed
 
 
-def test_resume_finds_the_folder_that_the_script_names(launch, script, undisturbed):
+def test_resume_finds_the_folder_that_the_script_names(resident, script, undisturbed):
     script.write_text(PILE.replace("SET dt", "SET outdir results\nSET dt"))
-    done = launch(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent)
+    done = resident(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent)
     assert done.returncode == 85
-    done = launch(1, script, "--resume", "--no-figure", cwd=script.parent)
+    done = resident(1, script, "--resume", "--no-figure", cwd=script.parent)
     assert done.returncode == 0 and "going on from" in done.stdout
     assert (script.parent / "results" / LAST_FRAME).read_bytes() == undisturbed
     assert not (script.parent / "data").exists()
@@ -263,53 +266,53 @@ def test_resume_finds_the_folder_that_the_script_names(launch, script, undisturb
 # -- hpcdem resume ---------------------------------------------------------------------------------------------------
 
 
-def taken_up(launch, n, folder, undisturbed, *arguments, cwd):
-    done = launch(n, "resume", *arguments, "--no-figure", cwd=cwd)
+def taken_up(resident, n, folder, undisturbed, *arguments, cwd):
+    done = resident(n, "resume", *arguments, "--no-figure", cwd=cwd)
     assert done.returncode == 0, done.stdout + done.stderr
     assert (folder / LAST_FRAME).read_bytes() == undisturbed
     return done
 
 
 @pytest.mark.parametrize("n", [pytest.param(1, marks=SLOW), pytest.param(2, marks=pytest.mark.mpi)])
-def test_resume_needs_no_script(launch, script, undisturbed, n, tmp_path_factory):
+def test_resume_needs_no_script(resident, script, undisturbed, n, tmp_path_factory):
     """Called from elsewhere, with the folder alone; done, it says so."""
-    done = launch(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent)
+    done = resident(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent)
     assert done.returncode == 85
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     data = script.parent / "data"
-    assert "going on from" in taken_up(launch, n, data, undisturbed, data, cwd=elsewhere).stdout
-    again = launch(1, "resume", data, cwd=elsewhere)
+    assert "going on from" in taken_up(resident, n, data, undisturbed, data, cwd=elsewhere).stdout
+    again = resident(1, "resume", data, cwd=elsewhere)
     assert again.returncode == 0 and "the run is done" in again.stdout
 
 
-def test_resume_takes_the_script_out_of_the_checkpoint(launch, script, undisturbed):
-    assert launch(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent).returncode == 85
+def test_resume_takes_the_script_out_of_the_checkpoint(resident, script, undisturbed):
+    assert resident(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent).returncode == 85
     script.unlink()
-    taken_up(launch, 1, script.parent / "data", undisturbed, cwd=script.parent)
+    taken_up(resident, 1, script.parent / "data", undisturbed, cwd=script.parent)
 
 
-def test_a_script_out_of_a_checkpoint_writes_nowhere_else(launch, script, tmp_path):
+def test_a_script_out_of_a_checkpoint_writes_nowhere_else(resident, script, tmp_path):
     victim = tmp_path.parent / "victim.dat"
     script.write_text(PILE.replace("STOP", f"EXP {victim}\nSTOP"))
-    assert launch(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent).returncode == 85
+    assert resident(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent).returncode == 85
     script.unlink()
-    done = launch(1, "resume", cwd=script.parent)
+    done = resident(1, "resume", cwd=script.parent)
     assert done.returncode == 2 and "outside of" in done.stderr and "victim.dat" in done.stderr
     assert not victim.exists()
 
 
-def test_a_moved_folder_goes_on(launch, script, undisturbed, tmp_path_factory):
-    assert launch(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent).returncode == 85
+def test_a_moved_folder_goes_on(resident, script, undisturbed, tmp_path_factory):
+    assert resident(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent).returncode == 85
     elsewhere = tmp_path_factory.mktemp("moved")
     shutil.move(script.parent / "data", elsewhere / "data")
     shutil.move(script, elsewhere / script.name)
-    taken_up(launch, 1, elsewhere / "data", undisturbed, cwd=elsewhere)
+    taken_up(resident, 1, elsewhere / "data", undisturbed, cwd=elsewhere)
 
 
-def test_nothing_to_resume(launch, tmp_path):
-    done = launch(1, "resume", cwd=tmp_path)
+def test_nothing_to_resume(resident, tmp_path):
+    done = resident(1, "resume", cwd=tmp_path)
     assert done.returncode == 2 and "no run to go on with" in done.stderr
-    done = launch(1, "resume", tmp_path / "nowhere", cwd=tmp_path)
+    done = resident(1, "resume", tmp_path / "nowhere", cwd=tmp_path)
     assert done.returncode == 2 and "no such folder" in done.stderr
 
 
@@ -342,39 +345,40 @@ def test_an_old_run_in_the_folder_is_not_gone_on_with(launch, script, undisturbe
     assert (stopped / LAST_FRAME).read_bytes() == undisturbed
 
 
-def test_checkpoints_are_rotated(launch, script, undisturbed):
-    done = launch(1, script, "--keep", "2", "--no-figure", cwd=script.parent)
+@SLOW
+def test_checkpoints_are_rotated(resident, script, undisturbed):
+    done = resident(1, script, "--keep", "2", "--no-figure", cwd=script.parent)
     assert done.returncode == 0, done.stderr
     data = script.parent / "data"
     assert len(checkpoints(data)) == 2 and checkpoints(data)[-1] == "0000006000.sav"
     assert (data / LAST_FRAME).read_bytes() == undisturbed
 
 
-def test_old_checkpoints_are_spared_by_the_time_of_the_model(launch, script, undisturbed):
+def test_old_checkpoints_are_spared_by_the_time_of_the_model(resident, script, undisturbed):
     """0.04 s a step, a checkpoint each 400: at or before 40, 80, ... s lie 32, 80, 112, 160 s, ..."""
-    done = launch(1, script, "--keep", "1", "--keep-every", "40", "--no-figure", cwd=script.parent)
+    done = resident(1, script, "--keep", "1", "--keep-every", "40", "--no-figure", cwd=script.parent)
     assert done.returncode == 0, done.stderr
     data = script.parent / "data"
     assert [int(name[:10]) for name in checkpoints(data)] == [800, 2000, 2800, 4000, 4800, 6000]
     assert (data / LAST_FRAME).read_bytes() == undisturbed
 
 
-def test_a_run_goes_on_from_the_last_checkpoint_before_a_time(launch, script, undisturbed, stopped):
+def test_a_run_goes_on_from_the_last_checkpoint_before_a_time(resident, script, undisturbed, stopped):
     """32.4 s are step 810. Later checkpoints of the run that was given up are passed over from then on."""
-    assert launch(1, script, "--before", "32.4", cwd=script.parent).stderr.count("give --resume as well") == 1
-    none = launch(1, script, "--resume", "--before", "15.9", "--no-figure", cwd=script.parent)
+    assert resident(1, script, "--before", "32.4", cwd=script.parent).stderr.count("give --resume as well") == 1
+    none = resident(1, script, "--resume", "--before", "15.9", "--no-figure", cwd=script.parent)
     assert none.returncode == 2 and "is of 15.9 s of the model or an earlier time" in none.stderr
-    cut = launch(1, "resume", "--before", "32.4", "--time-limit", "0.001", "--no-figure", cwd=script.parent)
+    cut = resident(1, "resume", "--before", "32.4", "--time-limit", "0.001", "--no-figure", cwd=script.parent)
     assert cut.returncode == 85 and "going on from" in cut.stdout and "0000000800.sav" in cut.stdout, cut.stderr
-    done = launch(1, "resume", "--no-figure", cwd=script.parent)
+    done = resident(1, "resume", "--no-figure", cwd=script.parent)
     assert done.returncode == 0, done.stderr
     step = int(re.search(r"going on from .*, step (\d+)", done.stdout)[1])
     assert 800 <= step < 1200 and (stopped / LAST_FRAME).read_bytes() == undisturbed
 
 
-def test_a_checkpoint_that_nobody_asked_for(launch, script, undisturbed):
+def test_a_checkpoint_that_nobody_asked_for(resident, script, undisturbed):
     script.write_text(PILE.replace(" save 400", "").replace(" save 8.0", ""))
-    done = launch(1, script, "--autosave", "0.1", "--no-figure", cwd=script.parent)
+    done = resident(1, script, "--autosave", "0.1", "--no-figure", cwd=script.parent)
     assert done.returncode == 0, done.stderr
     data = script.parent / "data"
     written = done.stdout.count("as the last one was long ago")  # one alone where writing it took a tenth of a second

@@ -262,9 +262,9 @@ def all_acts(found: Found) -> None:
 # Checkpoints after excavation and a change of channels.
 MODELS = {
     "bursting": Model(bursting, result, water_bursts, more, steps=1100, middle=703, slow=True),
-    "pumped": Model(pumped, result, wells_pump, more, steps=1100, middle=703),
+    "pumped": Model(pumped, result, wells_pump, more, steps=1100, middle=703, slow=True),
     "wet soil with bolts": Model(resting, all_of_it, all_acts, dig, steps=1100, middle=703),
     "seeping": Model(seeping, result, water_moves, move, steps=1100, middle=703, slow=True),
-    "tearing in space": Model(tearing, result, it_tears, more_in_space, steps=900, middle=603),
+    "tearing in space": Model(tearing, result, it_tears, more_in_space, steps=900, middle=603, slow=True),
     "seeping in space": Model(seeping_in_space, result, water_moves, move_in_space, steps=600, middle=303, slow=True),
 }

@@ -46,7 +46,9 @@ def said(rock: Rock, words: str) -> list[str]:
     return [line for line in rock.blocks.log.lines if words in line]
 
 
-@pytest.mark.parametrize(("bulk", "chosen"), [(1e6, "explicit"), (1e12, "implicit")])
+@pytest.mark.parametrize(
+    ("bulk", "chosen"), [pytest.param(1e6, "explicit", marks=pytest.mark.slow), (1e12, "implicit")]
+)
 def test_flow_alone_goes_the_cheaper_way(tmp_path, bulk, chosen) -> None:
     """Water that is soft, or stiff: few long sub-steps, or many short ones; the same pressures as by implicit steps."""
     script = STRIP.replace("BULK", f"{bulk:g}")
@@ -61,6 +63,7 @@ def test_flow_alone_goes_the_cheaper_way(tmp_path, bulk, chosen) -> None:
     assert one == pytest.approx(two, abs=0.02 * two.max()) and np.ptp(two) >= (1e3 if bulk < 1e7 else 0.0)
 
 
+@pytest.mark.slow
 def test_blocks_go_the_cheaper_way(tmp_path) -> None:
     """In static runs by the clock that was said, if that is stable."""
     rock = Rock(tmp_path / "a", HALVES.replace("BULK", "1e6"))

@@ -365,6 +365,7 @@ def test_a_well_in_nothing_is_refused_by_implicit_steps() -> None:
         pass
 
 
+@pytest.mark.slow
 def test_all_of_it_at_once_is_that_of_small_explicit_steps() -> None:
     """A well with stages, a table, a level, a rate, gravity, cracks that leak into rock that is not saturated; then a
     part is taken out. What leaks depends on the length of steps as its square root, as leak-off begins at once."""
@@ -559,6 +560,7 @@ def test_a_file_in_mid_injection(tmp_path) -> None:
     assert Flow.of(again).implicit_dt == Flow.of(whole).implicit_dt
 
 
+@pytest.mark.slow
 def test_injection_goes_on_where_a_part_is_dug_away(tmp_path) -> None:
     """A well with stages, leak-off into rock that is not saturated; elements on both sides of wet channels are taken
     out. From a checkpoint before that, the same."""

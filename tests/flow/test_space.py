@@ -349,6 +349,7 @@ def _disc(parts: int) -> tuple[Blocks, Flow, np.ndarray]:
     return sim, flow, r
 
 
+@pytest.mark.slow
 def test_steady_flow_in_a_disc_at_once() -> None:
     """Pressures at all nodes, and Q, of second order in the mesh; what comes in goes out."""
     errors = []

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
-from tests.conftest import mpi_command, run
+from tests.property.workers import Resident
 
 SCRIPT = """
 pcdc model new dim 3
@@ -42,11 +41,11 @@ pcdc model step 150
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of one rank."""
     folder = tmp_path_factory.mktemp("alone")
     (folder / "wet.sc").write_text(SCRIPT, encoding="utf-8")
-    done = run([sys.executable, "-m", "hpcdem", "wet.sc"], cwd=folder)
+    done = resident(1, "wet.sc", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -68,10 +67,12 @@ def test_frames_have_the_fluid_of_triangles(alone: Path) -> None:
     assert (state.of_joints["saturation"][wet] <= 1.0).all()
 
 
-def test_ranks_and_a_restart_come_to_the_same(alone: Path, tmp_path: Path, needs_parallel_hdf5: None) -> None:
+def test_ranks_and_a_restart_come_to_the_same(
+    alone: Path, resident: Resident, tmp_path: Path, needs_parallel_hdf5: None
+) -> None:
     shutil.copy(alone / "half.sav", tmp_path)
     (tmp_path / "go.sc").write_text("pcdc model restore 'half.sav'\npcdc model step 150\n", encoding="utf-8")
-    done = run([*mpi_command(2), sys.executable, "-m", "hpcdem", "go.sc"], cwd=tmp_path)
+    done = resident(2, "go.sc", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     name = "wet_0000000300.vtkhdf"
     one, other = (read_mesh_frame(folder / "data" / name, solid=True) for folder in (alone, tmp_path))

@@ -247,11 +247,11 @@ def it_flows(found: Found) -> None:
 
 # Checkpoints after excavation, and after the blocks have begun to move.
 MODELS = {
-    "cracking by heat": Model(cracking, result, it_cracks, more, steps=1100, middle=703),
+    "cracking by heat": Model(cracking, result, it_cracks, more, steps=1100, middle=703, slow=True),
     "steaming": Model(steaming, of_water, it_steams, steaming_on, steps=1100, middle=703, slow=True),
     "hot slurry": Model(hot_slurry, of_slurry, it_bursts, slurry_on, steps=880, middle=503, slow=True),
     "hot slurry in space": Model(
         hot_slurry_in_space, of_slurry, it_bursts_in_space, slurry_on_in_space, steps=700, middle=603
     ),
-    "warm clay": Model(warming, result, it_flows, move, steps=900, middle=503),
+    "warm clay": Model(warming, result, it_flows, move, steps=900, middle=503, slow=True),
 }

@@ -157,7 +157,7 @@ def test_fronts_and_what_the_limiter_keeps_of_them() -> None:
     assert width[1] < width[0] / 2.5, width
 
 
-@pytest.mark.parametrize("second", [0.0, 1.0])
+@pytest.mark.parametrize("second", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
 def test_implicit_steps_are_backward_euler_of_the_same(second: float) -> None:
     """(T' - T) C / dt is what the kernels of explicit steps bring at T', to fluid and rock; many short ones come to
     what explicit steps come to; the account closes."""
@@ -196,7 +196,9 @@ def test_steady_state_of_a_cooled_fracture() -> None:
     assert heat.account()["relative"] < 1e-12
 
 
-@pytest.mark.parametrize(("second", "least", "most"), [(0.0, 0.9, 1.1), (1.0, 1.75, 2.2)])
+@pytest.mark.parametrize(
+    ("second", "least", "most"), [pytest.param(0.0, 0.9, 1.1, marks=pytest.mark.slow), (1.0, 1.75, 2.2)]
+)
 def test_order_of_advection(second: float, least: float, most: float) -> None:
     """Of the same, against the exponential, on channels of 1 cm and of half of that."""
     off = []
@@ -265,6 +267,7 @@ def test_each_property_alone_changes_the_heat(name: str, value: float) -> None:
     assert np.abs(warmed() - warmed(**{name: value})).max() > 0.2
 
 
+@pytest.mark.slow
 def test_filling_a_dry_fracture_brings_its_heat() -> None:
     """Water of 40 K runs into dry channels, explicit flow and heat on one clock: what is in them has come in at 40 K,
     to the last digit, though nodes fill and flows change."""

@@ -135,6 +135,7 @@ def test_zdem_line_by_line(viewing: Viewing, folder: Path):
     assert talk(viewing, "7", language="pcdc")[-1] == "7", "the other language is another process"
 
 
+@pytest.mark.slow
 def test_it_can_be_started_anew(viewing: Viewing):
     talk(viewing, "x = 1", language="pcdc")
     viewing.ask("restart", {"language": "pcdc"})

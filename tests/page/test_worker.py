@@ -66,6 +66,7 @@ def test_the_newest_request_ends_slow_work_and_takes_its_place(workers, wanted):
     assert first.returncode == -signal.SIGKILL and worker.maker.process is not first
 
 
+@pytest.mark.slow
 def test_of_many_requests_only_the_newest_is_answered_besides_the_one_under_way(workers, wanted, monkeypatch):
     monkeypatch.setattr(module, "OVERTAKEN_AFTER", 3.0)
     worker = workers(newest_wins=True)
@@ -80,6 +81,7 @@ def test_of_many_requests_only_the_newest_is_answered_besides_the_one_under_way(
     assert late[-1].end().answer
 
 
+@pytest.mark.slow
 def test_files_are_made_one_after_the_other_and_only_so_many_wait(workers, wanted, monkeypatch):
     monkeypatch.setattr(module, "WAITING", 2)
     worker = workers(newest_wins=False)
@@ -94,6 +96,7 @@ def test_files_are_made_one_after_the_other_and_only_so_many_wait(workers, wante
     assert errors[:3] == [None, None, None] and "try again" in str(errors[3])
 
 
+@pytest.mark.slow
 def test_work_that_takes_too_long_is_ended_with_advice(workers, wanted):
     worker = workers(newest_wins=False)
     worker.ask("specimen", wanted(**QUICK))

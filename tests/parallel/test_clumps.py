@@ -83,7 +83,7 @@ def test_the_model_is_worth_comparing(reference: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", ways({"3 ranks", "2 threads"}))
+@pytest.mark.parametrize("case", ways({"3 ranks"}))
 def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
     ranks, options = WAYS[case]
     run(resident, tmp_path / "other", ranks, *options)
@@ -94,7 +94,7 @@ def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_p
 @pytest.mark.parametrize(
     ("checkpoint", "ranks"),
     [
-        ("first", 3),
+        pytest.param("first", 3, marks=pytest.mark.slow),
         pytest.param("middle", 1, marks=pytest.mark.slow),
         ("middle", 2),
         pytest.param("last", 4, marks=pytest.mark.slow),

@@ -69,10 +69,10 @@ def test_the_log_tells(one: tuple[Path, str]) -> None:
     [
         (2, 1),
         pytest.param(3, 1, marks=pytest.mark.slow),
-        (4, 1),
+        pytest.param(4, 1, marks=pytest.mark.slow),
         (1, 2),
         pytest.param(1, 3, marks=pytest.mark.slow),
-        (2, 2),
+        pytest.param(2, 2, marks=pytest.mark.slow),
     ],
 )
 def test_the_same_on_any_ranks_and_threads(

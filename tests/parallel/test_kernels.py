@@ -133,11 +133,9 @@ SLOW, MPI = pytest.mark.slow, pytest.mark.mpi
 )
 def test_particles(late, tmp_path: Path, ranks: int) -> None:
     write_lattice(tmp_path / "bodies.clumps", 3.0, 10, 6)
-    (tmp_path / "model.py").write_text(PARTICLES)
-    (tmp_path / "again.py").write_text(AGAIN)
-    (tmp_path / "followed.py").write_text(FOLLOWED)
-    for script in ("model.py", "again.py", "followed.py"):
-        assert late(ranks, script) == [NOTHING] * ranks
+    for name, text, n in (("model.py", PARTICLES, ranks), ("again.py", AGAIN, ranks), ("followed.py", FOLLOWED, 1)):
+        (tmp_path / name).write_text(text)
+        assert late(n, name) == [NOTHING] * n
 
 
 @pytest.mark.parametrize(
@@ -155,6 +153,7 @@ def test_blocks_and_particles_in_any_order(late, tmp_path: Path, ranks: int, fir
     assert late(ranks, "both.sc") == [NOTHING] * ranks
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=[MPI, SLOW])])
 def test_a_script_of_both_that_goes_on(launch: Launcher, tmp_path: Path, ranks: int) -> None:
     """The checkpoint is read while only the kernels of blocks are there."""
@@ -175,6 +174,7 @@ def test_a_bar_that_breaks(late, tmp_path: Path, ranks: int, threads: int) -> No
         assert late(ranks, SCRIPTS / name, "-j", threads, "--outdir", tmp_path / name[:3]) == [NOTHING] * ranks
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_of_two_threads(late, tmp_path: Path) -> None:
     write_lattice(tmp_path / "bodies.clumps", 3.0, 10, 6)

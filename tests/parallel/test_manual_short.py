@@ -38,12 +38,8 @@ CHAINS: dict[str, dict[str, str | None]] = {
 }
 """Scripts in the order in which they run, and the file each of them needs."""
 
-QUICK = {("push_add_del", 2)}
-"""Chains and numbers of ranks of the quick tests."""
-
-OTHERS = {chain for chain, _ in QUICK}
-"""Chains that quick tests of several ranks are compared with: what looks at their run on one rank runs beside them, and
-what looks at other chains is slow."""
+QUICK = "push_add_del"
+"""The chain whose run on one rank is looked at by quick tests; the others, and several ranks, are slow."""
 
 LAST_STEP = {
     "push": 8_000, "syn_erosion": 10_000, "syn_sedimentaion": 10_600, "pre_struct": 5_000, "detachment": 6_000,
@@ -91,11 +87,7 @@ def on_one_rank(
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     ("chain", "ranks"),
-    [
-        pytest.param(chain, ranks, marks=() if (chain, ranks) in QUICK else pytest.mark.slow)
-        for chain in CHAINS
-        for ranks in (2, 4)
-    ],
+    [pytest.param(chain, ranks, marks=pytest.mark.slow) for chain in CHAINS for ranks in (2, 4)],
 )
 def test_same_files_on_more_ranks(
     on_one_rank: Callable[[str], Path], resident: Resident, manual_scripts: Path, tmp_path: Path, chain: str, ranks: int
@@ -120,7 +112,7 @@ def test_same_push_however_it_is_run(
 @pytest.mark.parametrize(
     ("chain", "name"),
     [
-        pytest.param(chain, name, marks=pytest.mark.ranks if chain in OTHERS else pytest.mark.slow)
+        pytest.param(chain, name, marks=() if chain == QUICK else pytest.mark.slow)
         for chain, scripts in CHAINS.items()
         for name in scripts
     ],
@@ -182,7 +174,6 @@ def test_rule_gives_the_published_names() -> None:
     assert sorted(frame_names(PUSH_ADD_DEL)) == sorted(PUBLISHED_NAMES)
 
 
-@pytest.mark.ranks
 @pytest.mark.parametrize("suffix", [".dat", ".vtkhdf"])
 def test_names_of_the_short_run(on_one_rank: Callable[[str], Path], suffix: str) -> None:
     data = on_one_rank("push_add_del") / "push_add_del" / "data"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import assert_same_files, contents
 
 LAWS = Path(__file__).resolve().parent.parent / "laws" / "pairs.py"
@@ -34,20 +34,20 @@ SET energy 500"""
 SLOW = pytest.mark.slow
 
 
-def run(launch: Launcher, folder: Path, law: str, ranks: int, *options: str) -> None:
+def run(resident: Resident, folder: Path, law: str, ranks: int, *options: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     shutil.copy(LAWS, folder)
     (folder / "push.py").write_text(PUSH.replace("LAW", WORDS[law]))
-    done = launch(ranks, "push.py", "--no-figure", *options, cwd=folder)
+    done = resident(ranks, "push.py", "--no-figure", *options, cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """All of them on one rank with one thread."""
     folder = tmp_path_factory.mktemp("alone")
     for law in WORDS:
-        run(Launcher(), folder / law, law, 1)
+        run(resident, folder / law, law, 1)
     return folder
 
 
@@ -84,24 +84,25 @@ def test_two_laws_keep_an_account(alone):
 @pytest.mark.mpi
 @pytest.mark.parametrize("law", ["two", pytest.param("sticky", marks=SLOW), pytest.param("linear", marks=SLOW)])
 @pytest.mark.parametrize("ranks, threads", [(2, 1), pytest.param(4, 1, marks=SLOW), pytest.param(1, 2, marks=SLOW)])
-def test_ranks_and_threads_do_not_change_a_bit(alone, launch, tmp_path, law, ranks, threads):
-    run(launch, tmp_path, law, ranks, "-j", str(threads))
+def test_ranks_and_threads_do_not_change_a_bit(alone, resident, tmp_path, law, ranks, threads):
+    run(resident, tmp_path, law, ranks, "-j", str(threads))
     assert_same_files(alone / law / "data", tmp_path / "data")
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=SLOW)])
-def test_a_restart_does_not_change_a_bit(alone, launch, tmp_path, ranks):
+def test_a_restart_does_not_change_a_bit(alone, resident, tmp_path, ranks):
     """From step 1000, in the middle of the first CYC."""
     shutil.copytree(alone / "two", tmp_path / "run")
     data = tmp_path / "run" / "data"
     for path in [*data.glob("*.sav")]:
         if int(path.stem.rpartition("_")[2]) > 1000:
             path.unlink()
-    run(launch, tmp_path / "run", "two", ranks, "--resume")
+    run(resident, tmp_path / "run", "two", ranks, "--resume")
     assert_same_files(alone / "two" / "data", data)
 
 
+@pytest.mark.slow
 def test_another_text_does_not_go_on(alone, launch, tmp_path):
     shutil.copytree(alone / "sticky", tmp_path / "run")
     folder = tmp_path / "run"

@@ -42,7 +42,7 @@ def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("way", ways(quick=("2 ranks", "2 threads")))
+@pytest.mark.parametrize("way", ways(quick=("2 ranks",)))
 def test_ranks_and_threads_do_not_change_a_bit(resident: Resident, alone: Path, tmp_path: Path, way: str) -> None:
     ranks, options = WAYS[way]
     run(resident, tmp_path, ranks, *options)

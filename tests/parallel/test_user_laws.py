@@ -36,6 +36,7 @@ def run(launch, folder: Path, ranks: int, name: str, text: str):
     return launch(ranks, f"{name}.sc", "--outdir", name, "--no-figure", cwd=folder)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_script_goes_on_with_the_law_that_it_names_and_with_no_other(launch, tmp_path):
     (tmp_path / "rock.py").write_text((LAWS / "rock.py").read_text() + f"\n# {uuid.uuid4()}\n")

@@ -76,7 +76,10 @@ def traces(folder: Path, text: str) -> tuple[dict[str, bytes], dict[str, bytes]]
     return moved, said
 
 
-@pytest.mark.parametrize("name", contexts())
+SLOW = "dynamic block", "bodies", "block at a lake", "loaded block", "heat"
+
+
+@pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] * (one in SLOW)) for one in contexts()])
 def test_each_line_acts(tmp_path, name):
     context = contexts()[name]
     without = traces(tmp_path / "without", context.before + context.after)

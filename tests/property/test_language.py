@@ -19,7 +19,7 @@ from tests.property.grammar import MISTAKES, Model, good_models, models, same_bu
 from tests.tables import each
 
 ALWAYS_THE_SAME = settings(
-    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=30, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 
 
@@ -126,7 +126,7 @@ def test_the_models_use_every_word_of_the_language() -> None:
                     used.update({(command.name, option.name)} if option else ())
             used.update((command.name, option.name) for option in command.leading if option.kind is not t.FLAG)
 
-    @settings(max_examples=600, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(good_models())
     def body(model: Model) -> None:
         collect(model.text)
@@ -150,7 +150,7 @@ def test_every_mistake_can_be_made(name: str) -> None:
     """On any model, and most of them make another script of it."""
     other: list[bool] = []
 
-    @settings(max_examples=10, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=4, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(st.data())
     def body(data: st.DataObject) -> None:
         from tests.property.grammar import Maker, _good

@@ -126,6 +126,6 @@ def mud_rises(found: Found) -> None:
 MODELS = {
     "bursting with sand": Model(sandy, result, sand_bursts, sand_on, steps=1100, middle=703, slow=True),
     "sand by wells": Model(sandy_wells, result, sand_moves, sand_on, steps=1100, middle=703, slow=True),
-    "sand in space": Model(sandy_in_space, result, sand_tears, sand_on_in_space, steps=900, middle=603),
-    "mud": Model(muddy, result, mud_rises, move, steps=1300, middle=703),
+    "sand in space": Model(sandy_in_space, result, sand_tears, sand_on_in_space, steps=900, middle=603, slow=True),
+    "mud": Model(muddy, result, mud_rises, move, steps=1300, middle=703, slow=True),
 }

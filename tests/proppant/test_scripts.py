@@ -86,6 +86,7 @@ pcdc chart export 'sand' 'sand.png' fluid concentration
     assert {float(row["pack_pressure[Pa]"]) for row in rows} == {0.0}
 
 
+@pytest.mark.slow
 def test_a_well_brings_it_too(tmp_path: Path) -> None:
     well = """
 pcdc well create 'pump' range y 0 0

@@ -798,7 +798,8 @@ def different(one: Path, other: Path, names: list[str]) -> list[str]:
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     ("ranks", "how", "word"),
-    [(1, "hpcdem", ""), (1, "hpcdem", "again"), (2, "python", ""),
+    [pytest.param(1, "hpcdem", "", marks=pytest.mark.slow), (2, "hpcdem", "again"),
+     pytest.param(2, "python", "", marks=pytest.mark.slow),
      pytest.param(4, "hpcdem", "again", marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_python_says_what_the_script_says(
@@ -919,7 +920,7 @@ if not sim.resume():
     sim.nodes.force(fx=1e4, where="y 1 1")
     sim.histories.create("top", "node", "displacement-x", nearest=(1, 1), every=100)
     if "stop" in sys.argv:
-        threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGTERM)).start()
+        threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGTERM)).start()
     sim.solve(ratio=1e-30, cycles=STEPS)
 assert sim.solved["reason"] == "cycles" and sim.steps == STEPS
 open(f"end_{sim.rank}.txt", "w").write(" ".join(float(v).hex() for v in sim.nodes["position-x"]))
@@ -930,7 +931,7 @@ open(f"end_{sim.rank}.txt", "w").write(" ".join(float(v).hex() for v in sim.node
 def test_stopped_in_the_middle_and_taken_up(resident: Resident, tmp_path: Path) -> None:
     for name in ("whole", "cut"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "study.py").write_text(STOPPED.replace("STEPS", "60000"))
+        (tmp_path / name / "study.py").write_text(STOPPED.replace("STEPS", "25000"))
     done = resident(1, "study.py", "--no-figure", cwd=tmp_path / "whole")
     assert done.returncode == 0, done.stdout + done.stderr
     cut = resident(1, "study.py", "--no-figure", "--", "stop", cwd=tmp_path / "cut")
@@ -973,7 +974,7 @@ REFUSED = {
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", REFUSED)
+@each("case", REFUSED)
 def test_what_is_refused_in_a_run(resident: Resident, tmp_path: Path, case: str) -> None:
     text, code, expected = REFUSED[case]
     (tmp_path / "study.py").write_text(HEAD + text + "\n")
@@ -1021,6 +1022,7 @@ def test_several_models_and_their_folders(resident: Resident, tmp_path: Path) ->
     assert (tmp_path / "b" / "run.json").exists() and not (tmp_path / "data").exists()
 
 
+@pytest.mark.slow
 def test_the_example_comes_to_the_theory(launch: Launcher, tmp_path: Path) -> None:
     shutil.copy(ROOT / "examples" / "cantilever.py", tmp_path)
     done = launch(1, "cantilever.py", cwd=tmp_path)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.clumped import write_lattice
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import assert_same_files
 
 SCRIPT = """\
@@ -91,17 +91,17 @@ def folder(path: Path, name: str, text: str) -> Path:
     return path / name
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.mpi)])
-def test_the_same_files_as_the_script(launch: Launcher, tmp_path: Path, ranks: int) -> None:
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.mpi)])
+def test_the_same_files_as_the_script(resident: Resident, tmp_path: Path, ranks: int) -> None:
     for place, text in (("script", SCRIPT), ("program", PROGRAM)):
-        done = launch(ranks, folder(tmp_path / place, "run.py", text), "--no-figure", cwd=tmp_path / place)
+        done = resident(ranks, folder(tmp_path / place, "run.py", text), "--no-figure", cwd=tmp_path / place)
         assert done.returncode == 0, done.stdout + done.stderr
         (tmp_path / place / "end.sav").unlink()  # its text of the script is another
     (tmp_path / "program" / "run.py").write_text(SCRIPT)
     assert_same_files(tmp_path / "script", tmp_path / "program")
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(3, marks=pytest.mark.mpi)])
-def test_looking_and_setting(launch: Launcher, tmp_path: Path, ranks: int) -> None:
-    done = launch.python(ranks, folder(tmp_path / "here", "look.py", LOOKS), cwd=tmp_path / "here")
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.mpi)])
+def test_looking_and_setting(resident: Resident, tmp_path: Path, ranks: int) -> None:
+    done = resident(ranks, folder(tmp_path / "here", "look.py", LOOKS), cwd=tmp_path / "here")
     assert done.returncode == 0 and done.stdout.count("looked") == ranks, done.stdout + done.stderr

@@ -112,7 +112,7 @@ def assert_same(one: Path, other: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [pytest.param(n, marks=pytest.mark.slow) if n != 2 else n for n in (1, 2, 4)])
 def test_python_says_what_the_script_says(script: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     (tmp_path / "model.py").write_text(PYTHON)
     done = resident(ranks, "model.py", "--no-figure", cwd=tmp_path)
@@ -121,7 +121,7 @@ def test_python_says_what_the_script_says(script: Path, resident: Resident, tmp_
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
 def test_the_same_program_started_by_python(script: Path, launch: Launcher, tmp_path: Path, ranks: int) -> None:
     (tmp_path / "model.py").write_text(PYTHON)
     done = launch.python(ranks, "model.py", cwd=tmp_path)
@@ -175,14 +175,14 @@ if sim.rank == 0:
 def test_a_function_may_steer_the_run(resident: Resident, tmp_path: Path) -> None:
     """Servo wall, GEN, DEL and fields set in the middle of a cycle; an early end: the same on all numbers of ranks."""
     ends = []
-    for ranks in (1, 2, 4):
+    for ranks in (1, 3):
         folder = tmp_path / str(ranks)
         folder.mkdir()
         (folder / "model.py").write_text(STEERED)
         done = resident(ranks, "model.py", "--no-figure", cwd=folder)
         assert done.returncode == 0, done.stdout + done.stderr
         ends.append([line for line in done.stdout.splitlines() if line.startswith("END")])
-    assert len(ends[0]) == 1 and ends[0] == ends[1] == ends[2]
+    assert len(ends[0]) == 1 and ends[0] == ends[1]
     rain = int(ends[0][0].split()[3])
     assert rain > 20
     one, four = (contents(tmp_path / n / "data" / "all_0000001850.vtkhdf") for n in ("1", "4"))

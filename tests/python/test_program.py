@@ -69,7 +69,7 @@ def test_a_mistake_is_named_with_its_line(resident: Resident, tmp_path: Path, ca
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("how", ["hpcdem", "python"])
+@pytest.mark.parametrize("how", ["hpcdem", pytest.param("python", marks=pytest.mark.slow)])
 def test_a_mistake_stops_all_ranks_with_one_message(launch: Launcher, tmp_path: Path, how: str) -> None:
     program(tmp_path, "sim.prop(density=-1.0)\n")
     start = launch if how == "hpcdem" else launch.python
@@ -80,7 +80,7 @@ def test_a_mistake_stops_all_ranks_with_one_message(launch: Launcher, tmp_path: 
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("how", ["hpcdem", "python"])
+@pytest.mark.parametrize("how", [pytest.param("hpcdem", marks=pytest.mark.slow), "python"])
 def test_an_error_of_one_rank_ends_all(launch: Launcher, tmp_path: Path, how: str) -> None:
     program(tmp_path, "if sim.rank == 1:\n    values = [][3]\nsim.cycle(100)\n")
     start = launch if how == "hpcdem" else launch.python
@@ -97,12 +97,13 @@ def test_the_traceback_of_a_users_error_begins_in_the_program(resident: Resident
     assert "cli/run.py" not in done.stderr
 
 
-def test_arguments_and_exit_codes(launch: Launcher, tmp_path: Path) -> None:
+def test_arguments_and_exit_codes(resident: Resident, tmp_path: Path) -> None:
     program(tmp_path, "import sys\nprint('ARG', sys.argv[1:], __name__)\nsys.exit(3)\n", head="import hpcdem\n")
-    done = launch(1, "study.py", "--", "0.3", "--mu", cwd=tmp_path)
+    done = resident(1, "study.py", "--", "0.3", "--mu", cwd=tmp_path)
     assert done.returncode == 3 and "ARG ['0.3', '--mu'] __main__" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_several_simulations_and_the_end(launch: Launcher, tmp_path: Path) -> None:
     """A study over a parameter: folders of their own, beside the program; each ends with table, frame and figure."""
@@ -142,8 +143,8 @@ if not sim.resume():
     sim.cycle(10)
     if "stop" in sys.argv:
         import os, signal
-        sim.every(2000, lambda s: os.kill(os.getpid(), signal.SIGTERM))
-    sim.cycle(20000)
+        sim.every(1000, lambda s: os.kill(os.getpid(), signal.SIGTERM))
+    sim.cycle(4000)
 sim.write_frame()
 end = f"{sim.steps} {float(sim.gather('y').sum()).hex()} {ran[-1]}"
 open(f"end_{sim.rank}.txt", "w").write(end)  # not printed: ranks write into one pipe, lines may mix
@@ -158,7 +159,7 @@ open(f"end_{sim.rank}.txt", "w").write(end)  # not printed: ranks write into one
     rest = resident(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
     assert rest.returncode == 0, rest.stderr
     ends = {name: [file.read_text() for file in (tmp_path / name).glob("end_*.txt")] for name in ("whole", "cut")}
-    assert len(ends["whole"]) == 1 and ends["whole"][0].startswith("20010 ")
+    assert len(ends["whole"]) == 1 and ends["whole"][0].startswith("4010 ")
     assert ends["cut"] == ends["whole"] * 2
 
 
@@ -227,7 +228,7 @@ assert sim.count == 0 and sim.steps == 0 and not sim.walls
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_what_can_be_seen(resident: Resident, tmp_path: Path, ranks: int) -> None:
     program(tmp_path, LOOK)
     done = resident(ranks, "study.py", cwd=tmp_path)
@@ -241,6 +242,7 @@ def test_import_is_light(launch: Launcher, tmp_path: Path) -> None:
     assert launch.python(1, "a.py", cwd=tmp_path).stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_the_program_of_the_documentation_runs(launch: Launcher, tmp_path: Path) -> None:
     """The first block of docs/python.md, with fewer steps."""
     text = (ROOT / "docs" / "python.md").read_text().split("```python\n")[1].split("```")[0]

@@ -619,9 +619,9 @@ def it_settles(found: Found) -> None:
 
 MODELS = {
     "swinging": Model(swinging, result, it_swings, dig_and_fill, steps=1000, middle=401, come=10, slow=True),
-    "soil that swings": Model(yielding, flow, it_flows, dig_soil, steps=1000, middle=401, come=10),
-    "salt bar": Model(creeping, crept, it_creeps, creep_more, steps=1000, middle=401),
-    "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
+    "soil that swings": Model(yielding, flow, it_flows, dig_soil, steps=1000, middle=401, come=10, slow=True),
+    "salt bar": Model(creeping, crept, it_creeps, creep_more, steps=1000, middle=401, slow=True),
+    "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10, slow=True),
     "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10, slow=True),
     "hexahedra that shatter": Model(
         shattering_hexes, in_pieces_that_creep, hexes_shatter, dig_beam_of_hexes, steps=900, middle=501, come=10

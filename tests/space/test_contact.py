@@ -90,7 +90,9 @@ def test_a_block_stays_below_the_angle_of_friction() -> None:
     assert np.abs(way(sim, block) - before).max() < 1e-6  # what slips freely goes 0.07 m
 
 
-@pytest.mark.parametrize(("potential", "ripple"), [("distance", 1e-4), ("munjiza", 2e-3)])
+@pytest.mark.parametrize(
+    ("potential", "ripple"), [("distance", 1e-4), pytest.param("munjiza", 2e-3, marks=pytest.mark.slow)]
+)
 def test_a_block_moved_over_a_plate_with_other_elements(potential: str, ripple: float) -> None:
     """Both rigid. At one depth its force all but stays, less so by Munjiza's potential; along a closed way in and out
     no work is done; what one takes the other gives."""
@@ -204,7 +206,7 @@ def test_normal_damping() -> None:
     assert bounce(damping_t=2e4) < 0.9 * free
 
 
-@pytest.mark.parametrize("lies", ["top", "right"])
+@pytest.mark.parametrize("lies", ["top", pytest.param("right", marks=pytest.mark.slow)])
 def test_whose_friction_it_is(lies: str) -> None:
     """A block on the top of a slab, or pressed against its side: it rubs with the friction of the face that it touches,
     though the elements along the edges have faces with another one."""

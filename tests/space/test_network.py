@@ -6,14 +6,14 @@ from __future__ import annotations
 import csv
 import importlib.util
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
-from tests.conftest import absent, mpi_command, run
+from tests.conftest import absent
+from tests.property.workers import Resident
 
 HALF = """
 pcdc model restore 'half.sav'
@@ -39,23 +39,22 @@ print('closing', pcdc.energies['relative'])
 """
 
 
-def start(folder: Path, text: str, ranks: int = 1) -> str:
+def start(resident: Resident, folder: Path, text: str, ranks: int = 1) -> str:
     """What it said."""
     (folder / "bar.sc").write_text(text, encoding="utf-8")
-    first = mpi_command(ranks) if ranks > 1 else []
-    done = run([*first, sys.executable, "-m", "hpcdem", "bar.sc"], cwd=folder)
+    done = resident(ranks, "bar.sc", cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of one rank."""
     for name in ("gmsh", "shapely"):
         if importlib.util.find_spec(name) is None:
             absent(name, f"no package {name} here: install the extra [mesh]")
     folder = tmp_path_factory.mktemp("alone")
-    said = start(folder, SCRIPT)
+    said = start(resident, folder, SCRIPT)
     (closing,) = [float(line.split()[-1]) for line in said.splitlines() if "closing " in line and "error" not in line]
     assert closing < 0.01
     return folder
@@ -84,13 +83,17 @@ def test_rock_breaks_beside_the_network(alone: Path) -> None:
 
 
 @pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.slow), pytest.param(4, marks=pytest.mark.slow)])
-def test_the_whole_run_on_several_ranks(alone: Path, tmp_path: Path, ranks: int, needs_parallel_hdf5: None) -> None:
-    start(tmp_path, SCRIPT, ranks)
+def test_the_whole_run_on_several_ranks(
+    alone: Path, resident: Resident, tmp_path: Path, ranks: int, needs_parallel_hdf5: None
+) -> None:
+    start(resident, tmp_path, SCRIPT, ranks)
     same(alone, tmp_path)
 
 
 @pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 2])
-def test_the_second_half_from_a_checkpoint(alone: Path, tmp_path: Path, ranks: int, needs_parallel_hdf5: None) -> None:
+def test_the_second_half_from_a_checkpoint(
+    alone: Path, resident: Resident, tmp_path: Path, ranks: int, needs_parallel_hdf5: None
+) -> None:
     shutil.copy(alone / "half.sav", tmp_path)
-    start(tmp_path, HALF, ranks)
+    start(resident, tmp_path, HALF, ranks)
     same(alone, tmp_path)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import Launcher
 from tests.pcdc.test_whole import history, tables
+from tests.property.workers import Resident
 
 BEGIN = """
 pcdc model new dim 3
@@ -52,20 +52,21 @@ pcdc model solve thermal steady
 """
 
 
-def run(folder: Path, ranks: int, text: str) -> Path:
+def run(resident: Resident, folder: Path, ranks: int, text: str) -> Path:
     folder.mkdir(exist_ok=True)
     (folder / "rock.sc").write_text(text.replace(" &\n   ", ""))
-    done = Launcher()(ranks, "rock.sc", cwd=folder, timeout=1200)
+    done = resident(ranks, "rock.sc", cwd=folder, timeout=1200)
     assert done.returncode == 0, done.stderr
     return folder
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run on one rank."""
-    return run(tmp_path_factory.mktemp("rock") / "one", 1, BEGIN + END)
+    return run(resident, tmp_path_factory.mktemp("rock") / "one", 1, BEGIN + END)
 
 
+@pytest.mark.slow
 def test_it_gets_warm_and_cracks(alone: Path) -> None:
     """And the frame and the histories know the same of it. Heat goes sqrt(4 k t / rho c) = 6 cm far in 800 s: at half a
     metre from the oven the surface only cools down to the air; in the oven it has its temperature."""
@@ -81,9 +82,9 @@ def test_it_gets_warm_and_cracks(alone: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [2, 4])
-def test_the_same_on_several_ranks(alone: Path, tmp_path: Path, ranks: int) -> None:
+def test_the_same_on_several_ranks(alone: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     """The whole run, and its second half gone on with on other ranks: every bit until implicit steps, then 1e-9."""
-    other = run(tmp_path / "many", ranks, BEGIN + END)
+    other = run(resident, tmp_path / "many", ranks, BEGIN + END)
     frames = sorted(path.name for path in (alone / "data").glob("f_*.vtkhdf"))
     for name in frames:
         assert tables(alone / "data" / name) == tables(other / "data" / name), name
@@ -93,5 +94,5 @@ def test_the_same_on_several_ranks(alone: Path, tmp_path: Path, ranks: int) -> N
     again = tmp_path / "again"
     again.mkdir()
     (again / "half.sav").write_bytes((alone / "half.sav").read_bytes())
-    run(again, ranks, "pcdc model restore 'half.sav'\n" + END)
+    run(resident, again, ranks, "pcdc model restore 'half.sav'\n" + END)
     assert tables(alone / "end.sav") == tables(again / "end.sav")

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
-from tests.conftest import mpi_command, run
+from tests.conftest import run
+from tests.property.workers import Resident
 
 SCRIPT = """
 pcdc model new dim 3
@@ -35,11 +36,11 @@ pcdc model step 500
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of one rank."""
     folder = tmp_path_factory.mktemp("alone")
     (folder / "bar.sc").write_text(SCRIPT, encoding="utf-8")
-    done = run([sys.executable, "-m", "hpcdem", "bar.sc"], cwd=folder)
+    done = resident(1, "bar.sc", cwd=folder)
     assert done.returncode == 0, done.stderr
     (folder / "said.txt").write_text(done.stdout, encoding="utf-8")
     return folder
@@ -103,14 +104,14 @@ def test_frames_have_joints_as_triangles(alone: Path) -> None:
     assert set(np.unique(grid.celltypes)) == {5, 10} and grid.n_cells == 96 + len(state.joints)
 
 
-@pytest.mark.parametrize("ranks", [2, 4])
+@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_ranks_and_a_restart_come_to_the_same(
-    alone: Path, tmp_path: Path, ranks: int, needs_parallel_hdf5: None
+    alone: Path, resident: Resident, tmp_path: Path, ranks: int, needs_parallel_hdf5: None
 ) -> None:
     """The second half from the checkpoint on several ranks: frames and cracks byte for byte."""
     shutil.copy(alone / "half.sav", tmp_path)
     (tmp_path / "go.sc").write_text("pcdc model restore 'half.sav'\npcdc model step 500\n", encoding="utf-8")
-    done = run([*mpi_command(ranks), sys.executable, "-m", "hpcdem", "go.sc"], cwd=tmp_path)
+    done = resident(ranks, "go.sc", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     name = "bar_0000001000.vtkhdf"
     one, other = (read_mesh_frame(folder / "data" / name, solid=True) for folder in (alone, tmp_path))

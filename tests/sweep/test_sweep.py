@@ -126,6 +126,7 @@ def test_parquet_is_written_or_refused_by_name(fallen, tmp_path):
     assert [float(row["gravity"]) for row in table(tmp_path / "members.csv")] == read["gravity"] == [1, 1, 2, 2, 4, 4]
 
 
+@pytest.mark.slow
 def test_a_pcdc_script_from_a_file_of_settings(tmp_path):
     """Pure shear: strain s / 2G, so that the largest displacement of each member is known."""
     (tmp_path / "stretch.sc").write_text(STRETCH)
@@ -180,6 +181,7 @@ def undisturbed_and_killed(tmp_path: Path, seeds: str, steps: int) -> None:
     assert len(table(one)) > 20
 
 
+@pytest.mark.slow
 def test_a_sweep_survives_kills_and_its_report_is_that_of_an_undisturbed_one(tmp_path):
     undisturbed_and_killed(tmp_path, "1", 8000)
 
@@ -239,6 +241,7 @@ def test_members_of_several_ranks_have_the_same_bits(fallen, tmp_path):
     assert one.read_bytes() == other.read_bytes()
 
 
+@pytest.mark.slow
 def test_jobs_limit_how_many_run(tmp_path):
     """Programs that note when they began and ended: with one at once they do not overlap."""
     note = "open('when', 'w').write(f'{began} {time.time()}')\n"
@@ -322,6 +325,7 @@ def test_a_damaged_record_is_refused(tmp_path, change):
         hpcdem.Sweep.open(record.parent)
 
 
+@pytest.mark.slow
 def test_files_that_the_script_reads_are_found_in_each_member(tmp_path):
     (tmp_path / "table.txt").write_text("7")
     (tmp_path / "one.py").write_text("import sys\nn = 1\nassert open('table.txt').read() == '7' and n\n")

@@ -265,6 +265,7 @@ def test_step_by_step_in_a_script(resident, written, tmp_path):
     assert float(line.split()[1]) == pytest.approx(1e6 * curve[:, 1].max(), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_in_a_program_several_times(launch, written, tmp_path):
     (tmp_path / "study.py").write_text(PROGRAM)
     done = launch.python(1, "study.py", cwd=tmp_path, timeout=600)

@@ -859,7 +859,7 @@ def test_help_says_the_exit_codes():
     assert "Exit codes: 0 no" in CliRunner().invoke(program.doctor, ["--help"]).output
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.mpi)])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.mpi)])
 def test_the_doctor_comes(launch, tmp_path, ranks):
     """On one rank and on two: one table, nothing left behind."""
     done = launch(ranks, "doctor", "--dir", tmp_path, cwd=tmp_path, timeout=240)
@@ -876,7 +876,7 @@ def test_a_problem_is_exit_code_1(launch, tmp_path):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("rank", "code"), [(0, 1), (3, 0)])
+@pytest.mark.parametrize(("rank", "code"), [(0, 1), pytest.param(3, 0, marks=pytest.mark.slow)])
 def test_copies_of_rank_0_are_a_finding(launch, tmp_path, rank, code):
     """A launcher of another MPI says 4, MPI says 1: a run refuses that, the doctor says it. Only one copy speaks."""
     strange = {"MV2_COMM_WORLD_SIZE": "4", "MV2_COMM_WORLD_RANK": str(rank)}
@@ -893,7 +893,7 @@ runpy.run_module("hpcdem", run_name="__main__")
 """
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.mpi)])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.mpi)])
 def test_a_run_warns_at_its_start(launch, tmp_path, ranks):
     """The log of a run has what the table of checks finds, whatever becomes of the run."""
     done = launch.python(ranks, "-c", LIMITED, cwd=tmp_path, timeout=120)

@@ -72,6 +72,7 @@ def test_draw_makes_pictures_if_asked(launch: Launcher, tmp_path: Path) -> None:
     assert min(map(len, pictures[1].values())) > 5000
 
 
+@pytest.mark.slow
 def test_draw_is_only_noted_without_the_option(launch: Launcher, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(SCRIPT.format(what=""))
     done = launch(1, "--no-figure", "a.py", cwd=tmp_path)

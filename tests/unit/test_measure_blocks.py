@@ -265,6 +265,7 @@ def test_nothing_has_broken(tmp_path):
     assert any("left out: cracks: the blocks in" in line for line in run(tmp_path / "one"))
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_on_any_number_of_ranks(folder, launch, tmp_path):
     done = launch(2, "measure", str(folder), "-o", str(tmp_path / "two"), "--format", "none")

@@ -222,6 +222,7 @@ def test_words_of_space_are_refused_in_the_plane(tmp_path: Path, words: list[str
         run(tmp_path, *words)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_the_same_files_on_three_ranks(launch: Launcher, wet: Path):
     folder = wet

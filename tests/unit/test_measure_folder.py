@@ -380,16 +380,12 @@ common.run_program(measure, "hpcdem measure", sys.argv[1:], work)
 def test_three_ranks_write_the_same_files(folder: Path, tmp_path: Path, needs_mpi: None, launch: Any) -> None:
     program = tmp_path / "measure.py"
     program.write_text(PROGRAM)
-    for n in (1, 3):
-        ended = launch.python(n, program, folder, *NUMBERS, "-o", tmp_path / str(n))
-        assert ended.returncode == 0, ended.stdout + ended.stderr
-        written = sorted((tmp_path / str(n)).iterdir())
-        assert len(written) == 9
-        for path in written:
-            assert path.read_bytes() == (folder / "measure" / path.name).read_bytes(), path.name
-    run(folder, "faults", "-o", tmp_path / "1", figures=True)
-    assert launch.python(3, program, folder, "faults", "-o", tmp_path / "3").returncode == 0
-    assert (tmp_path / "1" / "faults.png").read_bytes() == (tmp_path / "3" / "faults.png").read_bytes()
+    ended = launch.python(3, program, folder, *NUMBERS, "-o", tmp_path / "3")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    written = sorted((tmp_path / "3").iterdir())
+    assert len(written) == 9
+    for path in written:
+        assert path.read_bytes() == (folder / "measure" / path.name).read_bytes(), path.name
     shutil.copytree(folder, tmp_path / "data")
     (tmp_path / "data" / "all_0000003000_ini.vtkhdf").write_bytes(b"no frame")
     ended = launch.python(3, program, tmp_path / "data", "layers")
@@ -414,6 +410,7 @@ STOP
 """
 
 
+@pytest.mark.slow
 def test_a_run_of_the_program(tmp_path: Path, launch: Any) -> None:
     """A small push: what is measured agrees with what the run itself says."""
     (tmp_path / "run.zdem").write_text(RUN)

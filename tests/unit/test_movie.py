@@ -90,6 +90,7 @@ def test_time_is_kept_where_frames_are_alike(folder: Path, no_ffmpeg: None) -> N
     assert len(frames) == 4 and sum(durations) == pytest.approx(1330, abs=10)
 
 
+@pytest.mark.slow
 def test_the_same_frames_give_the_same_film(folder: Path, no_ffmpeg: None) -> None:
     make(folder, "--size=200")
     first = (folder / "movie.gif").read_bytes()
@@ -97,6 +98,7 @@ def test_the_same_frames_give_the_same_film(folder: Path, no_ffmpeg: None) -> No
     assert (folder / "other.gif").read_bytes() == first
 
 
+@pytest.mark.slow
 def test_pages_of_zdemss_become_a_film(folder: Path, no_ffmpeg: None) -> None:
     pages = folder / "ss"
     with pytest.raises(HpcdemError, match="cannot read the folder"):

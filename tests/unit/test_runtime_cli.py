@@ -45,7 +45,7 @@ def test_all_options_of_a_run():
     assert found.resume and found.check and not found.figure
 
 
-@pytest.mark.parametrize("name", ["main", "start_zdem2jpg", "start_zdemss"])
+@pytest.mark.parametrize("name", ["start_zdem2jpg", "start_zdemss"])
 def test_every_program_starts(name):
     done = program(name, "--help")
     assert done.returncode in (0, 2) and "Traceback" not in done.stderr
@@ -96,7 +96,7 @@ def test_such_numbers_are_refused_by_name(words, capsys):
     assert left.value.code == 2 and words[0] in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("word", ["-h", "--help", "--hlep"])
+@pytest.mark.parametrize("word", [*(pytest.param(word, marks=pytest.mark.slow) for word in ("-h", "--help")), "--hlep"])
 def test_help_also_as_the_manual_spells_it(word):
     done = program("main", word)
     assert done.returncode == 0 and "--time-limit" in done.stdout
@@ -137,8 +137,8 @@ def test_every_command_of_the_table_starts():
     ("word", "said"),
     [
         ("viw", "no such script and no such command; did you mean hpcdem view?"),
-        ("mesure", "did you mean hpcdem measure?"),
-        ("xyzzyxyzzy", "see hpcdem --help"),
+        pytest.param("mesure", "did you mean hpcdem measure?", marks=pytest.mark.slow),
+        pytest.param("xyzzyxyzzy", "see hpcdem --help", marks=pytest.mark.slow),
         ("viw.py", "viw.py: no such script; hpcdem examples lists those that come along\n"),
     ],
 )
@@ -162,8 +162,9 @@ def test_examples_are_listed_and_copied(tmp_path):
 
 @pytest.mark.parametrize(
     "words",
-    ["--addball push.py", "--delball push.py", "-g 100.0 push.py", "--grid 200 push.py", "--leftwallid 1 push.py",
-     "--rightwallid 2 push.py", "--xmove -1000.0 push.py", "-j 12 --ymove -1000.0 push.py"],
+    ["--addball push.py", *(pytest.param(one, marks=pytest.mark.slow) for one in (
+     "--delball push.py", "-g 100.0 push.py", "--grid 200 push.py", "--leftwallid 1 push.py",
+     "--rightwallid 2 push.py", "--xmove -1000.0 push.py", "-j 12 --ymove -1000.0 push.py"))],
 )  # fmt: skip
 def test_options_of_stress_and_strain_belong_to_s(words):
     done = program("main", *words.split())
@@ -172,18 +173,35 @@ def test_options_of_stress_and_strain_belong_to_s(words):
     assert asked in done.stderr and "goes with -s DIR" in done.stderr
 
 
-@pytest.mark.parametrize("words", ["-s nowhere", "--strain-stress nowhere", "-j 1 --addball --strin-stres nowhere"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param("-s nowhere", marks=pytest.mark.slow),
+        pytest.param("--strain-stress nowhere", marks=pytest.mark.slow),
+        "-j 1 --addball --strin-stres nowhere",
+    ],
+)
 def test_stress_and_strain_of_a_folder_that_is_not_there(words, tmp_path):
     done = program("main", *words.replace("nowhere", str(tmp_path / "nowhere")).split())
     assert done.returncode != 0 and "nowhere" in done.stderr and "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("words", [[], ["-j", "0", "a.py"], ["--time-limit", "soon", "a.py"], ["--nonsense", "a.py"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        *(
+            pytest.param(one.split(), marks=pytest.mark.slow)
+            for one in ("-j 0 a.py", "--time-limit soon a.py", "--nonsense a.py")
+        ),
+    ],
+)
 def test_a_wrong_command_line_is_code_2(words):
     done = program("main", *words)
     assert done.returncode == 2 and "Usage:" in done.stderr and "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_wrong_command_line_is_said_once(launch):
     done = launch(3, "--nonsense", "a.py")
@@ -191,8 +209,8 @@ def test_a_wrong_command_line_is_said_once(launch):
     assert done.stderr.count("No such option") == 1
 
 
-def test_a_missing_script(launch, tmp_path):
-    done = launch(1, "nowhere.py", cwd=tmp_path)
+def test_a_missing_script(resident, tmp_path):
+    done = resident(1, "nowhere.py", cwd=tmp_path)
     assert done.returncode == 2 and "hpcdem: nowhere.py: no such script" in done.stderr
     assert list(tmp_path.iterdir()) == []
 
@@ -203,39 +221,40 @@ def test_a_missing_script_is_said_once(launch, tmp_path):
     assert done.returncode == 2 and done.stderr.count("no such script") == 1
 
 
-def test_a_pcdc_script_is_read_whole_before_anything_runs(launch, tmp_path):
+def test_a_pcdc_script_is_read_whole_before_anything_runs(resident, tmp_path):
     (tmp_path / "a.sc").write_text("open('ran', 'w')\nfor i in range(3):\n    pcdc block create\n")
-    done = launch(1, "a.sc", cwd=tmp_path)
+    done = resident(1, "a.sc", cwd=tmp_path)
     assert done.returncode == 2 and "hpcdem: a.sc:3: pcdc block create: read 'block'" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["a.sc"]
 
 
-def test_a_pcdc_script_is_checked_without_running_it(launch, tmp_path):
+def test_a_pcdc_script_is_checked_without_running_it(resident, tmp_path):
     lines = ["import math", "open('ran', 'w')", "pcdc model new", "for i in range(3):",
              "    pcdc geometry create circle ([i],0) 1 as-layer 'hole'",
              "pcdc mesh create from-layer 'whole' size 0.5"]  # fmt: skip
     (tmp_path / "a.sc").write_text("\r\n".join(lines))
-    done = launch(1, "--check", "a.sc", cwd=tmp_path)
+    done = resident(1, "--check", "a.sc", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "a.sc: 3 commands read, nothing was run" in done.stdout and "1 geometry create circle" in done.stdout
     assert "warning: line 6: no line makes the geometry layer 'whole'" in done.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["a.sc"]
 
 
-def test_a_pcdc_script_without_a_checkpoint_starts_at_the_beginning(launch, tmp_path):
+def test_a_pcdc_script_without_a_checkpoint_starts_at_the_beginning(resident, tmp_path):
     (tmp_path / "a.sc").write_text("pcdc model new\n")
-    done = launch(1, "--resume", "a.sc", cwd=tmp_path, timeout=600)
+    done = resident(1, "--resume", "a.sc", cwd=tmp_path, timeout=600)
     assert done.returncode == 0 and "no checkpoint in data: starting at the beginning" in done.stdout
 
 
-def test_a_return_outside_of_a_function_is_found_before_the_run(launch, tmp_path):
+def test_a_return_outside_of_a_function_is_found_before_the_run(resident, tmp_path):
     (tmp_path / "a.sc").write_text("pcdc model new\nreturn 3\n")
-    done = launch(1, "--check", "a.sc", cwd=tmp_path)
+    done = resident(1, "--check", "a.sc", cwd=tmp_path)
     assert (
         done.returncode == 2 and "hpcdem: a.sc:2: return 3: this is not correct Python: 'return' outside" in done.stderr
     )
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_the_console_is_for_one_rank(launch, tmp_path):
     done = launch(2, "console", cwd=tmp_path)
@@ -243,15 +262,15 @@ def test_the_console_is_for_one_rank(launch, tmp_path):
 
 
 @pytest.mark.parametrize("option", ["--check", "--resume"])
-def test_options_for_zdem_scripts_are_refused_for_python(launch, tmp_path, option):
+def test_options_for_zdem_scripts_are_refused_for_python(resident, tmp_path, option):
     (tmp_path / "a.py").write_text("import hpcdem\n")
-    done = launch(1, option, "a.py", cwd=tmp_path)
+    done = resident(1, option, "a.py", cwd=tmp_path)
     assert done.returncode == 2 and f"hpcdem: a.py: {option} is for ZDEM and PCDC scripts" in done.stderr
 
 
-def test_a_zdem_script_takes_no_arguments(launch, tmp_path):
+def test_a_zdem_script_takes_no_arguments(resident, tmp_path):
     (tmp_path / "a.py").write_text("START\nSTOP\n")
-    done = launch(1, "a.py", "0.3", cwd=tmp_path)
+    done = resident(1, "a.py", "0.3", cwd=tmp_path)
     assert done.returncode == 2 and "0.3: a ZDEM script takes no arguments" in done.stderr
 
 
@@ -266,9 +285,9 @@ STOP
 """
 
 
-def test_check_runs_nothing(launch, tmp_path):
+def test_check_runs_nothing(resident, tmp_path):
     (tmp_path / "a.py").write_text(SHORT)
-    done = launch(1, "--check", "a.py", cwd=tmp_path)
+    done = resident(1, "--check", "a.py", cwd=tmp_path)
     assert done.returncode == 0 and "100" in done.stdout
     assert [p.name for p in tmp_path.iterdir()] == ["a.py"]
 

@@ -281,7 +281,10 @@ def test_a_disk_that_is_full_for_a_while_leaves_a_gap_that_is_told(tmp_path):
     assert (tmp_path / "log").read_text().splitlines() == ["before", gap, "after", "later"]
 
 
-@pytest.mark.parametrize("stream", ["1>/dev/full", "2>/dev/full", "1>/dev/full 2>&1"])
+@pytest.mark.parametrize(
+    "stream",
+    [*(pytest.param(one, marks=pytest.mark.slow) for one in ("1>/dev/full", "2>/dev/full")), "1>/dev/full 2>&1"],
+)
 def test_a_full_disk_under_the_log_changes_no_exit_code(tmp_path, stream):
     """Nor do prints of a script end it."""
     for text, code in (("print('one')\nprint('two')\n", 0), ("print('one')\n1 / 0\n", 1)):

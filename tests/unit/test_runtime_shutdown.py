@@ -62,6 +62,7 @@ def run(launch, tmp_path, work: str, n: int = 3):
     return launch.python(n, program)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_good_end(launch, tmp_path):
     done = run(launch, tmp_path, "comm.barrier(); time.sleep(0.3 * comm.rank)")
@@ -76,6 +77,7 @@ def test_an_error_of_all_ranks_is_printed_once(launch, tmp_path):
     assert "rank" not in done.stderr.replace("BAD TERMINATION", "").split("\n")[0]
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_ranks_that_come_late_still_end_as_one(launch, tmp_path):
     done = run(launch, tmp_path, "time.sleep(0.3 * comm.rank); comm.agree('disk is full')")
@@ -91,12 +93,14 @@ def test_one_rank_fails_while_the_others_wait_for_it(launch, tmp_path):
     assert done.stderr.count("rank 1 of 3: hpcdem: particle 7 is lost") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_the_exit_code_of_the_error_survives_the_abort(launch, tmp_path):
     work = "comm.rank == 2 and (_ for _ in ()).throw(CommandError('no')); comm.barrier()"
     assert run(launch, tmp_path, work).returncode == 2
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_one_traceback_when_several_ranks_fail(launch, tmp_path):
     done = run(launch, tmp_path, "comm.rank and [].pop(); comm.barrier()")
@@ -113,11 +117,13 @@ def test_a_rank_that_is_done_still_hears_of_the_error(launch, tmp_path):
     assert done.stderr.count("rank 0 of 3: Traceback") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_rank_that_leaves_the_program_does_not_leave_the_others(launch, tmp_path):
     assert run(launch, tmp_path, "comm.rank == 1 and sys.exit(9); comm.barrier()").returncode == 9
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_checkpoint_code(launch, tmp_path):
     done = run(launch, tmp_path, "raise StoppedWithCheckpoint('saved all.sav')")

@@ -374,7 +374,7 @@ def test_a_process_that_is_killed_leaves_what_it_has_compiled(many, tmp_path, af
 
 
 def test_many_processes_at_once_compile_once(many, tmp_path):
-    processes = [many() for _ in range(6)]
+    processes = [many() for _ in range(3)]
     assert sum(compiled(process) for process in processes) == 6
     assert len(files(tmp_path / "cache")) == 6
 
@@ -607,7 +607,12 @@ def test_several_processes_fill_a_folder(processes, base, tmp_path):
 
 @pytest.mark.parametrize(
     ("limit", "value", "alone"),
-    [("cpu_quota", 1.2, True), ("cpu_quota", 2.0, False), ("memory", 9 * 10**8, True), ("memory", 2 * 10**9, False)],
+    [
+        ("cpu_quota", 1.2, True),
+        pytest.param("cpu_quota", 2.0, False, marks=pytest.mark.slow),
+        ("memory", 9 * 10**8, True),
+        pytest.param("memory", 2 * 10**9, False, marks=pytest.mark.slow),
+    ],
 )
 def test_as_many_processes_as_the_control_group_allows(processes, monkeypatch, limit, value, alone):
     monkeypatch.setattr(kernels_.cgroups, limit, lambda root: value)
@@ -624,6 +629,7 @@ def test_processes_that_fail_are_told_and_this_one_compiles(processes, base):
     assert len(list(folder.rglob("*.nbc"))) == 5
 
 
+@pytest.mark.slow
 def test_a_warm_up_that_hangs_without_its_kernels_is_given_up(processes, monkeypatch):
     monkeypatch.setattr(compilers, "PATIENCE", 3.0)
     assert "failed, so one went on alone (exit codes 1, 1;" in processes("hangs")
@@ -655,7 +661,7 @@ def test_processes_end_with_the_one_that_started_them(processes, tmp_path):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("cores", ["alone", "on the cores of all"])
+@pytest.mark.parametrize("cores", ["alone", pytest.param("on the cores of all", marks=pytest.mark.slow)])
 def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path, cores):
     """Bound to a core each, they compile in processes on all of these."""
     (tmp_path / "hpcdem_kernels_of_a_test.py").write_text(KERNELS)

@@ -38,6 +38,7 @@ def test_help_sets_nothing_up(name: str) -> None:
     assert "Setting up" not in done.stderr
 
 
+@pytest.mark.slow
 def test_what_has_passed_is_left_out(tmp_path: Path) -> None:
     """scripts/test --go-on."""
     (tmp_path / "test_two.py").write_text("def test_good(): pass\ndef test_bad(): assert False\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import time
 from collections.abc import Iterator
 
@@ -141,10 +142,14 @@ def dangers(source: str) -> Iterator[str]:
 
 
 def test_nothing_in_the_package_executes_what_it_reads():
+    names = {name.rpartition(".")[2] for name in (*MODULES, *BUILTINS, *CALLS, *PROCESSES)}
+    words = re.compile(rf"\b({'|'.join(names)}|allow_pickle|shell)\b")  # without one of them nothing is found
+    texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
     found = {
         (str(path.relative_to(PACKAGE)), what)
-        for path in PACKAGE.rglob("*.py")
-        for what in dangers(path.read_text(encoding="utf-8"))
+        for path, text in texts.items()
+        if words.search(text)
+        for what in dangers(text)
     }
     assert found - KNOWN == set(), "not known to be harmless"
     assert KNOWN - found == set(), "no longer there: take it off the list"

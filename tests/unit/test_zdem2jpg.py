@@ -402,6 +402,7 @@ common.run_program(module.zdem2jpg, "zdem2jpg", sys.argv[1:], module.work)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_the_same_bytes_by_two_ranks_and_errors_on_both(three: Path, tmp_path: Path, launch: Launcher) -> None:
     work(SerialComm(), Silent(), options("--dpi=100", "--max_workers=1", folder=three))  # type: ignore[arg-type]
@@ -436,6 +437,7 @@ class Deadly:
         return os._exit, (9,)
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_is_reported(three: Path) -> None:
     jobs = [Job(three / "all_0000001000.dat", three / f"{k}.jpg", Deadly()) for k in range(2)]  # type: ignore[arg-type]
     with pytest.raises(HpcdemError, match=r"want of memory.*--max_workers"):

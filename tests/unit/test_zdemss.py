@@ -104,6 +104,7 @@ def test_ours_comes_by_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert len({kind.title for kind in (*panels.KINDS, panels.HALF_SHEAR, panels.ROOT)}) == 7
 
 
+@pytest.mark.slow
 def test_pages_are_drawn_by_several_processes_with_a_word_on_the_way(tmp_path: Path) -> None:
     """The same bytes as by one."""
     sections = [wedge(step, 1000.0 * step, radius=300.0) for step in range(2)]
@@ -253,6 +254,7 @@ def test_particles_that_came_or_went_are_named_unless_meant(drawn: tuple[Path, l
     assert (o.came, o.went) == (max(-fewer, 0), max(fewer, 0))
 
 
+@pytest.mark.slow
 def test_the_same_section_gives_the_same_files(drawn: tuple[Path, list[Section], str], tmp_path: Path) -> None:
     folder, sections, _ = drawn
     write_wedges(tmp_path, sections)

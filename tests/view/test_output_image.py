@@ -25,6 +25,7 @@ MODEL = (
 PLAIN = "field 'stress-yy' object elements"
 
 
+@pytest.mark.slow
 def test_each_word_alone_changes_the_picture(tmp_path: Path) -> None:
     (tmp_path / "a.mv").write_text('{"view": 1, "layers": [{"object": "joints", "field": "state"}]}')
     words = [

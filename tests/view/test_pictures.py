@@ -235,7 +235,9 @@ def test_units_are_those_of_the_quantities():
 # ---- what is drawn ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("colours", list(COLOURS))
+@pytest.mark.parametrize(
+    "colours", [pytest.param(c, marks=[pytest.mark.slow] * (k > 1)) for k, c in enumerate(COLOURS)]
+)
 def test_each_element_has_the_colour_of_its_value(rock: Moment, tmp_path: Path, colours: str):
     view = bare(Layer(object="elements", field="stress_yy", limits=(-1e7, 0.0), colours=colours), deformed=0.0)
     picture = pixels(rock, view, tmp_path / "a.png")
@@ -268,18 +270,20 @@ def test_joints_have_the_colours_of_the_way_they_broke(rock: Moment):
     assert layer.rows.tolist() == [2] and layer.legend == [("tension", "#c81e1e")]
 
 
+LOOKS = [
+    ({"visible": False}, "elements"), ({"field": "stress_yy"}, "elements"),
+    ({"colour": "#ff00ff", "field": ""}, "elements"),
+    ({"opacity": 0.3}, "elements"), ({"edges": True}, "elements"), ({"filter": "x > 1.5"}, "elements"),
+    ({"filter": "group(roof)"}, "elements"), ({"vectors": "velocity"}, "elements"), ({"size": 4.0}, "joints"),
+    ({"opacity": 0.3}, "joints"), ({"field": "number"}, "joints"), ({"visible": False}, "bolts"),
+    ({"field": "axial_force"}, "bolts"), ({"visible": False}, "liners"), ({"colour": "#00ff00"}, "liners"),
+    ({"field": "aperture"}, "channels"), ({"name": "rock"}, "elements"),
+]  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    ("values", "kind"),
-    [
-        ({"visible": False}, "elements"), ({"field": "stress_yy"}, "elements"),
-        ({"colour": "#ff00ff", "field": ""}, "elements"),
-        ({"opacity": 0.3}, "elements"), ({"edges": True}, "elements"), ({"filter": "x > 1.5"}, "elements"),
-        ({"filter": "group(roof)"}, "elements"), ({"vectors": "velocity"}, "elements"), ({"size": 4.0}, "joints"),
-        ({"opacity": 0.3}, "joints"), ({"field": "number"}, "joints"), ({"visible": False}, "bolts"),
-        ({"field": "axial_force"}, "bolts"), ({"visible": False}, "liners"), ({"colour": "#00ff00"}, "liners"),
-        ({"field": "aperture"}, "channels"), ({"name": "rock"}, "elements"),
-    ],
-)  # fmt: skip
+    ("values", "kind"), [pytest.param(*one, marks=[pytest.mark.slow] * (k % 2)) for k, one in enumerate(LOOKS)]
+)
 def test_each_property_alone_changes_the_picture(usually: Usually, values: dict, kind: str):
     rock = usually.rock
     usual = default_view(rock).changed(camera=(0.0, 4.0, 0.0, 3.2))
@@ -288,6 +292,7 @@ def test_each_property_alone_changes_the_picture(usually: Usually, values: dict,
     assert same == (values == {"name": "rock"})  # a name is for the tree alone
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize(
     "values",
     [{"size": 0.5}, {"opacity": 0.4}, {"edges": True}, {"filter": "x > 1.5"}, {"vectors": "force"}, {"field": "vx"},
@@ -395,17 +400,19 @@ def test_a_folder_is_drawn_at_one_place_with_one_range(tmp_path: Path):
     assert not list(tmp_path.glob(".draw_*"))
 
 
+WORDS = [
+    ("--field=stress_yy",), ("--field=stress_yy", "--range=-2e6,0"), ("--field=stress_yy", "--colours=plasma"),
+    ("--object=elements", "--opacity=0.4"), ("--object=elements", "--edges"), ("--object=joints", "--size=5"),
+    ("--object=elements", "--colour=#00ff00"), ("--object=elements", "--vectors=velocity"),
+    ("--object=elements", "--vectors=velocity", "--arrows=3"), ("--object=elements", "--filter=x > 1"),
+    ("--hide=joints",), ("--deformed=0",), ("--camera=0,1,0,1",), ("--title=a",), ("--no-axes",), ("--no-legend",),
+    ("--page=10",), ("--font=14",), ("--dpi=70",), ("--field=aperture",), ("--field=aperture", "--log"),
+]  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    "words",
-    [
-        ("--field=stress_yy",), ("--field=stress_yy", "--range=-2e6,0"), ("--field=stress_yy", "--colours=plasma"),
-        ("--object=elements", "--opacity=0.4"), ("--object=elements", "--edges"), ("--object=joints", "--size=5"),
-        ("--object=elements", "--colour=#00ff00"), ("--object=elements", "--vectors=velocity"),
-        ("--object=elements", "--vectors=velocity", "--arrows=3"), ("--object=elements", "--filter=x > 1"),
-        ("--hide=joints",), ("--deformed=0",), ("--camera=0,1,0,1",), ("--title=a",), ("--no-axes",), ("--no-legend",),
-        ("--page=10",), ("--font=14",), ("--dpi=70",), ("--field=aperture",), ("--field=aperture", "--log"),
-    ],
-)  # fmt: skip
+    "words", [pytest.param(one, marks=[pytest.mark.slow] * (k % 3 > 0)) for k, one in enumerate(WORDS)]
+)
 def test_each_option_alone_changes_the_picture(usually: Usually, words: tuple[str, ...]):
     assert usually.commanded(*words) != usually.commanded(*words[:-1])
 

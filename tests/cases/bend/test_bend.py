@@ -15,12 +15,13 @@ def test_values_of_the_formulas_worked_out_by_hand():
     assert exact.first_crack(4e6, 0.2, 0.05) == pytest.approx(33333.33 / 0.955675, rel=1e-6)
 
 
-def test_a_beam_bends_as_it_should(launch, tmp_path):
+@pytest.mark.slow
+def test_a_beam_bends_as_it_should(resident, tmp_path):
     """Coarse, without a notch, and not over the peak. Stiffness 6 %: joints take some of it, triangles of a fifth
     of the height are too stiff. First crack: the outermost element takes the stress of its middle, h/H less than that
     of the fibre, and the law of the joint is bent before its peak."""
     case = ThreePointBend(notch=0, size=0.006, coarse=0.012, band=0.006, most=1.8, periods=2, penalty=20)
-    done = results(launch, tmp_path, case)
+    done = results(resident, tmp_path, case)
     assert done.sagging == pytest.approx(exact.stiffness(case.young, case.poisson, case.span, case.height), rel=0.06)
     first = exact.first_crack(case.tensile_strength, case.span, case.height)
     assert first < done.first < first * (1.0 + 2.0 * case.size / case.height)
@@ -29,20 +30,20 @@ def test_a_beam_bends_as_it_should(launch, tmp_path):
 
 
 @pytest.mark.slow
-def test_work_of_fracture_of_a_notched_beam(launch, tmp_path):
+def test_work_of_fracture_of_a_notched_beam(resident, tmp_path):
     """A crack along a line of edges: G_f over the ligament within 10 %, as tests of materials give it; here the tail, a
     tenth of the whole, is known to about a fifth because of swings."""
     case = ThreePointBend()
-    done = results(launch, tmp_path, case)
+    done = results(resident, tmp_path, case)
     assert (done.work + done.tail) / (case.height - case.notch) == pytest.approx(case.gf1, rel=0.10)
     assert done.shear == 0 and done.crack > 0.6 * (case.height - case.notch)
     assert done.energy_error < 0.01
 
 
 @pytest.mark.slow
-def test_strength_and_work_of_a_whole_beam(launch, tmp_path):
+def test_strength_and_work_of_a_whole_beam(resident, tmp_path):
     case = ThreePointBend(notch=0)
-    done = results(launch, tmp_path, case)
+    done = results(resident, tmp_path, case)
     assert done.sagging == pytest.approx(exact.stiffness(case.young, case.poisson, case.span, case.height), rel=0.08)
     first = exact.first_crack(case.tensile_strength, case.span, case.height)
     assert first < done.first < first * (1.0 + 2.0 * case.size / case.height)
@@ -51,7 +52,7 @@ def test_strength_and_work_of_a_whole_beam(launch, tmp_path):
 
 
 @pytest.mark.slow
-def test_mesh_size_and_pattern(launch, tmp_path):
+def test_mesh_size_and_pattern(resident, tmp_path):
     """Along a line the work over the ligament is that of the joints, and the peak the same, for every size. Through an
     irregular mesh the crack goes in steps: joints that are not across the pull slide as they open, which takes more;
     the path is one of the mesh, and where it branches the work may be twice as much."""
@@ -59,7 +60,7 @@ def test_mesh_size_and_pattern(launch, tmp_path):
     for path in ("line", "free"):
         for size in (0.005, 0.0035):
             case = ThreePointBend(path=path, size=size)
-            done = results(launch, tmp_path / f"{path}{size}", case)
+            done = results(resident, tmp_path / f"{path}{size}", case)
             assert done.energy_error < 0.01
             found[path, size] = (done.work + done.tail) / (case.height - case.notch) / case.gf1, done.peak
     print(found)

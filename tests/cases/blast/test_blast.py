@@ -74,14 +74,14 @@ if pcdc.rank == 0:
 @pytest.mark.parametrize(
     ("size", "fine"), [(0.5, 0.05), pytest.param(0.12, 0.015, marks=pytest.mark.slow)], ids=["coarse", "fine"]
 )
-def test_the_order_of_the_manual(launch, tmp_path, size, fine):
+def test_the_order_of_the_manual(resident, tmp_path, size, fine):
     """No joint breaks, or only yields, before the first blast; the stress of the cores goes down with their modulus to
     less than a hundredth; each blast cracks the rock around its hole; energy closes to 1e-3 (wanted: 2 %)."""
     for name in ("gmsh", "shapely"):
         if importlib.util.find_spec(name) is None:
             absent(name, f"no package {name} here: install the extra [mesh]")
     (tmp_path / "blast.sc").write_text(SCRIPT.replace("SIZE", str(size)).replace("FINE", str(fine)))
-    done = launch(1, "--no-figure", "blast.sc", cwd=tmp_path, timeout=1800)
+    done = resident(1, "--no-figure", "blast.sc", cwd=tmp_path, timeout=1800)
     assert done.returncode == 0, done.stderr
     found = json.loads((tmp_path / "found.json").read_text())
     core = found["core"]

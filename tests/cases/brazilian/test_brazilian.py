@@ -49,6 +49,7 @@ def check_split(found: Study, size: float) -> None:
     assert found.result["energy_error"] < 0.01
 
 
+@pytest.mark.slow
 def test_coarse_elastic_disc(launch, tmp_path):
     check_elastic(study(launch, tmp_path, "brazilian", joints=False, size=0.003, transits=20, most_strain=1e-3),
                   0.003, 0.03)  # fmt: skip

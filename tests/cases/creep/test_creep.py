@@ -14,8 +14,8 @@ from tests.cases.ready import results
 
 
 @pytest.mark.slow  # quick: tests/blocks/test_creep.py
-def test_against_the_closed_form(launch, tmp_path):
-    done = results(launch, tmp_path, Creep(size=0.025))
+def test_against_the_closed_form(resident, tmp_path):
+    done = results(resident, tmp_path, Creep(size=0.025))
     print(done.strain, done.exact, done.error, done.steps)
     assert done.at_once == pytest.approx(10e6 * (1.0 - 0.25**2) / 25e9, rel=1e-4)
     assert done.error < 2e-3 and done.strain == pytest.approx(done.exact, rel=2e-3)
@@ -23,10 +23,10 @@ def test_against_the_closed_form(launch, tmp_path):
 
 
 @pytest.mark.slow  # quick: the one above, tests/blocks/test_creep.py
-def test_a_finer_change_is_more_exact_and_the_last_rate_is_known(launch, tmp_path):
+def test_a_finer_change_is_more_exact_and_the_last_rate_is_known(resident, tmp_path):
     errors = []
     for change in (0.1, 0.02):
-        done = results(launch, tmp_path / str(change), Creep(size=0.025, change=change, time=2e6))
+        done = results(resident, tmp_path / str(change), Creep(size=0.025, change=change, time=2e6))
         (t0, e0), (t1, e1) = done.curve[-5], done.curve[-1]
         assert (e1 - e0) / (t1 - t0) == pytest.approx(10e6 / 4e16, rel=0.01)
         errors.append(done.error)

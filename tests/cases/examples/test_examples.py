@@ -10,29 +10,30 @@ import pytest
 
 from hpcdem.io.frames import list_frames, read_frame
 from hpcdem.lang.detect import kind
-from tests.conftest import ROOT, Launcher, sources
+from tests.conftest import ROOT, sources
+from tests.property.workers import Resident
 
 SCRIPTS = [p for p in sources("examples") if p.suffix in (".py", ".sc")]
 EXAMPLES = [p for p in SCRIPTS if kind(p.read_bytes()) in ("zdem", "pcdc")]
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda p: p.name)
-def test_every_example_passes_the_check(launch: Launcher, script: Path, tmp_path: Path) -> None:
+def test_every_example_passes_the_check(resident: Resident, script: Path, tmp_path: Path) -> None:
     """And leaves nothing beside it."""
     shutil.copy(script, tmp_path)
-    done = launch(1, "--check", tmp_path / script.name)
+    done = resident(1, "--check", tmp_path / script.name)
     assert done.returncode == 0, done.stderr
     assert [path.name for path in tmp_path.iterdir()] == [script.name]
 
 
-def test_push_with_fewer_steps_runs_to_its_figure(launch: Launcher, tmp_path: Path) -> None:
+def test_push_with_fewer_steps_runs_to_its_figure(resident: Resident, tmp_path: Path) -> None:
     """The text of the example with a tenth of the settling and a hundredth of the way: every command is carried out."""
     text = (ROOT / "examples" / "push.py").read_text()
     text = re.sub(r"^CYC (\d+)", lambda m: f"CYC {int(m[1]) // 10}", text, flags=re.MULTILINE)
     text, found = re.subn(r"xmove \S+ print \S+ save \S+", "xmove 60.0 print 30.0 save 60.0", text)
     assert found == 1
     (tmp_path / "push.py").write_text(text)
-    done = launch(1, tmp_path / "push.py")
+    done = resident(1, tmp_path / "push.py")
     assert done.returncode == 0, done.stdout + done.stderr
     figure = re.findall(r"^figure: (\S+)$", done.stdout, flags=re.MULTILINE)
     assert figure and Path(figure[0]).stat().st_size > 10_000
@@ -40,10 +41,10 @@ def test_push_with_fewer_steps_runs_to_its_figure(launch: Launcher, tmp_path: Pa
 
 @pytest.mark.slow
 @pytest.mark.mpi
-def test_whole_push_makes_thrust_sheets(launch: Launcher, tmp_path: Path) -> None:
+def test_whole_push_makes_thrust_sheets(resident: Resident, tmp_path: Path) -> None:
     """The figure of the README: the wedge at the wall is clearly thicker than the bed in front, and nothing was
     lost."""
-    done = launch(2, ROOT / "examples" / "push.py", "--outdir", tmp_path / "data", timeout=900)
+    done = resident(2, ROOT / "examples" / "push.py", "--outdir", tmp_path / "data", timeout=900)
     assert done.returncode == 0, done.stdout + done.stderr
     frames = list_frames(tmp_path / "data")
     first, last = read_frame(frames[0].path), read_frame(frames[-1].path)

@@ -115,6 +115,7 @@ def test_the_triangle_is_what_it_says(tmp_path: Path) -> None:
     assert 0.0 < gap.max() < 0.04 * math.sqrt(area)
 
 
+@pytest.mark.slow
 def test_short_angle_of_repose_collapses(launch: Launcher, tmp_path: Path) -> None:
     """A smaller column, the wall drawn back by a few millimetres: sand follows it."""
     script = shortened(

@@ -12,7 +12,8 @@ import pytest
 
 from hpcdem.io.frames import list_mesh_frames
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
-from tests.conftest import ROOT, Launcher, absent
+from tests.conftest import ROOT, absent
+from tests.property.workers import Resident
 
 YOUNG, POISSON, COHESION, FRICTION = 30e9, 0.25, 12e6, 35.0
 TEXT = (ROOT / "examples" / "jointed_specimen.sc").read_text(encoding="utf-8")
@@ -27,12 +28,12 @@ def gmsh() -> None:
         absent("gmsh", "no package gmsh here: install the extra [mesh]")
 
 
-def test_shortened_example_runs_to_its_figure(launch: Launcher, tmp_path: Path) -> None:
+def test_shortened_example_runs_to_its_figure(resident: Resident, tmp_path: Path) -> None:
     """A coarse mesh, and the first 2 % of the way."""
     text = TEXT.replace("0.10, 0.0022", "0.10, 0.006").replace("pcdc.time < 3e-3", "pcdc.time < 6e-5")
     assert text.count("0.006") == text.count("6e-5") == 1
     (tmp_path / "short.sc").write_text(text)
-    done = launch(1, "short.sc", cwd=tmp_path, timeout=600)
+    done = resident(1, "short.sc", cwd=tmp_path, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     (figure,) = re.findall(r"^figure: (\S+)$", done.stdout, flags=re.MULTILINE)
     assert (tmp_path / figure).stat().st_size > 10_000 and (tmp_path / "data" / "curve.png").stat().st_size > 5000
@@ -40,9 +41,9 @@ def test_shortened_example_runs_to_its_figure(launch: Launcher, tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_whole(launch: Launcher, tmp_path: Path) -> None:
+def test_whole(resident: Resident, tmp_path: Path) -> None:
     (tmp_path / "specimen.sc").write_text(TEXT)
-    done = launch(1, "specimen.sc", cwd=tmp_path, timeout=3600)
+    done = resident(1, "specimen.sc", cwd=tmp_path, timeout=3600)
     assert done.returncode == 0, done.stdout + done.stderr
     with open(tmp_path / "data" / "curve.csv", newline="", encoding="utf-8") as file:
         curve = np.array([[float(cell) for cell in row[1:]] for row in list(csv.reader(file))[1:]])

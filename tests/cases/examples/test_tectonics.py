@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 from hpcdem.io.frames import list_frames, read_frame
-from tests.conftest import ROOT, Launcher
+from tests.conftest import ROOT
+from tests.property.workers import Resident
 
 NAMES = (
     "detachment",
@@ -42,12 +43,12 @@ def shortened(text: str) -> str:
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in NAMES]
 )
-def test_shortened_example_runs_to_its_figure(launch: Launcher, tmp_path: Path, name: str) -> None:
+def test_shortened_example_runs_to_its_figure(resident: Resident, tmp_path: Path, name: str) -> None:
     """Every command of the example is carried out, and the figure shows the last state."""
     text = (ROOT / "examples" / f"{name}.py").read_text()
     assert re.search(r"^IMPLE .* xmove -?\d+\.\d+ ", text, flags=re.MULTILINE)
     (tmp_path / f"{name}.py").write_text(shortened(text))
-    done = launch(1, tmp_path / f"{name}.py")
+    done = resident(1, tmp_path / f"{name}.py")
     assert done.returncode == 0, done.stdout + done.stderr
     figure = re.findall(r"^figure: (\S+)$", done.stdout, flags=re.MULTILINE)
     assert figure and Path(figure[0]).stat().st_size > 10_000
@@ -95,9 +96,9 @@ class Run:
         return self.last["x"][chosen], self.last["y"][chosen]
 
 
-def whole(launch: Launcher, tmp_path: Path, name: str) -> Run:
+def whole(resident: Resident, tmp_path: Path, name: str) -> Run:
     """The example as it is, on two ranks."""
-    done = launch(2, ROOT / "examples" / f"{name}.py", "--outdir", tmp_path / "data", timeout=1800)
+    done = resident(2, ROOT / "examples" / f"{name}.py", "--outdir", tmp_path / "data", timeout=1800)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "figure: " in done.stdout
     return Run.of(tmp_path / "data")
@@ -258,6 +259,6 @@ def sedimentation_erosion(run: Run) -> None:
 @pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", NAMES)
-def test_whole_example_makes_its_structure(launch: Launcher, tmp_path: Path, name: str) -> None:
+def test_whole_example_makes_its_structure(resident: Resident, tmp_path: Path, name: str) -> None:
     """The claims of the header, measured."""
-    globals()[name](whole(launch, tmp_path, name))
+    globals()[name](whole(resident, tmp_path, name))

@@ -21,10 +21,10 @@ THICK = {
 
 @pytest.mark.slow
 @pytest.mark.mpi
-def test_a_short_fracture_on_a_coarse_mesh(launch, tmp_path):
+def test_a_short_fracture_on_a_coarse_mesh(resident, tmp_path):
     """Three process zones long: 10 % of length, 3 % of opening, 6 % of pressure. On two ranks the same to 1e-9."""
     small = HydraulicFracture(reach=1.0, time=0.6, far=6, size=0.04)
-    one, two = (results(launch, tmp_path / str(ranks), small, ranks) for ranks in (1, 2))
+    one, two = (results(resident, tmp_path / str(ranks), small, ranks) for ranks in (1, 2))
     print(vars(one))
     assert abs(one.length_error) < 0.1 and abs(one.opening_error) < 0.03 and abs(one.pressure_error) < 0.06
     assert one.balance < 1e-12 and one.steps > 50
@@ -35,9 +35,9 @@ def test_a_short_fracture_on_a_coarse_mesh(launch, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("given", [{}, RING, THICK], ids=["toughness", "K_Ic", "viscosity"])
-def test_the_closed_forms(launch, tmp_path, given):
+def test_the_closed_forms(resident, tmp_path, given):
     """Length 3 %, opening 2 %, net pressure 5 %, means over the last fifth."""
-    done = results(launch, tmp_path, HydraulicFracture(**given), timeout=7200.0)
+    done = results(resident, tmp_path, HydraulicFracture(**given), timeout=7200.0)
     print(vars(done))
     assert abs(done.length_error) < 0.03 and abs(done.opening_error) < 0.02 and abs(done.pressure_error) < 0.05
     assert done.balance < 1e-9
@@ -81,10 +81,10 @@ more = {'broken': int((found == 3).sum()), 'softened': int((found == 2).sum()), 
 
 
 @pytest.mark.slow
-def test_joints_beside_the_line_change_little(launch, tmp_path):
+def test_joints_beside_the_line_change_little(resident, tmp_path):
     """Those on all edges of the strip do not open; the fracture is that of the line alone to 2 %."""
-    alone = results(launch, tmp_path / "alone", HydraulicFracture(**COARSE), more=LOOK)
-    every = results(launch, tmp_path / "every", OnAllEdges(**COARSE), more=LOOK)
+    alone = results(resident, tmp_path / "alone", HydraulicFracture(**COARSE), more=LOOK)
+    every = results(resident, tmp_path / "every", OnAllEdges(**COARSE), more=LOOK)
     print(vars(alone), vars(every))
     assert every.length == pytest.approx(alone.length, abs=1e-6) and every.broken == pytest.approx(alone.broken, abs=1)
     assert every.opening == pytest.approx(alone.opening, rel=0.02)
@@ -94,11 +94,11 @@ def test_joints_beside_the_line_change_little(launch, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_fracture_from_edge_to_edge_is_tougher(launch, tmp_path):
+def test_a_fracture_from_edge_to_edge_is_tougher(resident, tmp_path):
     """No straight way for it: the length is that of the closed form to 10 %, but many edges beside it soften, and the
     pressure lies by 30 to 60 % above it, the widest opening by up to 20 %."""
     case = WithoutLine(**COARSE)
-    done = results(launch, tmp_path, case, more=LOOK)
+    done = results(resident, tmp_path, case, more=LOOK)
     young = case.young / (1.0 - case.poisson**2)
     wanted = kgd_solutions.slightly_viscous(young, case.energy, case.viscosity, case.rate, case.time)
     print(vars(done), wanted)
@@ -108,7 +108,7 @@ def test_a_fracture_from_edge_to_edge_is_tougher(launch, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_fluid_lags_behind_the_tip(launch, tmp_path):
+def test_the_fluid_lags_behind_the_tip(resident, tmp_path):
     """Long before the lag time, 9.8 s: neither closed form holds, the tip is dry. With the method of dry_tip.py, of
     K_Ic: half length and opening 3 %, net pressure 4 %, dry length one and a half joints."""
     size, time = 0.0125, 0.25
@@ -120,7 +120,7 @@ def test_the_fluid_lags_behind_the_tip(launch, tmp_path):
     assert forms.lag_time(young, 0.1, 5e6) > 30.0 * time
     rows = dry_tip.grown(young, 10.0, 0.1, 1e-3, 5e6, size, 55)
     length, front, opening, pressure = (np.interp(time, rows[:, 0], rows[:, k]) for k in range(1, 5))
-    done = results(launch, tmp_path, case, timeout=7200.0)
+    done = results(resident, tmp_path, case, timeout=7200.0)
     print(vars(done), length, front, opening, pressure)
     assert done.length == pytest.approx(length, rel=0.03) and done.opening == pytest.approx(opening, rel=0.03)
     assert done.pressure == pytest.approx(pressure, rel=0.04)

@@ -122,24 +122,24 @@ def test_within_a_per_cent_of_the_closed_form(tmp_path):
     assert near[0] == pytest.approx(found[1, 0], abs=0.2) and near[2] < found[1, 2] - 1.0
 
 
-def opened(launch, folder, cells: int, penalty: float, ranks: int = 1, everywhere: bool = False) -> dict[str, float]:
+def opened(resident, folder, cells: int, penalty: float, ranks: int = 1, everywhere: bool = False) -> dict[str, float]:
     """Errors of the opening in the middle and of the volume."""
     folder.mkdir()
     text = "import math\n" + SCRIPT.replace("CELLS", str(cells)).replace("PENALTY", f"{penalty:g}")
     text = text.replace("WHERE", "" if everywhere else "range geometry 'line'")
     (folder / "crack.sc").write_text(text)
-    done = launch(ranks, "--no-figure", "crack.sc", cwd=folder, timeout=600.0)
+    done = resident(ranks, "--no-figure", "crack.sc", cwd=folder, timeout=600.0)
     assert done.returncode == 0, done.stderr
     return json.loads((folder / "found.json").read_text())
 
 
 @pytest.mark.slow
 @pytest.mark.mpi
-def test_the_opening_converges_with_the_mesh(launch, tmp_path):
+def test_the_opening_converges_with_the_mesh(resident, tmp_path):
     """Of first order: errors of the opening fall by 1.6 and 0.9 % from 10 to 20 to 40 joints, to some -1.2 % that held
     sides at 20 a and the joints leave. Those of the volume are -8.0, -4.6, -2.9 %, a probe by others had -8.2, -4.7,
     -2.8 %. On two ranks the same."""
-    found = [opened(launch, tmp_path / str(n), n, 100.0) for n in (10, 20, 40)]
+    found = [opened(resident, tmp_path / str(n), n, 100.0) for n in (10, 20, 40)]
     errors = [one["middle"] for one in found]
     print(errors, [one["volume"] for one in found])
     assert [one["joints"] for one in found] == [10, 20, 40]
@@ -148,15 +148,15 @@ def test_the_opening_converges_with_the_mesh(launch, tmp_path):
     assert 2.0 * errors[2] - errors[1] == pytest.approx(-0.011, abs=0.004)
     assert [100.0 * one["volume"] for one in found] == pytest.approx([-8.2, -4.7, -2.8], abs=0.4)
     assert found[0]["given"] == pytest.approx(found[0]["stored"], rel=1e-12)
-    assert opened(launch, tmp_path / "both", 10, 100.0, 2) == found[0]
+    assert opened(resident, tmp_path / "both", 10, 100.0, 2) == found[0]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("penalty", "volume"), [(10.0, -4.1), (50.0, -4.6), (100.0, -4.7)])
-def test_joints_on_the_line_are_hardly_softer(launch, tmp_path, penalty, volume):
+def test_joints_on_the_line_are_hardly_softer(resident, tmp_path, penalty, volume):
     """Whole joints lie ahead of the crack only: penalties of 10 to 100 E change the opening by little more than 1 %.
     Errors of the volume are those of a probe by others."""
-    found = opened(launch, tmp_path / "one", 20, penalty)
+    found = opened(resident, tmp_path / "one", 20, penalty)
     print(found)
     assert found["middle"] == pytest.approx(-0.0295, abs=0.013)
     assert 100.0 * found["volume"] == pytest.approx(volume, abs=0.4)
@@ -164,11 +164,11 @@ def test_joints_on_the_line_are_hardly_softer(launch, tmp_path, penalty, volume)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("penalty", "wanted"), [(10.0, 16.4), (50.0, 1.0), (100.0, -1.0)])
-def test_joints_everywhere_are_softer(launch, tmp_path, penalty, wanted):
+def test_joints_everywhere_are_softer(resident, tmp_path, penalty, wanted):
     """40 joints on the crack: the volume grows by some 1.84 E / P, 18, 3.7 and 1.8 %, a probe by others had errors of
     15, 0.8 and -1.0 %. At 50 E the right answer is one of two errors that cancel."""
-    found = opened(launch, tmp_path / "all", 40, penalty, everywhere=True)
-    alone = opened(launch, tmp_path / "line", 40, penalty)
+    found = opened(resident, tmp_path / "all", 40, penalty, everywhere=True)
+    alone = opened(resident, tmp_path / "line", 40, penalty)
     print(found, alone)
     assert 100.0 * found["volume"] == pytest.approx(wanted, abs=0.5)
     softer = (1.0 + found["volume"]) / (1.0 + alone["volume"]) - 1.0

@@ -22,11 +22,11 @@ def needs_gmsh():
             absent(name, f"no package {name} here: install the extra [mesh]")
 
 
-def run(launch, folder: Path, ranks: int) -> np.ndarray:
+def run(resident, folder: Path, ranks: int) -> np.ndarray:
     """(n, 6) stresses xx yy xy [Pa], area [m2], x, y [m] of the elements at the end."""
     folder.mkdir(exist_ok=True)
     shutil.copy(SCRIPT, folder)
-    done = launch(ranks, "script.sc", cwd=folder, timeout=1200)
+    done = resident(ranks, "script.sc", cwd=folder, timeout=1200)
     assert done.returncode == 0, done.stderr
     return np.loadtxt(folder / "stress.txt")
 
@@ -38,8 +38,8 @@ def test_formulas_at_places_worked_out_by_hand():
 
 
 @pytest.mark.slow
-def test_stress_around_the_hole(launch, tmp_path):
-    xx, yy, xy, area, x, y = run(launch, tmp_path / "one", 1).T
+def test_stress_around_the_hole(resident, tmp_path):
+    xx, yy, xy, area, x, y = run(resident, tmp_path / "one", 1).T
     r, t = np.hypot(x, y), np.arctan2(y, x)
     near = (r > 1.05) & (r < 5.0)
     assert near.sum() > 1000
@@ -54,6 +54,6 @@ def test_stress_around_the_hole(launch, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.mpi
-def test_two_ranks_give_the_same_bits(launch, tmp_path):
-    one, two = (run(launch, tmp_path / str(n), n) for n in (1, 2))
+def test_two_ranks_give_the_same_bits(resident, tmp_path):
+    one, two = (run(resident, tmp_path / str(n), n) for n in (1, 2))
     assert (one == two).all()

@@ -39,12 +39,12 @@ def named(log: str) -> dict[str, list[int]]:
     return out
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(3, marks=pytest.mark.mpi)])
-def test_those_that_slip_through_are_named_once(launch, tmp_path: Path, ranks: int) -> None:
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.mpi)])
+def test_those_that_slip_through_are_named_once(resident, tmp_path: Path, ranks: int) -> None:
     script = tmp_path / "slip.py"
     back = "INI yv 5.0 RANGE id 501 501\nCYC 1200\n"  # back through the row
     script.write_text(SCRIPT.format(more=back))
-    done = launch(ranks, script, "--no-figure", cwd=tmp_path)
+    done = resident(ranks, script, "--no-figure", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert named(done.stdout) == {"a row of GLINE": [501, 502], "a wall": [505]}
     places = dict(re.findall(r"(\d+) at \((\S+, \S+)\)", done.stdout))
@@ -52,11 +52,11 @@ def test_those_that_slip_through_are_named_once(launch, tmp_path: Path, ranks: i
     assert x == 2000.0 and 100.0 - 30.0 < y < 100.0  # below the row, at the first rebuild after
 
 
-def test_rows_survive_a_checkpoint(launch, tmp_path: Path) -> None:
+def test_rows_survive_a_checkpoint(resident, tmp_path: Path) -> None:
     """Saved before the row is passed, gone on with after."""
     script = tmp_path / "slip.py"
     script.write_text(SCRIPT.format(more="").replace("CYC 4500", "CYC 1000\nSAV here.sav"))
-    assert launch(1, script, "--no-figure", cwd=tmp_path).returncode == 0
+    assert resident(1, script, "--no-figure", cwd=tmp_path).returncode == 0
     (tmp_path / "on.py").write_text("RES here.sav\nCYC 3500\nSTOP\n")
-    done = launch(1, tmp_path / "on.py", "--no-figure", cwd=tmp_path)
+    done = resident(1, tmp_path / "on.py", "--no-figure", cwd=tmp_path)
     assert named(done.stdout) == {"a row of GLINE": [501, 502], "a wall": [505]}

@@ -11,9 +11,9 @@ COARSE = {"size": 0.0762, "layer": 0.01905, "time": 6.0, "steps": 60}
 
 
 @pytest.mark.slow  # quick: tests/proppant
-def test_grains_come_in_and_settle(launch, tmp_path):
+def test_grains_come_in_and_settle(resident, tmp_path):
     """Of a coarse mesh: what came is there or left, and lies at the bottom; the speed of a grain is that of its law."""
-    done = results(launch, tmp_path, ProppantBed(**COARSE))
+    done = results(resident, tmp_path, ProppantBed(**COARSE))
     print(vars(done))
     assert done.lost < 1e-12 and done.fed == pytest.approx(0.07 * 3.785e-4 * 6.0 / 0.62 / 2.8317e-3, rel=1e-3)
     assert done.speed == pytest.approx(0.0669, rel=1e-3)
@@ -22,9 +22,9 @@ def test_grains_come_in_and_settle(launch, tmp_path):
 
 
 @pytest.mark.slow  # quick: tests/proppant
-def test_a_slot_of_the_laboratory(launch, tmp_path):
+def test_a_slot_of_the_laboratory(resident, tmp_path):
     """Chun et al. 2020, d 0.45 mm, 2550 kg/m3, c 0.07: the bed of the simulation that agrees with theirs."""
-    done = results(launch, tmp_path, ProppantBed())
+    done = results(resident, tmp_path, ProppantBed())
     print(vars(done))
     assert done.difference < 0.03 and done.settled > 0.8 and done.lost < 1e-11
     slopes = (done.bed[-1][1] - done.bed[9][1]) / 20.0, (0.430 - 0.131) / 20.0

@@ -9,8 +9,8 @@ from tests.cases.ready import results
 
 
 @pytest.mark.slow  # quick: tests/proppant
-def test_a_slurry_settles_as_kynch_says(launch, tmp_path):
-    done = results(launch, tmp_path, ProppantSlot())
+def test_a_slurry_settles_as_kynch_says(resident, tmp_path):
+    done = results(resident, tmp_path, ProppantSlot())
     print({name: value for name, value in vars(done).items() if name != "profiles"})
     assert done.exact_front == pytest.approx(done.speed * 0.8**5.65, rel=1e-9)
     assert done.front == pytest.approx(done.exact_front, rel=0.01)
@@ -21,13 +21,13 @@ def test_a_slurry_settles_as_kynch_says(launch, tmp_path):
 
 
 @pytest.mark.slow  # quick: tests/proppant
-def test_sand_in_water(launch, tmp_path):
+def test_sand_in_water(resident, tmp_path):
     """0.45 mm, 2550 kg/m3, 7 %: between the laws of Ferguson and Church for natural and smooth grains; the pack takes
     up what the front leaves, c (front + bed) = limit bed."""
     sand = {"grain_size": 4.5e-4, "grain_density": 2550.0, "viscosity": 1e-3, "concentration": 0.07}
     errors = []
     for size in (0.02, 0.01):
-        done = results(launch, tmp_path / str(size), ProppantSlot(**sand, size=size))
+        done = results(resident, tmp_path / str(size), ProppantSlot(**sand, size=size))
         print({name: value for name, value in vars(done).items() if name != "profiles"})
         assert 0.0613 < done.speed < 0.0802
         assert done.front == pytest.approx(done.exact_front, rel=0.01)

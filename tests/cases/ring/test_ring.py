@@ -11,9 +11,9 @@ from hpcdem.cases import CrackingRing, ThermalRing
 from tests.cases.ready import results
 
 
-def test_temperature_and_stress_in_a_ring(launch, tmp_path):
+def test_temperature_and_stress_in_a_ring(resident, tmp_path):
     """9.13: 0.5 % in temperature, 2 % of 48.7 MPa in stress."""
-    done = results(launch, tmp_path, ThermalRing())
+    done = results(resident, tmp_path, ThermalRing())
     print(vars(done))
     assert done.inside == pytest.approx(-48.733e6, rel=1e-4) and done.outside == pytest.approx(17.933e6, rel=1e-4)
     assert done.error < 0.005 and done.radial < 0.02 and done.tangential < 0.02
@@ -24,9 +24,9 @@ def test_temperature_and_stress_in_a_ring(launch, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_ring_cracks_by_heat(launch, tmp_path):
+def test_a_ring_cracks_by_heat(resident, tmp_path):
     """7.6.10: the rim cracks first, at 11.2 K within 15 %."""
-    done = results(launch, tmp_path, CrackingRing())
+    done = results(resident, tmp_path, CrackingRing())
     print(vars(done))
     assert done.exact == pytest.approx(11.15, rel=1e-3) and done.first == pytest.approx(11.2, rel=0.15)
     assert done.radius > 0.45 and done.broken > 5

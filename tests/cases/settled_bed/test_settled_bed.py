@@ -91,6 +91,7 @@ def test_published_bed_stays_at_rest(bed: Simulation) -> None:
     assert np.sqrt((speed**2).mean()) < 0.01 * np.sqrt(2.0 * G * 60.0)
 
 
+@pytest.mark.slow
 def test_settling_reproduces_the_published_bed() -> None:
     """A3: settle, cut at 4 km, rest. Kept 10 700 +- 2 %, small : large 2.0 +- 0.1, cover 0.943 +- 0.005 inside, rebound
     of the top to about 4110 m (bands of the published file)."""

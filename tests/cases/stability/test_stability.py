@@ -30,9 +30,9 @@ def chen(angle: float, number: float, factor: float, **more: float) -> SlopeStab
     return SlopeStability(**given)
 
 
-def test_a_steep_slope(launch, tmp_path):
+def test_a_steep_slope(resident, tmp_path):
     """A coarse mesh, above the bound by some percent; one trial in balance, one not."""
-    done = results(launch, tmp_path, chen(60.0, 10.39, 1.2, size=1.0, precision=0.05))
+    done = results(resident, tmp_path, chen(60.0, 10.39, 1.2, size=1.0, precision=0.05))
     print(done.factor, done.trials)
     assert done.factor == pytest.approx(1.2, rel=0.12)
     assert done.stands < done.factor < done.falls <= 1.06 * done.stands
@@ -43,8 +43,8 @@ def test_a_steep_slope(launch, tmp_path):
 
 
 @pytest.mark.slow
-def test_griffiths_and_lane(launch, tmp_path):
-    done = results(launch, tmp_path, SlopeStability(density=20e3 / 9.81))
+def test_griffiths_and_lane(resident, tmp_path):
+    done = results(resident, tmp_path, SlopeStability(density=20e3 / 9.81))
     print(done.factor, done.trials)
     assert done.factor == pytest.approx(1.40, rel=0.03)
     assert done.stands > 1.30 and done.falls < 1.50
@@ -55,9 +55,9 @@ def test_griffiths_and_lane(launch, tmp_path):
     ("angle", "number", "factor", "error"),
     [(45.0, 16.16, 1.2, 0.03), (60.0, 10.39, 1.2, 0.03), (60.0, 10.39, 0.7, 0.03), (90.0, 5.50, 1.5, 0.06)],
 )
-def test_chen(launch, tmp_path, angle, number, factor, error):
+def test_chen(resident, tmp_path, angle, number, factor, error):
     """A vertical face, in whose toe the stress is singular, is met less closely."""
-    done = results(launch, tmp_path, chen(angle, number, factor))
+    done = results(resident, tmp_path, chen(angle, number, factor))
     print(done.factor, done.trials)
     assert done.factor == pytest.approx(factor, rel=error)
 
@@ -65,6 +65,6 @@ def test_chen(launch, tmp_path, angle, number, factor, error):
 @pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.ranks
-def test_the_same_on_two_ranks(launch, tmp_path):
+def test_the_same_on_two_ranks(resident, tmp_path):
     case = chen(60.0, 10.39, 1.2, size=1.0, precision=0.05)
-    assert results(launch, tmp_path / "2", case, ranks=2) == results(launch, tmp_path / "1", case)
+    assert results(resident, tmp_path / "2", case, ranks=2) == results(resident, tmp_path / "1", case)

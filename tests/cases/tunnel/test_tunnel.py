@@ -20,11 +20,11 @@ for name in ('stress-xx', 'stress-yy', 'stress-xy', 'element-position-x', 'eleme
 
 
 @pytest.mark.parametrize("elements", ["tri", pytest.param("quad", marks=pytest.mark.slow)])
-def test_convergence_of_a_circular_tunnel(launch, tmp_path, elements):
+def test_convergence_of_a_circular_tunnel(resident, tmp_path, elements):
     """Hydrostatic stress p: u = (1 + nu)/E p a. 2 %: the sides, 12 a away, where p stays, add 2 (1 - nu)(a/R)2 = 1 %,
     linear elements are too stiff by about as much."""
     case = Tunnel(elements=elements, stress_xx=-15e6, stress_yy=-15e6, size=0.3)
-    done = results(launch, tmp_path, case)
+    done = results(resident, tmp_path, case)
     closed = (1 + case.poisson) / case.young * 15e6 * case.radius
     assert done.convergence == pytest.approx(closed, rel=0.02)
     for way in (done.crown, done.floor, done.left, done.right):
@@ -33,11 +33,11 @@ def test_convergence_of_a_circular_tunnel(launch, tmp_path, elements):
 
 
 @pytest.mark.slow
-def test_convergence_with_unequal_stress(launch, tmp_path):
+def test_convergence_with_unequal_stress(resident, tmp_path):
     """Kirsch: the part of the displacement that the excavation brings is, at the wall, (1 + nu)/E a ((P1 + P2)/2 +
     (3 - 4 nu)(P1 - P2)/2 cos 2t), P1 along x: at the crown 2.0833 mm, at the sides 0.4167 mm. 3 % of the larger."""
     case = Tunnel(size=0.25)
-    done = results(launch, tmp_path, case)
+    done = results(resident, tmp_path, case)
     unit = (1 + case.poisson) / case.young * case.radius
     crown, side = unit * (15e6 + 2 * 5e6), unit * (15e6 - 2 * 5e6)
     assert crown == pytest.approx(2.08333e-3, rel=1e-5)
@@ -47,13 +47,13 @@ def test_convergence_with_unequal_stress(launch, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("elements", ["tri", "quad"])
-def test_stress_around_the_tunnel(launch, tmp_path, elements):
+def test_stress_around_the_tunnel(resident, tmp_path, elements):
     """Kirsch's solution with P1 = -20, P2 = -10 MPa from 1.05 to 5 radii, after the stress of the core has died down:
     mean squares over the area within 2 % of 20 MPa."""
     case = Tunnel(
         elements=elements, radius=1.0, size=0.08, coarse=2.0, reach=20, stress_xx=exact.P1, stress_yy=exact.P2
     )
-    done = results(launch, tmp_path, case, more=FIELDS)
+    done = results(resident, tmp_path, case, more=FIELDS)
     xx, yy, xy = (np.array(getattr(done, f"stress_{c}")) for c in ("xx", "yy", "xy"))
     x, y = np.array(done.element_position_x), np.array(done.element_position_y)
     x, y = x[np.isfinite(x)], y[np.isfinite(y)]
@@ -65,15 +65,15 @@ def test_stress_around_the_tunnel(launch, tmp_path, elements):
 
 
 @pytest.mark.slow
-def test_a_horseshoe_gives_way_most_in_its_level_floor(launch, tmp_path):
-    done = results(launch, tmp_path, Tunnel(shape="horseshoe", size=0.4))
+def test_a_horseshoe_gives_way_most_in_its_level_floor(resident, tmp_path):
+    done = results(resident, tmp_path, Tunnel(shape="horseshoe", size=0.4))
     assert done.floor > 1.1 * done.crown > 0.0
     assert done.left == pytest.approx(done.right, rel=0.05) and done.left > 0.0
     assert done.hoop_most > 50e6 > 5e6 > done.hoop_least
 
 
 @pytest.mark.slow
-def test_a_jointed_tunnel_cracks_where_the_stress_is_largest(launch, tmp_path):
+def test_a_jointed_tunnel_cracks_where_the_stress_is_largest(resident, tmp_path):
     """Vertical stress twice the horizontal one: the walls carry 50 MPa, twice the strength of the rock, the crown
     10."""
     more = """
@@ -82,7 +82,7 @@ for axis in 'xy':
     more['crack_' + axis] = [float(v) for v in pcdc.values('joint', 'joint-position-' + axis)[state == 3]]
 """
     case = Tunnel(joints=True)
-    done = results(launch, tmp_path, case, more=more)
+    done = results(resident, tmp_path, case, more=more)
     assert done.tension + done.mixed + done.shear > 20
     x, y = np.abs(done.crack_x), np.abs(done.crack_y)
     assert (x > y).mean() > 0.8

@@ -13,9 +13,9 @@ from tests.cases.ready import results
 
 
 @pytest.mark.slow  # quick: tests/heat
-def test_water_cools_a_fracture(launch, tmp_path):
+def test_water_cools_a_fracture(resident, tmp_path):
     """9.14: within 2 % of the difference of temperature, water and rock; values of the water printed there."""
-    done = results(launch, tmp_path, Lauwerier())
+    done = results(resident, tmp_path, Lauwerier())
     print(vars(done))
     assert done.error < 0.02 and done.rock_error < 0.02 and done.account < 1e-9
     printed = {50.0: (0.6618, 0.2740, 0.0286, 0.0010), 150.0: (0.8006, 0.5278, 0.2066, 0.0581)}
@@ -27,21 +27,21 @@ def test_water_cools_a_fracture(launch, tmp_path):
 
 
 @pytest.mark.slow  # quick: the one above, tests/heat
-def test_conduction_along_the_fracture_is_not_in_the_closed_form(launch, tmp_path):
+def test_conduction_along_the_fracture_is_not_in_the_closed_form(resident, tmp_path):
     """Rock that conducts in all directions alike lies farther from it, the front is smeared ahead; still within 2 %."""
     coarse = {"size": 1.0, "coarse": 8.0, "steps": 60}
-    across = results(launch, tmp_path / "across", Lauwerier(**coarse))
-    alike = results(launch, tmp_path / "alike", Lauwerier(**coarse, along=1.0))
+    across = results(resident, tmp_path / "across", Lauwerier(**coarse))
+    alike = results(resident, tmp_path / "alike", Lauwerier(**coarse, along=1.0))
     print(across.error, alike.error)
     assert across.error < 0.02 and alike.error < 0.03 and alike.error > 1.2 * across.error
 
 
 @pytest.mark.slow  # quick: the first one, tests/heat
-def test_cold_comes_through_between_two_wells(launch, tmp_path):
+def test_cold_comes_through_between_two_wells(resident, tmp_path):
     """Coarse; half the rate takes twice as long."""
     coarse = {"size": 8.0, "steps": 80}
-    done = results(launch, tmp_path / "all", Doublet(**coarse))
-    half = results(launch, tmp_path / "half", Doublet(**coarse, rate=2e-4, duration=4.0))
+    done = results(resident, tmp_path / "all", Doublet(**coarse))
+    half = results(resident, tmp_path / "half", Doublet(**coarse, rate=2e-4, duration=4.0))
     for one in (done, half):
         print({name: value for name, value in vars(one).items() if name != "curve"})
         assert one.account < 1e-9 and one.error < 0.08
@@ -54,9 +54,9 @@ def test_cold_comes_through_between_two_wells(launch, tmp_path):
 
 
 @pytest.mark.slow
-def test_breakthrough_of_the_documented_doublet(launch, tmp_path):
+def test_breakthrough_of_the_documented_doublet(resident, tmp_path):
     """27 000 triangles. The front is at pi D2 (whole capacity) / (3 rho C Q) of Gringarten and Sauty."""
-    done = results(launch, tmp_path, Doublet())
+    done = results(resident, tmp_path, Doublet())
     print({name: value for name, value in vars(done).items() if name != "curve"})
     assert done.elements > 20000 and done.account < 1e-9
     cells = 2.0 / (math.sqrt(3.0) * 3.2**2)

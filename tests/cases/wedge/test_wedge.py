@@ -29,10 +29,10 @@ def test_a_wedge_as_flat_as_a_plane() -> None:
     assert one == pytest.approx(other)
 
 
-def found(launch: Any, folder: Any, **given: Any) -> Any:
+def found(resident: Any, folder: Any, **given: Any) -> Any:
     from hpcdem.cases import Wedge
 
-    return results(launch, folder, Wedge(**given))
+    return results(resident, folder, Wedge(**given))
 
 
 def check(got: Any, a: tuple[float, float], b: tuple[float, float], frictions: tuple[float, float]) -> None:
@@ -46,15 +46,15 @@ def check(got: Any, a: tuple[float, float], b: tuple[float, float], frictions: t
 
 
 @pytest.mark.slow
-def test_the_factor_of_safety_of_the_default(launch: Any, tmp_path: Any) -> None:
-    got = found(launch, tmp_path, size=3.0, coarse=6.0)
+def test_the_factor_of_safety_of_the_default(resident: Any, tmp_path: Any) -> None:
+    got = found(resident, tmp_path, size=3.0, coarse=6.0)
     check(got, (40.0, -45.0), (70.0, 75.0), (35.0, 20.0))
 
 
 @pytest.mark.slow
-def test_another_wedge(launch: Any, tmp_path: Any) -> None:
+def test_another_wedge(resident: Any, tmp_path: Any) -> None:
     """Mirrored joints with one friction, a steeper face; both joints carry alike, it slides straight out."""
-    got = found(launch, tmp_path, dip_a=50.0, towards_a=-60.0, dip_b=50.0, towards_b=60.0, friction_a=30.0,
+    got = found(resident, tmp_path, dip_a=50.0, towards_a=-60.0, dip_b=50.0, towards_b=60.0, friction_a=30.0,
                 friction_b=30.0, face=75.0, height=6.0, size=1.5, coarse=3.0)  # fmt: skip
     check(got, (50.0, -60.0), (50.0, 60.0), (30.0, 30.0))
 
