@@ -139,7 +139,7 @@ def test_a_rough_joint_sheared(kind):
     assert way > 2.0 and -sigma > 2.0 * 666667.0
 
 
-@pytest.mark.parametrize("kind", ["quad", "box"])
+@pytest.mark.parametrize("kind", ["quad", pytest.param("box", marks=pytest.mark.slow)])
 def test_a_rough_joint_sheared_at_once(kind):
     """Of 3 mm, in one increment of the static solve as in forty: dilation follows the path within it, up to 38.5 MPa
     (forty thousand steps of the law alone). With the dilation of its beginning there was none: 0.667 MPa."""
@@ -221,7 +221,7 @@ def test_past_the_strength_of_its_walls_the_closure_is_a_line():
         assert -sigma == pytest.approx(5e7 + slope * (v - at), rel=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["quad", "hexes"])
+@pytest.mark.parametrize("kind", ["quad", pytest.param("hexes", marks=pytest.mark.slow)])
 def test_a_block_on_an_incline(kind):
     """It rests below the friction angle; above it slides down with g (sin - cos tan(phi)), and the energy closes."""
     values = {**COULOMB, "cohesion": 0.0, "tensile_strength": 0.0, "dilation": 0.0}

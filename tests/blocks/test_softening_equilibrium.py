@@ -58,7 +58,7 @@ def drawn(sim: Blocks, mode: str, way: float, **how) -> equilibrium.Balanced:
     return equilibrium.solve_elastic(sim, softening=True, **how)
 
 
-@pytest.mark.parametrize("mode", ["opening", "slip"])
+@pytest.mark.parametrize("mode", ["opening", pytest.param("slip", marks=pytest.mark.slow)])
 def test_one_joint_by_hand(mode):
     """Opened, or slid, and half-way back and on again: the stress is f(D) T with D = (o - o_p) / o_t of the largest
     opening so far, below that on the line to the origin. In the end it breaks; what it took is G_f and the 2/3 o_p T
@@ -137,6 +137,7 @@ def parted(sim: Blocks, way: float, **how) -> float:
     return diagnostics.total(sim, "reaction_y", top)
 
 
+@pytest.mark.slow
 def test_an_increment_in_which_several_joints_pass_their_peak_is_cut():
     """Far apart in one go: it takes many increments, and comes to what small movements come to."""
     sim, slow = beam(), beam()

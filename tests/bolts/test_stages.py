@@ -84,6 +84,7 @@ def test_pretension_presses_the_rock_and_is_given_again_by_difference() -> None:
     assert bolts.values("bolt-element", "axial_force") == pytest.approx(first + 5e3)
 
 
+@pytest.mark.slow
 def test_what_creeps_hangs_on_its_bolt_more_and_more() -> None:
     """A column of a Maxwell rock (K, G, eta) that cannot give way aside, and a bolt that is tied to all of it, share a
     stress P. With k = E A over spacing and width, S the deviator along the column and T = 4 G / 3:

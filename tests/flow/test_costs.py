@@ -131,6 +131,7 @@ def test_estimates_are_of_the_right_size(tmp_path) -> None:
 # ---- stops in the middle ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reason", ["signal", pytest.param("limit", marks=pytest.mark.slow)])
 def test_a_stop_in_mid_injection_changes_nothing(tmp_path, monkeypatch, reason) -> None:
     """Joints broke before and break after it; the first time a checkpoint, then the run goes on, or its end."""

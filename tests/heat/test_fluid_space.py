@@ -158,6 +158,7 @@ def lauwerier(swept: np.ndarray, z: np.ndarray, time: float, rate: float, apertu
     return erfc((2.0 * CONDUCTIVITY * swept / (RHO_C * rate) + np.abs(z)) * np.sqrt(ROCK_C / CONDUCTIVITY / left) / 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("second", "error"), [pytest.param(0.0, 0.02, marks=pytest.mark.slow), (1.0, 0.004)])
 def test_water_cools_a_fracture_as_lauwerier_says(second: float, error: float) -> None:
     """Within 2 % of the difference of temperature, as in the plane, in the water and in the rock beside it; far nearer

@@ -74,6 +74,7 @@ def test_what_is_said_stays_in_a_saved_model(tmp_path):
     assert (project.run_time, project.look, project.step_table, project.relative) == (0.0, 0, "", set())
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_the_same_bits_on_two_ranks(launch, tmp_path):
     text = EVERYTHING + "print('bits', pcdc.values('node', 'velocity-x').tobytes().hex(), pcdc.time.hex())\n"

@@ -126,6 +126,7 @@ def test_crossed_faces_divide_it_as_a_plain_look_does() -> None:
     assert np.linalg.norm(np.diff(nodes, axis=0), axis=1).sum() == pytest.approx(np.linalg.norm(line[1] - line[0]))
 
 
+@pytest.mark.slow
 def test_a_block_hangs_on_a_bolt_and_a_plate() -> None:
     """A block under a void hangs on one bolt: all of its weight is in the bar where it crosses the void."""
     sim = body(box((2, 2, 12), (0.4, 0.4, 1.2)), dynamic=False)

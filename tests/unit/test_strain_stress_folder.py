@@ -358,6 +358,7 @@ except HpcdemError as error:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_any_number_of_ranks_writes_the_same_bytes(launch: Any, frames: list[Frame], tmp_path: Path) -> None:
     """Three frames: shared in rounds by 1 rank, each shared by 4."""

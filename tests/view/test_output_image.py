@@ -96,6 +96,7 @@ def test_what_cannot_be_is_refused_with_its_line(tmp_path: Path, words: str, mes
     assert not list((tmp_path / "data").glob("a_*"))
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_the_same_picture_on_two_ranks(launch: Launcher, tmp_path: Path) -> None:
     mesh, rest = MODEL.split("pcdc element c-model")
