@@ -117,6 +117,7 @@ def test_rollers_on_an_oblique_line_do_not_rub():
     assert diagnostics.unbalanced_ratio(sim) < 1e-9
 
 
+@pytest.mark.slow
 def test_what_is_taken_out_lets_go_slowly():
     """With `relax` the balance is kept at first and lost bit by bit; in the end all forces are gone."""
     sim = leaning("mixed", True)

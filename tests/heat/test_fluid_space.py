@@ -242,7 +242,7 @@ def test_perfect_exchange_holds_the_front_back() -> None:
     assert of_nodes(flow) == pytest.approx(temperatures(sim)[flow.network.nodes], abs=0.05)
 
 
-@pytest.mark.parametrize("second", [0.0, 1.0])
+@pytest.mark.parametrize("second", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
 def test_implicit_steps_come_to_what_explicit_ones_do(second: float) -> None:
     """On uneven triangles, with conduction, exchange and advection; the account of both closes."""
     found = []

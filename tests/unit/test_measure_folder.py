@@ -350,6 +350,7 @@ def test_a_row_of_walls_csv_that_is_being_written_does_not_count(folder: Path, t
 # --- figures, ranks, a true run ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.figures
 def test_figures_of_all_measures_in_all_formats(folder: Path, tmp_path: Path) -> None:
     run(folder, "--format", "png,svg", "-o", tmp_path / "a", figures=True)

@@ -71,9 +71,8 @@ if pcdc.rank == 0:
 """
 
 
-@pytest.mark.parametrize(
-    ("size", "fine"), [(0.5, 0.05), pytest.param(0.12, 0.015, marks=pytest.mark.slow)], ids=["coarse", "fine"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "fine"), [(0.5, 0.05), (0.12, 0.015)], ids=["coarse", "fine"])
 def test_the_order_of_the_manual(resident, tmp_path, size, fine):
     """No joint breaks, or only yields, before the first blast; the stress of the cores goes down with their modulus to
     less than a hundredth; each blast cracks the rock around its hole; energy closes to 1e-3 (wanted: 2 %)."""
