@@ -148,8 +148,8 @@ pcdc model step 3
         ({"model step": "model stpe"}, "u.sc", 2, r"u\.sc:4: .*did you mean 'step'"),
         ({"30e9": "30 GPa"}, "u.sc", 2, r"u\.sc:3: .*GPa"),
         ({"young 30e9": "young -30e9"}, "--check u.sc", 2, r"u\.sc:3: .*expected a number above 0"),
-        ({"model new": "model new\npcdc model units SI", "30e9": "30"}, "u.sc --no-figure", 0,
-         "young 30 Pa is an unlikely modulus: looks like GPa"),
+        pytest.param({"model new": "model new\npcdc model units SI", "30e9": "30"}, "u.sc --no-figure", 0,
+                     "young 30 Pa is an unlikely modulus: looks like GPa", marks=pytest.mark.slow),
         ({"mesh structured (0,0) (1,1) cells 2 2": "mesh import 'rock.msh'"}, "u.sc", 2, r"u\.sc:2: .*rock\.msh"),
     ],
 )  # fmt: skip
@@ -227,6 +227,7 @@ CELLS = (
 )
 
 
+@pytest.mark.slow
 def test_a_notebook(tmp_path: Path) -> None:
     """Cells as a newcomer types them; the last shows the model."""
     for name in ("nbclient", "ipykernel", "nbformat"):

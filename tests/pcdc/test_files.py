@@ -165,9 +165,11 @@ PARTICLES = "import hpcdem; hpcdem.Simulation().box(0, 1, 0, 1) #"
 
 @pytest.mark.parametrize(
     ("name", "text", "code", "said"),
-    [("loop.sc", OWN_LOOP, 130, "interrupted in line 6 of loop.sc, which came to no command; nothing was saved"),
+    [pytest.param("loop.sc", OWN_LOOP, 130, "in line 6 of loop.sc, which came to no command; nothing was saved",
+                  marks=pytest.mark.slow),
      ("loop.sc", COMMANDS, 85, "stopped at step 0 by Ctrl-C; checkpoint data"),
-     ("loop.py", OWN_LOOP.replace("pcdc mesh", PARTICLES), 130, "in line 6 of loop.py")],
+     pytest.param("loop.py", OWN_LOOP.replace("pcdc mesh", PARTICLES), 130, "in line 6 of loop.py",
+                  marks=pytest.mark.slow)],
     ids=["python", "commands", "program"],
 )  # fmt: skip
 def test_one_ctrl_c_ends_a_loop_of_the_script_itself(launch, tmp_path, name, text, code, said):

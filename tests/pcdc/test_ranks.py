@@ -44,6 +44,7 @@ def test_a_script_runs_on_every_rank_and_speaks_once(ranks, tmp_path, n):
     [
         ("x = 1\npcdc model gravity (0,[pcdc.rank])\n",
          "script.sc:2: pcdc model gravity (0,[pcdc.rank]): its values differ between rank 0 and rank 1"),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in (
         ("if pcdc.rank == 0:\n    pcdc model gravity (0,1)\nelse:\n    pcdc model new\n",
          "rank 0 and rank 1 are at different commands (script.sc:2 and script.sc:4)"),
         ("if pcdc.rank == 1:\n    pcdc model new\n",
@@ -51,6 +52,7 @@ def test_a_script_runs_on_every_rank_and_speaks_once(ranks, tmp_path, n):
         ("pcdc model step [10 if pcdc.rank else -10]\n",
          "rank 0 and rank 1"),
         ("pcdc geometry delete 'x'\n", "there is no geometry layer 'x'"),
+        )),
     ],
 )  # fmt: skip
 def test_ranks_that_go_different_ways_are_stopped(ranks, text, message):

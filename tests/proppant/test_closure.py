@@ -10,7 +10,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from tests.pcdc.fake import Bench
 
 
-@pytest.mark.parametrize(("modulus", "concentration"), [(100e6, 0.2), (20e6, 0.1)])
+@pytest.mark.parametrize(("modulus", "concentration"), [(100e6, 0.2), pytest.param(20e6, 0.1, marks=pytest.mark.slow)])
 def test_a_fracture_closes_on_its_grains(tmp_path, modulus: float, concentration: float) -> None:
     """E = 20 GPa, under 10 MPa, 12 MPa in the slurry, 5 MPa in the rock: s = (K + 5 - 10) / (12 - 10 + K limit / c) of
     the volume is left, and the pack bears what the fluid has given up, less the 2 s MPa by which the rock is open."""

@@ -224,6 +224,7 @@ def test_a_pulled_bar_breaks_in_the_middle_with_mode_1():
     assert (found["peak_step"] > 0).all() and (found["peak_step"] < found["step"]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [20.0, pytest.param(35.0, marks=pytest.mark.slow)])
 def test_a_sheared_bar_breaks_with_mode_2_and_slides_on_by_friction(friction):
     """The pressed joint breaks while it is closed: friction is handed over to the contact, whose tangent it then is."""

@@ -230,6 +230,7 @@ def test_there_are_never_more_processes_than_cores(tmp_path, monkeypatch):
         driver.jobs_at_once(plan, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_members_of_several_ranks_have_the_same_bits(fallen, tmp_path):
     if len(os.sched_getaffinity(0)) < 2:

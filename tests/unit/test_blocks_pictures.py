@@ -213,6 +213,7 @@ class TestPictures:
         left, right = dark.min(), dark.max()
         assert (np.array(places) - left) / (right - left) == pytest.approx([1 / 6, 3 / 6, 5 / 6], abs=0.01)
 
+    @pytest.mark.slow
     def test_same_frame_same_bytes_in_every_format(self, tmp_path):
         state = state_of(strip(broken=((1, 1.0),)))
         for suffix in saved.FORMATS:

@@ -660,8 +660,9 @@ def test_processes_end_with_the_one_that_started_them(processes, tmp_path):
     until(lambda: not any(at_work(pid) for pid in pids), "the end of the processes")
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
-@pytest.mark.parametrize("cores", ["alone", pytest.param("on the cores of all", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("cores", ["alone", "on the cores of all"])
 def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path, cores):
     """Bound to a core each, they compile in processes on all of these."""
     (tmp_path / "hpcdem_kernels_of_a_test.py").write_text(KERNELS)

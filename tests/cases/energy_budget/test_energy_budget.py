@@ -395,7 +395,9 @@ def test_the_bed_closes(tmp_path):
     assert abs(seen.closing) < 1e-3 * max(abs(seen.work_gravity), seen.work_walls)
 
 
-@pytest.mark.parametrize(("linear", "order", "finest"), [(False, 2.0, 1e-4), (True, 1.0, 5e-4)])
+@pytest.mark.parametrize(
+    ("linear", "order", "finest"), [pytest.param(False, 2.0, 1e-4, marks=pytest.mark.slow), (True, 1.0, 5e-4)]
+)
 def test_the_closing_error_falls_with_the_time_step(tmp_path, linear, order, finest):
     """dt / 4. Hertz: second order, 9e-4 to 6e-5. The linear bed is too soft: it is pressed through its walls, a quarter
     leaves the BOX, and the forces of those that left act half a kick more: first order, 1.2e-3 to 2.9e-4. The paths are
