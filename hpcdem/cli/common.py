@@ -93,3 +93,12 @@ def run_program(
         work(comm, Log(comm.rank), options)
 
     shutdown.leave(shutdown.run_together(comm, together))
+
+
+class Words(click.ParamType):
+    """Words with commas between them."""
+
+    name = "list"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return [w for w in (word.strip() for word in value.split(",")) if w] if isinstance(value, str) else value

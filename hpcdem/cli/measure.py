@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli import pictures
-from hpcdem.cli.common import FINITE, HELP, PATH, POSITIVE
+from hpcdem.cli.common import FINITE, HELP, PATH, POSITIVE, Words
 from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
@@ -18,15 +18,6 @@ if TYPE_CHECKING:
 WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks", "fragments", "emission", "fluid",
         "regions", "displacement")  # fmt: skip
 FORMATS = ("png", "jpg", "pdf", "svg")
-
-
-class Words(click.ParamType):
-    """Words with commas between them."""
-
-    name = "list"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return [w for w in (word.strip() for word in value.split(",")) if w] if isinstance(value, str) else value
 
 
 class Numbers(Words):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcdem.cli.common import FINITE, HELP, PATH
+from hpcdem.cli.common import FINITE, HELP, PATH, Words
 from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 @click.option("--delball", is_flag=True, help="Particles were deleted between frames (erosion).")
 @click.option("--leftwallid", type=int, metavar="ID", help="Leave out the particles to the left of this wall.")
 @click.option("--rightwallid", type=int, metavar="ID", help="Leave out the particles to the right of this wall.")
+@click.option("--groups", type=Words(), default="", metavar="A,B", help="Only particles of these groups.")
 @click.option("--xmove", type=FINITE, default=0.0, metavar="X", help="Add X [m] to all x [0].")
 @click.option("--ymove", type=FINITE, default=0.0, metavar="Y", help="Add Y [m] to all y [0].")
 @click.option("--increment", is_flag=True, help="Strain since the frame before, not since the first one.")
@@ -58,6 +59,7 @@ def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
             right_wall=options["rightwallid"], xmove=options["xmove"], ymove=options["ymove"],
             addball=options["addball"], delball=options["delball"], increment=options["increment"],
             smooth=options["smooth"],
+            groups=tuple(options["groups"]),
         ),
     )  # fmt: skip
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH, POSITIVE, Finite
-from hpcdem.cli.pictures import Formats, ManualCommand, number, processes
+from hpcdem.cli.pictures import Formats, ManualCommand, Numbers, number, processes
 from hpcdem.core.comm import Comm
+from hpcdem.core.errors import UsageError
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
@@ -55,6 +56,23 @@ def _length(name: str, default: float | None, text: str, said: str | None = None
     return click.option(name, type=POSITIVE, default=default, metavar="VALUE", help=f"{text} [{said}].")
 
 
+def _limits(axis: str) -> Any:
+    return click.option(
+        f"--{axis}lim", type=Numbers(2), default=None, metavar="FROM,TO",
+        help=f"Where the {axis} axis begins and ends (km) [all is shown].",
+    )  # fmt: skip
+
+
+def _ends(options: dict[str, Any], axis: str) -> tuple[float | None, float | None]:
+    """Begin and end of an axis [m]. Raises UsageError where two options differ."""
+    between, last = options[f"{axis}lim"], options[f"{axis}max"]
+    if between is None:
+        return None, None if last is None else 1000.0 * last
+    if last is not None:
+        raise UsageError(f"zdemss: give either --{axis}lim or --{axis}max")
+    return 1000.0 * between[0], 1000.0 * between[1]
+
+
 @click.command(
     cls=ManualCommand,
     context_settings=HELP,
@@ -91,6 +109,8 @@ def _length(name: str, default: float | None, text: str, said: str | None = None
 @_length("--maxstress", 300.0, "Stress at the end of the colour bar (MPa)")
 @_length("--xmax", None, "Where the x axis ends (km)", "all is shown")
 @_length("--ymax", None, "Where the y axis ends (km)", "all is shown")
+@_limits("x")
+@_limits("y")
 @click.option(
     "--width", type=Finite(5.0, 100.0), default=14.0, metavar="VALUE", help="Width of the pictures (cm) [14]."
 )
@@ -134,8 +154,8 @@ def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
         colormap=None if colormap.lower() == "default" else Path(colormap),
         sigma1=(options["gridsize"], options["scale"]) if options["sigma1"] else None,
         width=options["width"],
-        xmax=None if options["xmax"] is None else 1000.0 * options["xmax"],
-        ymax=None if options["ymax"] is None else 1000.0 * options["ymax"],
+        x=_ends(options, "x"),
+        y=_ends(options, "y"),
         maxstress=options["maxstress"],
     )
     draw.refuse(request)

@@ -23,8 +23,6 @@ MOST_LABELS = 5000
 TENSION, COMPRESSION, INK = "#c81e1e", "#1e3cb4", "#202020"
 BALL = 3.0
 """Radius of the ball that is rolled over the particles to find their surface, in median radii."""
-LOOSE = 1 / 500
-"""Pieces of less than this part of all particles are flying bits, not the model."""
 
 
 @dataclass(frozen=True)
@@ -88,38 +86,23 @@ def walls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def surface(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """The line over the top of the model, without flying bits."""
-    from hpcdem.post.surface import surface as rolled
+    """The line over the top of the model, without flying bits and particles that stand for walls."""
+    from hpcdem.post import surface as tops
 
     columns = frame.tables["particles"].columns
     if not len(frame.tables["particles"]):
         return
     x, y, radius = (np.asarray(columns[name], dtype=float) for name in ("x", "y", "radius"))
     kept = np.isfinite(x) & np.isfinite(y) & (radius > 0.0)
-    kept[kept] = in_large_pieces(x[kept], y[kept], radius[kept])
+    kept[kept] = tops.bed(x[kept], y[kept], radius[kept], tops.held_fast(columns, len(x))[kept])
     if not kept.any():
         return
     x, y, radius = x[kept], y[kept], radius[kept]
     usual = float(np.median(radius))
     # Fine enough to follow the discs, unless they are spread over an odd size of land.
     spacing = max(0.2 * usual, float(np.ptp(x)) / 100_000)
-    line = rolled(x, y, radius, max(BALL * usual, 2.0 * spacing), spacing)
+    line = tops.surface(x, y, radius, max(BALL * usual, 2.0 * spacing), spacing)
     _polylines(ax, [line], INK, 0.75 * look.line)
-
-
-def in_large_pieces(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Whether each disc is in a piece of at least LOOSE of all. Discs hang together where the squares of a grid, as
-    wide as the largest diameter, do."""
-    from scipy import ndimage
-
-    if len(x) == 0:
-        return np.zeros(0, bool)
-    side = max(2.0 * float(radius.max()), float(np.ptp(x)) / 5000.0, float(np.ptp(y)) / 5000.0)
-    column, row = (((v - v.min()) / side).astype(np.int64) for v in (x, y))
-    filled = np.zeros((row.max() + 1, column.max() + 1), bool)
-    filled[row, column] = True
-    piece = ndimage.label(filled, np.ones((3, 3)))[0][row, column]
-    return np.bincount(piece)[piece] >= LOOSE * len(x)
 
 
 def bonds(frame: Frame, ax: Any, look: Look = USUAL) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -17,6 +18,7 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.post import grid as grids
+from hpcdem.post.surface import bed
 
 UNITS = {
     "volumetric": "%",
@@ -32,9 +34,10 @@ UNITS = {
 mean stress (s1 + s2) / 2 and largest shear stress (s1 - s2) / 2; the components of the stress; the angle of s1."""
 PARTICLE_FIELDS = (
     "gid", "x", "y", "radius", "color", "pxx", "pxy", "pyy", "fxx", "fxy", "fyx", "fyy", "volumetric", "distortional",
+    "fixed",
 )  # fmt: skip
 """Columns of the particles: pseudo stress p [Pa] (force moments over the particle's own volume), deformation gradient F
-since the first section in which the particle was (identity there), strains of F."""
+since the first section in which the particle was (identity there), strains of F; whether it is fixed along x and y."""
 VERSION = 1
 
 
@@ -60,6 +63,12 @@ class Section:
 
     def __post_init__(self) -> None:
         self.average = self.average or self.size
+        self.particles.setdefault("fixed", np.zeros(len(self.particles["x"]), bool))  # files of 0.1 do not have it
+
+    @cached_property
+    def bed(self) -> np.ndarray:
+        """(n,): the particles that fields, surface and limits are of: neither fixed ones nor flying bits."""
+        return bed(*(self.particles[name] for name in ("x", "y", "radius", "fixed")))
 
     def mean_strain(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x (nx,), y (ny,) [m] and the distortional strain (ny, nx), the mean of the particles nearer than `average` to
@@ -67,7 +76,7 @@ class Section:
         if self.smooth:
             return self.x, self.y, self.fields["distortional"]
         p = self.particles
-        known = np.isfinite(p["distortional"])
+        known = np.isfinite(p["distortional"]) & self.bed
         x, y, strain = (p[name][known] for name in ("x", "y", "distortional"))
         if not len(x):
             return self.x, self.y, self.fields["distortional"]

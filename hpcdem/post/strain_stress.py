@@ -24,11 +24,12 @@ from hpcdem.core.comm import Comm, SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import on_first
 from hpcdem.io.disk import explain
+from hpcdem.io.frame import Frame
 from hpcdem.io.frames import FrameFile, left_out, list_frames, read_frame
 from hpcdem.post import grid as grids
 from hpcdem.post import section_files, strain, stress
 from hpcdem.post.section import Section, write_section
-from hpcdem.post.surface import surface
+from hpcdem.post.surface import bed, held_fast, surface
 
 QUIET_SECONDS = 2.0
 """At most one line on the progress in this time."""
@@ -45,7 +46,8 @@ class Options:
     """folder: with the frames; size: spacing of the grid [m]; left_wall, right_wall: ids of walls beyond which
     particles are left out; xmove, ymove [m]: added to all coordinates; addball, delball: whether particles may be
     added or deleted between frames; increment: strain since the frame before instead of since the first one; smooth:
-    strain fitted around the nodes of the grid and averaged, instead of by the nearest neighbours of each particle."""
+    strain fitted around the nodes of the grid and averaged, instead of by the nearest neighbours of each particle;
+    groups: names of those whose particles count, all if there are none."""
 
     folder: Path
     size: float = 200.0
@@ -57,6 +59,7 @@ class Options:
     delball: bool = False
     increment: bool = False
     smooth: bool = False
+    groups: tuple[str, ...] = ()
 
 
 def run(comm: Comm, log: Any, options: Options) -> Path:
@@ -164,8 +167,8 @@ def _tried(action: Callable[[], _T]) -> tuple[_T | None, str | None]:
 class Snapshot:
     """What is needed of a frame: particles (in the order of ids) and walls, after --xmove and --ymove.
 
-    inside: not beyond --leftwallid or --rightwallid; moments (n, 4): V s [N m]; volume (n,); thickness [m]; held (n,):
-    in contact with anything.
+    inside: not beyond --leftwallid or --rightwallid, and of the groups asked for; moments (n, 4): V s [N m]; volume
+    (n,); thickness [m]; held (n,): in contact with anything; fixed (n,): along x and y.
     """
 
     name: str
@@ -181,6 +184,7 @@ class Snapshot:
     volume: np.ndarray
     thickness: float
     held: np.ndarray
+    fixed: np.ndarray
     walls: dict[str, np.ndarray]
 
 
@@ -193,9 +197,10 @@ def look(path: Path, options: Options) -> Snapshot:
     bad = ~np.isfinite(p["x"] + p["y"] + p["radius"])
     if bad.any():
         raise HpcdemError(f"{path}: the place of particle {p['gid'][bad][0]} is not a number")
+    fixed = held_fast(p, len(p["x"]))
     try:
         moments, held = stress.moments(frame)
-        volume, thickness = stress.volume_rule(frame)
+        volume, thickness = stress.volume_rule(frame, bed(p["x"], p["y"], p["radius"], fixed))
     except HpcdemError as error:
         raise HpcdemError(f"{path}: {error}") from None
     move = np.array([options.xmove, options.ymove])
@@ -217,34 +222,51 @@ def look(path: Path, options: Options) -> Snapshot:
             inside &= sign * (x - middle) >= 0.0
     if not inside.any():
         raise HpcdemError(f"{path}: no particle lies between the walls given with --leftwallid and --rightwallid")
+    if options.groups:
+        inside &= _of_groups(frame, path, options.groups)
+        if not inside.any():
+            raise HpcdemError(f"{path}: no particle of the groups {', '.join(options.groups)} lies between the walls")
     return Snapshot(
         path.stem, frame.step, frame.time, p["gid"], x, y, p["radius"], p.get("color", np.zeros(len(x), np.int32)),
-        inside, moments, volume, thickness, held,
+        inside, moments, volume, thickness, held, fixed,
         {"id": walls["id"], "p1": walls["p1"] + move, "p2": walls["p2"] + move, "color": walls["color"]},
     )  # fmt: skip
+
+
+def _of_groups(frame: Frame, path: Path, groups: tuple[str, ...]) -> np.ndarray:
+    """(n,): the particles of these groups. Raises HpcdemError for groups that the frame does not know."""
+    names = [*frame.group_names]
+    if unknown := [name for name in groups if name not in names]:
+        known = ", ".join(names) or "none"
+        raise HpcdemError(f"{path} has no group {unknown[0]}; its groups: {known}")
+    column = frame.tables["particles"].columns.get("group", np.full(len(frame.tables["particles"]), -1))
+    return np.isin(column, [names.index(name) for name in groups])
 
 
 # --- two frames ------------------------------------------------------------------------------------------------
 
 
 class Earlier:
-    """The frame before, as it comes from the rank that read it: all particles by id, and which of them are inside."""
+    """The frame before, as it comes from the rank that read it: all particles by id, which of them are inside, and
+    which of those are free to move."""
 
     def __init__(self, name: str, packed: np.ndarray) -> None:
         """packed: see `packed`."""
         self.name = name
         gid, self.x, self.y, self.radius = (np.ascontiguousarray(c) for c in packed[:, :4].T)
-        self.gid, self.inside = gid.view(np.int64), packed[:, 4] > 0.0
+        self.gid, self.inside, self.free = gid.view(np.int64), packed[:, 4] > 0.0, packed[:, 4] > 1.0
 
 
 def packed(s: Snapshot) -> np.ndarray:
-    """(n, 5): gid (its bits), x, y, radius, inside."""
-    return np.stack([s.gid.astype(np.int64).view(np.float64), s.x, s.y, s.radius, s.inside.astype(float)], axis=1)
+    """(n, 5): gid (its bits), x, y, radius, and 0 outside, 1 fixed inside, 2 free inside."""
+    state = np.where(s.inside, np.where(s.fixed, 1.0, 2.0), 0.0)
+    return np.stack([s.gid.astype(np.int64).view(np.float64), s.x, s.y, s.radius, state], axis=1)
 
 
 class Link(NamedTuple):
     """From a frame to the next: rows (n,) of the later frame's particles among those of the earlier one, -1 for new
-    ones, and dF (m, 4) of the earlier one's; in both frames only those inside count."""
+    ones, and dF (m, 4) of the earlier one's; in both frames only those inside count. Fixed ones do not deform, and are
+    in no fit."""
 
     rows: np.ndarray
     df: np.ndarray
@@ -266,10 +288,13 @@ def link(earlier: Earlier, now: Snapshot, options: Options, sums: strain.Sums = 
             )
     both = there & now.inside
     both[both] = earlier.inside[at[both]]
-    row = at[both]
     df = np.full((len(earlier.gid), 4), np.nan)
+    df[at[both]] = strain.IDENTITY
+    free = both & ~now.fixed
+    free[free] = earlier.free[at[free]]
+    row = at[free]
     x, y = earlier.x[row], earlier.y[row]
-    u, v = now.x[both] - x, now.y[both] - y
+    u, v = now.x[free] - x, now.y[free] - y
     if options.smooth:
         df[row] = strain.increment(options.size, x, y, earlier.radius[row], u, v, sums)
     else:
@@ -300,9 +325,16 @@ def make_section(
     the nearest particle.
     """
     k = np.flatnonzero(s.inside)
-    x, y, radius, m = s.x[k], s.y[k], s.radius[k], s.moments[k]
-    pseudo = m / s.volume[k, None]
-    ev, ed = strain.volumetric(f), strain.distortional(f)
+    pseudo = s.moments[k] / s.volume[k, None]
+    particles = {
+        "gid": s.gid[k], "x": s.x[k], "y": s.y[k], "radius": s.radius[k], "color": s.color[k],
+        "pxx": pseudo[:, 0], "pxy": 0.5 * (pseudo[:, 1] + pseudo[:, 2]), "pyy": pseudo[:, 3],
+        "fxx": f[:, 0], "fxy": f[:, 1], "fyx": f[:, 2], "fyy": f[:, 3],
+        "volumetric": strain.volumetric(f), "distortional": strain.distortional(f), "fixed": s.fixed[k],
+    }  # fmt: skip
+    chosen = bed(*(particles[name] for name in ("x", "y", "radius", "fixed")))
+    x, y, radius, ev, ed = (particles[name][chosen] for name in ("x", "y", "radius", "volumetric", "distortional"))
+    m, held = s.moments[k[chosen]], s.held[k[chosen]]
     grid = grids.cover(size, x, y, radius)
     known = np.isfinite(ev)
     columns = {
@@ -337,12 +369,7 @@ def make_section(
     sxx, sxy, syy = (np.where(material, tensor[..., c], np.nan) for c in (0, 1, 2))
     mean, shear, angle = stress.principal(sxx, sxy, syy)
     fields |= {"mean": mean, "shear": shear, "sxx": sxx, "sxy": sxy, "syy": syy, "direction": angle}
-    particles = {
-        "gid": s.gid[k], "x": x, "y": y, "radius": radius, "color": s.color[k],
-        "pxx": pseudo[:, 0], "pxy": 0.5 * (pseudo[:, 1] + pseudo[:, 2]), "pyy": pseudo[:, 3],
-        "fxx": f[:, 0], "fxy": f[:, 1], "fyx": f[:, 2], "fyy": f[:, 3], "volumetric": ev, "distortional": ed,
-    }  # fmt: skip
-    top = s.held[k] if s.held[k].any() else slice(None)
+    top = held if held.any() else slice(None)
     line = surface(x[top], y[top], radius[top], size, 0.1 * size)
     return Section(
         s.name, s.step, s.time, grid.size, grid.x, grid.y, fields, particles, line, s.walls, smooth, size

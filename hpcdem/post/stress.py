@@ -138,9 +138,11 @@ def _wall_place(
     return centre[:, 0] + part * way[:, 0], centre[:, 1] + part * way[:, 1]
 
 
-def volume_rule(frame: Frame) -> tuple[np.ndarray, float]:
+def volume_rule(frame: Frame, bed: np.ndarray | None = None) -> tuple[np.ndarray, float]:
     """Volume of each particle (n,) [m^3] by SET disk, of members of clumps their share, and the thickness of the model
-    [m]: 1 for discs, twice the mean radius for spheres. HpcdemError for a rule that is not known."""
+    [m]: 1 for discs, twice the mean radius, of those in `bed` (n,), for spheres.
+
+    HpcdemError for a rule that is not known."""
     p = frame.tables["particles"].columns
     radius, disk = p["radius"], str(frame.settings.get("disk", "off"))
     if disk not in mass.SPHERES:
@@ -148,7 +150,8 @@ def volume_rule(frame: Frame) -> tuple[np.ndarray, float]:
     volume = mass.volume(radius, disk)
     if "clump" in p:
         volume = np.where(p["clump"] >= 0, p["mass"] / p["density"], volume)
-    return volume, 2.0 * float(np.mean(radius)) if mass.SPHERES[disk] else 1.0
+    mean = float(np.mean(radius if bed is None else radius[bed]))
+    return volume, 2.0 * mean if mass.SPHERES[disk] else 1.0
 
 
 def principal(sxx: np.ndarray, sxy: np.ndarray, syy: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,8 +1,43 @@
-"""The line over the top of the particles."""
+"""Which particles are the bed, and the line over the top of them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+
+from hpcdem.core.fields import FIX_X, FIX_Y
+
+LOOSE = 1 / 500
+"""Pieces of less than this part of all particles are flying bits, not the model."""
+HELD = FIX_X | FIX_Y
+
+
+def held_fast(columns: Mapping[str, np.ndarray], n: int) -> np.ndarray:
+    """(n,): which particles of a frame are fixed along x and y, as rows of particles are that stand for walls."""
+    return (np.asarray(columns.get("fix", np.zeros(n)), dtype=np.int64) & HELD) == HELD
+
+
+def bed(x: np.ndarray, y: np.ndarray, radius: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """(n,): the particles without flying bits and fixed ones; the fixed ones count where there are no others, and all
+    particles where there are only flying bits."""
+    kept = in_large_pieces(x, y, radius)
+    return next((some for some in (kept & ~fixed, kept) if some.any()), np.ones(len(x), bool))
+
+
+def in_large_pieces(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Whether each disc is in a piece of at least LOOSE of all. Discs hang together where the squares of a grid, as
+    wide as the largest diameter, do."""
+    from scipy import ndimage
+
+    if len(x) == 0:
+        return np.zeros(0, bool)
+    side = max(2.0 * float(radius.max()), float(np.ptp(x)) / 5000.0, float(np.ptp(y)) / 5000.0)
+    column, row = (((v - v.min()) / side).astype(np.int64) for v in (x, y))
+    filled = np.zeros((row.max() + 1, column.max() + 1), bool)
+    filled[row, column] = True
+    piece = ndimage.label(filled, np.ones((3, 3)))[0][row, column]
+    return np.bincount(piece)[piece] >= LOOSE * len(x)
 
 
 def surface(x: np.ndarray, y: np.ndarray, radius: np.ndarray, ball: float, spacing: float) -> np.ndarray:

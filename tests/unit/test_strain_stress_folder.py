@@ -17,10 +17,11 @@ from hpcdem.cli.strain_stress import strain_stress as command
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.dat import read_dat, write_dat
-from hpcdem.io.frame import Frame
+from hpcdem.io.frame import Frame, Table
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.post import strain, strain_stress
 from hpcdem.post.section import PARTICLE_FIELDS, UNITS, Section, read_section, write_section
+from hpcdem.post.sections import survey
 from tests.unit import bed
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -267,6 +268,72 @@ def test_a_file_as_zdem_writes_it(tmp_path: Path) -> None:
     np.testing.assert_allclose(seen.moments[1], expected.ravel(), rtol=1e-9)
 
 
+# --- rows that stand for walls, flying bits, groups ----------------------------------------------------------------
+
+
+def behind_a_row(frames: list[Frame], far: float = 0.0) -> list[Frame]:
+    """The first frame and the same after a shear, with a row of fixed discs of 12 km before it that moves by 1 km, and
+    two discs that have escaped `far` metres to the left."""
+    found = []
+    for step, k in ((0, 0.0), (500, 0.3)):
+        frame = moved(frames[0], step, np.array([[1.0, k], [0.0, 1.0]]))
+        p = frame.tables["particles"].columns
+        n, height = len(p["gid"]), np.arange(60.0, 12000.0, 120.0)
+        more = {name: np.repeat(values[:1], len(height) + 2, axis=0) for name, values in p.items()}
+        more["gid"] = np.arange(len(height) + 2) + p["gid"].max() + 1
+        more["x"] = np.append(np.full(len(height), -400.0 + 1000.0 * (step > 0) - 1200.0), [-far, -far - 150.0])
+        more["y"] = np.append(height, [900.0, 900.0])
+        more["radius"][:], more["fix"] = 60.0, np.append(np.full(len(height), 3), [0, 0]).astype(p["fix"].dtype)
+        columns = {name: np.concatenate([values, more[name]]) for name, values in p.items()}
+        frame.tables["particles"] = Table(columns, 0, n + len(height) + 2)
+        found.append(frame)
+    return found
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_rows_that_stand_for_walls_are_in_no_field_and_carry_no_surface(
+    frames: list[Frame], tmp_path: Path, smooth: bool
+) -> None:
+    plain = [moved(frames[0], step, np.array([[1.0, k], [0.0, 1.0]])) for step, k in ((0, 0.0), (500, 0.3))]
+    found = {
+        name: compute(write(tmp_path / name, some), smooth=smooth, addball=False, delball=False)[1]
+        for name, some in {"bed": plain, "row": behind_a_row(frames, 8000.0)}.items()
+    }
+    bed, row = found["bed"], found["row"]
+    assert row.surface[:, 1].max() < 4000.0 and row.x.min() > -2000.0
+    np.testing.assert_array_equal(row.surface, bed.surface)
+    for name, values in bed.fields.items():
+        np.testing.assert_allclose(row.fields[name], values, rtol=1e-9, atol=1e-9, err_msg=name)
+    fixed = row.particles["fixed"]
+    assert fixed.sum() == 100 and not bed.particles["fixed"].any()
+    assert not row.particles["distortional"][fixed].any()  # it is still listed, and drawn
+    outlines = [survey.outline(row), survey.outline(bed)]
+    assert outlines[0].extent == outlines[1].extent
+
+
+def test_where_everything_is_fixed_it_counts(frames: list[Frame], tmp_path: Path) -> None:
+    held = copy.deepcopy(frames[0])
+    held.tables["particles"].columns["fix"][:] = 3
+    ours, free = (compute(write(tmp_path / name, [frame]))[0] for name, frame in (("held", held), ("free", frames[0])))
+    np.testing.assert_array_equal(ours.surface, free.surface)
+    np.testing.assert_array_equal(ours.fields["mean"], free.fields["mean"])
+
+
+def test_only_particles_of_some_groups(frames: list[Frame], tmp_path: Path) -> None:
+    named = []
+    for frame in (copy.deepcopy(f) for f in frames[:2]):
+        p = frame.tables["particles"].columns
+        p["group"] = np.where(p["y"] < 1500.0, 1, 0).astype(np.int32)
+        frame.group_names[:] = ["top", "base"]
+        named.append(frame)
+    folder = write(tmp_path, named)
+    section = compute(folder, groups=("base",))[0]
+    assert (section.particles["y"] < 1500.0).all() and section.y.max() < 1700.0
+    assert len(section.particles["y"]) == (named[0].tables["particles"].columns["group"] == 1).sum()
+    with pytest.raises(HpcdemError, match=r"has no group bottom; its groups: top, base"):
+        compute(folder, groups=("bottom",))
+
+
 # --- files -------------------------------------------------------------------------------------------------------
 
 
@@ -278,7 +345,7 @@ def test_the_text_has_one_row_per_particle(frames: list[Frame], tmp_path: Path) 
     names = words.removeprefix("#").split()
     assert names == "id x[m] y[m] rad[m] color pxx[Pa] pxy[Pa] pyy[Pa] Fxx Fxy Fyx Fyy ev[%] ed".split()
     rows = np.loadtxt(path)
-    for column, values in zip(rows.T, (section.particles[n] for n in PARTICLE_FIELDS)):
+    for column, values in zip(rows.T, (section.particles[n] for n in PARTICLE_FIELDS if n != "fixed")):
         np.testing.assert_allclose(column, values, rtol=1e-8)
 
 
@@ -449,6 +516,7 @@ def test_the_command_line_is_that_of_the_manual() -> None:
     assert values == {
         "folder": Path("datass"), "size": 200.0, "addball": True, "delball": True, "leftwallid": None,
         "rightwallid": None, "xmove": -1000.0, "ymove": -1000.0, "increment": False, "smooth": False, "threads": 12,
+        "groups": [],
     }  # fmt: skip
     for name in ("--strin-stres", "--strain-stress"):
         assert command.make_context("zdem", [name, "a", "--grid", "50", "--leftwallid", "0"]).params["leftwallid"] == 0

@@ -12,11 +12,10 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.core.fields import sides_of_box
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import FrameFile, list_frames, read_frame
+from hpcdem.post.surface import held_fast
 
 Walls = dict[int, tuple[tuple[float, float], tuple[float, float]]]
 _COLUMNS = ("gid", "x", "y", "r", "color", "group", "fixed")
-_HELD = 3
-"""Fixed along x and y (see `fields.FIX_BITS`)."""
 
 
 def _no_pairs() -> np.ndarray:
@@ -88,7 +87,7 @@ def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grain
     row = np.asarray(p.get("group", np.full(len(gid), -1)), dtype=np.int64)[order]
     pairs = {name: _pairs(frame, name) for name in tables}
     group = names[np.where((row >= 0) & (row < len(names)), row, len(names) - 1)]
-    fixed = (np.asarray(p.get("fix", np.zeros(len(gid))), dtype=np.int64)[order] & _HELD) == _HELD
+    fixed = held_fast(p, len(gid))[order]
     return Grains(frame.step, gid[order], x, y, r, color, group, _walls(frame), frame.time, ini, **pairs, fixed=fixed)
 
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.frames import FrameFile
-from hpcdem.post import layers as drawing
 from hpcdem.post.measure import tracks
 from hpcdem.post.measure.grains import (
     Grains,
@@ -23,6 +22,7 @@ from hpcdem.post.measure.grains import (
     walls_of,
     when_it_moves,
 )
+from hpcdem.post.surface import bed
 
 KINDS = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks")
 """What can be measured of particles, by its word on the command line."""
@@ -182,13 +182,8 @@ def _followed(request: Request, first: Grains, last: Grains) -> np.ndarray:
 
 
 def bed_of(g: Grains) -> Grains:
-    """Without flying bits and without what is held fast, as rows of particles that stand for walls; unless there is
-    nothing else."""
-    kept = drawing.in_large_pieces(g.x, g.y, g.r)
-    for some in (kept & ~g.fixed, kept):
-        if some.any():
-            return g.take(some)
-    return g
+    """The grains of the bed, see `surface.bed`."""
+    return g.take(bed(g.x, g.y, g.r, g.fixed))
 
 
 @dataclass

@@ -37,7 +37,8 @@ DPI = 300
 class Request:
     """What is asked for. folder: of the frames, with ss/data in it; kinds: panels from top to bottom; colormap: a file,
     or invar or invar2, for both strains, None: invar2 for the distortional one and invar in per cent for the volumetric
-    one; sigma1: square [m] and scale of its bars; width [cm]; xmax, ymax [m]; maxstress [MPa]."""
+    one; sigma1: square [m] and scale of its bars; width [cm]; x, y: where the axes begin and end [m], None where the
+    model does; maxstress [MPa]."""
 
     folder: Path
     kinds: tuple[panels.Kind, ...] = panels.KINDS
@@ -49,8 +50,8 @@ class Request:
     colormap: Path | None = None
     sigma1: tuple[float, float] | None = None
     width: float = 14.0
-    xmax: float | None = None
-    ymax: float | None = None
+    x: survey.Limits = (None, None)
+    y: survey.Limits = (None, None)
     maxstress: float = 300.0
 
 
@@ -65,7 +66,7 @@ def draw_folder(request: Request, comm: Comm, log: Any, workers: int = 1) -> Non
             log.warn(f"{table.name}: {note}")
     outlines = _survey(files, comm)
     _name_changes(outlines, request, log)
-    seen = survey.common_view(outlines, request.xmax, request.ymax)
+    seen = survey.common_view(outlines, request.x, request.y)
     captions = survey.progress(outlines, seen.unit)
     style = Style(tables, request.width, request.colorbar, request.labels, request.sigma1)
     for sub in ("data2ps", "Tmp", "ps"):

@@ -153,7 +153,7 @@ class Pixels:
     @classmethod
     def over(cls, section: Section, width: float) -> Pixels | None:
         """For a panel that is `width` [m] wide; None without particles."""
-        p = section.particles
+        p = {name: section.particles[name][section.bed] for name in ("x", "y", "radius")}
         if not len(p["x"]):
             return None
         fine = int(np.clip(round(FIELD_PIXELS * section.size / width), 1, FINEST))

@@ -20,7 +20,7 @@ AIR = 0.02
 
 @dataclass(frozen=True)
 class Outline:
-    """The little of a section that every rank knows. extent: left, right, bottom, top of its particles [m]; reach:
+    """The little of a section that every rank knows. extent: left, right, bottom, top of its bed [m]; reach:
     left and right end of its walls [m]; sides: x [m] of the walls that stand upright, by id; came, went: particles
     added and removed since the section before."""
 
@@ -37,7 +37,7 @@ class Outline:
 def outline(section: Section, before: Section | None = None) -> Outline:
     """The outline of a section; before: the one before it."""
     p = section.particles
-    x, y, r = (np.asarray(p[k], dtype=float) for k in ("x", "y", "radius"))
+    x, y, r = (np.asarray(p[k], dtype=float)[section.bed] for k in ("x", "y", "radius"))
     extent = (
         float(np.min(x - r, initial=np.inf)), float(np.max(x + r, initial=-np.inf)),
         float(np.min(y - r, initial=np.inf)), float(np.max(y + r, initial=-np.inf)),
@@ -60,9 +60,13 @@ def outline(section: Section, before: Section | None = None) -> Outline:
     return Outline(section.name, section.step, section.initial, extent, reach, sides, came, went)
 
 
-def common_view(outlines: Sequence[Outline], xmax: float | None = None, ymax: float | None = None) -> View:
-    """The view of all sections together. xmax, ymax: where it ends [m], else beyond walls and particles, rounded; the
-    axes begin at 0 unless the model is far from there.
+Limits = tuple[float | None, float | None]
+"""Where an axis begins and ends [m], None: where the model does."""
+
+
+def common_view(outlines: Sequence[Outline], x: Limits = (None, None), y: Limits = (None, None)) -> View:
+    """The view of all sections together. x, y: where the axes begin and end [m]; else beyond walls and particles,
+    rounded, and from 0 on unless the model is far from there.
 
     Raises UsageError if nothing is left between the limits.
     """
@@ -74,12 +78,14 @@ def common_view(outlines: Sequence[Outline], xmax: float | None = None, ymax: fl
         low_x, high_x, low_y, high_y = 0.0, 1.0, 0.0, 1.0
     step = 10.0 ** math.floor(math.log10(max(high_x - low_x, high_y - low_y))) / 10.0
     left, bottom = (_begin(low, high, step) for low, high in ((low_x, high_x), (low_y, high_y)))
-    right = math.ceil(high_x / step - 0.3) * step if xmax is None else xmax
-    top = math.ceil((high_y + AIR * (right - left)) / step - 0.3) * step if ymax is None else ymax
-    for option, low, high in (("xmax", left, right), ("ymax", bottom, top)):
+    left, bottom = (began if low is None else low for began, (low, _) in zip((left, bottom), (x, y)))
+    right = math.ceil(high_x / step - 0.3) * step if x[1] is None else x[1]
+    top = math.ceil((high_y + AIR * (right - left)) / step - 0.3) * step if y[1] is None else y[1]
+    for axis, low, high in (("x", left, right), ("y", bottom, top)):
         if not high > low:
             raise UsageError(
-                f"zdemss: --{option} {high / KM:g} km leaves nothing to draw: the axis begins at {low / KM:g} km"
+                f"zdemss: nothing is left to draw between {axis} = {low / KM:g} km and {axis} = {high / KM:g} km: "
+                f"change --{axis}lim or --{axis}max"
             )
     return View(left, right, bottom, top)
 
