@@ -25,7 +25,6 @@ from hpcdem.runtime.pace import Pace
 
 if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
-    from hpcdem.core.comm import Comm
     from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.reproducibility import Reproduction

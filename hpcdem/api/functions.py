@@ -9,9 +9,8 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from importlib.util import find_spec
 from inspect import Parameter
 from pathlib import Path
@@ -93,10 +92,11 @@ class Taken:
 TAKEN = {
     "where": Taken("Selected", lambda sim, where: selection(where)),
     "color": Taken("str | int", lambda sim, color: color_number(color)),
-    "radii": Taken("Iterable[float]", lambda sim, radii: _radii(radii)),
     "dofs": Taken("str", lambda sim, dofs: _degrees(dofs)),
     "num": Taken("int", lambda sim, num: int(num)),
+    "list[float]": Taken("Iterable[float]", lambda sim, radii: _radii(radii)),
 }
+"""By the name of the argument, or its type."""
 READ = Taken("File", lambda sim, file: sim._existing(file))
 WRITTEN = Taken("File", lambda sim, file: sim.directory / file)
 
@@ -109,13 +109,12 @@ class Function:
     """Which function of `hpcdem.commands.dem` a method is.
 
     order: arguments that may be given by their place, if it is not that of the function; ``name?`` may be left out
-    though the function needs it, ``name!`` may not; the others are keywords. names: of arguments, by those of the
-    function; file: how a file is taken; alone: not for particles that touch blocks; looks: it changes nothing.
+    though the function needs it, ``name!`` may not; the others are keywords. file: how a file is taken; alone: not for
+    particles that touch blocks; looks: it changes nothing.
     """
 
     name: str
     order: str = ""
-    names: Mapping[str, str] = field(default_factory=dict)
     file: Taken = READ
     alone: bool = False
     looks: bool = False
@@ -126,15 +125,21 @@ class Function:
         module, _, name = self.name.partition(".")
         return _functions(module)[0][name]
 
-    def taken(self, own: str) -> Taken | None:
-        """How an argument of the function is taken, if not as it is."""
-        return self.file if own == "path" else TAKEN.get(own)
+    @functools.cached_property
+    def own(self) -> list[Parameter]:
+        """Arguments of the function."""
+        return [one for one in _parameters(self.node, self.name.partition(".")[0]) if one.name != "folder"]
+
+    @functools.cached_property
+    def taken(self) -> dict[str, Taken]:
+        """How arguments of the function are taken, if not as they are."""
+        known = {**TAKEN, "file": self.file}
+        return {one.name: known[key] for one in self.own for key in (one.name, one.annotation) if key in known}
 
     @functools.cached_property
     def parameters(self) -> list[Parameter]:
         """As a method has them."""
-        own = {self.names.get(one.name, one.name): one for one in _parameters(self.node, self.name.partition(".")[0])}
-        own = {name: replaced(one, name, self.taken(one.name)) for name, one in own.items() if one.name != "folder"}
+        own = {one.name: replaced(one, self.taken.get(one.name)) for one in self.own}
         if not self.order:
             return list(own.values())
         found = []
@@ -150,10 +155,7 @@ class Function:
 
     @property
     def docstring(self) -> str:
-        text = ast.get_docstring(self.node) or ""
-        for own, name in self.names.items():
-            text = re.sub(rf"(?<!\w){own}(?!\w)", name, text)
-        return text
+        return ast.get_docstring(self.node) or ""
 
     def method(self, owner: type, name: str) -> Callable[..., Any]:
         """The method of a class."""
@@ -161,19 +163,15 @@ class Function:
         more = any(one.kind is Parameter.VAR_KEYWORD for one in parameters)
         known = [one for one in parameters if one.kind is not Parameter.VAR_KEYWORD]
         usual = {one.name: one.default for one in known if one.default is not Parameter.empty}
-        own = {public: of for of, public in self.names.items()}
         module, _, function = self.name.partition(".")
         folder = any(one.arg == "folder" for one in self.node.args.kwonlyargs)
 
         def call(self_: Any, *values: Any, **options: Any) -> Any:
-            found = {**usual, **bound(known, values, options, more)}
-            given = {own.get(key, key): value for key, value in found.items()}
+            given = {**usual, **bound(known, values, options, more)}
             if self.alone:
                 self_._refuse_coupled(name)
             engine = self_.engine
-            for key, value in given.items():
-                if (taken := self.taken(key)) is not None:
-                    given[key] = taken.make(self_, value)
+            given |= {key: self.taken[key].make(self_, value) for key, value in given.items() if key in self.taken}
             if folder:
                 given["folder"] = self_.directory
             return getattr(getattr(dem, module), function)(engine, **given)
@@ -186,12 +184,12 @@ def _optional(kind: str) -> str:
     return kind if kind.endswith("None") else f"{kind} | None"
 
 
-def replaced(one: Parameter, name: str, taken: Taken | None) -> Parameter:
+def replaced(one: Parameter, taken: Taken | None) -> Parameter:
     """An argument of a function as a method has it."""
     kind = one.annotation if taken is None else taken.type
     if one.default is None and kind != "Selected":
         kind = _optional(kind)
-    return one.replace(name=name, annotation=kind)
+    return one.replace(annotation=kind)
 
 
 @functools.cache

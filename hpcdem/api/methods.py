@@ -18,15 +18,10 @@ from inspect import Parameter
 from typing import Any, TypeVar
 
 from hpcdem.api.program import HELP, carried_out, place, spelt
-from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
+from hpcdem.lang.pcdc.table import PCDC, SHORT, Command, Model, Option
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
 
-SHORT = {
-    **{f"{word}-{axis}": f"{word[0]}{axis}" for word in ("velocity", "acceleration", "force") for axis in "xyz"},
-    **{f"stress-{part}": part for part in ("xx", "yy", "zz", "xy", "xz", "yz", "normal")},
-}
-"""Words of the language that programs have shorter."""
 WHERE = "text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all"
 DIMENSIONS: dict[tuple[int, ...], str] = {(2,): "in the plane", (3,): "in three dimensions"}
 """Where a word is there, if not in both."""

@@ -52,9 +52,7 @@ class Orders:
         else:
             found = model_arguments(row, model, given, project.dim)
         project.line = place()[1]
-        call = Call(project, found, None, lambda names, file: None)
-        call.where = chosen
-        carry_out(row, call)
+        carry_out(Call(project, row, found, chosen))
 
 
 class Words:

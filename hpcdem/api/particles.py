@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from hpcdem.api.functions import WRITTEN, Function, commands
 
-FILE = {"path": "file"}
-
 
 @commands
 class ParticleCommands:
@@ -17,15 +15,15 @@ class ParticleCommands:
 
     box = Function("walls.box")
     wall = Function("walls.wall", "id nodes")
-    ball = Function("particles.ball", "x y rad id? color group", names={"gid": "id"})
-    gen = Function("particles.gen", names={"radii": "rad"})
-    gen_grid = Function("particles.gen_grid", names={"radii": "rad"})
+    ball = Function("particles.ball", "x y rad id? color group")
+    gen = Function("particles.gen")
+    gen_grid = Function("particles.gen_grid")
     gline = Function("particles.gline", "p1 p2 rad cratio")
-    load = Function("particles.load", names=FILE, alone=True)
-    clump = Function("clumps.clump", names=FILE)
+    load = Function("particles.load", alone=True)
+    clump = Function("clumps.clump")
     join = Function("clumps.join", "where! group color")
     delete = Function("particles.delete")
-    export = Function("particles.export", names={**FILE, "with_group": "group"}, file=WRITTEN, looks=True)
+    export = Function("particles.export", file=WRITTEN, looks=True)
     prop = Function("properties.prop")
     bond = Function("bonds.bond")
     break_bonds = Function("bonds.break_bonds")

@@ -87,7 +87,7 @@ class ParticleCommands:
         Parameters
         ----------
         num : number of particles to place.
-        rad : rad that are drawn from [m].
+        rad : radii that are drawn from [m].
         x, y : sides of the rectangle, (least, greatest) [m].
         color, group : name or number; name.
 
@@ -108,7 +108,7 @@ class ParticleCommands:
 
         Parameters
         ----------
-        rad : rad that are drawn from [m].
+        rad : radii that are drawn from [m].
         x, y : sides of the rectangle, (least, greatest) [m].
         idmin : first number; left out, the next free one.
         color, group : name or number; name.

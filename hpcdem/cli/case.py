@@ -14,7 +14,6 @@ from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
     from hpcdem.cases.base import Case
-    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 PROGRAM = "hpcdem case"

@@ -15,7 +15,6 @@ from hpcdem.cli.pictures import Formats, Numbers, number, processes
 from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.io.axes import View
     from hpcdem.post.series import ViewJob
     from hpcdem.post.view.model import ModelView

@@ -17,7 +17,6 @@ from hpcdem.cli.pictures import Formats
 from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.pre.specimen import Grading, Request, Specimen
     from hpcdem.pre.specimen.classes import Grains
     from hpcdem.runtime.progress import Log

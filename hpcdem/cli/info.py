@@ -15,7 +15,6 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.runtime import run_folder
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 

@@ -12,7 +12,6 @@ from hpcdem.cli.common import FINITE, HELP, PATH, POSITIVE, Words
 from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks", "fragments", "emission", "fluid",

@@ -16,7 +16,6 @@ from hpcdem.cli.pictures import ManualCommand, common_view, looks, number, proce
 from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.post.series import Job, ViewJob
     from hpcdem.runtime.progress import Log
 

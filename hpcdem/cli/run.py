@@ -26,7 +26,6 @@ from hpcdem.session import Session
 from hpcdem.session import enter as enter_session
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.lang.zdem.parser import Script
     from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.runtime.progress import Log

@@ -12,7 +12,6 @@ from hpcdem.cli.common import FINITE, HELP, PATH, Words
 from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 

@@ -18,7 +18,6 @@ from hpcdem.core.errors import EXIT_CHECKPOINT, EXIT_ERROR, EXIT_OK, UsageError
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
     from hpcdem.sweep import Sweep
 

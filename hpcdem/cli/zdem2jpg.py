@@ -14,7 +14,6 @@ from hpcdem.core.comm import Comm
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.post.view.model import Layer
     from hpcdem.runtime.progress import Log
 

@@ -14,7 +14,6 @@ from hpcdem.core.errors import UsageError
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
-    from hpcdem.core.comm import Comm
     from hpcdem.runtime.progress import Log
 
 FORMATS = ("jpg", "png", "tiff", "pdf", "svg", "ps")

@@ -205,7 +205,7 @@ def test_relaxation_says_what_it_lets_flow_on_the_way(tmp_path):
     for at_once in (False, True):
         plan = fdem.Project(Blocks(SerialComm()), outdir=tmp_path / "out")
         plan.blocks.log = log = Log()
-        fdem.meshes.rectangle(plan, (0.0, 0.0), (1.0, 1.0), (3, 3))
+        fdem.meshes.grid(plan, (0.0, 0.0), (1.0, 1.0), (3, 3))
         fdem.assignments.element_model(plan, "mech_mohr_coulomb", WEAK)
         fdem.settings.option(plan, dynamic=False)
         fdem.assignments.velocity(plan, vy=0.0, where=(Span(1, 0.0, 0.0),))

@@ -83,7 +83,7 @@ def test_what_is_not_there_is_no_number(broken):
 def supported(folder: Path, dynamic: bool = True) -> Project:
     """A plate with joints, its left side held, its right side drawn away until it breaks."""
     project = Project(Blocks(outdir=folder / "data"), folder, folder / "data")
-    meshes.rectangle(project, (0.0, 0.0), (0.4, 0.2), (8, 4))
+    meshes.grid(project, (0.0, 0.0), (0.4, 0.2), (8, 4))
     rock = {"density": 2700.0, "young": 20e9, "poisson_ratio": 0.2}
     assignments.element_model(project, "mech_iso_elastic", rock)
     law = {"tensile_strength": 1e6, "cohesion": 2e6, "friction": 20.0, "gf1": 1.0, "gf2": 3.0, "penalty_normal": 1e11}
@@ -136,8 +136,8 @@ def test_a_history_of_one_node_looks_at_one_row(tmp_path, monkeypatch):
     project = supported(tmp_path)
     for name in [*project.histories]:
         histories.delete(project, name)
-    histories.create(project, "node", NODE, "velocity_x", ident=20)
-    histories.create(project, "element", ELEMENT, "stress_xx", ident=11)
+    histories.create(project, "node", NODE, "velocity_x", id=20)
+    histories.create(project, "element", ELEMENT, "stress_xx", id=11)
     histories.create(project, "joint", JOINT, "opening", nearest=(0.2, 0.1))
     asked = []
     columns_of = diagnostics.columns_of

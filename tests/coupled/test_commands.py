@@ -30,7 +30,7 @@ from tests.coupled.support import ROCK, discs
 def scene(folder) -> tuple[Project, object]:
     """A block beside a disc that falls on it, not yet coupled."""
     project = Project(Blocks(outdir=folder / "data"), folder, folder / "data")
-    meshes.rectangle(project, (0.0, 0.0), (1.2, 0.6), (6, 3))
+    meshes.grid(project, (0.0, 0.0), (1.2, 0.6), (6, 3))
     assignments.element_model(project, "mech_iso_elastic", ROCK)
     sim = discs([(0.5, 0.6995, 0.1), (0.5, 0.8998, 0.1)], folder / "sand", dt=5e-6)
     properties.prop(sim, yv=-1.0, xv=0.3)

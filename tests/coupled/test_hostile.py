@@ -177,7 +177,7 @@ def test_blocks_in_three_dimensions(tmp_path):
     """Particles are discs of a plane: they are not stepped with tetrahedra."""
     project = Project(Blocks(outdir=tmp_path / "data"), tmp_path, tmp_path / "data")
     project.clear(3)
-    meshes.box(project, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (1, 1, 1))
+    meshes.grid(project, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (1, 1, 1))
     with pytest.raises(CommandError, match="discs move in a plane: they cannot be stepped with blocks in three"):
         coupling.couple(project, discs([(0.5, 1.5, 0.1)], tmp_path / "sand", dt=5e-6))
     assert project.coupled is None

@@ -188,12 +188,8 @@ assert abs(budget.stored_energy(sim) / (2e6 * 0.01**3 / 3.0) - 1.0) < 1e-9
                 "lang/zdem/table.py",
                 '    Command("FREE", "Takes FIX back.", options=_DEGREES, ranged=True, '
                 'example=("FREE x RANGE group base",)),',
-                '    Command("HALT", "Velocities become zero.", ranged=True, example=("HALT RANGE group base",)),',
-            ),
-            (
-                "lang/zdem/execute.py",
-                '    "FREE": _free,',
-                '    "HALT": lambda call: dem.properties.halt(call.sim, where=call.where),',
+                '    Command("HALT", "Velocities become zero.", ranged=True, example=("HALT RANGE group base",),\n'
+                '            does="properties.halt"),',
             ),
             (
                 "commands/dem/properties.py",
@@ -215,19 +211,15 @@ assert sim.particles["vx"][np.argsort(sim.particles["gid"])].tolist() == [2.0, 0
                 "lang/pcdc/table.py",
                 '    Command("mod{el} g{ravity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),',
                 '=    Command("mod{el} moon", "Gravity of the moon.", '
-                '("pcdc model moon",)),\n    Command("mod{el} g{ravity}", "Gravity from now on.", '
+                '("pcdc model moon",), does="settings.moon"),\n'
+                '    Command("mod{el} g{ravity}", "Gravity from now on.", '
                 '("pcdc model gravity (0,-9.81)",),',
             ),
             (
-                "lang/pcdc/bindings.py",
-                '    "model gravity": lambda c: fdem.settings.gravity(c.project, c["gravity"]),',
-                '    "model moon": lambda c: fdem.settings.moon(c.project),',
-            ),
-            (
                 "commands/fdem/settings.py",
-                "def gravity(project: Project, g: tuple[float, ...]) -> None:",
+                "def gravity(project: Project, gravity: tuple[float, ...]) -> None:",
                 "=def moon(project):\n    gravity(project, (0.0, -1.62))\n\n\n"
-                "def gravity(project: Project, g: tuple[float, ...]) -> None:",
+                "def gravity(project: Project, gravity: tuple[float, ...]) -> None:",
             ),
         ],
         """

@@ -40,7 +40,7 @@ class Quiet:
 def strip(tmp_path: Path) -> fdem.Project:
     """8 x 2 m with a channel along the middle: water comes in on the left and has filled half of it."""
     model = fdem.Project(Blocks(SerialComm()), outdir=tmp_path / "out")
-    fdem.meshes.rectangle(model, (0.0, 0.0), (8.0, 2.0), (8, 2))
+    fdem.meshes.grid(model, (0.0, 0.0), (8.0, 2.0), (8, 2))
     fdem.assignments.element_model(model, "mech_iso_elastic", ROCK)
     fdem.flow.model(model, {**WATER, "aperature_initial": 1e-4}, where=MIDDLE)
     fdem.settings.option(model, mechanical=False)
@@ -75,7 +75,7 @@ def test_channels_are_coloured_by_what_is_in_them(tmp_path: Path) -> None:
 
 def _without(tmp_path: Path) -> fdem.Project:
     model = fdem.Project(Blocks(SerialComm()), outdir=tmp_path / "dry")
-    fdem.meshes.rectangle(model, (0.0, 0.0), (8.0, 2.0), (8, 2))
+    fdem.meshes.grid(model, (0.0, 0.0), (8.0, 2.0), (8, 2))
     fdem.assignments.element_model(model, "mech_iso_elastic", ROCK)
     return model
 

@@ -34,7 +34,7 @@ def test_steady_flow_around_a_hole(tmp_path) -> None:
     model = project(tmp_path)
     for name, radius in (("out", 5.0), ("hole", 1.0)):
         fdem.geometry.create(model, "circle", name, (0.0, 0.0), radius)
-    fdem.meshes.create(model, "out", 0.15, holes=["hole"])
+    fdem.meshes.create(model, "out", 0.15, hole=["hole"])
     fdem.assignments.element_model(model, "mech_iso_elastic", ROCK)
     fdem.flow.model(model, {**WATER, "fluid_bulk": 1e9})
     fdem.settings.option(model, mechanical=False)
@@ -57,7 +57,7 @@ def test_steady_flow_around_a_hole(tmp_path) -> None:
 
 def strip(tmp_path) -> fdem.Project:
     model = project(tmp_path)
-    fdem.meshes.rectangle(model, (0.0, 0.0), (4.0, 2.0), (4, 2))
+    fdem.meshes.grid(model, (0.0, 0.0), (4.0, 2.0), (4, 2))
     fdem.assignments.element_model(model, "mech_iso_elastic", ROCK)
     return model
 

@@ -183,7 +183,7 @@ def test_what_implicit_steps_cannot_do_is_refused() -> None:
 def test_the_command_says_how_it_ended(tmp_path) -> None:
     """Steps of equal length, a steady state, histories, what is refused."""
     project = fdem.Project(Blocks(SerialComm()), outdir=tmp_path / "out")
-    fdem.meshes.rectangle(project, (0.0, 0.0), (2.0, 1.0), (4, 2))
+    fdem.meshes.grid(project, (0.0, 0.0), (2.0, 1.0), (4, 2))
     fdem.assignments.element_model(project, "mech_iso_elastic", ROCK)
     fdem.heat.model(project, GRANITE)
     fdem.settings.option(project, mechanical=False)

@@ -19,7 +19,7 @@ LEFT, RIGHT = (Span(0, 0.0, 0.0),), (Span(0, 4.0, 4.0),)
 
 def strip(tmp_path) -> fdem.Project:
     model = fdem.Project(Blocks(SerialComm()), outdir=tmp_path / "out")
-    fdem.meshes.rectangle(model, (0.0, 0.0), (4.0, 2.0), (4, 2))
+    fdem.meshes.grid(model, (0.0, 0.0), (4.0, 2.0), (4, 2))
     fdem.assignments.element_model(model, "mech_iso_elastic", ROCK)
     return model
 

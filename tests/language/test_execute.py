@@ -54,14 +54,22 @@ class _Module:
     def __getattr__(self, command):
         def call(sim, *args, **kwargs):
             name = f"{self.module}.{command}"
-            real = getattr(importlib.import_module(f"hpcdem.commands.dem.{self.module}"), command)
-            inspect.signature(real).bind(sim, *args, **kwargs)
-            self.recorder.calls.append((name, args, kwargs))
+            self.recorder.calls.append(by_name(name, args, kwargs))
             self.recorder.positions.append((sim.position, sim.line))
             if name in self.recorder.fail:
                 raise self.recorder.fail[name]
 
         return call
+
+
+def by_name(command, args, kwargs):
+    """A call, which must fit the signature of the real command, with all its arguments by name."""
+    module, _, name = command.partition(".")
+    real = getattr(importlib.import_module(f"hpcdem.commands.dem.{module}"), name)
+    given = inspect.signature(real).bind(None, *args, **kwargs).arguments
+    more = [one.name for one in inspect.signature(real).parameters.values() if one.kind is one.VAR_KEYWORD]
+    given |= {key: value for name in more for key, value in given.pop(name, {}).items()}
+    return command, (), {key: value for key, value in given.items() if key != "sim"}
 
 
 def run(text, file="/models/a.py", fail=None, **how):
@@ -109,9 +117,9 @@ A = Group("a")
          [("particles.gline", (), {"p1": (0.0, 0.0), "p2": (9.0, 0.0), "rad": 1.0, "cratio": 0.4})]),
         ("DEL RANGE y {top}-1000.0 {top}", [("particles.delete", (Interval("y", 3000.0, 4000.0),), {})]),
         ("DEL", [("particles.delete", (None,), {})]),
-        ("EXP b.dat", [("particles.export", ("/models/b.dat",), {"with_group": False, "where": None})]),
+        ("EXP b.dat", [("particles.export", ("/models/b.dat",), {"where": None})]),
         ("EXP /tmp/B.dat GROUP RANGE group a",
-         [("particles.export", ("/tmp/B.dat",), {"with_group": True, "where": A})]),
+         [("particles.export", ("/tmp/B.dat",), {"group": True, "where": A})]),
         ("PROP den 1 hertz color 3 group b RANGE group a",
          [("properties.prop", (A,), {"density": 1.0, "hertz": True, "color": 3, "group": "b"})]),
         ("INI xv 0 spin 1", [("properties.prop", (None,), {"xv": 0.0, "spin": 1.0})]),
@@ -145,7 +153,7 @@ A = Group("a")
     ],
 )  # fmt: skip
 def test_every_command(line, calls):
-    assert calls_of(line) == calls
+    assert calls_of(line) == [by_name(*call) for call in calls]
 
 
 def test_the_simulation_knows_where_it_is():
@@ -192,13 +200,14 @@ def test_files_are_looked_for_beside_the_script_then_in_data(tmp_path, folder, l
     place.mkdir(exist_ok=True)
     (place / "1.sav").touch()
     recorder, _ = run(line, file=str(tmp_path / "a.py"))
-    assert recorder.calls[0] == (command, (str(place / "1.sav"),), {})
+    assert recorder.calls[0] == (command, (), {"file": str(place / "1.sav")})
 
 
 def test_load_takes_a_scale_and_a_window(tmp_path):
     (tmp_path / "a.dat").touch()
     recorder, _ = run("LOAD a.dat scale 2 x 0 1 y 2 3", file=str(tmp_path / "a.py"))
-    assert recorder.calls[0][2] == {"scale": 2.0, "x": (0.0, 1.0), "y": (2.0, 3.0)}
+    file = str(tmp_path / "a.dat")
+    assert recorder.calls[0][2] == {"file": file, "scale": 2.0, "x": (0.0, 1.0), "y": (2.0, 3.0)}
 
 
 def test_a_file_that_is_not_there(tmp_path):
@@ -220,7 +229,7 @@ def test_rank_0_looks_for_files(tmp_path):
     sim, recorder = Sim(), Recorder()
     sim.comm = Comm()
     carry_out(parse_text("RES 1.sav", str(tmp_path / "a.py")), recorder, sim)
-    assert recorder.calls[0] == ("checkpoints.restore", ("/from/rank/0",), {})
+    assert recorder.calls[0] == ("checkpoints.restore", (), {"file": "/from/rank/0"})
 
 
 # ---- going on after a checkpoint

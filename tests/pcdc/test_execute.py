@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 
 from hpcdem.core.errors import HpcdemError, ScriptError
-from hpcdem.lang.pcdc.bindings import BINDINGS
+from hpcdem.lang.pcdc.bindings import CONVERTERS, argument, takes
 from hpcdem.lang.pcdc.table import PCDC
 
 BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right group 'rock' set 'domain'\n"
@@ -18,8 +20,23 @@ def failure(bench, text: str) -> str:
     return str(caught.value)
 
 
-def test_every_command_has_a_binding():
-    assert set(BINDINGS) == {c.name for c in PCDC.commands if not (c.idle or c.refused)}
+def test_every_command_and_model_has_a_function_that_takes_its_words():
+    used = set()
+    for command in (c for c in PCDC.commands if not (c.idle or c.refused)):
+        for row in command.models or (command,):
+            if row.does in CONVERTERS:
+                used.add(row.does)
+                continue
+            wanted = takes(row.does)
+            options = row.options if "properties" not in wanted else ()
+            words = {argument(o.name) for o in (*row.leading, *options) if not o.refused}
+            words |= {argument(w.name) for o in options if o.values and not o.repeated for w in o.more}
+            words |= {name for name, _ in row.fixed}
+            others = {name for name in wanted if wanted[name].kind is not inspect.Parameter.VAR_KEYWORD}
+            assert words <= others or len(others) < len(wanted), (command.name, row.does, words - others)
+            needed = {name for name in others if wanted[name].default is inspect.Parameter.empty}
+            assert needed <= words | {"kind", "name", "properties", "where"}, (command.name, row.does, needed - words)
+    assert used == set(CONVERTERS)
 
 
 def test_the_loop_of_the_manual(bench):

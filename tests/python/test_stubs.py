@@ -48,7 +48,7 @@ def test_a_method_of_particles_has_the_arguments_of_its_function(name: str) -> N
     method = OF_FUNCTIONS[name]
     module, _, function = method.made_by.name.partition(".")
     real = inspect.signature(getattr(getattr(dem, module), function)).parameters
-    names = {method.made_by.names.get(one, one): value for one, value in real.items() if one not in ("sim", "folder")}
+    names = {one: value for one, value in real.items() if one not in ("sim", "folder")}
     own = {one: value for one, value in inspect.signature(method).parameters.items() if one != "self"}
     assert own.keys() == names.keys() and inspect.getdoc(method)
     for one, parameter in own.items():

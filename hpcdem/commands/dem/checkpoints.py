@@ -8,14 +8,14 @@ from hpcdem.physics.dem import saved_state
 from hpcdem.physics.dem.simulation import Simulation
 
 
-def save(sim: Simulation, path: Path | str) -> None:
+def save(sim: Simulation, file: Path | str) -> None:
     """SAV: write the state to this name."""
-    saved_state.save(sim, path)
+    saved_state.save(sim, file)
 
 
-def restore(sim: Simulation, path: Path | str) -> None:
+def restore(sim: Simulation, file: Path | str) -> None:
     """RES: go on from a file written by SAV; the place in the present script stays."""
-    saved_state.restore(sim, path)
-    sim.restored = Path(path), sim.clock.step
+    saved_state.restore(sim, file)
+    sim.restored = Path(file), sim.clock.step
     if sim.energy is not None and sim.energy.running:
         sim.energy.pause(sim)  # the CYC in which the file was written is not taken up

@@ -38,7 +38,7 @@ MOST_MEMBERS = 10**5
 
 def clump(
     sim: Simulation,
-    path: Path | str,
+    file: Path | str,
     x: float = 0.0,
     y: float = 0.0,
     angle: float = 0.0,
@@ -52,7 +52,7 @@ def clump(
 
     Parameters
     ----------
-    path : the file.
+    file : the file.
     x, y : way [m].
     angle : of the turn [rad].
     scale : factor on all lengths.
@@ -65,7 +65,7 @@ def clump(
     _need_discs(sim)
     sim.prepare_kernels("clumps")
     try:
-        bodies = on_first(sim.comm, lambda: read_clumps(path))
+        bodies = on_first(sim.comm, lambda: read_clumps(file))
     except HpcdemError as problem:
         raise CommandError(str(problem)) from None
     if not (math.isfinite(scale) and scale > 0.0):

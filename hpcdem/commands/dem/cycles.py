@@ -39,12 +39,12 @@ TOUCHING = 8
 """Contacts of one particle, no more than which are thought of where a time step is called small without a look."""
 
 
-def cycle(sim: Simulation, n: int) -> None:
-    """CYC: n steps. Output at steps that are multiples of the SET intervals, and an `_ini` frame before the first."""
-    if n < 0:
-        raise CommandError(f"CYC needs a number of steps that is not negative, got {n}")
+def cycle(sim: Simulation, steps: int) -> None:
+    """CYC: so many steps. Output at those that are multiples of the SET intervals, an `_ini` frame before the first."""
+    if steps < 0:
+        raise CommandError(f"CYC needs a number of steps that is not negative, got {steps}")
     intervals = {kind: getattr(sim.settings, kind) for kind in OUTPUTS}
-    _begin(sim, "CYC", n, 0, intervals, final_frame=False)
+    _begin(sim, "CYC", steps, 0, intervals, final_frame=False)
 
 
 def imple(

@@ -33,7 +33,7 @@ def start(sim: Simulation) -> None:
 
 def load(
     sim: Simulation,
-    path: Path | str,
+    file: Path | str,
     scale: float = 1.0,
     x: tuple[float, float] | None = None,
     y: tuple[float, float] | None = None,
@@ -43,7 +43,7 @@ def load(
 
     Parameters
     ----------
-    path : the file.
+    file : the file.
     scale : factor on all lengths, of rows.
     x, y : only centres in these ranges, (least, greatest), in the numbers of the file.
 
@@ -51,14 +51,14 @@ def load(
     -------
     int : how many there are.
     """
-    if sim.comm.bcast(is_frame(path) if sim.comm.rank == 0 else None):
+    if sim.comm.bcast(is_frame(file) if sim.comm.rank == 0 else None):
         if scale != 1.0:
-            raise CommandError(f"scale {scale:g} is for files of x y r; {path} is a frame, with stiffnesses and forces")
-        return load_frame(sim, path, x, y)
+            raise CommandError(f"scale {scale:g} is for files of x y r; {file} is a frame, with stiffnesses and forces")
+        return load_frame(sim, file, x, y)
     if not scale > 0.0:
         raise CommandError(f"scale must be positive, got {scale:g}")
     comm = sim.comm
-    rows, names = _read_xyr(sim, Path(path))
+    rows, names = _read_xyr(sim, Path(file))
     keep = np.ones(len(rows), bool)
     for bounds, column in ((x, rows[:, 0]), (y, rows[:, 1])):
         if bounds is not None:
@@ -66,7 +66,7 @@ def load(
     of_file, rows, names = sim.count(len(rows)), rows[keep] * scale, names[keep]
     kept = sim.count(len(rows))
     if not kept:
-        raise CommandError(f"none of the {of_file} particles of {path} lies within the bounds of x and y")
+        raise CommandError(f"none of the {of_file} particles of {file} lies within the bounds of x and y")
     check_circles(comm, rows)
     if sim.log is not None and kept < of_file:
         sim.log.info(f"LOAD: {kept} of {of_file} particles lie within the bounds")
@@ -128,7 +128,7 @@ def _agree(sim: Simulation, error: str | None) -> None:
 
 
 def ball(
-    sim: Simulation, gid: int | None, x: float, y: float, rad: float, color: int = 0, group: str = NO_GROUP
+    sim: Simulation, id: int | None, x: float, y: float, rad: float, color: int = 0, group: str = NO_GROUP
 ) -> None:
     """BALL: one particle.
 
@@ -136,22 +136,22 @@ def ball(
     ----------
     x, y : place of its centre [m].
     rad : radius [m].
-    gid : number; left out, the next free one.
+    id : number; left out, the next free one.
     color, group : name or number; name.
     """
     limits.check_circle(x, y, rad)
-    if gid is not None:
-        if gid < 0:
-            raise CommandError(f"id must not be negative, got {gid}")
-        if sim.comm.any(bool((sim.particles["gid"] == gid).any())):
-            raise CommandError(f"there is a particle with id {gid} already")
-    add(sim, np.array([[x, y, rad]]), sim.group_number(group), color, first_gid=gid)
+    if id is not None:
+        if id < 0:
+            raise CommandError(f"id must not be negative, got {id}")
+        if sim.comm.any(bool((sim.particles["gid"] == id).any())):
+            raise CommandError(f"there is a particle with id {id} already")
+    add(sim, np.array([[x, y, rad]]), sim.group_number(group), color, first_gid=id)
 
 
 def gen(
     sim: Simulation,
     num: int,
-    radii: list[float],
+    rad: list[float],
     x: tuple[float, float],
     y: tuple[float, float],
     color: int = 0,
@@ -165,7 +165,7 @@ def gen(
     Parameters
     ----------
     num : number of particles to place.
-    radii : radii that are drawn from [m].
+    rad : radii that are drawn from [m].
     x, y : sides of the rectangle, (least, greatest) [m].
     color, group : name or number; name.
 
@@ -173,12 +173,12 @@ def gen(
     -------
     int : how many found room.
     """
-    limits.check_rectangle(radii, x, y, grid=False)
+    limits.check_rectangle(rad, x, y, grid=False)
     limits.check_attempts(num, sim.settings.gentry)
-    existing = _near(sim, radii, x, y)
+    existing = _near(sim, rad, x, y)
     factor = sim.settings.gentry
     ends = {"attempts": max(int(factor * num), num)} if factor > 0.0 else {"in_a_row": FAILURES}
-    rows, tried = packing.insert_randomly(num, np.array(radii), x, y, existing, sim.settings.seed, sim.streams, **ends)
+    rows, tried = packing.insert_randomly(num, np.array(rad), x, y, existing, sim.settings.seed, sim.streams, **ends)
     sim.streams += 1
     made = add(sim, rows, sim.group_number(group), color)
     if sim.log is not None:
@@ -189,18 +189,18 @@ def gen(
 
 def gen_grid(
     sim: Simulation,
-    radii: list[float],
+    rad: list[float],
     x: tuple[float, float],
     y: tuple[float, float],
     idmin: int | None = None,
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """GEN grid: a particle at each node of a square lattice of spacing 2 max(radii).
+    """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad).
 
     Parameters
     ----------
-    radii : radii that are drawn from [m].
+    rad : radii that are drawn from [m].
     x, y : sides of the rectangle, (least, greatest) [m].
     idmin : first number; left out, the next free one.
     color, group : name or number; name.
@@ -209,10 +209,10 @@ def gen_grid(
     -------
     int : how many were made.
     """
-    limits.check_rectangle(radii, x, y, grid=True)
-    total = math.prod(packing.nodes(np.array(radii), x, y))
+    limits.check_rectangle(rad, x, y, grid=True)
+    total = math.prod(packing.nodes(np.array(rad), x, y))
     first, end = share(total, sim.comm)
-    rows = packing.lattice(np.array(radii), x, y, sim.settings.seed, sim.streams, first, end)
+    rows = packing.lattice(np.array(rad), x, y, sim.settings.seed, sim.streams, first, end)
     sim.streams += 1
     if idmin is not None and idmin < sim.next_gid and sim.count(len(sim.particles)):
         raise CommandError(f"idmin {idmin}: ids below {sim.next_gid} are taken or were once")
@@ -262,13 +262,13 @@ def delete(sim: Simulation, where: Selection | None = None) -> int:
     return sim.remove(chosen(sim, where))
 
 
-def export(sim: Simulation, path: Path | str, with_group: bool = False, where: Selection | None = None) -> None:
+def export(sim: Simulation, file: Path | str, group: bool = False, where: Selection | None = None) -> None:
     """EXP: rows "x y r [group]" in the order of ids, 13 significant digits.
 
     Parameters
     ----------
-    path : the file.
-    with_group : with the names of groups.
+    file : the file.
+    group : with the names of groups.
     where : the particles.
     """
     p = sim.particles
@@ -283,10 +283,10 @@ def export(sim: Simulation, path: Path | str, with_group: bool = False, where: S
         ints, reals = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
         order = np.argsort(ints[:, 0])
         lines = []
-        for (_, group), (x, y, r) in zip(ints[order], reals[order], strict=True):
-            lines.append(f"{x:.12e}   {y:.12e}   {r:.12e}" + (f"   {sim.groups[group]}" if with_group else ""))
+        for (_, of), (x, y, r) in zip(ints[order], reals[order], strict=True):
+            lines.append(f"{x:.12e}   {y:.12e}   {r:.12e}" + (f"   {sim.groups[of]}" if group else ""))
         text = "\n".join(lines) + "\n"
-    write_sections(path, sim.comm, lambda: [text.encode()])
+    write_sections(file, sim.comm, lambda: [text.encode()])
 
 
 def check_circles(comm: Comm, rows: np.ndarray) -> None:

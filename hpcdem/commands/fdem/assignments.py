@@ -26,7 +26,7 @@ Number = float | str
 """A number, or the name of a table of time."""
 
 
-def group(project: Project, kind: str, name: str, set_name: str = DEFAULT, where: Range | None = None) -> None:
+def group(project: Project, kind: str, group: str, set_name: str = DEFAULT, where: Range | None = None) -> None:
     """Put objects of a kind (model.blocks.groups) into a group, also of elements that were taken out: these may come
     back. They leave the one of the set that they were in."""
     found, groups = everything(project, kind, where, null_too=True), project.groups[kind]
@@ -37,9 +37,9 @@ def group(project: Project, kind: str, name: str, set_name: str = DEFAULT, where
         new = sides.corners(mesh.cells, found, len(mesh.points))
         for other, members in known.items():
             old = sides.corners(mesh.cells, members, len(mesh.points))
-            known[other] = sides.numbers(mesh.cells, old | new if other == name else old & ~new, every)
-        found = known.get(name, found)
-    groups.assign(found, name, set_name)
+            known[other] = sides.numbers(mesh.cells, old | new if other == group else old & ~new, every)
+        found = known.get(group, found)
+    groups.assign(found, group, set_name)
 
 
 def element_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
@@ -59,29 +59,21 @@ def around(project: Project, where: Range | None) -> Range | None:
     return None if where is None else (Around(tuple(everything(project, ELEMENT, where).tolist())),)
 
 
-def load_law(project: Project, law: str) -> None:
+def load_law(project: Project, law: str) -> UserLaw:
     """Read, check and compile a law 'file.py:function' of the user. Collective."""
-    _law(project, law)
-
-
-def _law(project: Project, law: str) -> UserLaw:
     return user_laws.load(project.blocks, project.to_read(law.rpartition(":")[0]), law)
 
 
-def load_function(project: Project, name: str) -> None:
-    """Read, check and compile a function 'file.py:function' of place and time. Collective."""
-    function(project, name)
-
-
-def function(project: Project, name: str) -> str:
-    """The same; returns its name as value of a condition. Collective."""
-    return user_functions.load(project.blocks, project.to_read(name.rpartition(":")[0]), name)
+def load_function(project: Project, function: str) -> str:
+    """Read, check and compile a function 'file.py:function' of place and time; returns its name as value of a
+    condition. Collective."""
+    return user_functions.load(project.blocks, project.to_read(function.rpartition(":")[0]), function)
 
 
 def user_model(project: Project, law: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """The same, and elements get it, with its properties. Collective."""
+    """Elements get a law of the user, with its properties. Collective."""
     project.ready()
-    element_model(project, _law(project, law).name, properties, where)
+    element_model(project, load_law(project, law).name, properties, where)
 
 
 def null(project: Project, relax: float = 0.0, where: Range | None = None) -> None:
@@ -198,16 +190,18 @@ def force(
     blocks.force_condition(nodes, *from_now(project, blocks.time_now(), {"fx": fx, "fy": fy, "fz": fz}).values())
 
 
-def damp(project: Project, alpha: float, where: Range | None = None) -> None:
+def damp(project: Project, local: float, where: Range | None = None) -> None:
     """Local damping of nodes, from 0 to 1, in the place of that of the model."""
     blocks = project.ready()
-    if alpha > 0.0 and blocks.budget is not None:
+    if local > 0.0 and blocks.budget is not None:
         raise CommandError("the energy budget knows no local damping of nodes: model option energy off")
-    blocks.damp_nodes(chosen(project, NODE, where), alpha)
+    blocks.damp_nodes(chosen(project, NODE, where), local)
 
 
-def move(project: Project, kind: int, direction: tuple[float, ...] = (0.0, 0.0), where: Range | None = None) -> None:
-    """Freedom of nodes: 0 free, 1 held, 2 along the direction only, 3 (in space) across it only."""
+def move(project: Project, type: Sequence[Any], where: Range | None = None) -> None:
+    """Freedom of nodes: 0 free, 1 held, 2 along a direction only, which follows the number, 3 (in space) across it
+    only."""
+    kind, direction = type if len(type) == 2 else (type[0], (0.0,) * project.dim)
     if kind not in (0, 1, 2) and (kind != 3 or project.dim == 2):
         raise CommandError(f"type {kind} is unknown: 0 free, 1 held, 2 along a vector" + ", 3 is for 3-D" * (kind == 3))
     if kind in (2, 3) and not any(direction):
@@ -302,12 +296,12 @@ def _known(project: Project, *values: Number | None) -> None:
 
 
 def table(
-    project: Project, name: str, pairs: list[tuple[float, float]] | None = None, relative: bool | None = None
+    project: Project, name: str, values: list[tuple[float, float]] | None = None, relative: bool | None = None
 ) -> None:
     """A function of time, linear from point to point; relative: its times count from when a condition takes it. What is
     not given stays."""
-    if pairs is not None:
-        project.blocks.table(name, pairs)
+    if values is not None:
+        project.blocks.table(name, values)
     elif name not in project.blocks.tables:
         raise CommandError(f"there is no table '{name}' yet: data makes it")
     if relative is not None:

@@ -50,13 +50,13 @@ def between(
     project: Project,
     first: Sequence[float],
     second: Sequence[float],
-    size: float = SIZE,
+    mesh_size: float = SIZE,
     group: str | None = None,
     set_name: str = DEFAULT,
     where: Range | None = None,
 ) -> None:
-    """Install a bolt from a point to another [m] in elements no longer than size, one in each part of the way that lies
-    in the rock, or in these elements of it. CommandError if none does."""
+    """Install a bolt from a point to another [m] in elements no longer than mesh_size, in each part that lies in the
+    rock, or in these elements of it. CommandError if none does."""
     blocks = project.ready()
     alive = np.zeros(len(blocks.alive), bool)
     alive[everything(project, ELEMENT, where)] = True
@@ -67,7 +67,7 @@ def between(
     if not len(pieces):
         raise CommandError("no part of the bolt lies in the rock")
     for ends in pieces:
-        create(project, ends.tolist(), length=size, group=group, set_name=set_name)
+        create(project, ends.tolist(), length=mesh_size, group=group, set_name=set_name)
     left = float(layout.lengths(pieces[:, 1] - pieces[:, 0]).sum())
     whole = float(layout.lengths((line[1] - line[0])[None])[0])
     if project.log is not None and left < whole * (1.0 - 1e-9):

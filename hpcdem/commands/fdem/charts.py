@@ -48,8 +48,8 @@ def add(
     """
     chart = _chart(project, name)
     if profile:
-        values, label = _profile(project, profile, where), label or profile.replace("_", " ")
-        values = [(scale_x * s, scale_y * value) for s, value in values]
+        found, label = _profile(project, profile.replace("-", "_"), where), label or profile.replace("-", " ")
+        values = [(scale_x * s, scale_y * value) for s, value in found]
     for history in filter(None, (x, y)):
         find(project, history)
     chart.curves.append(Curve(label or y or "points", x, y, scale_x, scale_y, list(values), style))
@@ -88,7 +88,7 @@ def _by_number(values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
 
 
 def export(
-    project: Project, name: str, path: str, cracks: bool = False, plastic: bool = False, fluid: str = "",
+    project: Project, name: str, file: str, cracks: bool = False, plastic: bool = False, fluid: str = "",
     temperature: bool = False,
 ) -> None:  # fmt: skip
     """Write the diagram as a figure into the folder of the results, and its curves as CSV beside it: curve, x, y, one
@@ -96,8 +96,8 @@ def export(
     figure also shows the model at this moment, with one of them. Collective."""
     from hpcdem.post.charts import draw
 
-    chart, figure = _chart(project, name), project.result(path)
-    figure_name(path)
+    chart, figure = _chart(project, name), project.result(file)
+    figure_name(file)
     beside = [panel for panel in ("cracks" * cracks, "plastic" * plastic, "temperature" * temperature, fluid) if panel]
     if len(beside) > 1:
         raise CommandError("cracks, plastic, temperature and fluid: beside a diagram there is room for one of them")
@@ -110,8 +110,8 @@ def export(
     rows = [f"{histories._quoted(label)},{x!r},{y!r}" for label, _, points in curves for x, y in points]
     titles = [histories._quoted(text) for text in (chart.x_label or "x", chart.y_label or "y")]
     text = "\n".join([",".join(["curve", *titles]), *rows]) + "\n"
-    for file in (figure, figure.with_suffix(".csv")):
-        project.to_write(file)
+    for written in (figure, figure.with_suffix(".csv")):
+        project.to_write(written)
     project.folder()
     make_folder(figure.parent, project.comm)
     write_sections(figure.with_suffix(".csv"), project.comm, lambda: [text.encode()])

@@ -34,9 +34,9 @@ def named(path: str) -> str:
     return path if Path(path).suffix else path + SUFFIX
 
 
-def save(project: Project, path: str) -> None:
+def save(project: Project, file: str) -> None:
     """The whole state to a file beside the script, `SUFFIX` behind a name without an ending. Collective."""
-    _write(project, project.to_write(project.path(named(path))), {"names": project.names()})
+    _write(project, project.to_write(project.path(named(file))), {"names": project.names()})
 
 
 def write_checkpoint(project: Project, automatic: bool = False) -> Path:

@@ -107,7 +107,7 @@ def time(project: Project, part: str) -> float:
     return float(_physics(project, part).time)
 
 
-def query(project: Project, *parts: str) -> None:
+def query(project: Project, **parts: Mapping[str, Any]) -> None:
     """Say in the log what time these parts have come to, and their time step. Collective."""
     for part in parts:
         of = project.blocks.clock if part == MECHANICAL else _physics(project, part)

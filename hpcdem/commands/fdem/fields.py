@@ -72,11 +72,11 @@ def initial(project: Project, name: str, value: float, where: Range | None = Non
 
 
 def clock(
-    project: Project, name: str, flows: bool | None = None, sub_steps: int | None = None,
+    project: Project, field: str, flows: bool | None = None, sub_steps: int | None = None,
     time_step: float | None = None, current_time: float | None = None,
 ) -> None:  # fmt: skip
     """Whether the field flows; sub-steps of a cycle; their length [s]; what its clock shows now [s]."""
-    found = of(project, name)
+    found = of(project, field)
     found.clock(flows, sub_steps, time_step)
     if current_time is not None:
         found.set_clock(current_time)

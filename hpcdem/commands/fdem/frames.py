@@ -30,22 +30,21 @@ from hpcdem.physics.fields import kinds
 from hpcdem.physics.flow.model import Flow
 
 
-def vtk(project: Project, name: str, every: int | None = None) -> None:
-    """Write `<name>_<step>.vtkhdf` into the folder of the results: now, or every so many steps. Collective."""
-    frames_name(name)
+def vtk(project: Project, file: str, every: int | None = None, off: bool = False) -> None:
+    """Write `<file>_<step>.vtkhdf` into the folder of the results: now, or every so many steps; off: no more of this
+    name. Collective."""
+    if off:
+        if file not in project.frames:
+            known = ", ".join(f"'{other}'" for other in project.frames) or "none"
+            raise CommandError(f"there are no frames '{file}' to stop; there is {known}")
+        del project.frames[file]
+        return
+    frames_name(file)
     if every is None:
         project.ready(use=False)
-        _write(project, name)
+        _write(project, file)
     else:
-        project.frames[name] = every
-
-
-def stop(project: Project, name: str) -> None:
-    """No more frames of this name."""
-    if name not in project.frames:
-        known = ", ".join(f"'{other}'" for other in project.frames) or "none"
-        raise CommandError(f"there are no frames '{name}' to stop; there is {known}")
-    del project.frames[name]
+        project.frames[file] = every
 
 
 def write_due(project: Project) -> None:

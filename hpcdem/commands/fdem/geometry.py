@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.commands.fdem.values import DEFAULT_LAYER
 from hpcdem.core.errors import CommandError
 from hpcdem.io.agreed import on_first
 from hpcdem.pre.mesh import cad, dxf, solids
@@ -44,17 +45,18 @@ def create(project: Project, kind: str, layer: str, *values: Any) -> None:
     project.layers.add(layer, *shape(kind, *values))
 
 
-def extrude(project: Project, layer: str, of: str, along: Vector) -> None:
-    """The polygons of a layer, drawn along a way [m], as bodies of another."""
-    project.layers.add(layer, *(solids.made("extrude", one.corners, along) for one in _polygons(project, of)))
+def extrude(project: Project, layer: str, along: Vector, as_layer: str = DEFAULT_LAYER) -> None:
+    """The polygons of a layer, drawn along a vector [m], as bodies of another."""
+    project.layers.add(as_layer, *(solids.made("extrude", one.corners, along) for one in _polygons(project, layer)))
 
 
 def revolve(
-    project: Project, layer: str, of: str, axis: Vector, about: Vector = (0.0, 0.0, 0.0), angle: float = solids.FULL
-) -> None:
+    project: Project, layer: str, axis: Vector, about: Vector = (0.0, 0.0, 0.0), angle: float = solids.FULL,
+    as_layer: str = DEFAULT_LAYER,
+) -> None:  # fmt: skip
     """The polygons of a layer, turned about an axis through a point [m] by an angle [degrees], as bodies of another."""
-    made = (solids.made("revolve", one.corners, about, axis, angle) for one in _polygons(project, of))
-    project.layers.add(layer, *made)
+    made = (solids.made("revolve", one.corners, about, axis, angle) for one in _polygons(project, layer))
+    project.layers.add(as_layer, *made)
 
 
 def _polygons(project: Project, layer: str) -> list[solids.Polygon]:
@@ -64,25 +66,27 @@ def _polygons(project: Project, layer: str) -> list[solids.Polygon]:
     return found
 
 
-def import_file(project: Project, layer: str, path: str, of: str | None = None, scale: float | None = None) -> None:
+def import_file(
+    project: Project, file: str, as_layer: str = DEFAULT_LAYER, dxf_layer: str | None = None, scale: float | None = None
+) -> None:
     """The lines of a DXF file, or of one of its layers; in space the solids of a STEP or BREP file, or what the
     triangles of an STL or DXF file enclose. scale: metres in a unit of the file; None: as the file says, else 1.
     Collective."""
-    file = project.to_read(path)
-    if project.dim == 3 and of is not None and file.suffix.lower() != ".dxf":
-        raise CommandError(f"{file}: layers are of DXF files")
+    path = project.to_read(file)
+    if project.dim == 3 and dxf_layer is not None and path.suffix.lower() != ".dxf":
+        raise CommandError(f"{path}: layers are of DXF files")
 
     def make() -> tuple[list[Any], list[str]]:
         notes: list[str] = []
         if project.dim == 3:
-            return cad.read(file, of, scale, notes), notes
-        drawing = dxf.opened(file)
+            return cad.read(path, dxf_layer, scale, notes), notes
+        drawing = dxf.opened(path)
         unit = dxf.metres(drawing, scale, notes)
-        found = dxf.curves(drawing, file, {of} if of else None)
+        found = dxf.curves(drawing, path, {dxf_layer} if dxf_layer else None)
         return [shapes.transformed(curve, scale=unit) for curves in found.values() for curve in curves], notes
 
     made, notes = made_once(project.comm, make)
-    project.layers.add(layer, *made)
+    project.layers.add(as_layer, *made)
     if project.log is not None:
         bounds = [
             one.bounds() if project.dim == 3 else (one.points.min(axis=0), one.points.max(axis=0)) for one in made
@@ -91,7 +95,7 @@ def import_file(project: Project, layer: str, path: str, of: str | None = None, 
         high = np.max([b[1] for b in bounds], axis=0)
         first, last = (", ".join(f"{c:g}" for c in at) for at in (low, high))
         project.log.info(
-            f"layer '{layer}': from ({first}) to ({last}) m; {file.name}: {'; '.join(notes) or 'in metres'}"
+            f"layer '{as_layer}': from ({first}) to ({last}) m; {path.name}: {'; '.join(notes) or 'in metres'}"
         )
 
 
@@ -109,11 +113,20 @@ def transform(
     if scale <= 0.0:
         raise CommandError(f"a scale is above 0, got {scale:g}")
     given = {"about": about, "translate": move, "axis": axis}
-    moved(project, [layer], scale=scale, rotate=rotate, **{k: v for k, v in given.items() if v is not None})
+    _move(project, [layer], scale=scale, rotate=rotate, **{k: v for k, v in given.items() if v is not None})
 
 
-def moved(project: Project, layers: Sequence[str] | None = None, **how: Any) -> None:
-    """Scale (factors along the axes), turn or translate [m] layers; None: all of them."""
+def scale(project: Project, factors: Vector, layer: Sequence[str] | None = None) -> None:
+    """Multiply the coordinates of layers; None: of all of them."""
+    _move(project, layer, scale=factors)
+
+
+def translate(project: Project, way: Vector, layer: Sequence[str] | None = None) -> None:
+    """Move layers [m]; None: all of them."""
+    _move(project, layer, translate=way)
+
+
+def _move(project: Project, layers: Sequence[str] | None, **how: Any) -> None:
     every = list(project.layers) if layers is None else list(dict.fromkeys(layers))
     for layer in every:
         _ = project.layers[layer]
@@ -125,14 +138,14 @@ def _transformed(one: Any, **how: Any) -> Any:
     return (shapes if isinstance(one, shapes.Curve) else solids).transformed(one, **how)
 
 
-def export(project: Project, layers: Sequence[str], path: str) -> None:
+def export(project: Project, layers: Sequence[str], file: str) -> None:
     """Write layers to a DXF file in the folder of the results, each as a layer of its name, in metres. Collective."""
-    if not path.lower().endswith(".dxf"):
-        raise CommandError(f"'{path}': layers are exported to files *.dxf")
+    if not file.lower().endswith(".dxf"):
+        raise CommandError(f"'{file}': layers are exported to files *.dxf")
     wanted = {layer: project.layers[layer] for layer in dict.fromkeys(layers)}
     project.folder()
-    file = project.to_write(project.result(path))
-    on_first(project.comm, lambda: dxf.write(file, wanted))
+    path = project.to_write(project.result(file))
+    on_first(project.comm, lambda: dxf.write(path, wanted))
 
 
 def delete(project: Project, layers: Sequence[str]) -> None:

@@ -37,7 +37,7 @@ def create(
     name: str,
     kind: str,
     value: str,
-    ident: int | None = None,
+    id: int | None = None,
     nearest: tuple[float, ...] | None = None,
     how: str = "",
     every: int = 1,
@@ -63,7 +63,7 @@ def create(
         raise CommandError("object well and well, its name, go together")
     if well:
         needed(project, Flow).well(well)
-    numbers = [] if kind in (MODEL, WELL) else _followed(project, kind, ident, nearest, where).tolist()
+    numbers = [] if kind in (MODEL, WELL) else _followed(project, kind, id, nearest, where).tolist()
     _check_value(project, kind, value)
     if kind == JOINT and value in diagnostics.QUANTITIES:
         _warn_of_nothing(project, name, value, numbers)
@@ -203,10 +203,10 @@ def _line(row: Sequence[float]) -> str:
     return ",".join(repr(number) for number in row)
 
 
-def export(project: Project, path: str, names: Sequence[str] = ()) -> None:
+def export(project: Project, file: str, names: Sequence[str] = ()) -> None:
     """Write histories side by side as CSV into the folder of the results: step, time, one column each, empty where one
     has no record. Collective."""
-    result_name(path)
+    result_name(file)
     wanted = {name: find(project, name) for name in names} or project.histories
     if not wanted:
         raise CommandError("there is no history to write")
@@ -221,10 +221,10 @@ def export(project: Project, path: str, names: Sequence[str] = ()) -> None:
     for step in sorted(by_step):
         cells = [repr(by_step[step][name]) if name in by_step[step] else "" for name in wanted]
         lines.append(",".join([str(step), repr(times[step]), *cells]))
-    file = project.to_write(project.result(path))
+    path = project.to_write(project.result(file))
     project.folder()
-    make_folder(file.parent, project.comm)
-    write_sections(file, project.comm, lambda: [("\n".join(lines) + "\n").encode()])
+    make_folder(path.parent, project.comm)
+    write_sections(path, project.comm, lambda: [("\n".join(lines) + "\n").encode()])
 
 
 def _quoted(title: str) -> str:

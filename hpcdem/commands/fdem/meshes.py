@@ -48,48 +48,51 @@ ARC_STEPS = 360
 
 def create(
     project: Project,
-    outline: str,
+    from_layer: str,
     size: float,
-    kind: str = "tri",
+    type: str = "tri",
     group: str = DEFAULT,
     set_name: str = DEFAULT,
-    refine: Sequence[tuple[str, float, float | None]] = (),
-    holes: Sequence[str] = (),
-    regions: Sequence[tuple[str, str]] = (),
-    embedded: Sequence[str] = (),
-    cracks: Sequence[str] = (),
+    refine_layer: Sequence[tuple[str, float, float | None]] = (),
+    hole: Sequence[str] = (),
+    region: Sequence[tuple[str, str | None]] = (),
+    embed: Sequence[str] = (),
+    crack: Sequence[str] = (),
     irregular: bool = False,
     smooth: bool = False,
     bodies: bool = False,
 ) -> None:
-    """Mesh the inside of a layer with Gmsh; kind: "tri" or "quad"; irregular: triangles in no pattern; smooth: inner
+    """Mesh the inside of a layer with Gmsh; type: "tri" or "quad"; irregular: triangles in no pattern; smooth: inner
     points in the middle of their neighbours. Collective.
 
-    refine: (layer, size there [m], distance over which it grows [m] or None); holes: layers whose inside stays empty;
-    regions: (layer, group) of parts with a group of their own; embedded: layers that become edges; cracks: layers that
-    become edges with a crack. In space embedded and cracks are layers of surfaces, which become faces; bodies: each
-    body of the outline is a group of its own, by its name in the file it is of, else by the layer and its number.
+    refine_layer: (layer, size there [m], distance over which it grows [m] or None); hole: layers whose inside stays
+    empty; region: (layer, group, else its name) of parts with a group of their own; embed: layers that become edges;
+    crack: layers that become edges with a crack. In space embed and crack are layers of surfaces, which become faces;
+    bodies: each body of the outline is a group of its own, by its name in the file it is of, else by the layer and its
+    number.
     """
-    for layer in (outline, *(name for name, *_ in refine), *holes, *(name for name, _ in regions), *embedded, *cracks):
+    regions = [(layer, name or layer) for layer, name in region]
+    named = (*(one[0] for one in refine_layer), *(one[0] for one in regions))
+    for layer in (from_layer, *named, *hole, *embed, *crack):
         _ = project.layers[layer]
     if project.dim == 3:
-        others = {"type": kind != "tri", "irregular": irregular, "smooth": smooth}
+        others = {"type": type != "tri", "irregular": irregular, "smooth": smooth}
         lost = [word for word, said in others.items() if said]
         if lost:
             raise CommandError(f"{lost[0]} of mesh create is for two dimensions")
-        _fill(project, outline, size, group, set_name, refine, holes, regions, embedded, cracks, bodies)
+        _fill(project, from_layer, size, group, set_name, refine_layer, hole, regions, embed, crack, bodies)
         return
     if bodies:
         raise CommandError("bodies of mesh create is for three dimensions")
     first = 0 if project.mesh is None else int(project.mesh.crack_sets.max(initial=-1)) + 1
     wishes = Wishes(
-        [Region(outline, group, set_name), *(Region(layer, name, set_name) for layer, name in regions)],
+        [Region(layer, name, set_name) for layer, name in ((from_layer, group), *regions)],
         size,
-        kind,
-        holes,
-        embedded,
-        [(layer, first + k) for k, layer in enumerate(cracks)],
-        refine=[Refinement(layer, fine, distance=distance) for layer, fine, distance in refine],
+        type,
+        hole,
+        embed,
+        [(layer, first + k) for k, layer in enumerate(crack)],
+        refine=[Refinement(layer, fine, distance=distance) for layer, fine, distance in refine_layer],
         irregular=irregular,
         smooth=smooth,
     )
@@ -132,43 +135,26 @@ def _fill(
     _add(project, mesh)
 
 
-def box(
-    project: Project,
-    first: tuple[float, ...],
-    second: tuple[float, ...],
-    cells: tuple[int, ...],
-    split: int = 6,
-    group: str = DEFAULT,
-    set_name: str = DEFAULT,
-    ratio: tuple[float, ...] = (1.0, 1.0, 1.0),
-    hexes: bool = False,
-) -> None:
-    """Regular tetrahedra in the box between two corners [m]; cells along x, y and z, each split into 5, 6 or 12, or
-    hexahedra; ratio: each is so many times as large as the one before. Its sides are the layers left, right, front,
-    back, bottom, top."""
-    lines, name = values.grid_lines(first, second, cells, ratio), (set_name, group)
-    _add(project, structured_space.hexes(lines, name) if hexes else structured_space.box(lines, split, name))
-
-
 def brick(
     project: Project,
-    corner: tuple[float, ...],
-    ends: Sequence[tuple[float, ...]],
-    cells: tuple[int, ...],
+    p0: tuple[float, ...],
+    p1: tuple[float, ...],
+    p2: tuple[float, ...],
+    n: tuple[int, ...],
+    p3: tuple[float, ...] | None = None,
     ratio: tuple[float, ...] | None = None,
-    split: bool = True,
+    triangle: bool = True,
     group: str = DEFAULT,
     set_name: str = DEFAULT,
 ) -> None:
-    """A regular mesh of the parallelogram, in space the parallelepiped, whose edges lead from a corner to two or three
-    ends [m]; cells along each, and ratio: each is so many times as large as the one before. split: into triangles or
-    tetrahedra, else quads or hexahedra. Its sides are the layers of `rectangle` and `box`."""
-    grid = values.brick(corner, ends, cells, ratio)
-    name = (set_name, group)
+    """A regular mesh of the parallelogram, in space the parallelepiped, whose edges lead from a corner p0 to the other
+    points [m]; n: cells along each, and ratio: each is so many times as large as the one before. triangle: into
+    triangles or tetrahedra, else quads or hexahedra. Its sides are the layers of `grid`."""
+    grid, name = values.brick(p0, [p1, p2, *([] if p3 is None else [p3])], n, ratio), (set_name, group)
     if grid.shape[-1] == 2:
-        _add(project, structured.of_grid(grid, "tri" if split else "quad", group=name))
+        _add(project, structured.of_grid(grid, "tri" if triangle else "quad", group=name))
     else:
-        _add(project, structured_space.of_grid(grid, group=name) if split else
+        _add(project, structured_space.of_grid(grid, group=name) if triangle else
              structured_space.hexes_of_grid(grid, name))  # fmt: skip
 
 
@@ -196,21 +182,28 @@ def patch(
     _add(project, Mesh.of(mesh.points, mesh.cells, mesh.groups, named, mesh.cracks, mesh.crack_sets))
 
 
-def rectangle(
+def grid(
     project: Project,
-    first: tuple[float, float],
-    second: tuple[float, float],
-    cells: tuple[int, int],
-    kind: str = "tri",
+    first: tuple[float, ...],
+    second: tuple[float, ...],
+    cells: tuple[int, ...],
+    type: str | None = None,
     diagonal: str = "alternate",
+    split: int = 6,
     group: str = DEFAULT,
     set_name: str = DEFAULT,
-    ratio: tuple[float, float] = (1.0, 1.0),
+    ratio: tuple[float, ...] | None = None,
 ) -> None:
-    """A regular mesh of the rectangle between two corners [m]; cells along x and y; ratio: each is so many times as
-    large as the one before. Its sides are the layers left, right, bottom and top."""
-    x, y = values.grid_lines(first, second, cells, ratio)
-    _add(project, structured.rectangle(x, y, kind, diagonal, (set_name, group)))
+    """A regular mesh of the rectangle, in space the box, between two corners [m]; cells along x and y (and z); type:
+    "tri" or "quad", in space "tet" (split: tetrahedra of each cell) or "hex"; ratio: each is so many times as large as
+    the one before. Its sides are the layers left, right, bottom and top, in space front and back too."""
+    lines = values.grid_lines(first, second, cells, ratio or (1.0,) * len(first))
+    name = (set_name, group)
+    if len(lines) == 2:
+        made = structured.rectangle(*lines, type or "tri", diagonal, name)
+    else:
+        made = structured_space.hexes(lines, name) if type == "hex" else structured_space.box(lines, split, name)
+    _add(project, made)
 
 
 def equilateral(
@@ -229,7 +222,7 @@ def equilateral(
 
 def import_file(
     project: Project,
-    path: str,
+    file: str,
     group: str | None = None,
     set_name: str = DEFAULT,
     merge: float = 0.0,
@@ -237,8 +230,8 @@ def import_file(
 ) -> None:
     """A mesh file of another program. Collective. group: one that all elements are put into; merge: points nearer than
     this are one [m]; scale: metres in a unit of the file."""
-    file = project.to_read(path)
-    found = made_once(project.comm, lambda: imported.read(file, merge, scale, project.dim))
+    path = project.to_read(file)
+    found = made_once(project.comm, lambda: imported.read(path, merge, scale, project.dim))
     mesh = found.mesh
     for included in found.files:
         project.to_read(str(included.absolute()))
@@ -253,16 +246,16 @@ def import_file(
     low, high = (", ".join(f"{c:g}" for c in at) for at in (mesh.points.min(axis=0), mesh.points.max(axis=0)))
     apart = int(bodies_of(mesh.face_partners()).max()) + 1
     said = f"{apart} bodies, which meet by contact" if apart > 1 else "one body"
-    _say(project, f"{file.name}: from ({low}) to ({high}) m, {said}")
+    _say(project, f"{path.name}: from ({low}) to ({high}) m, {said}")
     for kind, sets in ((ELEMENT, mesh.groups), (NODE, found.nodes), (FACE, found.faces)):
         names = [f"set '{name}': " + ", ".join(f"'{group}'" for group in of) for name, of in sets.items()]
         if names:
-            _say(project, f"{file.name}: groups of {kind}s, {'; '.join(names)}")
+            _say(project, f"{path.name}: groups of {kind}s, {'; '.join(names)}")
     if found.notes:
-        _say(project, f"{file.name}: left out: " + "; ".join(found.notes))
+        _say(project, f"{path.name}: left out: " + "; ".join(found.notes))
     unfit = fit.fit(project.whole_mesh(), cells).said()
     if unfit and project.log is not None:
-        project.log.warn(f"{file.name}: {unfit}")
+        project.log.warn(f"{path.name}: {unfit}")
 
 
 def intersect(project: Project, layer: str, follow: bool = False) -> None:
@@ -350,12 +343,15 @@ def delete(project: Project, where: Range | None = None) -> None:
     _say(project, f"element delete: {lost} elements are gone, {len(made.parent)} are left")
 
 
-def densify(project: Project, pattern: tuple[int, int], most: tuple[float, float], where: Range | None = None) -> None:
-    """Quads are halved along x, along y or both (pattern, 0 or 1) until they are no longer than `most` [m]; neighbours
-    follow, so that no side has more than one point on it; quads with such points become triangles. Collective."""
+def densify(
+    project: Project, maximum_length: Sequence[float], pattern: tuple[int, int] = (1, 1), where: Range | None = None
+) -> None:
+    """Quads are halved along x, along y or both (pattern, 0 or 1) until they are no longer than this [m], one number
+    for both; neighbours follow, so that no side has more than one point on it; quads with such points become triangles.
+    Collective."""
     project.refuse_in_use("elements are densified")
     mesh = project.whole_mesh()
-    elements = everything(project, ELEMENT, where)
+    elements, most = everything(project, ELEMENT, where), (maximum_length[0], maximum_length[-1])
     made = made_once(project.comm, lambda: quadtree.densified(mesh, elements, pattern, most))
     project.refit(made)
     _say(project, f"element densify: {len(made.parent) - len(mesh.cells)} more elements, {len(made.parent)} in all")

@@ -18,38 +18,40 @@ from hpcdem.physics.fdem.groups import SHOWN, Range, UseHidden
 
 def image(
     project: Project,
-    name: str,
+    file: str,
     view: str = "",
     field: str = "",
-    kind: str = "",
-    corners: tuple[tuple[float, float], tuple[float, float]] | None = None,
+    object: str = "",
+    camera: tuple[tuple[float, float], tuple[float, float]] | None = None,
     eye: str | None = None,
     section: str | None = None,
     deformed: float | None = None,
     title: str | None = None,
+    full: bool = False,
     where: Range | None = None,
     **looks: Any,
 ) -> None:
-    """Draw the model as it is now into `<name>_<step>.png` in the folder of the results (.pdf or .svg if the name ends
-    so). view: a file *.mv; field: what colours objects of this kind (else the first that have it); looks: values of
-    `hpcdem.post.view.model.Layer`; corners: of the part of the plane [m]; eye, section: in space, as in
-    `hpcdem.post.view.model.ModelView`; where: the objects of the kind that are shown. Collective."""
+    """Draw the model as it is now into `<file>_<step>.png` in the folder of the results (.pdf or .svg if the name ends
+    so). view: a file *.mv; field: what colours these objects (else the first that have it); looks: values of
+    `hpcdem.post.view.model.Layer`, full: all values have colours; camera: corners of the part of the plane [m]; eye,
+    section: in space, as in `hpcdem.post.view.model.ModelView`; where: the objects that are shown. Collective."""
     from hpcdem.post.view.model import ModelView, read_view
     from hpcdem.post.view.moment import of_blocks
     from hpcdem.post.view.paper import draw
     from hpcdem.post.view.scene import adjusted, default_view
 
-    frames_name(name)
-    suffix = Path(name).suffix.lower()
-    stem = name[: -len(suffix)] if suffix in FIGURES else name
-    if where is not None and kind not in SHOWN:
+    frames_name(file)
+    suffix = Path(file).suffix.lower()
+    stem = file[: -len(suffix)] if suffix in FIGURES else file
+    if where is not None and object not in SHOWN:
         raise CommandError(f"range goes with object, one of {', '.join(SHOWN)}")
     project.ready(use=False)
-    only = {} if where is None else {kind: np.asarray(everything(project, SHOWN[kind], where))}
+    only = {} if where is None else {object: np.asarray(everything(project, SHOWN[object], where))}
     if project.hidden.any():
         for of in ("elements", "joints"):
             only.setdefault(of, everything(project, SHOWN[of], (UseHidden(False),)))
-    file = project.to_read(view) if view else None
+    said = project.to_read(view) if view else None
+    looks |= {"limits": "full"} if full else {}
     step = project.step
     path = project.to_write(project.folder() / f"{stem}_{step:010d}{suffix if suffix in FIGURES else FIGURES[0]}")
     state = frames.whole(project)
@@ -59,13 +61,18 @@ def image(
     def picture() -> None:
         assert state is not None
         moment = of_blocks(state)
-        shown: ModelView = default_view(moment) if file is None else read_view(file)
+        shown: ModelView = default_view(moment) if said is None else read_view(said)
         more: dict[str, Any] = {"deformed": deformed, "title": title, "eye": eye, "section": section}
-        if corners is not None:
-            (left, bottom), (right, top) = corners
+        if camera is not None:
+            (left, bottom), (right, top) = camera
             more["camera"] = left, right, bottom, top
         more = {word: value for word, value in more.items() if value is not None}
-        draw(moment, path, adjusted(shown, moment, field or None, kind or None, looks, **more), only=only or None)
+        draw(
+            moment,
+            path,
+            adjusted(shown, moment, field.replace("-", "_") or None, object or None, looks, **more),
+            only=only or None,
+        )
 
     with project.blocks.timers.around("output"):
         on_first(project.comm, picture)

@@ -22,11 +22,11 @@ def new(project: Project, dim: int = 2) -> None:
     project.clear(dim)
 
 
-def gravity(project: Project, g: tuple[float, ...]) -> None:
+def gravity(project: Project, gravity: tuple[float, ...]) -> None:
     """Gravity (2,), in space (3,), [m/s2] from now on."""
-    if len(g) != project.dim:
-        raise CommandError(f"gravity: a vector of {project.dim} numbers is needed, got {len(g)}")
-    project.blocks.gravity(*g)
+    if len(gravity) != project.dim:
+        raise CommandError(f"gravity: a vector of {project.dim} numbers is needed, got {len(gravity)}")
+    project.blocks.gravity(*gravity)
 
 
 def units(project: Project, system: str) -> None:

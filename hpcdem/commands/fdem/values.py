@@ -22,6 +22,8 @@ from hpcdem.pre.mesh.pieces import Piece as Piece
 from hpcdem.pre.mesh.sizes import skew_grid, spaced
 
 FIGURES = (".png", ".pdf", ".svg")
+DEFAULT_LAYER = "default"
+"""Of shapes that name none."""
 
 
 def grid_lines(

@@ -19,7 +19,7 @@ def warm_up(threads: int = 1) -> None:
     physics.warm_up(threads)
     project = Project(Blocks(SerialComm(), threads))
     project.cracks_filed = 0  # no file is begun for them
-    meshes.rectangle(project, (0.0, 0.0), (2.0, 1.0), (2, 1))
+    meshes.grid(project, (0.0, 0.0), (2.0, 1.0), (2, 1))
     assignments.element_model(project, "mech_iso_elastic", physics.ROCK)
     steps.step(project, 2)
     assignments.joint_model(project, "classic_intrinsic_cohesive_interface", physics.JOINT)

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from hpcdem.commands.fdem.packages import EXTRA, NEEDED
+from hpcdem.commands.fdem.values import DEFAULT_LAYER
 from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.pcdc import source
-from hpcdem.lang.pcdc.bindings import DEFAULT_LAYER
 from hpcdem.lang.pcdc.kinds import Pending, TableName
 from hpcdem.lang.pcdc.source import Source
 from hpcdem.lang.pcdc.statement import Statement

@@ -31,7 +31,7 @@ from hpcdem.core.errors import (
     UsageError,
 )
 from hpcdem.lang.pcdc import names, source
-from hpcdem.lang.pcdc.bindings import PASSED_OVER, Call, carry_out
+from hpcdem.lang.pcdc.bindings import PASSED_OVER, Call, carry_out, where
 from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal, described
 from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.source import CALL, Source
@@ -213,7 +213,7 @@ class Interpreter:
         if asked and self.journal is not None:
             fdem.steps.stop_here(self.project, asked)
         try:
-            carry_out(statement.command, Call(self.project, arguments, terms, self.restore_names))
+            carry_out(Call(self.project, statement.command, arguments, where(terms), self.restore_names))
         except HpcdemError as error:
             known = self._told_with_line(error, statement)
             if self.journal is not None:

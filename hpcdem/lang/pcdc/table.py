@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 from hpcdem.commands.fdem.recorded import UNITS as UNITS_OF
 from hpcdem.core.looks import COLOURS, OBJECTS
@@ -70,6 +71,11 @@ from hpcdem.physics.liners.properties import LINER as LINER_PROPERTIES
 from hpcdem.physics.proppant.properties import MEDIUM as MEDIUM_PROPERTIES
 from hpcdem.physics.proppant.properties import PROPPANT as PROPPANT_PROPERTIES
 
+SHORT = {
+    **{f"{word}-{axis}": f"{word[0]}{axis}" for word in ("velocity", "acceleration", "force") for axis in "xyz"},
+    **{f"stress-{part}": part for part in ("xx", "yy", "zz", "xy", "xz", "yz", "normal")},
+}
+"""Words of the language that programs and functions have shorter."""
 BOTH, PLANE, SPACE = (2, 3), (2,), (3,)
 """Dimensions of space in which a word is there."""
 
@@ -110,7 +116,9 @@ class Option:
 class Model:
     """A constitutive model or boundary condition with its properties. number: of the manual's table; leading: values
     that come first; one_of: sets of properties of which one must be complete; any_of: at least one property must be
-    given; of: the model of the simulation; dims: dimensions of space in which it is there."""
+    given; of: the model of the simulation; dims: dimensions of space in which it is there; does, fixed: as of commands;
+    by_time: tables of time may stand for numbers, and no functions of place; ranged: the objects that it belongs to, if
+    they are not those of the command; of_field: the field (physics/fields.py) whose it is."""
 
     notation: str
     number: str
@@ -122,6 +130,11 @@ class Model:
     of: properties.Model | None = None
     leading: tuple[Option, ...] = ()
     dims: tuple[int, ...] = PLANE
+    does: str = ""
+    fixed: tuple[tuple[str, Any], ...] = ()
+    by_time: bool = False
+    ranged: str = ""
+    of_field: str = ""
 
     @cached_property
     def keyword(self) -> Keyword:
@@ -134,7 +147,9 @@ class Command:
     named after the words; ranged: the objects that RANGE chooses among, "" if it takes none; needs_option: at least one
     option must be given; properties: the word ``property`` may stand before the options; manual: printed there; dims:
     as of models; also: other words for all of the notation, of the online help; idle: why it has no effect here;
-    refused: why it is, and what to write instead."""
+    refused: why it is, and what to write instead; does: its function, as "module.name" of `hpcdem.commands.fdem`, which
+    has arguments of the names of its options, or the name of a converter in bindings.py; of commands with models that
+    is said by the model; fixed: more arguments of the function."""
 
     notation: str
     doc: str
@@ -150,6 +165,8 @@ class Command:
     also: tuple[str, ...] = ()
     idle: str = ""
     refused: str = ""
+    does: str = ""
+    fixed: tuple[tuple[str, Any], ...] = ()
 
     @cached_property
     def words(self) -> tuple[Keyword, ...]:
@@ -266,14 +283,14 @@ _PAIRS = (("young", "poisson-ratio"), ("shear", "bulk"))
 
 ISO_ELASTIC = Model(
     "mech{anical}-iso-e{lastic}", "1", "Isotropic, linear elastic, for large rotations.",
-    _ELASTIC, one_of=_PAIRS, of=properties.MECH_ISO_ELASTIC, dims=BOTH,
+    _ELASTIC, one_of=_PAIRS, of=properties.MECH_ISO_ELASTIC, dims=BOTH, does="assignments.element_model",
 )  # fmt: skip
 NULL = Model(
     "null", "", "The elements are taken out: excavated. Faces beside them become free. Another model in a range that "
     "names them brings them back, as new material where the void is then, free of stress; they hang together with what "
     "lies around them, without joints, until face-joint c-model gives them some.",
     (Option("relax", (POSITIVE,), "what they did to the others dies down over this time (static runs: so many steps)",
-            "s", "at once"),), dims=BOTH,
+            "s", "at once"),), dims=BOTH, does="assignments.null",
 )  # fmt: skip
 MOHR_COULOMB = Model(
     "mech{anical}-m{ohr}-c{oulomb}", "2",
@@ -282,7 +299,7 @@ MOHR_COULOMB = Model(
         properties.MECH_MOHR_COULOMB, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "fri{ction}",
         "coh{esion}", "ten{sile}", "di{lation}", "d{amp}-f{actor}", "pen{alty}", "d{amp}-b",
     ),
-    one_of=_PAIRS, of=properties.MECH_MOHR_COULOMB, dims=BOTH,
+    one_of=_PAIRS, of=properties.MECH_MOHR_COULOMB, dims=BOTH, does="assignments.element_model",
 )  # fmt: skip
 _FUNCTION = Option("function", (FILE,), "'file.py:function', beside the script; plain text", required=True)
 _LAW = Option("law", (FILE,), "'file.py:law': the file, beside the script, and the name of the law in it; plain text",
@@ -297,7 +314,7 @@ USER = Model(
     "user", "", "A law in a Python file of the user, see docs/user_laws.md.",
     (*declared(properties.USER, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "d{amp}-f{actor}",
                "fri{ction}", "pen{alty}"), _PARAMETER),
-    one_of=_PAIRS, of=properties.USER, leading=(_LAW,), dims=BOTH,
+    one_of=_PAIRS, of=properties.USER, leading=(_LAW,), dims=BOTH, does="assignments.user_model",
 )  # fmt: skip
 BURGERS = Model(
     "mech{anical}-bur{gers}", "3",
@@ -310,6 +327,7 @@ BURGERS = Model(
         "k{elvin}-s{train}-yz", "d{amp}-f{actor}", "fri{ction}",
     ),
     one_of=(("young", "poisson-ratio"), ("bulk", "maxwell-shear")), of=properties.MECH_BURGERS, dims=BOTH,
+    does="assignments.element_model",
 )  # fmt: skip
 _COEFFICIENTS = {
     "transfer-coeficient": ("t{ransfer}-c{oefficient}", "t{ransfer}-c{oefficent}"),
@@ -323,18 +341,20 @@ ISO_HEAT = Model(
     "Temperatures are those of any scale of degrees.",
     declared(HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "e{xpansion}-c{oeficient}",
              "conductivity-a{cross}", "conductivity-ang{le}", also=_COEFFICIENTS),
-    of=HEAT_PROPERTIES, dims=BOTH,
+    of=HEAT_PROPERTIES, dims=BOTH, does="heat.model",
 )  # fmt: skip
 FIELD_MODELS = {
     one.name: Model(one.word, "", f"Diffusion of {one.doc}, beside the mechanical model of the elements, all of which "
                     "need it where one has it. It crosses joints until they break. At the values of this moment "
-                    "elements are free of the stress that it brings.", declared(one.model), of=one.model, dims=BOTH)
+                    "elements are free of the stress that it brings.", declared(one.model), of=one.model, dims=BOTH,
+            does="fields.model", of_field=one.name)
     for one in kinds().values()
 }  # fmt: skip
 """Of fields that diffuse in elements (physics/fields.py), by their names, as the next ones."""
 FIELDS_AT_NODES = {
     one.name: Model(one.on_nodes, "", f"The {one.name} of nodes; times of tables are those of the field.",
-                    (Option(one.name, (TABLED,), one.doc, one.unit, required=True),), dims=BOTH)
+                    (Option(one.name, (TABLED,), one.doc, one.unit, required=True),), dims=BOTH,
+            does="node_field", of_field=one.name, by_time=True)
     for one in kinds().values()
 }  # fmt: skip
 FIELDS_AT_FACES = {
@@ -344,7 +364,8 @@ FIELDS_AT_FACES = {
         (Option("flux", (TABLED,), "what comes in", one.flux),
          Option("transfer", (NOT_NEGATIVE,), "what goes to the environment, over the difference to it", one.transfer,
                 "that of the elements"),
-         Option("environment", (TABLED,), "value of the environment", one.unit)), any_of=True, dims=BOTH)
+         Option("environment", (TABLED,), "value of the environment", one.unit)), any_of=True, dims=BOTH,
+                 does="fields.face_condition", of_field=one.name, by_time=True)
     for one in kinds().values()
 }  # fmt: skip
 
@@ -360,13 +381,13 @@ VELOCITY = Model(
      Option("a{cceleration}-x", (TABLED,), "acceleration along x", "m/s2"),
      Option("a{cceleration}-y", (TABLED,), "acceleration along y", "m/s2"),
      Option("a{cceleration}-z", (TABLED,), "acceleration along z", "m/s2", dims=SPACE)),
-    any_of=True, dims=BOTH,
+    any_of=True, dims=BOTH, does="assignments.velocity",
 )  # fmt: skip
 FORCE = Model(
     "mech{anical}-f{orce}-b{oundary}-c{ondition}", "5", "Force on each node.",
     (Option("f{orce}-x", (TABLED,), "force along x", "N"), Option("f{orce}-y", (TABLED,), "force along y", "N"),
      Option("f{orce}-z", (TABLED,), "force along z", "N", dims=SPACE)),
-    any_of=True, dims=BOTH,
+    any_of=True, dims=BOTH, does="assignments.force",
 )  # fmt: skip
 MOVE = Model(
     "mech{anical}-m{ove}-b{oundary}-c{onstraint}", "7",
@@ -375,7 +396,7 @@ MOVE = Model(
     (Option("t{ype}", (FREEDOM, OPTIONAL_VECTOR),
             "0 free (takes constraints back), 1 held, 2 moves along the vector only, 3 (in three dimensions) across it "
             "only (type 0 and 1 take a vector and do not use it)", required=True),), dims=BOTH,
-    also=("mech{anical}-m{ove}-c{onstrain}",),
+    also=("mech{anical}-m{ove}-c{onstrain}",), does="assignments.move",
 )  # fmt: skip
 STRESS = Model(
     "m{echanical}-s{tress}-b{oundary}-c{ondition}", "6",
@@ -394,13 +415,13 @@ STRESS = Model(
      Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s"),
      Option("inc{oming}-y", (TABLED,), "the same along y", "m/s"),
      Option("inc{oming}-z", (TABLED,), "the same along z", "m/s", dims=SPACE)),
-    any_of=True, dims=BOTH, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
+    any_of=True, dims=BOTH, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",), does="assignments.stress",
 )  # fmt: skip
 ABSORB = Model(
     "mech{anical}-abs{orb}-b{oundary}-c{ondition}", "", "Surfaces through which waves leave, as m-s-b-c quiet on.",
     (Option("n{ormal}", (TABLED,), "stress along the normal, which enters as a wave of half its size", "Pa"),
      Option("d{ip}", (TABLED,), "the same along the surface, counter-clockwise about the body", "Pa", dims=PLANE)),
-    dims=BOTH,
+    dims=BOTH, does="assignments.stress", fixed=(("quiet", True),),
 )  # fmt: skip
 FLOW_CONDITION = Model(
     "hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11",
@@ -415,23 +436,24 @@ FLOW_CONDITION = Model(
             "fluid; in space m3/s", "m2/s")),
     any_of=True, dims=BOTH,
     also=("hydr{aulic}-c{onstant}-f{low}-b{oundary}", "hydra{ulic}-c{onstant}-f{luid}-b{oundary}"),
+    does="flow.condition",
 )  # fmt: skip
 FREE_FIELD = Model(
     "free-f{ield}", "", "Vertical sides beyond which the ground goes on: a column with the elements of the side and "
     "the base of the model there, velocity or quiet faces, moves beside each, and the side has its stress and dashpots "
     "that see the difference of both motions. The nodes of the side are held by the forces that they have now, so the "
-    "conditions of the static stage can go.", (),
+    "conditions of the static stage can go.", (), does="assignments.free_field",
 )  # fmt: skip
 TEMPERATURE = Model(
     "therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes; times of tables are those of heat.",
     (Option("t{emperature}", (TABLED,), "temperature", "K", required=True, also=("t{mperature}",)),), dims=BOTH,
-    also=("therm{al}-n{ode}-b{oundary}-c{ondition}",),
+    also=("therm{al}-n{ode}-b{oundary}-c{ondition}",), does="heat.condition", by_time=True,
 )  # fmt: skip
 FLUID_TEMPERATURE = Model(
     "therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of the fluid at flow nodes, as of what is injected "
     "there; times of tables are those of heat.",
     (Option("t{emperature}", (TABLED,), "temperature", "K", required=True, also=("t{mperature}",)),), dims=BOTH,
-    also=("therm{al}-c{avity}-b{oundary}-c{ondition}",),
+    also=("therm{al}-c{avity}-b{oundary}-c{ondition}",), does="heat.fluid_condition", by_time=True,
 )  # fmt: skip
 PROPPANT_CONDITION = Model(
     "hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that comes in at flow nodes, of wells too, one of these; "
@@ -440,7 +462,7 @@ PROPPANT_CONDITION = Model(
             "wells bring: volume of grains over that of the slurry", "1"),
      Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (TABLED,), "volume of grains that comes in at each node, in the "
             "slurry that is there; in space m3/s", "m2/s")),
-    any_of=True, dims=BOTH,
+    any_of=True, dims=BOTH, does="flow.proppant_condition", by_time=True,
 )  # fmt: skip
 CONST_HEAT = Model(
     "therm{al}-c{onst}-h{eat}", "16",
@@ -451,6 +473,7 @@ CONST_HEAT = Model(
             "that of the elements",
             also=(*_COEFFICIENTS["transfer-coeficient"], "h{eat}-t{ransfer}-c{oefficent}")),
      Option("e{nvironment}-t{emperature}", (TABLED,), "temperature of the environment", "K")), any_of=True, dims=BOTH,
+     does="heat.face_condition", by_time=True,
 )  # fmt: skip
 
 # ---- contact and joints (tables 8, 9, 10, 13, 17) ------------------------------------------------------------------
@@ -463,7 +486,7 @@ CONTACT = Model(
                                                        "penalty-shear": ("s{hear}-s{tiffness}",)})
     + (Option("c{ohesion}", (NOT_NEGATIVE,), "surfaces that touch have none", "Pa", "0", refused="surfaces that touch "
               "have friction and no cohesion; joints have it until they break: face-joint c-model c-i-c-i cohesion"),),
-    of=properties.CONTACT_MOHR_COULOMB, dims=BOTH,
+    of=properties.CONTACT_MOHR_COULOMB, dims=BOTH, does="assignments.face_model",
 )  # fmt: skip
 COHESIVE = Model(
     "c{lassic}-i{ntrinsic}-c{ohesive}-i{nterface}", "9",
@@ -472,7 +495,7 @@ COHESIVE = Model(
                "p{enalty}-o{verlay}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}",
                also={"penalty-overlay": ("p{enalty}-o{verlap}",)}),
      Option("np", (POINTS,), "integration points", "1", "3")),
-    of=properties.COHESIVE, dims=BOTH,
+    of=properties.COHESIVE, dims=BOTH, does="assignments.joint_model",
 )  # fmt: skip
 COULOMB_JOINT = Model(
     "j{oint}-m{ohr}-c{oulomb}", "",
@@ -481,7 +504,7 @@ COULOMB_JOINT = Model(
     "strength loses that and its cohesion.",
     declared(properties.COULOMB_JOINT, "n{ormal}-s{tiffness}", "s{hear}-s{tiffness}", "f{riction}", "c{ohesion}",
              "t{ensile}-s{trength}", "dil{ation}", "dil{ation}-l{imit}"),
-    of=properties.COULOMB_JOINT, dims=BOTH,
+    of=properties.COULOMB_JOINT, dims=BOTH, does="assignments.joint_model",
 )  # fmt: skip
 BARTON_BANDIS = Model(
     "j{oint}-b{arton}-b{andis}", "",
@@ -492,7 +515,7 @@ BARTON_BANDIS = Model(
     "close and never break.",
     declared(properties.BARTON_BANDIS, "n{ormal}-s{tiffness}", "s{hear}-s{tiffness}", "c{losure}-m{aximum}",
              "r{esidual}-f{riction}", "jrc", "jcs", "j{oint}-s{ize}", "dil{ation}-p{art}"),
-    of=properties.BARTON_BANDIS, dims=BOTH,
+    of=properties.BARTON_BANDIS, dims=BOTH, does="assignments.joint_model",
 )  # fmt: skip
 _APERTURES = {
     "aperature-initial": ("a{perture}-i{nitial}",), "aperature-maximum": ("a{perture}-max{imum}",),
@@ -512,7 +535,7 @@ POROUS = Model(
     "Fluid in joints: each is a channel between its two nodes, broken or not, of the aperture aperature-initial plus "
     "its mean opening, within the limits. It acts beside the mechanical model of the joint. Given again, fluid that "
     "has no room any more is gone, and new room is dry. In space channels are the triangles of the joints.",
-    _POROUS, of=POROUS_PROPERTIES, dims=BOTH,
+    _POROUS, of=POROUS_PROPERTIES, dims=BOTH, does="flow.model", ranged=JOINT,
 )  # fmt: skip
 FLUID_HEAT = Model(
     "t{hermal}-f{luid}", "13",
@@ -524,7 +547,7 @@ FLUID_HEAT = Model(
         also={"transfer-coeficient": (*_COEFFICIENTS["transfer-coeficient"],
                                       "c{onvective}-h{eat}-t{ransfer}-c{oefficient}"),
               "capacity": ("h{eat}-cap{acity}",)})),
-    of=FLUID_HEAT_PROPERTIES, dims=BOTH, also=("f{luid}-t{hermal}",),
+    of=FLUID_HEAT_PROPERTIES, dims=BOTH, also=("f{luid}-t{hermal}",), does="heat.fluid_model", ranged=JOINT,
 )  # fmt: skip
 _GRAINS = tuple(
     replace(o, values=(BOOL,), unit="", default="off") if o.name == "proppant-stokes" else o for o in declared(
@@ -546,7 +569,7 @@ PROPPANT = Model(
     "Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, make it heavier and "
     "more viscous, settle, and bridge where it is narrow. A node that is filled to the limit is a pack: no grains pass "
     "it, fluid does, and the walls lean on it.",
-    (*_POROUS, *_GRAINS), of=MEDIUM_PROPERTIES, dims=BOTH,
+    (*_POROUS, *_GRAINS), of=MEDIUM_PROPERTIES, dims=BOTH, does="flow.with_proppant", ranged=JOINT,
 )  # fmt: skip
 
 # ---- bolts (tables 19 to 21) ---------------------------------------------------------------------------------------
@@ -565,17 +588,18 @@ BOLT = Model(
         "g{rout}-t{hickness}", "c{ohesion}-r{ock}-g{rout}", "c{ohesion}-g{rout}-b{olt}", "f{riction}-r{ock}-g{rout}",
         "f{riction}-g{rout}-b{olt}", "spac{ing}", "pre{tension}-f{orce}", "d{amp}-f{actor}", uniform=True,
     ),
-    of=BOLT_PROPERTIES, dims=BOTH,
+    of=BOLT_PROPERTIES, dims=BOTH, does="supports.assign",
 )  # fmt: skip
 BOLT_VELOCITY = Model(
     "b{olt}-n{ode}-c{onstrain}", "20", "Velocity or acceleration of nodes of bolts. Components that are not given stay "
     "free: along the bar by its forces, across it with the rock.", VELOCITY.options, any_of=True, dims=BOTH,
-    also=("s{upport}-n{ode}-c{onstrain}",),
+    also=("s{upport}-n{ode}-c{onstrain}",), does="bolts.velocity",
 )  # fmt: skip
 BOLT_FORCE = Model(
     "b{olt}-n{ode}-f{orce}-b{oundary}-c{ondition}", "21", "Force on each node of one bolt; across the bar the rock "
     "takes it.", FORCE.options, any_of=True, dims=BOTH,
     also=("b{olt}-n{ode}-f{orce}-b{oundary}-c{onditio}", "s{upport}-n{ode}-f{orce}-b{oundary}-c{onditio}"),
+    does="bolts.force",
 )  # fmt: skip
 
 # ---- liners, beyond the manual -------------------------------------------------------------------------------------
@@ -592,19 +616,19 @@ LINER = Model(
         "t{ensile}-s{trength}", "c{ompressive}-s{trength}", "pl{astic}-m{oment}", "n{ormal}-s{tiffness}",
         "s{hear}-s{tiffness}", "b{ond}-t{ensile}-s{trength}", "b{ond}-c{ohesion}", "b{ond}-f{riction}", uniform=True,
     ),
-    of=LINER_PROPERTIES,
+    of=LINER_PROPERTIES, does="supports.assign",
 )  # fmt: skip
 LINER_VELOCITY = Model(
     "l{iner}-n{ode}-c{onstrain}", "", "Velocity of nodes of liners. Components that are not given stay free.",
     (Option("v{elocity}-x", (TABLED,), "velocity along x", "m/s"),
      Option("v{elocity}-y", (TABLED,), "velocity along y", "m/s"),
-     Option("spin", (TABLED,), "rate of rotation, counter-clockwise", "rad/s")), any_of=True,
+     Option("spin", (TABLED,), "rate of rotation, counter-clockwise", "rad/s")), any_of=True, does="liners.velocity",
 )  # fmt: skip
 LINER_FORCE = Model(
     "l{iner}-n{ode}-f{orce}-b{oundary}-c{ondition}", "", "Force and moment on each node of a liner, of a metre of "
     "thickness.",
     (Option("f{orce}-x", (TABLED,), "force along x", "N/m"), Option("f{orce}-y", (TABLED,), "force along y", "N/m"),
-     Option("m{oment}", (TABLED,), "moment, counter-clockwise", "N m/m")), any_of=True,
+     Option("m{oment}", (TABLED,), "moment, counter-clockwise", "N m/m")), any_of=True, does="liners.force",
 )  # fmt: skip
 
 # ---- RANGE ---------------------------------------------------------------------------------------------------------
@@ -679,7 +703,7 @@ def _group_command(kind: str, notation: str, also: str = "") -> Command:
         "one it was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
         (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
         dims=BOTH if kind in ("element", "element-face", "face-joint", "node", "bolt-element", "bolt-node") else PLANE,
-        also=(f"{also} g{{roup}}",) if also else (),
+        also=(f"{also} g{{roup}}",) if also else (), does="assignments.group",
     )  # fmt: skip
 
 
@@ -687,6 +711,7 @@ def _list_command(kind: str, notation: str) -> Command:
     return Command(
         f"{notation} l{{ist}} sum{{mary}}", f"Says in the log how many {kind}s there are, by model and group.",
         (f"pcdc {kind} list summary range x 0 5",), ranged=kind, dims=BOTH, also=(f"{notation} l{{ist}}",),
+        does="summary.listed",
     )  # fmt: skip
 
 
@@ -732,18 +757,20 @@ _MODEL = (
     Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
             ("pcdc model new", "pcdc model new dim 3"),
             options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three not everything is there, see "
-                            "the end of the reference", "", "2"),), manual=True, dims=BOTH),
+                            "the end of the reference", "", "2"),), manual=True, dims=BOTH, does="settings.new"),
     Command("mod{el} sav{e}", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables "
             "and functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
-            (_leading("file", FILE, "name of the file, beside the script"),), manual=True, dims=BOTH),
+            (_leading("file", FILE, "name of the file, beside the script"),), manual=True, dims=BOTH,
+            does="checkpoints.save"),
     Command("mod{el} rest{ore}", "The state of a file, and its m_ variables and functions.",
-            ("pcdc model restore 'test.sav'",), (_leading("file", FILE, "name of the file"),), manual=True, dims=BOTH),
+            ("pcdc model restore 'test.sav'",), (_leading("file", FILE, "name of the file"),), manual=True, dims=BOTH,
+            does="restore"),
     Command("mod{el} g{ravity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),
-            (_leading("gravity", VECTOR, "acceleration", "m/s2"),), dims=BOTH),
+            (_leading("gravity", VECTOR, "acceleration", "m/s2"),), dims=BOTH, does="settings.gravity"),
     Command("mod{el} units", "The units of all values that follow: those that are unlikely in them are warned of, once "
             "per property and with the factor that looks missing; histories and charts are labelled with them. No "
             "value is changed.", ("pcdc model units SI", "pcdc model units mm-MPa-s"),
-            (_leading("system", choice(*UNITS), ", ".join(UNITS.values())),), dims=BOTH),
+            (_leading("system", choice(*UNITS), ", ".join(UNITS.values())),), dims=BOTH, does="settings.units"),
     Command("mod{el} opt{ion}", "Switches of the calculation.",
             ("pcdc model option dynamic off", "pcdc model option collision on"),
             options=(
@@ -772,7 +799,7 @@ _MODEL = (
                        "the stress that they bring, stay as they are", default="on"),
                 Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
                        "where they are", default="on", also=("p{roppant}-t{ransport}",))),
-            needs_option=True, manual=True, dims=BOTH, also=("mod{el}",)),
+            needs_option=True, manual=True, dims=BOTH, also=("mod{el}",), does="option"),
     Command("mod{el} t{ime}-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. "
             "Without this command it is estimated at the first step and after each change of the model. Of value, "
             "mass-scaling and auto on the one said last holds and ends the others.",
@@ -796,9 +823,9 @@ _MODEL = (
                 Option("therm{al}", (NOT_NEGATIVE,), "sub-step of heat, which then has a clock of its own; 0: those of "
                        "a cycle take the time of the steps of the blocks, or without motion 0.9 of what is stable", "s",
                        "0")),
-            needs_option=True, manual=True, dims=BOTH),
+            needs_option=True, manual=True, dims=BOTH, does="settings.time_step"),
     Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
-            (_leading("steps", ZERO_OR_MORE, "number of steps"),), dims=BOTH),
+            (_leading("steps", ZERO_OR_MORE, "number of steps"),), dims=BOTH, does="steps.step"),
     Command("mod{el} sol{ve}", "Steps until the first of ratio, cycles, time and run-time is reached. Without any of "
             "them it is ratio 1e-5 or 10 000 cycles; a warning says if it was the cycles. With elastic: "
             "straight to static equilibrium by Newton's method, for blocks that are elastic or yield, whose joints "
@@ -844,36 +871,37 @@ _MODEL = (
                             "it is there, from 400 000 unknowns on, in space from 20 000", default="auto"),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
-                            "halved", "", "1")), dims=BOTH),
+                            "halved", "", "1")), dims=BOTH, does="solve"),
     Command("mod{el} r{un}-t{ime}", "The time that model solve takes at most from now on, from its beginning or from "
             "the start-time of model reset; without another aim each model solve goes on for it. In static runs "
             "without creep no time passes.", ("pcdc model run-time 0.1", "pcdc model run-time 0"),
-            (_leading("time", NOT_NEGATIVE, "0: no end any more", "s"),), dims=BOTH),
+            (_leading("time", NOT_NEGATIVE, "0: no end any more", "s"),), dims=BOTH, does="clocks.run_time"),
     Command("mod{el} s{olve}-c{heck}", "Steps between two looks at the ratio in model solve.",
             ("pcdc model solve-check 10",), (_leading("steps", COUNT, "in static runs 50, in dynamic ones 100 without "
-                                                      "this command"),), dims=BOTH),
+                                                      "this command"),), dims=BOTH, does="clocks.solve_check"),
     Command("mod{el} c{ycle}-o{ption}", "Time step and number of steps of each part in a cycle of a coupled "
             "calculation: those of the blocks as model time-step value and model sub-step mechanical, those of fluid "
             "and heat as model time-step and model sub-step with these words. Proppant moves with the fluid, in its "
             "steps.", ("pcdc model cycle-option mechanical cycle-number 20 hydraulic time-step 0.5 cycle-number 4",),
             options=tuple(Option(word, (), f"of {what}", more=_STEPS) for word, what in _PARTS),
-            needs_option=True, dims=BOTH),
+            needs_option=True, dims=BOTH, does="clocks.cycle_option"),
     Command("mod{el} reset", "Sets the clocks of the parts. Tables of conditions, stages of wells and leak-off go by "
             "them.", ("pcdc model reset mechanical current-time 0", "pcdc model reset hydraulic current-time 0 "
                       "time-step 0.5"),
             options=tuple(Option(word, (), f"of {what}", more=_CLOCKS) for word, what in _PARTS),
-            needs_option=True, dims=BOTH),
+            needs_option=True, dims=BOTH, does="clocks.reset"),
     Command("mod{el} query", "Says in the log what time a part has come to, and its time step.",
             ("pcdc model query mechanical time",),
             options=tuple(Option(word, (), f"of {what}", more=(Option("t{ime}", (), "its clock", required=True),))
                           for word, what in _PARTS),
-            needs_option=True, dims=BOTH),
+            needs_option=True, dims=BOTH, does="clocks.query"),
     Command("mod{el} pl{ane}-strain", "Nothing moves across the plane. Models of the plane are in plane strain unless "
-            "model plane-stress says otherwise; it takes that back.", ("pcdc model plane-strain",)),
+            "model plane-stress says otherwise; it takes that back.", ("pcdc model plane-strain",),
+            does="settings.option", fixed=(("plane_stress", False),)),
     Command("mod{el} pl{ane}-stress", "The model is a plate of a metre of thickness whose two faces bear nothing: the "
             "stress across the plane is 0, in elements that are elastic, yield or creep, and with heat. It comes "
             "before element initial and before the first step. A law of the user must give 0 for that stress itself.",
-            ("pcdc model plane-stress",)),
+            ("pcdc model plane-stress",), does="settings.option", fixed=(("plane_stress", True),)),
     Command("mod{el} p{lot}-f{requency}", "Steps between two pictures of the window.", ("pcdc model p-f 10",),
             (_leading("steps", COUNT, "steps"),), dims=BOTH, idle=_WINDOW),
     Command("mod{el} r{ender}-i{nterval}", "The same.", ("pcdc model render-interval 10",),
@@ -899,7 +927,7 @@ _MODEL = (
                             default="0"),
                      Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as are stable",
                             default="0")),
-            needs_option=True, dims=BOTH),
+            needs_option=True, dims=BOTH, does="flow.sub_step"),
     Command("mod{el} fi{eld}", "The clock of a field that diffuses in elements, as of moisture.",
             ("pcdc model field moisture time-step 3600", "pcdc model field moisture flows off"),
             (_leading("field", choice(*kinds()), "its name"),),
@@ -910,7 +938,7 @@ _MODEL = (
                             "of what is stable", "s", "0"),
                      Option("s{ub}-s{teps}", (ZERO_OR_MORE,), "in a cycle; 0: as many as are stable", default="0"),
                      Option("c{urrent}-t{ime}", (FLOAT,), "what its clock shows now", "s")),
-            needs_option=True, dims=BOTH),
+            needs_option=True, dims=BOTH, does="fields.clock"),
     Command("mod{el} ray{leigh}", "Rayleigh damping of elements in dynamic runs, beside that of their damp-factor: "
             "alpha times the mass, beta times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + "
             "pi beta f.",
@@ -919,7 +947,7 @@ _MODEL = (
             (_leading("ratio", NOT_NEGATIVE, "part of the critical damping at the frequency; 0: none any more", "1"),),
             (Option("freq{uency}", (POSITIVE,), "where the ratio is this; with both parts it is least there", "Hz"),
              Option("part", (choice("both", "mass", "stiffness"),), "both, or one of them alone", default="both")),
-                    dims=BOTH),
+                    dims=BOTH, does="settings.rayleigh"),
     Command("mod{el} creep", "Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time "
             "passes with the time of the model. In static runs model solve time makes it pass, in creep steps, each of "
             "which ends in balance; `every` of histories and frames then counts creep steps.",
@@ -931,7 +959,8 @@ _MODEL = (
                     "of elements and of their Kelvin dashpots in a creep step, over the largest deviator of all; from "
                     "one to the next it halves or doubles at most", "1", "dt stays"),
              Option("least", (POSITIVE,), "with change: shortest creep step", "s", "dt / 100"),
-             Option("great{est}", (POSITIVE,), "with change: longest creep step", "s", "100 dt")), dims=BOTH),
+             Option("great{est}", (POSITIVE,), "with change: longest creep step", "s", "100 dt")), dims=BOTH,
+            does="settings.creep"),
 )  # fmt: skip
 
 _LENGTHS = (
@@ -943,15 +972,16 @@ _LENGTHS = (
 _GEOMETRY = (
     Command("geom{etry} c{reate} p{olyline}", "Straight lines from point to point.",
             ("pcdc geometry create polyline ([i],0) (0,[i]) as-layer ['line'+ str(i)]",),
-            (_leading("points", VECTORS, "the points; or a list of vectors", "m"),), (_LAYER,), manual=True),
+            (_leading("points", VECTORS, "the points; or a list of vectors", "m"),), (_LAYER,), manual=True,
+            does="shape"),
     Command("geom{etry} c{reate} polyg{on}", "A closed line; in three dimensions the flat surface within.",
             ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'block'",),
             (_leading("points", PLACES, "the corners", "m"),), (_LAYER,), dims=BOTH,
-            also=("geom{etry} c{reate} p{olyline}-c{lose}",)),
+            also=("geom{etry} c{reate} p{olyline}-c{lose}",), does="shape"),
     Command("geom{etry} c{reate} rec{tangle}", "A rectangle along the axes.",
             ("pcdc geometry create rectangle (0,0) (10,5) as-layer 'box'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
-            (_LAYER,)),
+            (_LAYER,), does="shape"),
     Command("geom{etry} c{reate} cir{cle}", "A circle; with segment-length a polygon of equal sides. In three "
             "dimensions the surface of a disc.",
             ("pcdc geometry create circle (0,0) 1 as-layer 'hole'",
@@ -961,15 +991,15 @@ _GEOMETRY = (
              Option("s{egment}-l{ength}", (POSITIVE,), "of its sides, about", "m", "a true circle",
                     dims=PLANE),
              Option("n{ormal}", (VECTOR,), "of the disc, of any length", "", "(0,0,1)", dims=SPACE), _LAYER),
-            dims=BOTH),
+            dims=BOTH, does="shape"),
     Command("geom{etry} c{reate} arc", "A part of a circle, counter-clockwise.",
             ("pcdc geometry create arc (0,0) 1 0 90 as-layer 'arch'",),
             (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m"),
              _leading("begin", FLOAT, "first angle", "degrees"), _leading("end", FLOAT, "last angle", "degrees")),
-            (_LAYER,)),
+            (_LAYER,), does="shape"),
     Command("geom{etry} c{reate} poi{nt}", "Single points, which become points of the mesh.",
             ("pcdc geometry create point (1,1) as-layer 'gauge'",),
-            (_leading("points", VECTORS, "the points", "m"),), (_LAYER,)),
+            (_leading("points", VECTORS, "the points", "m"),), (_LAYER,), does="shape"),
     Command("geom{etry} c{reate} frac{tures}", "A set of fractures with given statistics, as straight lines, in three "
             "dimensions discs; for mesh create crack, or mesh intersect.",
             ("pcdc geometry create fractures orientation fisher 30 spread 20 length exponential 2 p21 1.5 inside 'out' "
@@ -1000,48 +1030,51 @@ _GEOMETRY = (
                 Option("ins{ide}", (STRING,), "the layer that bounds them", required=True),
                 Option("hole", (STRING,), "none inside of this layer", repeated=True, dims=PLANE),
                 Option("shortest", (NOT_NEGATIVE,), "shorter pieces at the rim are left out", "m", "0", dims=PLANE),
-                Option("seed", (ZERO_OR_MORE,), "another seed, another network", required=True), _LAYER), dims=BOTH),
+                Option("seed", (ZERO_OR_MORE,), "another seed, another network", required=True), _LAYER), dims=BOTH,
+            does="fractures"),
     Command("geom{etry} c{reate} box", "A box along the axes.",
             ("pcdc geometry create box (0,0,0) (10,5,4) as-layer 'rock'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
-            (_LAYER,), dims=SPACE),
+            (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} sph{ere}", "A sphere.", ("pcdc geometry create sphere (0,0,0) 1 as-layer 'cavity'",),
             (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m")),
-            (_LAYER,), dims=SPACE),
+            (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} cyl{inder}", "A round cylinder.",
             ("pcdc geometry create cylinder (0,0,0) (0,0,0.1) 0.025 as-layer 'core'",),
             (_leading("first", VECTOR, "middle of one end", "m"), _leading("second", VECTOR, "of the other", "m"),
-             _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE),
+             _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} con{e}", "A round cone, or a part of one.",
             ("pcdc geometry create cone (0,0,0) (0,0,1) 0.5 0.2 as-layer 'tip'",),
             (_leading("first", VECTOR, "middle of one end", "m"), _leading("second", VECTOR, "of the other", "m"),
              _leading("radius", NOT_NEGATIVE, "radius at the first end", "m"),
-             _leading("other", NOT_NEGATIVE, "radius at the other", "m")), (_LAYER,), dims=SPACE),
+             _leading("other", NOT_NEGATIVE, "radius at the other", "m")), (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} disc", "The surface of a round disc: meshes are cut along it.",
             ("pcdc geometry create disc (0,0,0) (0,0,1) 2 as-layer 'crack'",),
             (_leading("centre", VECTOR, "centre", "m"), _leading("normal", VECTOR, "normal of any length"),
-             _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE),
+             _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} plane", "A plane without end.",
             ("pcdc geometry create plane (0,0,1) (0,0.2,1) as-layer 'fault'",),
             (_leading("point", VECTOR, "a point of it", "m"), _leading("normal", VECTOR, "normal of any length")),
-            (_LAYER,), dims=SPACE),
+            (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} ext{rude}", "The bodies that the polygons of a layer become, drawn along a way.",
             ("pcdc geometry create extrude layer 'profile' along (0,10,0) as-layer 'slope'",),
             options=(Option("layer", (STRING,), "of polygons", required=True),
-                     Option("along", (VECTOR,), "the way", "m", required=True), _LAYER), dims=SPACE),
+                     Option("along", (VECTOR,), "the way", "m", required=True), _LAYER), dims=SPACE,
+            does="geometry.extrude"),
     Command("geom{etry} c{reate} rev{olve}", "The bodies that the polygons of a layer become, turned about an axis in "
             "their plane.", ("pcdc geometry create revolve layer 'profile' axis (0,0,1) as-layer 'ring'",),
             options=(Option("layer", (STRING,), "of polygons", required=True),
                      Option("axis", (VECTOR,), "direction of the axis", required=True),
                      Option("about", (VECTOR,), "a point of it", "m", "(0,0,0)"),
-                     Option("angle", (POSITIVE,), "right-handed, up to 360", "degrees", "360"), _LAYER), dims=SPACE),
+                     Option("angle", (POSITIVE,), "right-handed, up to 360", "degrees", "360"), _LAYER), dims=SPACE,
+            does="geometry.revolve"),
     Command("geom{etry} imp{ort}", "Lines of a DXF file; in three dimensions the solids of a STEP or BREP file, or "
             "what the triangles of an STL or DXF file (3DFACE) enclose.",
             ("pcdc geometry import 'slope.dxf' as-layer 'slope'",),
             (_leading("file", FILE, "name of the file"),),
             (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all"),
              Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "as STEP and DXF files say, else 1")),
-            dims=BOTH),
+            dims=BOTH, does="geometry.import_file"),
     Command("geom{etry} transf{orm}", "Moves, turns or scales a layer.",
             ("pcdc geometry transform 'hole' rotate 30 about (0,0) move (1,0)",),
             (_leading("layer", STRING, "name of the layer"),),
@@ -1050,20 +1083,21 @@ _GEOMETRY = (
                     "degrees"),
              Option("axis", (VECTOR,), "about which it is turned", "", "(0,0,1)", dims=SPACE),
              Option("about", (VECTOR,), "centre of both", "m", "the origin"), Option("move", (VECTOR,), "last", "m")),
-            needs_option=True, dims=BOTH),
+            needs_option=True, dims=BOTH, does="geometry.transform"),
     Command("geom{etry} s{cale}", "Multiplies the coordinates of layers, of all without layer; a negative factor "
             "mirrors. What is round takes one size of factor only.",
             ("pcdc geometry scale (2,1) layer 'hole' 'slope'",),
-            (_leading("factors", VECTOR, "along the axes, not 0"),), (_SOME_LAYERS,), dims=BOTH),
+            (_leading("factors", VECTOR, "along the axes, not 0"),), (_SOME_LAYERS,), dims=BOTH, does="geometry.scale"),
     Command("geom{etry} t{ranslate}", "Moves layers, all without layer.",
             ("pcdc geometry translate (10,0) layer 'hole' 'slope'",),
-            (_leading("way", VECTOR, "where to", "m"),), (_SOME_LAYERS,), dims=BOTH),
+            (_leading("way", VECTOR, "where to", "m"),), (_SOME_LAYERS,), dims=BOTH, does="geometry.translate"),
     Command("geom{etry} exp{ort}", "Writes layers to a DXF file, in metres, each as a layer of its name.",
             ("pcdc geometry export 'hole' 'slope' file 'plan.dxf'",),
             (_leading("layers", STRINGS, "names of the layers"),),
-            (Option("f{ile}", (FILE,), "name of the file, in the folder of the results", required=True),)),
+            (Option("f{ile}", (FILE,), "name of the file, in the folder of the results", required=True),),
+            does="geometry.export"),
     Command("geom{etry} d{elete}", "Forgets layers.", ("pcdc geometry delete 'hole'", "pcdc geometry delete 'a' 'b'"),
-            (_leading("layers", STRINGS, "names of the layers"),), dims=BOTH),
+            (_leading("layers", STRINGS, "names of the layers"),), dims=BOTH, does="geometry.delete"),
 )  # fmt: skip
 
 _MESH = (
@@ -1090,7 +1124,8 @@ _MESH = (
                 Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri", dims=PLANE),
                 Option("irr{egular}", (), "triangles in no pattern: rows of equilateral ones lead cracks", dims=PLANE),
                 Option("smooth", (), "inner points lie in the middle of their neighbours, so that joints on all "
-                       "edges share a uniform stress evenly; for triangles", dims=PLANE), _GROUP), dims=BOTH),
+                       "edges share a uniform stress evenly; for triangles", dims=PLANE), _GROUP), dims=BOTH,
+            does="meshes.create"),
     Command("mesh str{uctured}", "A regular mesh of a rectangle.",
             ("pcdc mesh structured (0,0) (10,5) cells 40 20 type tri diagonal both group 'base'",
              "pcdc mesh structured (0,0,0) (10,5,5) cells 20 10 10 type hex"),
@@ -1103,23 +1138,25 @@ _MESH = (
              Option("diag{onal}", (choice("right", "left", "alternate", "both"),), "of the triangles; alternating, or "
                     "both of each rectangle", default="alternate", dims=PLANE),
              Option("ratio", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along x and y (and z): each rectangle or box is so "
-                    "many times as large as the one before", "1", "1 1"), _GROUP), dims=BOTH),
+                    "many times as large as the one before", "1", "1 1"), _GROUP), dims=BOTH,
+            does="meshes.grid"),
     Command("mesh equi{lateral}", "Nearly equilateral triangles in a rectangle.",
             ("pcdc mesh equilateral (0,0) (10,5) size 0.25 group 'base'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
-            (Option("size", (POSITIVE,), "length of edges", "m", required=True), _GROUP)),
+            (Option("size", (POSITIVE,), "length of edges", "m", required=True), _GROUP), does="meshes.equilateral"),
     Command("mod{el} add node", "More nodes, for elements that are added next, before the first model or condition is "
             "assigned. Their numbers follow those of the mesh.", ("pcdc model add node (0,0) (1,0) (0,1)",),
-            (_leading("points", PLACES, "the nodes", "m"),), dims=BOTH),
+            (_leading("points", PLACES, "the nodes", "m"),), dims=BOTH, does="meshes.add_nodes"),
     Command("mod{el} add element", "One more element, by the numbers of its nodes.", ("pcdc model add element 0 1 2",),
             (Option("corners", (ZERO_OR_MORE, ZERO_OR_MORE, ZERO_OR_MORE, LAST_ID), "three or four, in three "
-                    "dimensions four", required=True),), dims=BOTH),
+                    "dimensions four", required=True),), dims=BOTH, does="meshes.add_element"),
     Command("mod{el} scale", "Coordinates of all points of the mesh are multiplied, before the first model or "
             "condition is assigned.", ("pcdc model scale (1,2)",),
             (_leading("factors", VECTOR, "along the axes, above 0"),),
-            dims=BOTH),
+            dims=BOTH, does="meshes.scale"),
     Command("mod{el} tran{slate}", "All points of the mesh are moved, before the first model or condition is "
-            "assigned.", ("pcdc model translate (10,0)",), (_leading("way", VECTOR, "where to", "m"),), dims=BOTH),
+            "assigned.", ("pcdc model translate (10,0)",), (_leading("way", VECTOR, "where to", "m"),), dims=BOTH,
+            does="meshes.translate"),
     Command("mesh imp{ort}", "A mesh of another program, for example .msh or .inp; its physical groups and sets of "
             "elements, nodes and faces become groups.",
             ("pcdc mesh import 'rock.msh'",), (_leading("file", FILE, "name of the file"),),
@@ -1127,12 +1164,12 @@ _MESH = (
                     more=(SET,)),
              Option("merge", (NOT_NEGATIVE,), "points nearer than this are one", "m", "0"),
              Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1")), dims=BOTH,
-            also=("mod{el} imp{ort} gmsh", "mod{el} imp{ort} abaqus")),
+            also=("mod{el} imp{ort} gmsh", "mod{el} imp{ort} abaqus"), does="meshes.import_file"),
     Command("mesh int{ersect}", "Joints on a layer become cracks: the edges of the mesh that lie on it.",
             ("pcdc mesh intersect layer 'fault'",),
             options=(Option("layer", (STRING,), "its lines are edges of the mesh, its surfaces faces", required=True),
                      Option("follow", (), "they are not: the edges that follow them best are taken, the faces between "
-                            "elements on either side")), dims=BOTH),
+                            "elements on either side")), dims=BOTH, does="meshes.intersect"),
     Command("mesh glue", "Bodies that were meshed separately hang together where their faces lie on each other: these "
             "become joints, as inside of a body. Elements are cut where points of others lie on their sides. With a "
             "range only faces of its elements are glued, to any others.",
@@ -1140,12 +1177,13 @@ _MESH = (
             options=(Option("tol{erance}", (POSITIVE,), "points nearer than this are one", "m",
                             "a thousandth of the shortest edge"),
                      Option("betw{een}", (STRING, STRING), "only faces between the elements of these two groups",
-                            more=(SET,))), ranged="element", dims=BOTH, also=("e{lement} glue",)),
+                            more=(SET,))), ranged="element", dims=BOTH, also=("e{lement} glue",), does="meshes.glue"),
     Command("mesh quad{ratic}", "Each triangle of the mesh becomes a six-node triangle, in which displacements are "
             "quadratic: a beam bends with one of them through its height. It is stored as four elements, which go "
             "together; joints, contact and loads act on the halves of its sides. Elastic. The mesh has triangles only; "
-            "comes before the first model or condition.", ("pcdc mesh quadratic",)),
-    Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",), dims=BOTH),
+            "comes before the first model or condition.", ("pcdc mesh quadratic",), does="meshes.six_nodes"),
+    Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",), dims=BOTH,
+            does="meshes.tell_quality"),
 )  # fmt: skip
 
 # ---- meshes in the words of the online commands -------------------------------------------------------------------
@@ -1167,7 +1205,7 @@ _ELEMENT_CREATE = (
                      Option("r{atio}", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along each edge an element is so many "
                             "times as large as the one before", "1", "1 1"),
                      Option("tri{angle}", (BOOL,), "triangles, or tetrahedra; off: quads, or hexahedra", default="on",
-                            also=("tet{ra}",)), _GROUP), dims=BOTH),
+                            also=("tet{ra}",)), _GROUP), dims=BOTH, does="meshes.brick"),
     Command("e{lement} create geo{metry}", "Triangles in the inside of closed lines, by Gmsh, with a mesh size for "
             "each piece. Other pieces become edges and points of the mesh, as far as they lie inside.",
             ("pcdc element create geometry layer 'out' m-s 1.5 is-boundary layer 'fault' m-s 0.5 circle center (4,3) "
@@ -1181,7 +1219,7 @@ _ELEMENT_CREATE = (
                        more=(Option("c{enter}", (VECTOR,), "its centre", "m", required=True),
                              Option("s{tart}-p{oint}", (VECTOR,), "where it begins", "m", required=True),
                              Option("e{nd}-p{oint}", (VECTOR,), "where it ends", "m", required=True), _SIZE,
-                             _BOUNDARY)), _GROUP), needs_option=True),
+                             _BOUNDARY)), _GROUP), needs_option=True, does="patch"),
     Command("e{lement} create geo{metry}-p{atch}", "Triangles in the inside of closed lines, by Gmsh, that follow "
             "other lines and points as far as these lie inside.",
             ("pcdc element create geometry-patch b-c-p array (0,0) (9,0) (9,6) (0,6) m-s 1 c-polyline layer 'fault' "
@@ -1194,7 +1232,8 @@ _ELEMENT_CREATE = (
                 Option("c{onstrain}-p{oint}", (), "points of the mesh", repeated=True, more=(_ARRAY, _LAYERS, _SIZE)),
                 Option("g{lobal}-m{esh}-s{ize}", (POSITIVE,), "of pieces without one, and away from them", "m",
                        "the largest of the pieces"),
-                Option("t{olerance}", (NOT_NEGATIVE,), "points nearer than this are one", "m", "1e-4"), _GROUP)),
+                Option("t{olerance}", (NOT_NEGATIVE,), "points nearer than this are one", "m", "1e-4"), _GROUP),
+            does="patch"),
     Command("e{lement} create geo{metry}-b{oundary}", "Triangles in the inside of a closed line, by Gmsh, with others "
             "in it that are holes, or filled.",
             ("pcdc element create geometry-boundary boundary (0,0) (9,0) (9,6) (0,6) m-s 1 inner-boundary (3,2) (5,2) "
@@ -1204,20 +1243,20 @@ _ELEMENT_CREATE = (
                        more=(_SIZE,)),
                 Option("i{nner}-b{oundary}", (VECTORS,), "corners of a line in it", "m", repeated=True,
                        more=(_SIZE, Option("filled", (BOOL,), "elements inside; off: a hole", default="off"))),
-                _GROUP)),
+                _GROUP), does="patch"),
     Command("e{lement} create h{ollow}-cir{cle}", "Triangles in a ring, by Gmsh.",
             ("pcdc element create hollow-circle center (0,0) radius 4 m-s 0.8 inner-radius 1 m-s 0.2",),
             options=(Option("c{enter}", (VECTOR,), "centre of both circles", "m", required=True),
                      Option("r{adius}", (POSITIVE,), "outer radius", "m", required=True, more=(_SIZE,)),
                      Option("i{nner}-r{adius}", (POSITIVE,), "radius of the hole", "m", required=True, more=(_SIZE,)),
-                     _GROUP)),
+                     _GROUP), does="patch"),
 )  # fmt: skip
 
 _OBJECTS = (
     _group_command("element", "e{lement}"),
     Command("e{lement} delete", "Elements are gone. Before the first model or condition is assigned the mesh is "
             "without them, and numbers of others close up; later they are taken out, as by element c-model null.",
-            ("pcdc element delete range x 2 4 y 0 1",), ranged="element", dims=BOTH),
+            ("pcdc element delete range x 2 4 y 0 1",), ranged="element", dims=BOTH, does="meshes.delete"),
     Command("e{lement} from", "Elements of another program.", ("pcdc element from",), dims=BOTH,
             refused="a mesh of another program is read by mesh import 'file' (model import gmsh or abaqus)"),
     Command("e{lement} dens{ify}", "Quads are halved until they are short enough, before the first model or condition "
@@ -1226,15 +1265,17 @@ _OBJECTS = (
             ("pcdc element densify pattern 1 1 maximum-length 0.5 0.5 range x 2 4 y 0 1",),
             options=(Option("p{attern}", (CHOSEN, CHOSEN), "1: halved along x, along y; 0: not", "", "1 1"),
                      Option("m{aximum}-l{ength}", (POSITIVE, SECOND_POSITIVE), "of sides along x and y; one number for "
-                            "both", "m", required=True)), ranged="element"),
+                            "both", "m", required=True)), ranged="element", does="meshes.densify"),
     Command("e{lement} hide", "Elements are hidden from pictures and, where use-hidden is not said, from ranges; off: "
             "seen again. They go on being computed.",
             ("pcdc element hide range group 'cover'", "pcdc element hide off"),
-            (_leading("hidden", BOOL, "whether they are", required=False),), ranged="element", dims=BOTH),
+            (_leading("hidden", BOOL, "whether they are", required=False),), ranged="element", dims=BOTH,
+            does="settings.hide"),
     _list_command("element", "e{lement}"),
     Command("e{lement} col{lision}", "Whether contact of these elements is looked for; off: others pass through them.",
             ("pcdc element collision off range group 'cover'",),
-            (_leading("on", BOOL, "whether they touch others"),), ranged="element", dims=BOTH),
+            (_leading("on", BOOL, "whether they touch others"),), ranged="element", dims=BOTH,
+            does="settings.collision"),
     Command("e{lement} w{ater}", "Water stands before the surface of the model: its pressure, the depth below a water "
             "line times density and gravity, pushes on all free faces of these elements that lie below the line, on "
             "parts of faces too, wherever they move. Where the line, which goes from left to right, does not reach "
@@ -1243,7 +1284,7 @@ _OBJECTS = (
             options=(Option("s{urface}", (STRING,), "layer of the water line, in three dimensions of planes and "
                             "polygons", required=True),
                      Option("d{ensity}", (NOT_NEGATIVE,), "of the water; 0: there is none any more", "kg/m3",
-                            required=True)), ranged="element", dims=BOTH),
+                            required=True)), ranged="element", dims=BOTH, does="assignments.water"),
     Command("e{lement} c-m{odel}", "The constitutive model of elements, with its properties. Models of fluid "
             "are those of the joints around the elements.",
             ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25",
@@ -1261,12 +1302,12 @@ _OBJECTS = (
             dims=BOTH),
     Command("e{lement} law", "Reads, checks and compiles a law of a Python file without giving it to elements: for a "
             "script that begins with model restore. A checkpoint does not name files that are executed.",
-            ("pcdc element law 'clay.py:clay'",), (_LAW,), dims=BOTH),
+            ("pcdc element law 'clay.py:clay'",), (_LAW,), dims=BOTH, does="assignments.load_law"),
     Command("e{lement} prop{erty}", "Changes properties; the others stay.",
             ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
              "pcdc element property conductivity 3.5 range group 'salt'",
              "pcdc element property young table 'E_of_depth' over y density field 'density'"),
-            options=_OF_SOLIDS, ranged="element", needs_option=True, dims=BOTH),
+            options=_OF_SOLIDS, ranged="element", needs_option=True, dims=BOTH, does="heat.element_property"),
     Command("e{lement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
             "not given are zero; in the plane stress-zz is then that of plane strain, Poisson's ratio times xx + yy, "
             "in plane stress 0. It is that of a strain, by the moduli of this moment: where these are lowered later, "
@@ -1279,13 +1320,13 @@ _OBJECTS = (
                 for c in ("xx", "yy", "xy", "zz")) + tuple(
                 Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa", dims=SPACE, also=(f"s{{stress}}-{c}",),
                        more=(Option("g{radient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
-                for c in ("xz", "yz")), ranged="element", needs_option=True, dims=BOTH),
+                for c in ("xz", "yz")), ranged="element", needs_option=True, dims=BOTH, does="initial_stress"),
     Command("e{lement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
             "log says that nothing was changed. Stresses stay; plastic strain is counted from here on.",
-            ("pcdc element reset state",), ranged="element", manual=True, dims=BOTH),
+            ("pcdc element reset state",), ranged="element", manual=True, dims=BOTH, does="settings.reset_elements"),
     Command("e{lement} res{et} k{elvin}-s{train}", "The Kelvin units of elements that creep are without strain from "
             "here on. Stresses and displacements stay.", ("pcdc element reset kelvin-strain",), ranged="element",
-            dims=BOTH),
+            dims=BOTH, does="settings.reset_kelvin_strain"),
     _group_command("element-face", "e{lement}-f{ace}"),
     _list_command("element-face", "e{lement}-f{ace}"),
     Command("e{lement}-f{ace} c-m{odel}", "The contact model of surfaces.",
@@ -1293,7 +1334,7 @@ _OBJECTS = (
             models=(CONTACT,), ranged="element-face", manual=True, dims=BOTH),
     Command("e{lement}-f{ace} prop{erty}", "Changes properties of contact models; the others stay.",
             ("pcdc element-face property friction 20 range geometry 'fault'",), options=_properties(CONTACT),
-            ranged="element-face", needs_option=True, dims=BOTH),
+            ranged="element-face", needs_option=True, dims=BOTH, does="assignments.face_property"),
     Command("e{lement}-f{ace} b{oundary}", "A boundary condition of surfaces.",
             ("pcdc element-face boundary m-s-b-c stress-normal table 'blast' range geometry 'hole'",
              "pcdc element-face boundary m-s-b-c quiet on incoming-x table 'wave' range boundary y 0 0",
@@ -1305,7 +1346,7 @@ _OBJECTS = (
             ("pcdc element-face boundary remove range geometry 'hole'",
              "pcdc element-face boundary remove therm-c-h range geometry 'hole'"),
             options=_removed(STRESS, CONST_HEAT, *FIELDS_AT_FACES.values()), ranged="element-face", dims=BOTH,
-            also=("e{lement}-f{ace} r{emove}",)),
+            also=("e{lement}-f{ace} r{emove}",), does="free_faces"),
     _group_command("face-joint", "f{ace}-j{oint}"),
     _list_command("face-joint", "f{ace}-j{oint}"),
     Command("f{ace}-j{oint} c-m{odel}", "The model of the joints between elements. Joints without one hold for ever.",
@@ -1319,10 +1360,10 @@ _OBJECTS = (
              "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'",
              "pcdc face-joint property aperature-initial field 'aperture' shear-dilation 5 range geometry 'fault'"),
             options=(*_OF_JOINTS, *_properties(POROUS), *_properties(FLUID_HEAT), *_properties(GRAINS)),
-            ranged="face-joint", needs_option=True, dims=BOTH),
+            ranged="face-joint", needs_option=True, dims=BOTH, does="flow.joint_property"),
     Command("f{ace}-j{oint} res{et} state", "Damage of joints that are not broken is forgotten. Those "
             "that slide forget that they are torn, not what has slid.",
-            ("pcdc face-joint reset state",), ranged="face-joint", dims=BOTH),
+            ("pcdc face-joint reset state",), ranged="face-joint", dims=BOTH, does="settings.reset_joints"),
     _group_command("node", "n{ode}"),
     Command("n{ode} bou{ndary}", "A boundary condition of nodes.",
             ("pcdc node boundary mech-vel-b-c velocity-y -0.05 range group 'platen' set 'bc'",
@@ -1339,16 +1380,16 @@ _OBJECTS = (
             "step is shorter by the root of 1 + damping.",
             ("pcdc node mechanical-damp local 0.3 range y 0 2",),
             options=(Option("l{ocal}", (limited(0.0, 1.0, True),), "part, from 0 to 1", "1", required=True),),
-            ranged="node", dims=BOTH),
+            ranged="node", dims=BOTH, does="assignments.damp"),
     Command("n{ode} func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
-            ("pcdc node function 'pump.py:wave'",), (_FUNCTION,), dims=BOTH),
+            ("pcdc node function 'pump.py:wave'",), (_FUNCTION,), dims=BOTH, does="assignments.load_function"),
     Command("n{ode} bou{ndary} r{emove}", "Takes boundary conditions of nodes back.",
             ("pcdc node boundary remove range group 'platen' set 'bc'",
              "pcdc node boundary remove mech-vel-b-c range group 'platen' set 'bc'"),
             options=_removed(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE,
                              *FIELDS_AT_NODES.values()),
-            ranged="node", dims=BOTH, also=("n{ode} rem{ove}",)),
+            ranged="node", dims=BOTH, also=("n{ode} rem{ove}",), does="free_nodes"),
     Command("n{ode} init{ial}", "The velocity or temperature of nodes now.",
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
@@ -1360,38 +1401,39 @@ _OBJECTS = (
                             "Elements around the nodes are free of thermal stress then", "K"),
                      *(Option(one.name, (FLOAT,), f"{one.doc}; before, it is 0. Elements around the nodes are free of "
                               "the stress that it brings then", one.unit) for one in kinds().values())), ranged="node",
-            needs_option=True, dims=BOTH),
+            needs_option=True, dims=BOTH, does="initial_nodes"),
     Command("n{ode} therm{al}-init{ialize}", "The temperature of nodes now, as node initial temperature.",
             ("pcdc node thermal-initialize temperature 15 range x 0 1",),
             options=(Option("t{emperature}", (FLOAT,), "temperature, of the fluid at them too", "K", required=True),),
-            ranged="node", dims=BOTH),
+            ranged="node", dims=BOTH, does="heat.initial"),
     Command("n{ode} hydr{aulic}-init{ialize}", "Fluid that flow nodes hold now, and its temperature.",
             ("pcdc node hydraulic-initialize flow-node-saturation 0.5",),
             options=(Option("f{low}-n{ode}-s{aturation}", (limited(0.0, 1.0, True),), "part of the room that is "
                             "filled", "1", also=("f{luid}-c{avity}-s{aturation}",)),
                      Option("f{low}-n{ode}-t{emperature}", (FLOAT,), "of the fluid alone", "K",
                             also=("f{luid}-c{avity}-t{emperature}",))),
-            ranged="node", needs_option=True, dims=BOTH),
+            ranged="node", needs_option=True, dims=BOTH, does="initial_fluid"),
     Command("n{ode} hist{ory}", "A history of the temperature of a node, of several their mean.",
             ("pcdc node history 'gauge' thermal temperature range id 3",), (_NAME,),
             options=(Option("therm{al}", (), "of heat", required=True,
                             more=(Option("temp{erature}", (), "temperature", required=True),)), _EVERY),
-            ranged="node", dims=BOTH),
+            ranged="node", dims=BOTH, does="node_history"),
     Command("n{ode} re{set} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True,
-    dims=BOTH),
+    dims=BOTH, does="settings.reset_velocity"),
     Command("n{ode} re{set} dis{placement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
-            manual=True, dims=BOTH),
+            manual=True, dims=BOTH, does="settings.reset_displacement"),
     Command("flow-n{ode} init{ial}", "Fluid that the flow nodes (nodes at which a channel ends) among these nodes hold "
             "now; before, channels are dry.", ("pcdc flow-node initial saturation 1",
                                                "pcdc flow-node initial pressure 1e6 range x 0 1"),
             options=(Option("p{ressure}", (NOT_NEGATIVE,), "filled, at this pressure", "Pa"),
                      Option("sat{uration}", (limited(0.0, 1.0, True),), "part of the room that is filled", "1"),
                      Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the fluid that is there", "1")),
-            ranged="node", needs_option=True, dims=BOTH),
+            ranged="node", needs_option=True, dims=BOTH, does="flow.initial"),
     Command("well cr{eate}", "Flow nodes of a range are a well: one room, whose pressure is that at its highest node. "
             "Stages say what it does; without one it is shut in. Its water pushes on free faces whose nodes all lie in "
             "the range.",
-            ("pcdc well create 'injection' range geometry 'hole'",), (_NAME,), ranged="node", dims=BOTH),
+            ("pcdc well create 'injection' range geometry 'hole'",), (_NAME,), ranged="node", dims=BOTH,
+            does="flow.well"),
     Command("well st{age}", "One more stage of a well, after those that it has; one without time that has begun ends "
             "now. After the last the well is shut in. Times of tables are those of flow.",
             ("pcdc well stage 'injection' rate 1e-4 time 60 limit 8e6", "pcdc well stage 'injection' shut-in time 600",
@@ -1403,7 +1445,7 @@ _OBJECTS = (
                      Option("sh{ut}-in", (), "nothing comes in or out"),
                      Option("time", (POSITIVE,), "time of flow that it takes", "s", "no end"),
                      Option("lim{it}", (NOT_NEGATIVE,), "with rate: pressure above which less is pumped in", "Pa",
-                            "none")), dims=BOTH),
+                            "none")), dims=BOTH, does="stage"),
     Command("bolt cr{eate} p{olyline}", "Installs a rock bolt along these points, as things are now: at any stage of "
             "a run. It is divided at the edges of elements, or as said. Nodes go with the rock across the bar, and are "
             "tied to it along the bar by grout, under the plate altogether; where the rock is taken out they are free. "
@@ -1417,7 +1459,7 @@ _OBJECTS = (
                     "the rest is free", "m", "all of it"),
              Option("plate", (), "the first node is tied to the rock: a face plate"),
              Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
-                    more=(SET,))), dims=BOTH),
+                    more=(SET,))), dims=BOTH, does="bolts.create"),
     Command("bolt c-m{odel}", "The properties of elements of bolts, which act from then on.",
             ("pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 tensile-yield-force 250e3 "
              "shear-stiffness-rock-bolt 1e9 grout-thickness 0.0125 cohesion-rock-grout 1.5e6 cohesion-grout-bolt 2e6 "
@@ -1430,7 +1472,8 @@ _OBJECTS = (
             (_leading("first", VECTOR, "head", "m"), _leading("second", VECTOR, "end", "m")),
             (Option("m{esh}-s{ize}", (POSITIVE,), "length of its elements, at most", "m", "0.2"),
              Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
-                    more=(SET,))), ranged="element", dims=BOTH, also=("s{upport}-e{lement} c{reate}",)),
+                    more=(SET,))), ranged="element", dims=BOTH, also=("s{upport}-e{lement} c{reate}",),
+            does="bolts.between"),
     _group_command("bolt-element", "b{olt}-e{lement}", "s{upport}-e{lement}"),
     _group_command("bolt-node", "b{olt}-n{ode}", "s{upport}-n{ode}"),
     Command("b{olt}-n{ode} bou{ndary}", "What is prescribed at nodes of bolts.",
@@ -1443,10 +1486,11 @@ _OBJECTS = (
             ("pcdc bolt-node boundary remove range group 'heads'",
              "pcdc bolt-node boundary remove b-n-f-b-c range group 'heads'"),
             options=_removed(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH,
-            also=("b{olt}-n{ode} r{emove}", "s{upport}-n{ode} bou{ndary} r{emove}", "s{upport}-n{ode} r{emove}")),
+            also=("b{olt}-n{ode} r{emove}", "s{upport}-n{ode} bou{ndary} r{emove}", "s{upport}-n{ode} r{emove}"),
+            does="free_bolt_nodes"),
     Command("bolt del{ete}", "Takes elements of bolts out at once, with their part of the grout. Their numbers go with "
             "them, those of the others stay; without RANGE all of them.",
-            ("pcdc bolt delete range group 'roof'",), ranged="bolt-element", dims=BOTH),
+            ("pcdc bolt delete range group 'roof'",), ranged="bolt-element", dims=BOTH, does="supports.delete"),
     Command("liner cr{eate}",
             "Puts a liner on the free faces that the range chooses, as things are now: at any stage of a run, "
             "without force in it. A face has one beam; where faces or liners meet at a point of the mesh they are "
@@ -1454,14 +1498,15 @@ _OBJECTS = (
             "them is the rock of their faces.",
             ("pcdc liner create group 'shotcrete' range geometry 'tunnel'", "pcdc liner create range boundary y 2 3"),
             options=(Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
-                            more=(SET,)),), ranged="element-face"),
+                            more=(SET,)),), ranged="element-face", does="liners.create"),
     Command("liner c-m{odel}", "The properties of elements of liners, which act from then on.",
             ("pcdc liner c-model beam property density 2400 young 20e9 poisson-ratio 0.2 thickness 0.2 "
              "tensile-strength 2e6 compressive-strength 25e6 normal-stiffness 1e10 shear-stiffness 1e10 "
              "bond-tensile-strength 0.5e6 bond-cohesion 1e6 bond-friction 35 range group 'shotcrete'",),
             models=(LINER,), ranged="liner-element"),
     Command("liner del{ete}", "Takes elements of liners out at once. Their numbers go with them, those of the others "
-            "stay; without RANGE all of them.", ("pcdc liner delete range group 'shotcrete'",), ranged="liner-element"),
+            "stay; without RANGE all of them.", ("pcdc liner delete range group 'shotcrete'",), ranged="liner-element",
+            does="supports.delete"),
     _group_command("liner-element", "liner-e{lement}"),
     _group_command("liner-node", "liner-n{ode}"),
     Command("liner-n{ode} bou{ndary}", "What is prescribed at nodes of liners.",
@@ -1469,7 +1514,8 @@ _OBJECTS = (
              "pcdc liner-node boundary l-n-f-b-c force-y -50e3 moment 1e3 range id 3"),
             models=(LINER_VELOCITY, LINER_FORCE), ranged="liner-node"),
     Command("liner-n{ode} bou{ndary} rem{ove}", "Takes it back.",
-            ("pcdc liner-node boundary remove range group 'footing'",), ranged="liner-node"),
+            ("pcdc liner-node boundary remove range group 'footing'",), ranged="liner-node",
+            does="supports.remove_conditions"),
 )  # fmt: skip
 
 _RECORDS = (
@@ -1480,7 +1526,7 @@ _RECORDS = (
              "pcdc table create 'E_of_depth' values (-500,60e9) (0,20e9)",
              "pcdc table create 'c_of_strain' values (0,2e6) (0.01,2e5)"),
             (_NAME,), (Option("val{ues}", (VECTORS,), "(time or coordinate, value), the first ascending", "s or m",
-                              required=True),), dims=BOTH),
+                              required=True),), dims=BOTH, does="assignments.table"),
     Command("tab{le}", "The same in pairs of numbers. With relative-time the table begins when a condition takes it: "
             "its times count from that moment.",
             ("pcdc table 'ramp' data 0 0, 0.1 2e6, 1 2e6", "pcdc table 'ramp' data 0 0 0.1 2e6 type relative-time"),
@@ -1488,8 +1534,9 @@ _RECORDS = (
                        Option("t{ype}", (), "what its times count from",
                               more=(Option("r{elative}-t{ime}", (), "the moment at which a condition takes it"),
                                     Option("a{bsolute}-t{ime}", (), "the beginning of the model")))),
-            needs_option=True, dims=BOTH),
-    Command("tab{le} del{ete}", "Forgets a table.", ("pcdc table delete 'blast'",), (_NAME,), dims=BOTH),
+            needs_option=True, dims=BOTH, does="table"),
+    Command("tab{le} del{ete}", "Forgets a table.", ("pcdc table delete 'blast'",), (_NAME,), dims=BOTH,
+            does="assignments.remove_table"),
     Command("field cr{eate}", "A random field: properties that differ from element to element, face to face, joint to "
             "joint. Where several properties take the same field they are drawn together; another seed is another, "
             "independent field. What was drawn stays, whatever becomes of the field.",
@@ -1505,9 +1552,10 @@ _RECORDS = (
                     more=(Option("cov{ariance}", (choice("exponential", "gaussian"),), "exp(-r/L), or exp(-(r/L)2), "
                                  "which is smooth", "", "exponential"),)),
              Option("least", (FLOAT,), "the distribution is cut below", "", "none"),
-             Option("great{est}", (FLOAT,), "the distribution is cut above", "", "none")), dims=BOTH),
+             Option("great{est}", (FLOAT,), "the distribution is cut above", "", "none")), dims=BOTH,
+            does="random_field"),
     Command("field del{ete}", "Forgets a random field; what was drawn from it stays.",
-            ("pcdc field delete 'strength'",), (_NAME,), dims=BOTH),
+            ("pcdc field delete 'strength'",), (_NAME,), dims=BOTH, does="assignments.remove_field"),
     Command("his{tory} cr{eate}", "Records a number during the run: of one object, of those of a range or, without "
             "one, of all (sum, mean, minimum or maximum), or of the model.",
             ("pcdc history create 'load' node value reaction-y sum every 100 range group 'platen' set 'bc'",
@@ -1523,15 +1571,15 @@ _RECORDS = (
              Option("well", (STRING,), "with object well: its name"),
              *(Option(how, (), "of the objects of range, or of all")
                for how in ("sum", "mean", "min{imum}", "max{imum}"))),
-            ranged="any", dims=BOTH),
+            ranged="any", dims=BOTH, does="history"),
     Command("his{tory} del{ete}", "Stops a history; its file stays.", ("pcdc history delete 'load'",), (_NAME,),
-    dims=BOTH),
+    dims=BOTH, does="histories.delete"),
     Command("his{tory} exp{ort}", "Writes all histories, or some, side by side as CSV.",
             ("pcdc history export 'curves.csv'",), (_leading("file", FILE, "name of the file"),),
-            (Option("name{s}", (STRINGS,), "only these", default="all"),), dims=BOTH),
+            (Option("name{s}", (STRINGS,), "only these", default="all"),), dims=BOTH, does="histories.export"),
     Command("chart cr{eate}", "A diagram.", ("pcdc chart create 'ucs' x-label 'strain' y-label 'stress [[MPa]]'",),
             (_NAME,), (Option("tit{le}", (STRING,), "over the diagram"), Option("x-l{abel}", (STRING,), "of the axis"),
-                       Option("y-l{abel}", (STRING,), "of the axis")), dims=BOTH),
+                       Option("y-l{abel}", (STRING,), "of the axis")), dims=BOTH, does="charts.create"),
     Command("chart add", "A curve of two histories, or of points.",
             ("pcdc chart add 'ucs' x 'shortening' scale-x -0.01 y 'load' scale-y 2e-8 label 'sample'",
              "pcdc chart add 'ucs' values [curve] label 'exact' style points",
@@ -1547,7 +1595,7 @@ _RECORDS = (
                     "[m] from its left end", dims=PLANE),
              Option("lab{el}", (STRING,), "in the legend"),
              Option("style", (choice("line", "points"),), "how it is drawn", default="line")), ranged="face-joint",
-                    dims=BOTH),
+                    dims=BOTH, does="charts.add"),
     Command("chart exp{ort}", "Writes a diagram as CSV and as a figure of the same name.",
             ("pcdc chart export 'ucs' 'ucs.png'", "pcdc chart export 'ucs' 'ucs.png' cracks",
             "pcdc chart export 'slope' 'slope.png' plastic", "pcdc chart export 'crack' 'crack.png' fluid aperture"),
@@ -1559,12 +1607,14 @@ _RECORDS = (
              Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks",
                     dims=PLANE),
              Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity", "concentration"),),
-                    "beside it the model as it is now, its channels coloured by that", dims=PLANE)), dims=BOTH),
+                    "beside it the model as it is now, its channels coloured by that", dims=PLANE)), dims=BOTH,
+            does="charts.export"),
     Command("output vtk", "Frames for ParaView: now, and every so many steps.",
             ("pcdc output vtk 'blast' every 1000", "pcdc output vtk 'last'"),
             (_leading("file", FILE, "first part of the names of the files, in the folder of the results"),),
             (Option("ev{ery}", (COUNT,), "steps between two frames", "", "once, now"),
-             Option("off", (), "no more frames of this name")), dims=BOTH, also=("mod{el} exp{ort} vtk",)),
+             Option("off", (), "no more frames of this name")), dims=BOTH, also=("mod{el} exp{ort} vtk",),
+            does="frames.vtk"),
     Command("output image", "A picture of the model as it is now, `<name>_<step>.png`, of any field that frames have.",
             ("pcdc output image 'stress' field 'stress-yy' limits -2e6 0 colours blue-red",
              "pcdc output image 'roof.pdf' object elements field 'displacement' deformed 100 range group 'roof'",
@@ -1594,12 +1644,13 @@ _RECORDS = (
              Option("section", (SECTION,), "a plane that cuts it: 'x=1.5' takes the part towards the eye away, 'x<1.5' "
                     "and 'x>1.5' say what stays, 'px,py,pz,nx,ny,nz' gives a point and the normal into what is taken "
                     "away", "", "whole", dims=SPACE),
-             Option("title", (STRING,), "over the picture; {step} and {time} are filled in")), ranged="any", dims=BOTH),
+             Option("title", (STRING,), "over the picture; {step} and {time} are filled in")), ranged="any", dims=BOTH,
+            does="pictures.image"),
 )  # fmt: skip
 
 _ONLINE = (
     Command("dev{ice} l{ist}", "Says in the log what the run computes with: ranks, threads, cores.",
-            ("pcdc device list",), dims=BOTH),
+            ("pcdc device list",), dims=BOTH, does="clocks.devices"),
     Command("dev{ice} s{witch}-t{o}", "Another device.", ("pcdc device switch-to 'GPU 0'",),
             (_leading("name", STRING, "its name"),), dims=BOTH,
             idle="a run computes with the ranks and threads that it was started with (mpirun -n, -j)"),

@@ -190,19 +190,19 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
 # ---- commands that make something of their values alone --------------------------------------------------------------
 
 
-def _shape(arguments: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in arguments.items() if name != "as-layer"}
+def shape(command: str, arguments: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Kind and values of the shape of `geometry create ...`, see `geometry.shape`."""
+    kind = command.rpartition(" ")[2]
+    if kind == "circle":
+        return _circle(arguments)
+    return kind, *(value for name, value in arguments.items() if name != "as-layer")
 
 
-def _make_shape(command: str) -> Callable[[Mapping[str, Any]], None]:
-    def make(arguments: Mapping[str, Any]) -> None:
-        geometry.shape(command, *_shape(arguments).values())
-
-    return make
+def _shape(kind: str, arguments: Mapping[str, Any]) -> None:
+    geometry.shape(*shape(kind, arguments))
 
 
-def circle(arguments: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Kind and values of the shape of `geometry create circle`, see `geometry.shape`."""
+def _circle(arguments: Mapping[str, Any]) -> tuple[Any, ...]:
     centre, radius = arguments.get("centre", arguments.get("center")), arguments.get("radius")
     if centre is None or radius is None or {"centre", "center"} <= arguments.keys():
         raise CommandError("a circle needs a centre and a radius, each once")
@@ -211,19 +211,6 @@ def circle(arguments: Mapping[str, Any]) -> tuple[Any, ...]:
     if "segment-length" in arguments:
         return "segmented-circle", centre, radius, arguments["segment-length"]
     return "circle", centre, radius
-
-
-def _circle(arguments: Mapping[str, Any]) -> None:
-    geometry.shape(*circle(arguments))
-
-
-def _rectangle(arguments: Mapping[str, Any]) -> None:
-    even = (1.0,) * len(arguments["first"])
-    values.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", even))
-
-
-def _equilateral(arguments: Mapping[str, Any]) -> None:
-    values.grid_lines(arguments["first"], arguments["second"], (1, 1), (1.0, 1.0))
 
 
 def _brick(arguments: Mapping[str, Any]) -> None:
@@ -289,30 +276,6 @@ def _pieces(arguments: Mapping[str, Any]) -> None:
             geometry.shape(*piece.shape)
 
 
-def _table(arguments: Mapping[str, Any]) -> None:
-    Table.of(arguments["values"], arguments["name"])
-
-
-def _history(arguments: Mapping[str, Any]) -> None:
-    values.history_name(arguments["name"])
-
-
-def _columns(arguments: Mapping[str, Any]) -> None:
-    values.result_name(arguments["file"])
-
-
-def _export(arguments: Mapping[str, Any]) -> None:
-    values.figure_name(arguments["file"])
-
-
-def _drawing(arguments: Mapping[str, Any]) -> None:
-    values.result_name(arguments["file"])
-
-
-def _frames(arguments: Mapping[str, Any]) -> None:
-    values.frames_name(arguments["file"])
-
-
 def _bolt(arguments: Mapping[str, Any]) -> None:
     points = arguments["points"]
     line = layout.checked(points, len(points[0]) if points else 2)
@@ -366,23 +329,24 @@ def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-_TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
-    **{f"geometry create {name}": _make_shape(name) for name in
-       ("polyline", "polygon", "rectangle", "arc", "point", "box", "sphere", "cylinder", "cone", "disc",
+_TRIALS: dict[str, Callable[[Mapping[str, Any]], object]] = {
+    **{f"geometry create {name}": functools.partial(_shape, name) for name in
+       ("polyline", "polygon", "rectangle", "circle", "arc", "point", "box", "sphere", "cylinder", "cone", "disc",
         "plane")},
-    "geometry create circle": _circle,
     "geometry create fractures": _fractures,
-    "geometry export": _drawing,
+    "geometry export": lambda given: values.result_name(given["file"]),
     "bolt create polyline": _bolt,
     "bolt-element create": _bar,
-    "mesh structured": _rectangle,
+    "mesh structured": lambda given: values.grid_lines(
+        given["first"], given["second"], given["cells"], given.get("ratio", (1.0,) * len(given["first"]))
+    ),
     "element create brick": _brick,
     **{f"element create {name}": _pieces for name in
        ("geometry", "geometry-patch", "geometry-boundary", "hollow-circle")},
-    "mesh equilateral": _equilateral,
-    "table create": _table,
-    "history create": _history,
-    "history export": _columns,
-    "chart export": _export,
-    "output vtk": _frames,
+    "mesh equilateral": lambda given: values.grid_lines(given["first"], given["second"], (1, 1), (1.0, 1.0)),
+    "table create": lambda given: Table.of(given["values"], given["name"]),
+    "history create": lambda given: values.history_name(given["name"]),
+    "history export": lambda given: values.result_name(given["file"]),
+    "chart export": lambda given: values.figure_name(given["file"]),
+    "output vtk": lambda given: values.frames_name(given["file"]),
 }  # fmt: skip

@@ -171,7 +171,10 @@ class Interpreter:
 
     @staticmethod
     def _command(call: _Call) -> None:
-        _COMMANDS[call.statement.command](call)
+        if call.row.does:
+            _by_name(call, call.row.does)
+        else:
+            _CONVERTERS[call.statement.command](call)
         look_at_units(call.sim, call.statement.command, call.arguments)
 
     @staticmethod
@@ -215,6 +218,7 @@ class _Call:
 
     def __init__(self, interpreter: Interpreter, sim: Any, statement: Statement) -> None:
         self.sim, self.statement = sim, statement
+        self.row = next(row for row in ZDEM.commands if row.name == statement.command)
         self.directory = interpreter.script.directory
         self.arguments = dict(statement.arguments)
         self.where: Selection | None = statement.selection
@@ -247,65 +251,30 @@ class _Call:
         return found
 
 
-# ---- one function per command --------------------------------------------------------------------------------------
+# ---- commands --------------------------------------------------------------------------------------------------------
 
 
-def _start(call: _Call) -> None:
-    dem.particles.start(call.sim)
-
-
-def _restore(call: _Call) -> None:
-    dem.checkpoints.restore(call.sim, call.existing())
-
-
-def _load(call: _Call) -> None:
-    dem.particles.load(call.sim, call.existing(), **call.given("scale", "x", "y"))
-
-
-def _stop(call: _Call) -> None:
-    dem.cycles.stop(call.sim)
-
-
-def _box(call: _Call) -> None:
-    dem.walls.box(call.sim, **call.given())
-
-
-def _wall(call: _Call) -> None:
-    dem.walls.wall(call.sim, **call.given())
-
-
-def _ball(call: _Call) -> None:
-    arguments = call.given()
-    dem.particles.ball(call.sim, arguments.pop("id"), **arguments)
+def _by_name(call: _Call, does: str) -> None:
+    """Call the function that the row of the table names, with the arguments of the line under their names."""
+    given = call.given()
+    if "file" in given:
+        given["file"] = call.path() if call.statement.command in ("EXP", "SAV") else call.existing()
+    if call.row.ranged:
+        given["where"] = call.where
+    module, _, name = does.partition(".")
+    getattr(getattr(dem, module), name)(call.sim, **given)
 
 
 def _gen(call: _Call) -> None:
-    arguments = call.given()
-    radii = arguments.pop("rad")
-    if arguments.pop("grid", False):
-        dem.particles.gen_grid(call.sim, radii, **arguments)
-    else:
-        dem.particles.gen(call.sim, arguments.pop("num"), radii, **arguments)
-
-
-def _gline(call: _Call) -> None:
-    dem.particles.gline(call.sim, **call.given())
+    grid = call.arguments.pop("grid", False)
+    _by_name(call, "particles.gen_grid" if grid else "particles.gen")
 
 
 def _clump(call: _Call) -> None:
-    arguments = call.given()
-    if arguments.pop("file", None) is not None:
-        dem.clumps.clump(call.sim, call.existing(), **arguments)
+    if "file" in call.arguments:
+        dem.clumps.clump(call.sim, call.existing(), **call.given("x", "y", "angle", "scale", "color", "group"))
     else:
-        dem.clumps.join(call.sim, call.where, **arguments)
-
-
-def _del(call: _Call) -> None:
-    dem.particles.delete(call.sim, call.where)
-
-
-def _exp(call: _Call) -> None:
-    dem.particles.export(call.sim, call.path(), with_group="group" in call.arguments, where=call.where)
+        dem.clumps.join(call.sim, call.where, **call.given())
 
 
 def _prop(call: _Call) -> None:
@@ -328,18 +297,6 @@ def _set_properties(call: _Call, properties: dict[str, Any]) -> None:
     dem.properties.prop(call.sim, call.where, **properties)
 
 
-def _bond(call: _Call) -> None:
-    dem.bonds.break_bonds(call.sim, call.where)
-
-
-def _fix(call: _Call) -> None:
-    dem.properties.fix(call.sim, tuple(call.arguments), where=call.where)
-
-
-def _free(call: _Call) -> None:
-    dem.properties.free(call.sim, tuple(call.arguments), where=call.where)
-
-
 def _set(call: _Call) -> None:
     for name, value in call.arguments.items():
         if name == "damp":
@@ -349,26 +306,9 @@ def _set(call: _Call) -> None:
         dem.settings.set_option(call.sim, name, value)
 
 
-def _cyc(call: _Call) -> None:
-    dem.cycles.cycle(call.sim, call.arguments["steps"])
-
-
 def _imple(call: _Call) -> None:
     arguments = call.given()
     dem.cycles.imple(call.sim, arguments.pop("id"), **arguments)
-
-
-def _sav(call: _Call) -> None:
-    dem.checkpoints.save(call.sim, call.path())
-
-
-def _hist(call: _Call) -> None:
-    what = recorded(call.statement)
-    dem.history.hist(call.sim, call.arguments["id"], call.arguments["interval"], what)
-
-
-def _plot(call: _Call) -> None:
-    dem.history.plot_hist(call.sim, y=call.arguments["y"], x=call.arguments["x"])
 
 
 def _draw(call: _Call) -> None:
@@ -377,44 +317,23 @@ def _draw(call: _Call) -> None:
     dem.history.draw(call.sim, call.arguments.get("interval"), what, off)
 
 
-def _log(call: _Call) -> None:
-    _say(call, "the log goes to standard output; nothing to switch")
-
-
-def _pause(call: _Call) -> None:
-    _say(call, "a run waits for nobody, it goes on")
-
-
 def _say(call: _Call, text: str) -> None:
     """A line in the log for a command without effect."""
     if getattr(call.sim, "log", None) is not None:
         call.sim.log.info(f"line {call.sim.line}: {call.statement.command}: {text}")
 
 
-_COMMANDS: dict[str, Callable[[_Call], None]] = {
-    "START": _start,
-    "RESTORE": _restore,
-    "LOAD": _load,
-    "STOP": _stop,
-    "BOX": _box,
-    "WALL": _wall,
-    "BALL": _ball,
+_CONVERTERS: dict[str, Callable[[_Call], None]] = {
     "GEN": _gen,
-    "GLINE": _gline,
     "CLUMP": _clump,
-    "DEL": _del,
-    "EXP": _exp,
     "PROP": _prop,
-    "BOND": _bond,
-    "FIX": _fix,
-    "FREE": _free,
+    "FIX": lambda call: dem.properties.fix(call.sim, tuple(call.arguments), where=call.where),
+    "FREE": lambda call: dem.properties.free(call.sim, tuple(call.arguments), where=call.where),
     "SET": _set,
-    "CYC": _cyc,
     "IMPLE": _imple,
-    "SAV": _sav,
-    "HIST": _hist,
-    "PLOT": _plot,
+    "HIST": lambda call: dem.history.hist(call.sim, **call.given("id", "interval"), what=recorded(call.statement)),
     "DRAW": _draw,
-    "LOG": _log,
-    "PAUSE": _pause,
+    "LOG": lambda call: _say(call, "the log goes to standard output; nothing to switch"),
+    "PAUSE": lambda call: _say(call, "a run waits for nobody, it goes on"),
 }
+"""Commands whose row names no function."""

@@ -277,7 +277,9 @@ def find(word: str, rows: Sequence[AnyRow]) -> tuple[AnyRow | None, bool]:
 class Command(Row):
     """A command: fixed words and values first (`leading`, in this order), then `options` in any order, then RANGE.
 
-    same_as: the command this is another name of. example: lines that parse; the reference page shows them.
+    same_as: the command this is another name of. example: lines that parse; the reference page shows them. does: its
+    function, as "module.name" of `hpcdem.commands.dem`, which has arguments of the names of its options; "": execute.py
+    converts them.
     """
 
     leading: tuple[Option, ...] = ()
@@ -285,6 +287,7 @@ class Command(Row):
     ranged: bool = False
     same_as: str = ""
     example: tuple[str, ...] = ()
+    does: str = ""
 
     def option(self, word: str) -> Option | None:
         """The option a (lower-case) word stands for."""
@@ -420,12 +423,14 @@ _SETTINGS = (
 
 COMMANDS = (
     # ---- beginning and end
-    Command("START", "Begins a new calculation: no particles, no walls, step 0.", example=("START",)),
+    Command("START", "Begins a new calculation: no particles, no walls, step 0.", example=("START",),
+            does="particles.start"),
     Command(
         "RESTORE",
         "Goes on from a restart file of hpcdem, looked for beside the script, then in ./data below it.",
         leading=(Option("file", "restart file", kind=FILE, required=True),),
         example=("RES 0000046000.sav",),
+        does="checkpoints.restore",
     ),
     Command(
         "LOAD",
@@ -440,8 +445,9 @@ COMMANDS = (
         ),
         example=("LOAD init_xyr.dat", "LOAD init_xyr.dat scale 0.1 x 1000.0 2000.0 y 2000.0 4000.0",
                  "LOAD all_0000046000.dat"),
+        does="particles.load",
     ),
-    Command("STOP", "Ends the run; what follows it is not read.", source="S", example=("STOP",)),
+    Command("STOP", "Ends the run; what follows it is not read.", source="S", example=("STOP",), does="cycles.stop"),
     # ---- walls
     Command(
         "BOX",
@@ -457,6 +463,7 @@ COMMANDS = (
             replace(_FRIC, source="S"),
         ),
         example=("BOX left 0.0 right 41000.0 bottom 0.0 height 11000.0 kn=0e10 ks=0e10 fric 0.0",),
+        does="walls.box",
     ),
     Command(
         "WALL",
@@ -475,6 +482,7 @@ COMMANDS = (
         ),
         example=("WALL ID 1, NODES ( 10.0 , 10000.0 ) ( 10.0 , 10.0 ), kn=0e10 ks=0e10 fric 0.0 COLOR blue",
                  "WALL id 1 xv 2.0"),
+        does="walls.wall",
     ),
     # ---- particles
     Command(
@@ -489,6 +497,7 @@ COMMANDS = (
             _GROUP,
         ),
         example=("BALL ID=0 X=2.0 Y=0.5 RAD=0.5 COLOR=blue",),
+        does="particles.ball",
     ),
     Command(
         "GEN",
@@ -528,6 +537,7 @@ COMMANDS = (
             _GROUP,
         ),
         example=("GLINE P1 ( 2.0 10.0 ) P2 ( 40.0 10.0 ), RAD=0.5 kn=4.14e3 ks=4.14e3 fric=0.55 GROUP=bom CRATIO=0.8",),
+        does="particles.gline",
     ),
     Command(
         "CLUMP",
@@ -558,6 +568,7 @@ COMMANDS = (
         longest="delete",
         ranged=True,
         example=("DEL RANGE y {top}-1000.0, {top}",),
+        does="particles.delete",
     ),
     Command(
         "EXP",
@@ -567,6 +578,7 @@ COMMANDS = (
         options=(Option("group", "the group as a fourth column"),),
         ranged=True,
         example=("EXP init_xyr.dat GROUP RANGE y 1000.0 2000.0",),
+        does="particles.export",
     ),
     # ---- properties
     Command(
@@ -590,6 +602,7 @@ COMMANDS = (
         leading=(Option("break", "the only thing BOND does", required=True),),
         ranged=True,
         example=("BOND break RANGE y 1.0 10.0",),
+        does="bonds.break_bonds",
     ),
     Command(
         "FIX",
@@ -614,6 +627,7 @@ COMMANDS = (
         longest="cycle",
         leading=(Option("steps", "steps", kind=INDEX, required=True),),
         example=("CYC 5000",),
+        does="cycles.cycle",
     ),
     Command(
         "IMPLE",
@@ -637,6 +651,7 @@ COMMANDS = (
         source="S",
         leading=(Option("file", "restart file", kind=FILE, required=True, source="S"),),
         example=("SAV initxyr.sav",),
+        does="checkpoints.save",
     ),
     # ---- histories and pictures
     Command(
@@ -685,6 +700,7 @@ COMMANDS = (
             Option("y", "history on the y axis", kind=INDEX, required=True, source="S"),
         ),
         example=("PLOT hist 2 1",),
+        does="history.plot_hist",
     ),
     Command(
         "DRAW",
