@@ -1,17 +1,17 @@
-# Angle of repose: a wall is drawn back from a column of sand
+# Angle of repose: a wall is withdrawn from a column of sand
 # -----------------------------------------------------------------------------
 # shows     a slope of 41 degrees in sand of friction 0.3. With 0.1 it is 12,
 #           with 0.2 27 and with 0.5 56 degrees: change PROP and WALL below, and
-#           give a low friction a longer floor and way
+#           use a longer floor and displacement for low friction
 # model     column 15 mm wide and 17 mm high, 1750 discs that do not rotate
 # run       ./scripts/run examples/angle_of_repose.py     (half a minute)
-# results   examples/data: frames every 4 mm of the way of the wall, walls.csv,
+# results   examples/data: frames every 4 mm of wall displacement, walls.csv,
 #           a figure of the slope
 # -----------------------------------------------------------------------------
-# The grains may not rotate: round ones would roll and make a much lower slope.
-# That stands for the interlocking of sharp grains. The parameters are those of
-# a published sandbox (Li et al. 2021), whose angles docs/validation.md sets
-# beside ours.
+# Rotation is fixed: round grains would roll and form a much lower slope. This
+# represents the interlocking of angular grains. The parameters are those of a
+# published sandbox (Li et al. 2021); docs/validation.md compares its angles
+# with ours.
 START
 SET disk hex                            # mass: density x cell of a close packing
 SET frac 0.3                            # time step from mass and stiffness
@@ -23,8 +23,8 @@ WALL id 1 nodes (0.0, 50e-3) (0.0, 0.0)     kn 1.5e4 ks 1.5e4 color black
 WALL id 2 nodes (0.0, 0.0) (46e-3, 0.0)     kn 1.5e4 ks 1.5e4 color black
 WALL id 3 nodes (15e-3, 50e-3) (15e-3, 0.0) kn 1.5e4 ks 1.5e4 color blue
 
-# Loose grains of four sizes, the small ones twice as many, fall and settle
-# without friction, hence densely.
+# Loose grains of four sizes, twice as many small ones, settle without friction
+# to a dense packing.
 GEN grid rad discrete 0.1e-3 0.1e-3 0.2e-3 0.2e-3 0.25e-3 0.3e-3 x (0.0, 15e-3) y (0.0, 42e-3)
 PROP density 1.3e3 kn 1.5e4 ks 1.5e4 damp 0.4 fric 0.0
 FIX spin
@@ -40,8 +40,8 @@ PROP color red  range y  9e-3 10e-3
 PROP color blue range y 12e-3 13e-3
 PROP color red  range y 15e-3 16e-3
 
-# Friction of grains and floor; the wall goes away at 40 mm/s, slowly enough for
-# the sand to follow. When it stops, the sand hardly moves any more.
+# Friction of grains and floor; the wall moves away at 40 mm/s, slowly enough for
+# the sand to follow. When it stops, the sand is nearly at rest.
 PROP fric 0.3
 WALL id 2 fric 0.3
 WALL id 3 xv 40e-3

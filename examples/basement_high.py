@@ -1,7 +1,7 @@
 # Basement high: thrusts meet a fixed horst
 # -----------------------------------------------------------------------------
-# shows     two thrusts before the high, none behind it: the upper one climbs its slope and carries the red bed 1 km
-#           over itself; the surface rises by 1 km on average before the high, by nothing behind it
+# shows     two thrusts in front of the high, none behind it: the upper one climbs its slope and carries the red bed
+#           1 km over itself; the mean uplift is 1 km in front of the high and zero behind it
 # model     22 km long, 2.2 km thick, with a fixed trapezium of 1.2 km under the middle; about 5600 spheres of radius
 #           45 and 60 m
 # run       ./scripts/run examples/basement_high.py       (under a minute on two cores)
@@ -11,14 +11,14 @@
 START
 SET disk off                            # spheres: mass 4/3 pi r^3 x density
 SET seed 42
-SET gentry 2.75                         # attempts per particle asked for
+SET gentry 2.75                         # attempts per requested particle
 
 BOX left -100.0 right 22100.0 bottom -100.0 height 5200.0
 WALL id 0 nodes (0.0, 0.0) (22000.0, 0.0)            color black
 WALL id 1 nodes (0.0, 5000.0) (0.0, 0.0)             color blue
 WALL id 2 nodes (22000.0, 0.0) (22000.0, 5000.0)     color red
 
-# Rain of particles, as many as fit; then a flat top at 2.2 km.
+# As many random particles as fit; then a flat top at 2.2 km.
 GEN NUM 60000 rad discrete 45.0 60.0 x (0.0, 22000.0) y (0.0, 5000.0) group cover
 PROP density 2500.0 shear 2.9e9 poiss 0.2 hertz damp 0.4 fric 0.0
 SET gravity 0.0 -9.8
@@ -39,8 +39,8 @@ PROP color red    range y 1100.0 1350.0
 PROP color mg     range y 1600.0 1850.0
 PROP color gb     range y 2000.0 9999.0
 
-# The high is cut out of the bed where it lies, and held: FIX keeps a velocity, so that is set to zero first. The
-# order of the corners is that of a walk around it.
+# The high is part of the bed and fixed: FIX keeps the velocity, which is therefore set to zero first. Its corners
+# are given in order around it.
 PROP color black fric 0.3 group high range P4 (10500.0, -100.0) (15500.0, -100.0) (13800.0, 1200.0) (12200.0, 1200.0)
 BOND break range group high
 PROP xv 0.0 yv 0.0 spin 0.0 range group high

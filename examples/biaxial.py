@@ -4,7 +4,7 @@
 #           stresses, its friction angle and cohesion (about 16 degrees and
 #           11 MPa), and the bands along which its bonds broke
 # model     1430 spheres of radius 60 and 80 m between four smooth walls; the
-#           side walls are held at their stress by a servo (sim.every)
+#           a servo holds the stress on the side walls (sim.every)
 # run       hpcdem examples/biaxial.py         (under a minute on one core)
 # results   examples/data: biaxial.jpg, frames at the start of each stage,
 #           walls.csv (forces on all walls)

@@ -3,9 +3,9 @@
 # shows     stress and volume of two dense samples of the same grading and the
 #           same friction: round grains, and triangles with rounded corners
 #           (rigid clumps of seven discs). Triangles interlock: they are
-#           stronger, and swell more before they fail
+#           stronger, and dilate more before they fail
 # model     450 grains of 4 to 6 mm, friction 0.5, between four smooth walls;
-#           side walls are held at 100 kPa by a servo (sim.every)
+#           a servo holds the side walls at 100 kPa (sim.every)
 # run       hpcdem examples/biaxial_triangles.py   (two minutes on one core)
 # results   examples/data: biaxial_triangles.jpg, round.clumps and
 #           triangle.clumps (the grains), frames, walls.csv

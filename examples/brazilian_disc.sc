@@ -1,8 +1,8 @@
-# A disc of rock, 50 mm wide and 20 mm thick, is pressed across between two strips until it splits (Brazilian test),
-# in three dimensions: tetrahedra with a joint on every inner face. The crack runs through the middle, between wedges of
-# crushed rock under the strips; 2 P / (pi D t) at the peak is the indirect tensile strength, above that of the joints
-# (5 MPa), as they soften over a length that is not small beside the disc and the test is a fast one. A minute on one
-# core. Needs the extra [mesh].
+# Brazilian test: a disc of rock, 50 mm wide and 20 mm thick, is compressed between two strips until it splits, in three
+# dimensions: tetrahedra with a joint on every inner face. The crack runs through the middle, between wedges of crushed
+# rock under the strips. 2 P / (pi D t) at the peak is the indirect tensile strength. It exceeds that of the joints
+# (5 MPa), because the path is rough and the test is fast. A minute on one core.
+# Needs the extra [mesh].
 #
 #   hpcdem brazilian_disc.sc      data/split_<step>.png: the halves; brazilian_disc.png: force over shortening
 import math

@@ -1,4 +1,4 @@
-"""A beam of elastic elements bends under its own weight: its end against the theory of beams, for finer and finer meshes.
+"""A beam of elastic elements bends under its own weight: deflection against beam theory, for finer and finer meshes.
 
 hpcdem.Simulation has blocks as it has particles, with the words of PCDC scripts. A few seconds on one core.
 

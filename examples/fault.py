@@ -1,7 +1,7 @@
 # Fault at depth: a basement block moves up a reverse fault and folds the beds above it
 # -----------------------------------------------------------------------------
 # shows     a fault-propagation fold: the fault carries the green bed 1.0 km over itself and the yellow one 0.7 km,
-#           and dies out in the red one, which hangs over in an S; the surface steps down by 1.4 km
+#           and dies out in the red one, which is overturned; the surface forms a step of 1.4 km
 # model     12 km long, 1.7 km of bonded beds over two rigid blocks of basement, made of the same spheres: the right
 #           one moves up a fault that dips 50 degrees to the right; about 6200 spheres of radius 40 and 50 m
 # run       ./scripts/run examples/fault.py       (under a minute on two cores)
@@ -10,17 +10,17 @@
 START
 SET disk off                            # spheres: mass 4/3 pi r^3 x density
 SET seed 45
-SET gentry 2.75                         # attempts per particle asked for
+SET gentry 2.75                         # attempts per requested particle
 
-# No BOX: the walls hold everything. The floor is deeper on the right, so that the block there brings its own root
-# along when it rises by 1.43 km.
+# No BOX: the walls confine everything. The floor is deeper on the right, so that the block there is thick enough
+# when it rises by 1.43 km.
 WALL id 0 nodes (   0.0,     0.0) ( 6600.0,     0.0) color black
 WALL id 3 nodes (6600.0,     0.0) ( 7800.0, -1430.0) color black
 WALL id 4 nodes (7800.0, -1430.0) (12000.0, -1430.0) color black
 WALL id 1 nodes (   0.0,  6500.0) (    0.0,     0.0) color blue
 WALL id 2 nodes (12000.0, -1430.0) (12000.0, 6500.0) color red
 
-# Rain of particles, as many as fit; then a flat top at 2.8 km.
+# As many random particles as fit; then a flat top at 2.8 km.
 GEN NUM 60000 rad discrete 40.0 50.0 x (   0.0, 12000.0) y (    0.0, 6500.0) group cover
 GEN NUM 20000 rad discrete 40.0 50.0 x (7800.0, 12000.0) y (-1430.0,    0.0) group cover
 PROP density 2500.0 shear 2.9e9 poiss 0.2 hertz damp 0.4 fric 0.0
@@ -45,13 +45,13 @@ PROP color green  range group cover and y 1100.0 1400.0
 PROP color yellow range group cover and y 1700.0 2000.0
 PROP color red    range group cover and y 2300.0 2600.0
 
-# The blocks hold themselves now: a plain floor, and lower sides for a smaller figure.
+# The blocks now need no support: a plane floor, and lower sides for a smaller figure.
 WALL id 3 nodes ( 6600.0,    0.0) ( 7800.0,    0.0) color black
 WALL id 4 nodes ( 7800.0,    0.0) (12000.0,    0.0) color black
 WALL id 1 nodes (    0.0, 4800.0) (    0.0,    0.0) color blue
 WALL id 2 nodes (12000.0,    0.0) (12000.0, 4800.0) color red
 
-# 2 m/s along the fault: cos 50, sin 50. The right side goes with the block.
+# 2 m/s along the fault: cos 50, sin 50. The right side moves with the block.
 PROP xv -1.2856 yv 1.5321 range group hang
 WALL id 2 xv -1.2856
 IMPLE wall id 2 xmove -1200.0 print 300.0

@@ -1,7 +1,7 @@
-# Hello, drop: balls fall into a box, and the fall is held against theory
+# Hello, drop: balls fall into a box, compared with theory
 # -----------------------------------------------------------------------------
-# shows     how far the first ball has fallen before anything is hit, and the
-#           closed form of it: equal to the last digit printed; a picture of
+# shows     the height of fall of the first ball before any impact, and its
+#           closed form, equal to the last digit printed; a picture of
 #           the nine balls at five moments of the fall and at rest
 # model     a box 8 m wide, nine spheres of radius 0.3 to 0.5 m
 # run       python examples/hello_drop.py    or    hpcdem examples/hello_drop.py

@@ -1,7 +1,7 @@
 # Uniaxial compression of a jointed rock specimen, 50 x 100 mm.
 #
 # Three closed joints lie at 45 degrees to the load. Wing cracks grow from their tips towards the load, in tension; then
-# the bridges of rock between joints and surface fail. About 40 s on one core. Needs the extra [mesh] (Gmsh).
+# the rock bridges between joints and surface fail. About 40 s on one core. Needs the extra [mesh] (Gmsh).
 #
 #   hpcdem jointed_specimen.sc        figure, histories and curve.png in data/
 #   hpcdem movie data
@@ -20,7 +20,7 @@ pcdc mesh create from-layer 'outline' size [size] crack 'joints' irregular group
 
 pcdc element c-model mech-iso-e property density 2650 young [young] poisson-r [poisson] damp-factor 0.3
 pcdc face-joint c-model c-i-c-i property friction 35 cohesion 12e6 tensile-strength 4e6 gf1 20 gf2 200
-# A low penalty lets the time step be large; contacts of broken joints go on with the stiffness of the joint anyway.
+# A low penalty permits a large time step; contacts of broken joints keep the stiffness of the joint anyway.
 pcdc element-face c-model contact-m-c property friction 25 penalty-normal [2*young] penalty-shear [2*young]
 
 pcdc node group 'bottom' set 'ends' range y 0 0

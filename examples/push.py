@@ -10,18 +10,18 @@
 START
 SET disk off                            # spheres: mass 4/3 pi r^3 x density
 SET seed 20
-SET gentry 2.75                         # attempts per particle asked for
+SET gentry 2.75                         # attempts per requested particle
 
-# The space in which particles may be, a little wider than the model.
+# The space for particles, slightly wider than the model.
 BOX left -100.0 right 20100.0 bottom -100.0 height 6000.0
 
-# Floor, moving wall, far wall. Particles of the Hertz law bring their own
-# stiffness, so walls need none.
+# Floor, moving wall, far wall. Hertz particles have their own stiffness, so
+# walls need none.
 WALL id 0 nodes (0.0, 0.0) (20000.0, 0.0)            color black
 WALL id 1 nodes (0.0, 5800.0) (0.0, 0.0)             color blue
 WALL id 2 nodes (20000.0, 0.0) (20000.0, 5800.0)     color red
 
-# Loose rain of particles; far more are asked for than fit, so the space fills up.
+# Loose random particles; far more are requested than fit, so the space is filled.
 GEN num 60000 rad discrete 45.0 60.0 x (0.0, 20000.0) y (0.0, 5800.0) group rock
 PROP density 2500.0 shear 2.9e9 poiss 0.2 hertz damp 0.4 fric 0.0
 

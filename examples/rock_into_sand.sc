@@ -1,6 +1,6 @@
 # A jointed boulder falls into a bed of sand: particles and blocks in one run.
 #
-# The sand settles by itself first; then the boulder is made of elements with cohesive joints, and from hpcdem.couple on
+# The sand settles first; then the boulder is made of elements with cohesive joints, and from hpcdem.couple on
 # `pcdc model step` steps both. About a minute on one core.
 #
 #   hpcdem rock_into_sand.sc          frames of the boulder in data/, of the sand in sand/
@@ -16,7 +16,7 @@ for k in range(6):                                    # layers of different colo
              color=('yellow', 'mg')[k % 2], group='layer%d' % k)
 sand.prop(density=1900.0, kn=2e7, ks=1e7, fric=0.5, damp=0.4)
 sand.cycle(40000)
-sand.prop(damp=0.0)                                   # what flies shall not be braked
+sand.prop(damp=0.0)                                   # no damping of flying bodies
 
 top = sand.extents()['top']
 pcdc model new

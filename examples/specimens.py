@@ -2,7 +2,7 @@
 # -----------------------------------------------------------------------------
 # shows     how a grading curve becomes a specimen (docs/specimens.md): its
 #           grading, packings of five shapes at one void ratio, and the discs
-#           that stand for rounded polygons and ellipses in the solver
+#           that represent rounded polygons and ellipses in the solver
 # model     examples/grading.txt, 500 grains of each shape; nothing moves
 # run       ./scripts/run examples/specimens.py      (some seconds)
 # results   examples/data: specimens.jpg, specimen_grading.jpg,

@@ -1,7 +1,7 @@
-# A tunnel of 3 m radius is driven 30 m into rock under 10 MPa from all sides: how far does its wall close, before and
+# A tunnel of 3 m radius is driven 30 m into rock under 10 MPa from all sides: how much does its wall close ahead of and
 # behind the face? Three dimensions, a quarter of the tunnel by symmetry. Far behind the face the wall closes by
-# (1 + nu) p r / E = 3.75 mm (by 0.945 of it here: the box is held at ten radii, and tetrahedra are stiff), at the face by
-# 0.29 of what it does far behind (Vlachopoulos & Diederichs 2009; 0.26 here). A few seconds on one core.
+# (1 + nu) p r / E = 3.75 mm (0.945 of it here: the box is fixed at ten radii, and tetrahedra are stiff), at the face by
+# 0.29 of the value far behind (Vlachopoulos & Diederichs 2009; 0.26 here). A few seconds on one core.
 # Needs the extra [mesh].
 #
 #   hpcdem tunnel_face.sc      tunnel_face.png: closure along the tunnel; data/closure_<step>.png: the rock
