@@ -9,7 +9,7 @@ from hpcdem.core.fields import FIELDS
 from hpcdem.lang.pages import escaped
 from hpcdem.physics.bolts.model import QUANTITIES as OF_BOLTS
 from hpcdem.physics.fdem.diagnostics import QUANTITIES
-from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
+from hpcdem.physics.flow.values import QUANTITIES as OF_FLOW
 from hpcdem.physics.liners.model import QUANTITIES as OF_LINERS
 
 _TOP = """\

@@ -16,6 +16,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels, reference
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.tangent import Tangent
 from hpcdem.physics.flow.wells import RATE
 from hpcdem.pre.mesh import structured_space
 from tests.flow import exact
@@ -540,7 +541,7 @@ def test_the_matrix_is_the_derivative_of_what_is_lacking() -> None:
         now = fluid.balance(step, u, x)
         first, n = len(x), fluid.n
         matrix = np.zeros((n, 3 * first + n))
-        for one in fluid.pieces(step, now, u, x, first)[:2]:
+        for one in Tangent(fluid).pieces(step, now, u, x, first)[:2]:
             for nodes, stiffness in zip(one.node, one.stiffness):
                 places = [3 * k + np.arange(3) if k < first else np.array([3 * first + k - first, -1, -1])
                           for k in nodes]  # fmt: skip

@@ -10,7 +10,6 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, diagnostics, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.field import kernels
 from hpcdem.physics.field.diffusing import SAFETY
 from hpcdem.physics.heat import reference
 from hpcdem.physics.heat.model import Heat
@@ -343,8 +342,3 @@ def test_what_makes_no_sense_is_refused() -> None:
     bare.heat_clock(dt=1.0)
     with pytest.raises(CommandError, match="time-step of heat was said, but no element has a thermal model"):
         bare.step()
-
-
-def test_pairs_of_corners() -> None:
-    found = {tuple(sorted(map(int, pair))): kernels._pair(*pair) for pair in kernels.PAIRS}
-    assert found == {tuple(sorted(map(int, pair))): k for k, pair in enumerate(kernels.PAIRS)}

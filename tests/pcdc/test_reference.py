@@ -19,7 +19,7 @@ from hpcdem.lang.pcdc.reference import IN_THE_PLANE, missing_in_space, page
 from hpcdem.lang.pcdc.trial import MODELS, python
 from hpcdem.physics import supports
 from hpcdem.physics.fdem.properties import Property
-from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
+from hpcdem.physics.flow.values import QUANTITIES as OF_FLOW
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
 from tests.conftest import ROOT
 

@@ -10,9 +10,10 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant import kernels as own
-from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant
+from hpcdem.physics.proppant.model import Proppant
 from hpcdem.physics.proppant.properties import PROPPANT
 from hpcdem.physics.proppant.reference import sub_step
+from hpcdem.physics.proppant.said import CONCENTRATION, RATE
 from tests.flow.support import at, hold, over, until
 from tests.proppant.support import OIL, SAND, nodes_up, profile, slot
 

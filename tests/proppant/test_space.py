@@ -15,8 +15,8 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant import kernels as own
-from hpcdem.physics.proppant import kernels_space
-from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant
+from hpcdem.physics.proppant.model import Proppant
+from hpcdem.physics.proppant.said import CONCENTRATION, RATE
 from tests.flow.space import on_plane, points_at, standing
 from tests.flow.support import over
 from tests.pcdc.fake import Bench, Noted
@@ -56,7 +56,7 @@ def test_medians_pass_on_what_a_uniform_velocity_brings() -> None:
     sim.close_model()
     down, gradient = np.array([0.36, -0.48, -0.8]), np.array([3e5, 1e5, -2e5])
     found = np.zeros(len(flow.links[0]))
-    kernels_space.falls(*flow.sides, sim.x, down, found)
+    own.falls(*flow.sides, sim.x, down, found)
     table, head = flow.channel_table, SHAKEN.points[flow.number] @ gradient
     ends = flow.links[0]
     q = table[:, kernels.CONDUCT] * (head[ends[:, 0]] - head[ends[:, 1]])

@@ -156,13 +156,13 @@ def heat_limit(sim: Blocks, heat: Heat) -> float:
     """2 over the largest eigenvalue of all that conducts over its capacity [s]."""
     sim.close_model()
     run = Implicit(sim)
-    n = len(heat.leads)
+    n = len(heat.at.leads)
     k, c = np.zeros((n, n)), np.zeros(n)
     for piece in run._pieces(math.inf):
         ends = piece.node
         for m in range(len(ends)):
             k[np.ix_(ends[m], ends[m])] += piece.stiffness[m, ::2, ::2]
-    np.add.at(c, heat.node.reshape(-1)[4 * sim.number[:, None] + np.arange(4)], heat._corner_capacity)
+    np.add.at(c, heat.at.number[4 * sim.number[:, None] + np.arange(4)], heat._corner_capacity)
     root = 1.0 / np.sqrt(c)
     return 2.0 / float(np.linalg.eigvalsh(root[:, None] * k * root)[-1])
 

@@ -11,12 +11,7 @@ LONGER = {
     "hpcdem.physics.bolts.model.Bolts": "older than the limit",
     "hpcdem.physics.fdem.local.Local": "older than the limit: a rank's tables of all kinds of elements",
     "hpcdem.physics.fdem.local_space.LocalSpace": "older than the limit",
-    "hpcdem.physics.field.diffusing.Diffusing": "older than the limit",
-    "hpcdem.physics.flow.coupled.Coupled": "older than the limit",
-    "hpcdem.physics.flow.implicit.Fluid": "older than the limit",
-    "hpcdem.physics.flow.model.Flow": "older than the limit",
     "hpcdem.physics.liners.model.Liners": "older than the limit",
-    "hpcdem.physics.proppant.model.Proppant": "older than the limit",
 }
 """Take a line away when you have split the class."""
 

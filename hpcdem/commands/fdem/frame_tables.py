@@ -148,7 +148,7 @@ def _face_conditions(blocks: Blocks) -> Columns | None:
     """Stresses that act on faces, and heat; quiet: whether waves leave through them; water_pressure: of water before
     them, NaN where they are dry. Collective."""
     heat, flow = Heat.there(blocks), Flow.there(blocks)
-    given = np.zeros(1, np.int32) if heat is None else heat.face
+    given = np.zeros(1, np.int32) if heat is None else heat.exposed.row
     wet = {"number": np.empty(0, np.int64)} if flow is None else flow.wet_faces()
     numbers = np.union1d(np.flatnonzero((blocks.load_row > 0) | (given > 0)), wet["number"])
     numbers = numbers[blocks.alive[numbers // 4]]
@@ -170,8 +170,10 @@ def _face_conditions(blocks: Blocks) -> Columns | None:
         columns["water_pressure"][np.searchsorted(numbers, wet["number"])] = wet["pressure"]
     if heat is not None:
         for name in ("flux", "transfer", "environment"):
-            now = [assigned.now(blocks.tables, _or_nan(getattr(one, name)), heat.time) for one in heat.faces]
-            columns[_OF_HEAT[name]] = np.array(now, float)[heat.face[numbers]]
+            now = [
+                assigned.now(blocks.tables, _or_nan(getattr(one, name)), heat.time) for one in heat.exposed.conditions
+            ]
+            columns[_OF_HEAT[name]] = np.array(now, float)[heat.exposed.row[numbers]]
     return columns
 
 

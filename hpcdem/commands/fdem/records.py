@@ -14,8 +14,8 @@ from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.groups import CHANNEL, NODE, SUPPORTS
 from hpcdem.physics.fields import kinds
-from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.values import QUANTITIES as OF_FLOW
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import Proppant
 

@@ -21,6 +21,10 @@ from hpcdem.physics.field import assigned
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
+MANY = 100_000
+"""Sub-steps in a cycle that are too many to be meant."""
+LOOK = 100
+"""Cycles after which a field is looked at: whether it has blown up, and how long its sub-steps may be."""
 Tables = dict[str, dict[str, np.ndarray]]
 
 
@@ -110,31 +114,64 @@ class Assigned:
 
 class Travelling:
     """Nodes of a field that go to the rank that owns the first element around them; those of other ranks beside its
-    elements are copies. number (n,): own ones, ascending; state (n + copies, k)."""
+    elements are copies. number (n,): own ones, ascending; state (n + copies, k).
 
+    of_nodes: table of checkpoints with what own nodes hold, its columns by name: the attribute, and its column or -1;
+    widths: columns of these attributes, 0: of one dimension.
+    """
+
+    of_nodes: ClassVar[str]
+    columns: ClassVar[Mapping[str, tuple[str, int]]]
+    widths: ClassVar[Mapping[str, int]]
     blocks: Blocks
+    state: np.ndarray
     _copies: Copies | None
 
     def __init__(self) -> None:
         self.number = np.empty(0, np.int64)
-        self.state = np.empty((0, 0))
         self._copies = None
+        self._empty(0, 0)
 
-    def _fetch(
-        self, had: np.ndarray, mine: np.ndarray, wanted: np.ndarray, width: int, more: int = 0
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of own nodes from those (n, k) of all ranks, 0 where there were none; mine are the own ones from now on,
-        with a state of so many columns, and so many more rows after the copies. wanted: numbers of copies, returned in
-        the order of their owners. Collective."""
-        comm = self.blocks.comm
+    def _empty(self, n: int, copies: int) -> None:
+        """Room for n own nodes and so many copies, all zero."""
+        for name, width in self.widths.items():
+            rows = n + copies if name == "state" else n
+            setattr(self, name, np.zeros((rows, width) if width else rows))
+
+    def _column(self, name: str) -> np.ndarray:
+        attribute, k = self.columns[name]
+        values: np.ndarray = getattr(self, attribute)[: len(self.number)]
+        return values if k < 0 else values[:, k]
+
+    def _fetch(self, mine: np.ndarray, wanted: np.ndarray, more: int = 0) -> tuple[np.ndarray, np.ndarray]:
+        """`mine` are the own nodes from now on, with what all ranks know of them, and copies of those that are wanted,
+        and so many more rows of the state. Which of `mine` are new, and those wanted, in the order of their owners.
+        Collective."""
+        comm, n = self.blocks.comm, len(self.number)
+        had = np.column_stack([*(self._column(name) for name in self.columns), np.ones(n)])
         rows, owner = moved(comm, len(self.blocks.the_mesh().points), self.number, had, mine, wanted)
         order = np.lexsort((wanted, owner))
         wanted, owner = wanted[order], owner[order]
-        self.number = mine.copy()
         self.close()
-        self.state = np.zeros((len(mine) + len(wanted) + more, width))
+        self.number = mine.copy()
+        self._empty(len(mine), len(wanted) + more)
+        for name, values in zip(self.columns, rows.T):
+            self._column(name)[:] = values
         self._copies = Copies(comm, mine, wanted, owner, self.state)
-        return rows, wanted
+        return rows[:, -1] == 0.0, wanted
+
+    def _forget(self, gone: np.ndarray) -> None:
+        """Nodes (n,) bool are no longer there. Collective."""
+        if not self.blocks.comm.any(bool(gone.any())):
+            return
+        self._book_gone(gone)
+        self.number = self.number[~gone]
+        for name in self.widths:
+            setattr(self, name, getattr(self, name)[: len(gone)][~gone])
+
+    def _book_gone(self, gone: np.ndarray) -> None:
+        """What nodes (n,) bool hold is gone with them. Collective."""
+        raise NotImplementedError
 
     def _refresh(self) -> None:
         if self._copies is not None:
@@ -146,6 +183,19 @@ class Travelling:
             self._copies.close()
             self._copies = None
 
+    def saved_rows(self) -> Tables:
+        """What this rank's nodes hold."""
+        held = {name: np.ascontiguousarray(self._column(name)) for name in self.columns}
+        return {self.of_nodes: {"number": self.number, **held}}
+
+    def _restore_rows(self, tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
+        """Inverse; nodes go to their owners with the first storage."""
+        held = tables[self.of_nodes]
+        self.number = held["number"].astype(np.int64)
+        self._empty(len(self.number), 0)
+        for name in self.columns:
+            self._column(name)[:] = held[name]
+
 
 class Field(SurfaceLoad):
     """A field of a model of blocks. Methods are collective unless they say otherwise; CommandError, alike on all ranks,
@@ -154,6 +204,8 @@ class Field(SurfaceLoad):
 
     of_mesh: ClassVar[bool] = True
     own_clock: ClassVar[bool] = True
+    told: ClassVar[str] = ""
+    """What messages call it, if not by its name."""
     blocks: Blocks
 
     def _start_clock(self, time: float) -> None:
@@ -173,6 +225,23 @@ class Field(SurfaceLoad):
         for name in ("time", "cycles", "waited", "sub_steps", "dt"):
             if name in state:
                 setattr(self, name, state[name])
+
+    def _divide(self, steps: int, dt: float, period: float, alone: float, within: float, instead: str) -> None:
+        """Sub-steps of a cycle and their length by what was given (steps, 0: as many as are needed; dt, 0: by clocks),
+        the time of a cycle by the clock of others, 0: there is none, and the longest sub-steps [s] without and with
+        such a clock. CommandError if they are too many, which says how many of which, and what to do `instead`."""
+        if dt > 0.0:
+            self.sub_steps, self.dt = max(1, steps), dt
+        elif period == 0.0:
+            self.sub_steps, self.dt = max(1, steps), alone
+        else:
+            need = period / within if within > 0.0 else math.inf
+            self.sub_steps = steps or max(1, math.ceil(min(need, 1e15)))
+            self.dt = period / self.sub_steps
+        if not steps and self.sub_steps > MANY:
+            raise CommandError(
+                f"{self.told or self.name} would need {self.sub_steps} sub-steps of {within:.3g} s in {instead}"
+            )
 
     def _unset(self, conditions: np.ndarray, numbers: np.ndarray | None) -> None:
         """Rows of conditions of these numbers (None: all) become 0."""

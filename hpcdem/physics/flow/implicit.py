@@ -29,8 +29,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hpcdem.physics.fdem.linear import Pieces
-from hpcdem.physics.flow import kernels, kernels_space
+from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.network import LINKS
 from hpcdem.physics.flow.wells import Asked, Well
 
@@ -185,12 +184,8 @@ class Fluid:
 
     def state_of(self, u: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Pressure, saturation and potential energy (n, kernels.STATE) at these variables and positions (nn, dim)."""
-        options = self.flow.blocks.options
-        state = np.empty((self.n, kernels.STATE))
-        at = x[self.lead]
-        along = options.gx * at[:, 0] + options.gy * at[:, 1]
-        if self.dim == 3:
-            along += options.gz * at[:, 2]
+        state, at = np.empty((self.n, kernels.STATE)), x[self.lead]
+        along = sum(g * at[:, k] for k, g in enumerate(self.flow._gravity()))
         state[:, kernels.E] = -self.flow.fluid("fluid_density") * along
         own = self._own(u, state[:, kernels.E])
         state[:, kernels.P] = np.maximum(own, 0.0) * self.p0
@@ -319,206 +314,13 @@ class Fluid:
         dim, table = self.dim, np.empty((len(self.ends), kernels.CHANNEL))
         width = self.at.shape[1] * dim
         corners = np.ascontiguousarray(x[self.at].reshape(self.m, width))
-        begin, args = width * np.arange(self.m), (self.law, self.laws, corners, self.flow.viscosity, table)
-        threads, of = self.flow.blocks.threads, kernels if dim == 2 else kernels_space
-        near = begin if dim == 2 else begin[:, None] + 3 * np.arange(3)
-        geometry = of.geometry if threads == 1 else of.geometry_threaded
-        geometry(threads, near, near + (4 if dim == 2 else 9), *args)
+        near = width * np.arange(self.m)[:, None] + dim * np.arange(dim)
+        threads = self.flow.blocks.threads
+        geometry = kernels.geometry if threads == 1 else kernels.geometry_threaded
+        geometry(threads, near, near + dim * dim, self.law, self.laws, corners, self.flow.viscosity, table)
         return table
 
-    def _opens(self, x: np.ndarray, delta: np.ndarray) -> np.ndarray:
-        """Derivatives of apertures delta (m,) of channels by the positions of their corners `at`, (m, dim corners)."""
-        law = self.laws[self.law[:: LINKS[self.dim]]]
-        moves = (delta > law[:, kernels.LEAST]) & (delta < law[:, kernels.MOST])
-        dilate = law[:, kernels.DILATE, None]
-        at, k = x[self.at], self.dim
-        near, far = at[:, :k], at[:, k:]
-        if k == 2:
-            way = 0.5 * ((near[:, 1] + far[:, 0]) - (near[:, 0] + far[:, 1]))
-            h = np.hypot(way[:, 0], way[:, 1])
-            across, along = np.column_stack([way[:, 1], -way[:, 0]]) / h[:, None], way / h[:, None]
-            slip = 0.5 * ((((far[:, 1] - near[:, 0]) + (far[:, 0] - near[:, 1])) * along).sum(axis=1))
-            size, along = np.abs(slip), np.sign(slip)[:, None] * along
-        else:
-            middle = 0.5 * (near + far[:, [0, 2, 1]])
-            across = np.cross(middle[:, 1] - middle[:, 0], middle[:, 2] - middle[:, 0])
-            across /= np.linalg.norm(across, axis=1)[:, None]
-            away = (far.sum(axis=1) - near.sum(axis=1)) / 3.0
-            slip = away - (away * across).sum(axis=1)[:, None] * across
-            size = np.linalg.norm(slip, axis=1)
-            along = slip / np.maximum(size, 1e-300)[:, None]
-        gains = law[:, kernels.DILATE] * size < law[:, kernels.GAIN]
-        opens = across + np.where(gains[:, None], dilate, 0.0) * along
-        side = np.repeat([-1.0, 1.0], k)[:, None] / k
-        return (np.where(moves, 1.0, 0.0)[:, None, None] * side * opens[:, None, :]).reshape(self.m, -1)
-
     # ---- derivatives ---------------------------------------------------------------------------------------------
-
-    def pieces(self, step: Step, now: Balance, u: np.ndarray, x: np.ndarray, first: int) -> list[Pieces]:
-        """Derivatives for Newton's method, as pieces of a matrix (see linear.py) whose "nodes" from `first` on are flow
-        nodes, then their packs if some bear: of channels, on rank 0, of faces of this rank, and of nodes, on rank 0."""
-        rank = self.flow.blocks.comm.rank
-        mine = slice(None) if rank == 0 else slice(0, 0)
-        own = [Pieces(one.key[mine], one.node[mine], one.stiffness[mine]) for one in self._own_pieces(now, u, first)]
-        made = [
-            self._channel_pieces(step, now, u, x, first, mine), *own,
-            *self._face_pieces(self._rises(u, now)[0], x, first + self.first, len(self.face_key)),
-        ]  # fmt: skip
-        if now.slow is not None:
-            made.append(self._turbulent_pieces(step, now, u, first, mine))
-        if now.packs is not None:
-            packs = first + self.n + np.arange(self.n)
-            made += self._pack_pieces(now, x, packs, mine)
-            made += self._face_pieces(np.ones(self.n), x, packs, self.of_channels)
-        return made
-
-    def _pack_pieces(self, now: Balance, x: np.ndarray, packs: np.ndarray, mine: slice) -> list[Pieces]:
-        """Of w - w(V) by w itself, and by the corners of the channels around each node. packs (n,): their "nodes"."""
-        assert now.packs is not None
-        dim, ends = self.dim, self.ends[mine]
-        own = np.zeros((len(packs[mine]), dim, dim))
-        own[:, 0, 0] = 1.0
-        table = now.table[mine]
-        by_x = self._opens(x, now.table[:: LINKS[dim], kernels.APERTURE])[self.of][mine]
-        by_x *= (table[:, kernels.HALF] / table[:, kernels.APERTURE])[:, None]
-        width = by_x.shape[1]
-        out = np.zeros((len(ends), width + 2 * dim, width + 2 * dim))
-        for end in range(2):
-            out[:, width + dim * end, :width] = -now.packs[1, ends[:, end], None] * by_x
-        nodes = np.column_stack([self.at[self.of][mine], packs[ends]])
-        key = np.arange(self.n)[mine]
-        return [Pieces(self.channels[self.of][mine], nodes, out), Pieces(key, packs[mine][:, None], own)]
-
-    def _rises(self, u: np.ndarray, now: Balance) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of pressure and saturation (n,) by the variable that counts for each node."""
-        full = (u > 0.0)[self.first]
-        pressed = full & (~self.tied | (now.state[:, kernels.P] > 0.0))
-        return np.where(pressed, self.p0, 0.0), np.where(full, 0.0, 1.0)
-
-    def _own_pieces(self, now: Balance, u: np.ndarray, first: int) -> list[Pieces]:
-        """Of storage; and nodes whose variable is another's are no unknowns of their own."""
-        p_u, s_u = self._rises(u, now)
-        room = np.maximum(now.volume, 1e-300)
-        diagonal = np.where(now.held, room, now.volume * (s_u + p_u / self.bulk))
-        tied = np.flatnonzero(self.tied)
-        made = []
-        for key, node, values in ((np.arange(self.n), self.first, diagonal), (tied, tied, room[tied])):
-            stiffness = np.zeros((len(key), self.dim, self.dim))
-            stiffness[:, 0, 0] = values
-            made.append(Pieces(key, first + node[:, None], stiffness))
-        return made
-
-    def _channel_pieces(
-        self, step: Step, now: Balance, u: np.ndarray, x: np.ndarray, first: int, mine: slice
-    ) -> Pieces:
-        """Of flow, leak-off and volume of channels by the variables at their ends and the corners of their faces."""
-        ends, state = self.ends[mine], now.state
-        delta, conduct, half, weight = now.table[mine].T
-        m, dt = len(ends), step.dt
-        p_u, s_u = self._rises(u, now)
-        s_u = np.where(u[self.first] > -1.0, s_u, 0.0)
-        p, s, e = (state[:, k][ends] for k in (kernels.P, kernels.S, kernels.E))
-        s = np.maximum(s, 0.0)
-        head = (p[:, 0] - p[:, 1]) + (e[:, 0] - e[:, 1]) * weight
-        mean, down = 0.5 * (s[:, 0] + s[:, 1]), (head > 0.0) == (conduct > 0.0)
-        up = np.where(down, s[:, 0], s[:, 1])
-        wet = np.minimum(mean, up)
-        part, slope = wet * wet * (3.0 - 2.0 * wet), 6.0 * wet * (1.0 - wet)
-        of_mean = mean <= up
-        by_s = np.column_stack([np.where(of_mean, 0.5, down), np.where(of_mean, 0.5, ~down)])
-        sign = np.array([1.0, -1.0])
-        by_u = conduct[:, None] * (
-            part[:, None] * sign * p_u[ends] + (head * slope)[:, None] * by_s * s_u[ends]
-        )  # of q
-        leak_u = np.zeros((m, 2))
-        at = np.flatnonzero(now.lost[mine] > 0.0)
-        if len(at):
-            over = 0.5 * p[at].sum(axis=1) - self.laws[self.law[mine][at], kernels.PORE]
-            power = np.where(self.laws[self.law[mine][at], kernels.FRONT] > 0.0, 0.5, 1.0)
-            held = mean[at]
-            by_part = now.lost[mine][at] / np.maximum(held * held * (3.0 - 2.0 * held), 1e-300)
-            leak_u[at] = 0.5 * (
-                (now.lost[mine][at] * power / over)[:, None] * p_u[ends[at]]
-                + (by_part * 6.0 * held * (1.0 - held))[:, None] * s_u[ends[at]]
-            )
-        by_x = self._opens(x, now.table[:: LINKS[self.dim], kernels.APERTURE])[self.of][mine]
-        # Blocks that stand still need no columns.
-        dim, first_row = self.dim, by_x.shape[1] if self.flow.blocks.options.mechanical else 0
-        fill = state[:, kernels.S] + state[:, kernels.P] / self.bulk
-        out = np.zeros((m, first_row + 2 * dim, first_row + 2 * dim))
-        cubic = 3.0 if now.slow is None else np.where(now.slow[mine] < 1.0, 12.0 / 7.0, 3.0)  # of q by delta
-        for end in range(2):
-            row = first_row + dim * end
-            out[:, row, first_row::dim] = sign[end] * dt * by_u + leak_u
-            if first_row:
-                stored = half / delta * fill[ends[:, end]]
-                out[:, row, :first_row] = (stored + sign[end] * dt * cubic * now.q[mine] / delta)[:, None] * by_x
-            out[now.held[ends[:, end]], row, :] = 0.0
-        of_fluid = first + self.first[ends]
-        nodes = np.column_stack([self.at[self.of][mine], of_fluid]) if first_row else of_fluid
-        return Pieces(self.channels[self.of][mine], nodes, out)
-
-    def _turbulent_pieces(self, step: Step, now: Balance, u: np.ndarray, first: int, mine: slice) -> Pieces:
-        """Of turbulent flow by the pressures in a channel, beside those of its conductance: this goes with the size of
-        the gradient to the power -3/7, so with the flows F into its nodes and the heads h along its links, -3/7 F F^T /
-        sum(q h)."""
-        assert now.slow is not None
-        links = LINKS[self.dim]
-        ends, q = self.ends[mine].reshape(-1, links, 2), now.q[mine].reshape(-1, links)
-        state = now.state
-        conduct, weight = (now.table[mine, k].reshape(-1, links) for k in (kernels.CONDUCT, kernels.WEIGHT))
-        p, e = state[:, kernels.P][ends], state[:, kernels.E][ends]
-        head = (p[..., 0] - p[..., 1]) + (e[..., 0] - e[..., 1]) * weight
-        nodes = ends[:, 0] if links == 1 else ends[:, [1, 2, 0], 0]
-        side = (ends[:, None, :, 1] == nodes[:, :, None]).astype(float) - (ends[:, None, :, 0] == nodes[:, :, None])
-        # Of full channels the same twice: what is half full flows slower by the same gradient.
-        into, full = ((side * flow[:, None]).sum(axis=2) for flow in (q, conduct * head))
-        power = np.maximum((conduct * head * head).sum(axis=1), 1e-300)
-        fast = now.slow[mine].reshape(-1, links)[:, 0] < 1.0
-        rate = np.where(fast, -3.0 / 7.0 * step.dt, 0.0) / power
-        values = (rate[:, None] * into)[:, :, None] * (full * self._rises(u, now)[0][nodes])[:, None, :]
-        values[now.held[nodes]] = 0.0
-        k, dim = nodes.shape[1], self.dim
-        out = np.zeros((len(nodes), k * dim, k * dim))
-        out[:, ::dim, ::dim] = values
-        return Pieces(self.channels[mine], first + self.first[nodes], out)
-
-    def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, variable: np.ndarray, count: int) -> list[Pieces]:
-        """Of the forces on the first `count` faces by variables at their ends: kernels.loads, and in space those on
-        sides of hexahedra. p_u (n,): derivatives of pressures by them; variable (n,): their "nodes"."""
-        if len(self.shore_node):  # there pressures follow the lowest node of a well, or nothing that is unknown
-            shore = self.flow.state[len(self.held_rows) :, kernels.P]
-            p_u = np.append(p_u, np.where((self.shore_node >= 0) & (shore > 0.0), p_u[self.shore_node], 0.0))
-            variable = np.append(variable, variable[np.maximum(self.shore_node, 0)])
-        at, dim = x[self.face_at[:count]], self.dim
-        way = at[:, 1:] - at[:, :1]
-        if dim == 2:
-            normal = np.column_stack([way[:, 0, 1], -way[:, 0, 0]]) / 6.0
-        else:
-            normal = np.cross(way[:, 0], way[:, 1]) / 24.0
-        weight = (1.0 + np.eye(dim)) * p_u[self.face_node[:count]][:, None]
-        if dim == 2:
-            return [self._pushed(slice(count), weight, normal, self.face_at[:count], variable)]
-        half, fourth, g, e = (one[self.on_sides[0] < count] for one in self.on_sides)
-        rest = np.delete(np.arange(len(at)), half)
-        share = np.concatenate([weight[half], np.zeros((len(half), 1, dim))], axis=1)
-        share -= g[:, :, None] * (e[:, :, None] * weight[half]).sum(axis=1)[:, None]
-        ends = np.column_stack([self.face_at[half], fourth])
-        return [
-            self._pushed(rest, weight[rest], normal[rest], self.face_at[rest], variable),
-            self._pushed(half, share, normal[half], ends, variable),
-        ]
-
-    def _pushed(
-        self, of: slice | np.ndarray, weight: np.ndarray, normal: np.ndarray, ends: np.ndarray, variable: np.ndarray
-    ) -> Pieces:
-        """Of some faces (k,): weight (k, ends, dim) of each variable on each end, ends (k, ends): their nodes."""
-        (k, m, dim), key = weight.shape, self.face_key[of]
-        out = np.zeros((k, (m + dim) * dim, (m + dim) * dim))
-        for end in range(m):
-            for by in range(dim):
-                out[:, dim * end : dim * end + dim, dim * (m + by)] = weight[:, end, by, None] * normal
-        return Pieces(key, np.column_stack([ends, variable[self.face_node[of]]]), out)
 
     # ---- the end of a step ---------------------------------------------------------------------------------------
 

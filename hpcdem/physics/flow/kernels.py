@@ -1,7 +1,7 @@
 """The arithmetic of flow in channels: apertures, flows, volumes and pressures of nodes, loads on faces.
 
-What flows goes along links (network.py): in the plane each channel is one; in space (kernels_space.py) three, and each
-row of the table of "channels" is that of a link. A link may have a negative conductance, opposite an obtuse angle.
+What flows goes along links (network.py): in the plane each channel is one, in space three, and each row of the table of
+"channels" is that of a link. A link may have a negative conductance, opposite an obtuse angle.
 
 Node state (n, 3): pressure [Pa], saturation, and potential energy of the fluid per volume by its height, -rho g . x
 [Pa]. Flows are those of the manual, 7.5.1, with its slips corrected; nodes keep the volume of their fluid at reference
@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit, prange
 
-from hpcdem.physics.fdem.kernels import joints
+from hpcdem.physics.fdem.kernels import joints, joints_space
 
 P, S, E = range(3)
 STATE = 3
@@ -42,29 +43,75 @@ def part(s):
     return s * s * (3.0 - 2.0 * s)
 
 
+@njit(cache=True, error_model="numpy")
+def _edge(x, one, other):
+    """Length, mean opening, size of the mean slip, of an edge."""
+    a, b, p, q = one[0], one[1], other[0], other[1]  # p is opposite b
+    _, _, h2, oa, sa, ob, sb = joints.openings(x[a], x[a + 1], x[b], x[b + 1], x[p], x[p + 1], x[q], x[q + 1])
+    h = math.sqrt(h2)
+    return h, 0.5 * (oa + ob) / h, abs(0.5 * (sa + sb) / h)
+
+
+@njit(cache=True, error_model="numpy")
+def _triangle(x, one, other, cot):
+    """Area, mean opening, size of the mean slip, of the present mid-surface of a triangle, and into cot (3,) the
+    cotangents of its angles."""
+    a, b, c, p, q, r = (
+        one[0],
+        one[1],
+        one[2],
+        other[0],
+        other[1],
+        other[2],
+    )  # p is opposite a, r opposite b, q opposite c
+    nx, ny, nz, area, d0x, d0y, d0z, d1x, d1y, d1z, d2x, d2y, d2z = joints_space.opened(
+        x[a], x[a + 1], x[a + 2], x[b], x[b + 1], x[b + 2], x[c], x[c + 1], x[c + 2], x[p], x[p + 1], x[p + 2],
+        x[q], x[q + 1], x[q + 2], x[r], x[r + 1], x[r + 2],
+    )  # fmt: skip
+    opening, _, _, _, slip = joints_space.parted(
+        (d0x + (d1x + d2x)) / 3.0, (d0y + (d1y + d2y)) / 3.0, (d0z + (d1z + d2z)) / 3.0, nx, ny, nz
+    )
+    mx, my, mz = x[a] + x[p], x[a + 1] + x[p + 1], x[a + 2] + x[p + 2]
+    ux, uy, uz = x[b] + x[r] - mx, x[b + 1] + x[r + 1] - my, x[b + 2] + x[r + 2] - mz
+    wx, wy, wz = x[c] + x[q] - mx, x[c + 1] + x[q + 1] - my, x[c + 2] + x[q + 2] - mz
+    ux, uy, uz, wx, wy, wz = 0.5 * ux, 0.5 * uy, 0.5 * uz, 0.5 * wx, 0.5 * wy, 0.5 * wz
+    vx, vy, vz = wx - ux, wy - uy, wz - uz
+    cot[0] = (ux * wx + (uy * wy + uz * wz)) / (2.0 * area)
+    cot[1] = (-ux * vx + (-uy * vy + -uz * vz)) / (2.0 * area)
+    cot[2] = (wx * vx + (wy * vy + wz * vz)) / (2.0 * area)
+    return area, opening, slip
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _geometry(t, threads, one, other, law, laws, x, viscosity, out):
-    x = x.reshape(x.size)
-    n = len(one)
-    for c in range(n * t // threads, n * (t + 1) // threads):
-        a, b, row = one[c], other[c], laws[law[c]]
-        _, _, h2, oa, sa, ob, sb = joints.openings(
-            x[a], x[a + 1], x[a + 2], x[a + 3], x[b], x[b + 1], x[b + 2], x[b + 3]
-        )
-        h = math.sqrt(h2)
-        gain = min(row[DILATE] * abs(0.5 * (sa + sb) / h), row[GAIN])
-        delta = min(max(row[INITIAL] + 0.5 * (oa + ob) / h + gain, row[LEAST]), row[MOST])
-        out[c, APERTURE] = delta
-        out[c, CONDUCT] = delta * delta * delta / (12.0 * viscosity * h)
-        out[c, HALF] = 0.5 * delta * h
-        out[c, WEIGHT] = 1.0
+    x, n, cot = x.reshape(x.size), len(one), np.empty(3)
+    links = 1 if one.shape[1] == 2 else 3
+    for k in range(n * t // threads, n * (t + 1) // threads):
+        if links == 1:
+            size, opening, slip = _edge(x, one[k], other[k])
+        else:
+            size, opening, slip = _triangle(x, one[k], other[k], cot)
+        row = laws[law[links * k]]
+        gain = min(row[DILATE] * slip, row[GAIN])
+        delta = min(max(row[INITIAL] + opening + gain, row[LEAST]), row[MOST])
+        for m in range(links):
+            c = links * k + m
+            out[c, APERTURE], out[c, WEIGHT] = delta, 1.0
+            if links == 1:
+                out[c, HALF], out[c, CONDUCT] = 0.5 * delta * size, delta * delta * delta / (12.0 * viscosity * size)
+            else:
+                out[c, HALF], out[c, CONDUCT] = delta * size / 6.0, delta * delta * delta / (24.0 * viscosity) * cot[m]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def geometry(threads, *args):
-    """Aperture [m] (79) with what slip adds, conductance delta^3 / (12 mu L) [m2 / (Pa s)] and half of the volume [m2]
-    of channels, out (m, 4). one, other (m,): where both faces begin in x; law (m,): rows of laws; viscosity: dynamic
-    [Pa s]."""
+    """Aperture [m] (79) with what slip adds, conductance [m2 / (Pa s)] and half of the volume [m2] of the links of
+    channels, out (l, 4), in space [m3 / (Pa s)] and [m3]. one, other (m, dim): where the corners of both faces begin in
+    x; law (l,): rows of laws; viscosity: dynamic [Pa s].
+
+    An edge is one link, delta^3 / (12 mu L). Pressure is linear over a triangle, so what flows to its corners, -q . n s
+    / 2 each (the manual's 7.5.1), is the sum of what goes along its sides, three links of a third of its area each:
+    delta^3 cot(angle opposite) / (24 mu)."""
     for t in range(threads):
         _geometry(t, threads, *args)
 
@@ -266,17 +313,37 @@ def fill_threaded(threads, begin, channel, side, q, leaks, lost, dt, condition, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def loads(edge, ends, nodes, x, state, column, applied):
-    """Add the pressure on faces, a column of state, to what is applied to corners [N/m]: linear between the nodes
-    (k, 2), L (2 p1 + p2) / 6 on the first. edge (k,): where faces begin in x; ends (k, 2): their corners in `applied`
-    (flat)."""
-    x, applied = x.reshape(x.size), applied.reshape(applied.size)
-    for m in range(len(edge)):
-        a = edge[m]
-        nx, ny = x[a + 3] - x[a + 1], x[a] - x[a + 2]  # outward, as long as the face
+def loads(at, to, nodes, g, e, x, state, column, applied):
+    """Add the pressure on faces, a column of state, to what is applied to corners [N/m], in space [N]: linear between
+    the nodes (k, dim), L (2 p1 + p2) / 6 or A (2 p1 + p2 + p3) / 12 on the first. at, to (k, dim): where corners begin
+    in x, and in `applied` (flat).
+
+    Of halves of sides of hexahedra, whose opening is bilinear (fdem/kernels/joints_hexes.py), to (k, 4) has the corner
+    that only the other half has at the end, g (k, 4) and e (k, 3) share the pressure out; of other faces they have no
+    rows.
+    """
+    x, applied, push = x.reshape(x.size), applied.reshape(applied.size), np.zeros(4)
+    edges, bilinear = nodes.shape[1] == 2, to.shape[1] == 4
+    for m in range(len(at)):
+        a, b = at[m, 0], at[m, 1]
+        ux, uy = x[b] - x[a], x[b + 1] - x[a + 1]
         p, q = state[nodes[m, 0], column], state[nodes[m, 1], column]
-        first, last = (2.0 * p + q) / 6.0, (p + 2.0 * q) / 6.0
-        applied[ends[m, 0]] -= first * nx
-        applied[ends[m, 0] + 1] -= first * ny
-        applied[ends[m, 1]] -= last * nx
-        applied[ends[m, 1] + 1] -= last * ny
+        if edges:
+            nx, ny, nz = uy, -ux, 0.0  # outward, as long as the face
+            push[0], push[1] = (2.0 * p + q) / 6.0, (p + 2.0 * q) / 6.0
+        else:
+            c, r = at[m, 2], state[nodes[m, 2], column]
+            uz, wx, wy, wz = x[b + 2] - x[a + 2], x[c] - x[a], x[c + 1] - x[a + 1], x[c + 2] - x[a + 2]
+            nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx  # 2 A n
+            total = p + (q + r)
+            push[0], push[1], push[2], push[3] = (total + p) / 24.0, (total + q) / 24.0, (total + r) / 24.0, 0.0
+        if bilinear:
+            back = e[m, 0] * push[0] + e[m, 1] * push[1] + e[m, 2] * push[2]
+            for k in range(4):
+                push[k] -= g[m, k] * back
+        for k in range(to.shape[1]):
+            corner = to[m, k]
+            applied[corner] -= push[k] * nx
+            applied[corner + 1] -= push[k] * ny
+            if not edges:
+                applied[corner + 2] -= push[k] * nz

@@ -15,8 +15,21 @@ import numpy as np
 from hpcdem.physics.fdem.connectivity import corner_counts
 from hpcdem.physics.fdem.mesh import Mesh
 
-LINKS = {2: 1, 3: 3}
-"""Of a channel, by dimensions of space."""
+
+@dataclass(frozen=True)
+class Shape:
+    """What channels are. links: corners between which fluid goes; facing: which corner of the other face faces each."""
+
+    links: tuple[tuple[int, int], ...]
+    facing: tuple[int, ...]
+
+
+EDGE = Shape(((0, 1),), (1, 0))
+TRIANGLE = Shape(((1, 2), (2, 0), (0, 1)), (0, 2, 1))
+SHAPES = {2: EDGE, 3: TRIANGLE}
+"""By the number of their corners, which is that of the dimensions of space."""
+LINKS = {corners: len(shape.links) for corners, shape in SHAPES.items()}
+"""Of a channel."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +56,31 @@ class Network:
 def links_of(corners: np.ndarray) -> np.ndarray:
     """(l, 2) ends of the links of channels with these corners (m, 2) or (m, 3): the sides of triangles one after the
     other, the k-th opposite the k-th corner."""
-    return corners if corners.shape[1] == 2 else np.ascontiguousarray(corners[:, [1, 2, 2, 0, 0, 1]]).reshape(-1, 2)
+    return corners[:, np.array(SHAPES[corners.shape[1]].links)].reshape(-1, 2)
+
+
+def normals(corners: np.ndarray) -> np.ndarray:
+    """Outward normals (m, dim) of faces (m, dim, dim), as long as edges, twice as long as triangles are large."""
+    way = corners[:, 1:] - corners[:, :1]
+    if way.shape[1] == 1:
+        return np.column_stack([way[:, 0, 1], -way[:, 0, 0]])
+    return np.cross(way[:, 0], way[:, 1])
+
+
+def conducting(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of the links (l,) of channels with these corners (m, dim, dim): from end to end (l, dim) [m]; length over width
+    of what conducts along them [m, in space 1], below 0 opposite an obtuse angle; part of a wall at each end [m, in
+    space m2]."""
+    ends = links_of(np.arange(corners.shape[1])[None])
+    sides = corners[:, ends[:, 1]] - corners[:, ends[:, 0]]
+    if len(ends) == 1:
+        length = np.hypot(*sides[:, 0].T)
+        return sides[:, 0], length, 0.5 * length
+    double = np.linalg.norm(normals(corners), axis=1)
+    one, other = corners[:, [1, 2, 0]] - corners, corners[:, [2, 0, 1]] - corners
+    with np.errstate(divide="ignore"):
+        way = 2.0 * double[:, None] / (one * other).sum(axis=2)
+    return sides.reshape(-1, 3), way.reshape(-1), np.repeat(double / 12.0, 3)
 
 
 def at_nodes(ends: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ fluid has sub-steps of its own, as short as flow needs them; meanwhile the rock 
 the walls took. Owners of nodes and their neighbours are those of the flow.
 
 In space a channel is three links, as in the flow. Nodes own their parts of a triangle up to its medians, so a link
-carries what crosses the piece of median between its ends (physics/proppant/kernels_space.py), conducts by the cotangent
+carries what crosses the piece of median between its ends (physics/proppant/kernels.py), conducts by the cotangent
 of the angle opposite it, and passes a sixth of the triangle's heat on to each wall at each end: every corner gets a
 third. Areas and volumes are those of the whole triangle: m3 for m2, J for J/m, W/K for W/(m K).
 """
@@ -25,9 +25,9 @@ from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem.properties import JOINT
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.field import assigned
-from hpcdem.physics.field.model import Assigned, Travelling
+from hpcdem.physics.field.model import MANY, Assigned, Travelling
 from hpcdem.physics.flow import kernels as flowing
-from hpcdem.physics.flow.network import LINKS, at_nodes, links_of
+from hpcdem.physics.flow.network import LINKS, SHAPES, conducting, links_of
 from hpcdem.physics.heat import kernels
 from hpcdem.physics.heat.properties import FLUID_HEAT
 
@@ -48,37 +48,36 @@ SAFETY = 0.9
 """Part of the stability limit that a sub-step may be."""
 SCANT = 1e-4
 """Part of its room below which the fluid of a node does not limit sub-steps: it has the temperature of what passes."""
-MANY = 100_000
-"""Sub-steps in one of the rock that are too many to be meant."""
-FACING = {2: [1, 0], 3: [0, 2, 1]}
-"""By dimensions of space: which corner of the other face faces each of the lower one."""
 LEAST = 1e-3
 """Part of its length that a link leads along the flow at least."""
-_COLUMNS = ("temperature", "given", "had")
-"""Of nodes, as they are saved: temperature [K], heat that came with fluid and by conditions [J/m], and the fluid at the
-end of the last cycle [m2]."""
 
 
 class FluidHeat(Assigned, Travelling):
     """The heat of the fluid of a model with heat. Methods are collective unless they say otherwise.
 
     row (4 ne,): of the table of properties, by joint, 0: none; held (np,): row of the prescribed temperatures of the
-    heat, by node, 0: none; number (n,): flow nodes owned here; given, had (n,): see _COLUMNS; state (n + copies,
-    kernels.FLUID_STATE): of them and of other ranks' nodes beside this rank's elements.
+    heat, by node, 0: none; number (n,): flow nodes owned here; given, had (n,): heat that came with fluid and by
+    conditions [J/m], and the fluid at the end of the last cycle [m2]; state (n + copies, kernels.FLUID_STATE): of them
+    and of other ranks' nodes beside this rank's elements.
     """
 
     of_objects: ClassVar[str] = JOINT
     model = FLUID_HEAT
     kind_of_model: ClassVar[str] = "thermal"
     alike: ClassVar[tuple[str, ...]] = ("conductivity", "capacity", "second_order")
+    of_nodes: ClassVar[str] = "fluid_heat"
+    columns: ClassVar[Mapping[str, tuple[str, int]]] = {
+        "temperature": ("state", kernels.T), "given": ("given", -1), "had": ("had", -1),
+    }  # fmt: skip
+    widths: ClassVar[Mapping[str, int]] = {"state": kernels.FLUID_STATE, "given": 0, "had": 0}
+    given: np.ndarray
+    had: np.ndarray
 
     def __init__(self, heat: Rock, flow: Flow) -> None:
         Assigned.__init__(self, heat.blocks)
         Travelling.__init__(self)
         self.heat, self.flow = heat, flow
         self.held = np.zeros(len(self.blocks.the_mesh().points), np.int32)
-        self.given, self.had = np.empty(0), np.empty(0)
-        self.state = np.empty((0, kernels.FLUID_STATE))
         self.rho_c = 0.0
         self.sub_steps = 0
         self.rate = 0.0
@@ -139,35 +138,21 @@ class FluidHeat(Assigned, Travelling):
 
     def bind(self) -> None:
         """Elements have other rows or owners, there are other channels, or something was said."""
-        blocks, flow, network = self.blocks, self.flow, self.flow.network
-        self._forget(~network.there[self.number])
+        blocks, flow = self.blocks, self.flow
+        self._forget(~flow.network.there[self.number])
         if not self.on:
             return
-        own, points, mine = blocks.owned, len(network.there), flow.number
-        at = blocks.where[np.column_stack([network.channels, blocks.partner[network.channels]]) // 4]
-        beside = ((at >= own.start) & (at < own.stop)).any(axis=1)
-        here = np.isin(network.corners, mine).any(axis=1) | beside
-        self.channels, ends = network.channels[here], links_of(network.corners[here])
-        n, wanted = len(self.number), np.setdiff1d(ends, mine)
-        had = np.column_stack([self.state[:n, kernels.T], self.given, self.had, np.ones(n)])
-        rows, wanted = self._fetch(had, mine, wanted, kernels.FLUID_STATE)
-        self.given, self.had = rows[:, 1].copy(), rows[:, 2].copy()
-        self._new = np.flatnonzero(rows[:, 3] == 0.0)
-        self.state[: len(mine), kernels.T] = rows[:, 0]
-        local = np.full(points, -1, np.int64)
-        local[mine], local[wanted] = np.arange(len(mine)), len(mine) + np.arange(len(wanted))
-        self._ends = np.ascontiguousarray(local[ends])
-        self._points = ends
-        self._begin, self._channel, self._side = at_nodes(self._ends, len(mine))
-        corner = self.walls(self.channels)
+        mine, channels = flow.number, flow.channels_here
+        new, _ = self._fetch(mine, flow.held[len(mine) :])
+        self._new = np.flatnonzero(new)
+        self._ends, self._begin, self._channel, self._side = flow.links
+        corner = self.walls(channels)
         row = blocks.where[corner // 4]
         self._walls = np.ascontiguousarray(np.where(row >= 0, row * self.heat.t.shape[1] + corner % 4, -1))
-        self._sides, self._way, part_of_wall = self.shapes(self.channels)
-        self._exchange = part_of_wall * np.repeat(self.transfers(self.channels), self.links)
+        self._sides, self._way, part_of_wall = self.shapes(channels)
+        self._exchange = part_of_wall * np.repeat(self.transfers(channels), self.links)
         self._length = reduce(np.hypot, self._sides.T)
-        self.wall_heat = np.zeros((len(ends), 4))
-        place = flow.places_of(self.channels)[:, None]
-        self._place = np.where(place >= 0, self.links * place + np.arange(self.links), -1).reshape(-1)
+        self.wall_heat = np.zeros((len(self._ends), 4))
         self._held = self.held[mine].astype(np.int64) - 1
         self._tell_obtuse()
 
@@ -189,16 +174,10 @@ class FluidHeat(Assigned, Travelling):
                 "angles of triangles are obtuse: where little flows, temperatures may leave the range of those around",
             )
 
-    def _forget(self, gone: np.ndarray) -> None:
-        """The heat of nodes (n,) bool that are no longer there is gone with them."""
-        comm, accounts, n = self.blocks.comm, self.heat.accounts, len(self.number)
-        if not comm.any(bool(gone.any())):
-            return
-        t = self.state[:n, kernels.T]
-        accounts["removed"] += exact_sum(self.rho_c * self.had[gone] * t[gone], comm)
+    def _book_gone(self, gone: np.ndarray) -> None:
+        comm, accounts = self.blocks.comm, self.heat.accounts
+        accounts["removed"] += exact_sum(self.rho_c * self.had[gone] * self._column("temperature")[gone], comm)
         accounts["given"] += exact_sum(self.given[gone], comm)
-        self.state = self.state[:n][~gone]
-        self.number, self.given, self.had = self.number[~gone], self.given[~gone], self.had[~gone]
 
     def take_new(self) -> None:
         """New nodes have the temperature of the rock around them; what all hold by the present capacity."""
@@ -229,25 +208,13 @@ class FluidHeat(Assigned, Travelling):
         """Corners (l, 4), element * 4 + k, beside the links of channels (m,): at each end on the lower face and on the
         other one. Not collective."""
         mesh = self.blocks.the_mesh()
-        other = mesh.face_corners(self.blocks.partner[channels])[:, FACING[self.blocks.dim]]
+        other = mesh.face_corners(self.blocks.partner[channels])[:, SHAPES[self.blocks.dim].facing]
         sides = links_of(mesh.face_corners(channels)), links_of(other)
         return np.stack(sides, axis=2).reshape(-1, 4)
 
     def shapes(self, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of the links (l,) of channels (m,) in the mesh: from end to end (l, dim) [m]; length over width of what
-        conducts along them [m, in space 1], below 0 opposite an obtuse angle; part of a wall at each end [m, in space
-        m2]. Not collective."""
-        at = self.blocks.reference.points[self.blocks.the_mesh().face_points(channels)]
-        sides = at[:, links_of(np.arange(self.blocks.dim)[None])]
-        sides = (sides[:, :, 1] - sides[:, :, 0]).reshape(-1, self.blocks.dim)
-        length = reduce(np.hypot, sides.T)
-        if self.blocks.dim == 2:
-            return sides, length, 0.5 * length
-        double = np.linalg.norm(np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]), axis=1)
-        one, other = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
-        with np.errstate(divide="ignore"):
-            way = 2.0 * double[:, None] / (one * other).sum(axis=2)
-        return sides, way.reshape(-1), np.repeat(double / 12.0, 3)
+        """`network.conducting` of channels (m,), in the mesh. Not collective."""
+        return conducting(self.blocks.reference.points[self.blocks.the_mesh().face_points(channels)])
 
     def lengths(self, sides: np.ndarray, q: np.ndarray) -> np.ndarray:
         """How far links (l,) lead along what flows in their channels [m], not quite 0; sides (l, dim): from end to end
@@ -277,20 +244,14 @@ class FluidHeat(Assigned, Travelling):
         """Flow of a cycle of heat that takes so long [s]: the mean of the last cycle of flow, or that of this moment
         where it stands still."""
         flow, n = self.flow, len(self.number)
-        known = np.maximum(self._place, 0)
-        there = self._place >= 0
-        q, aperture = flow.mean_flows(), flow.apertures()
-        if self.links > 1:
-            aperture = np.repeat(aperture, self.links)
-        q = np.where(there, q[known], 0.0) if len(q) else np.zeros(len(known))
-        delta = np.where(there, aperture[known], 0.0) if len(q) else np.zeros(len(known))
+        q, delta = flow.mean_flows(), np.repeat(flow.apertures(), self.links)
         w0, w, room = self.had, flow.nodes[:, flowing.W], flow.nodes[:, flowing.V]
         least = np.minimum(w0, w)
         self._period, self._passed, self._w0, self._leaked = period, 0.0, w0.copy(), flow.leaked()
         wet = np.minimum(np.divide(least, room, out=np.zeros(n), where=room > 0.0), 1.0)
         self.state[:n, kernels.S], self.state[:n, kernels.X], self.state[:n, kernels.FULL] = wet, part(wet), w0
         self._refresh()
-        self._q, wet = self.crossing(q, self.state[:, kernels.S], self._ends, self._points)
+        self._q, wet = self.crossing(q, self.state[:, kernels.S], self._ends, flow.held[self._ends])
         self._conduct = self.constant("conductivity") * delta * wet / self._way
         self._second = self.constant("second_order") > 0.0
         if self._second and self.links > 1:
@@ -390,22 +351,13 @@ class FluidHeat(Assigned, Travelling):
         rows = {"heat_channels": self.row, "heat_flow_nodes": self.held}
         return {name: assigned.numbered(row) for name, row in rows.items()}
 
-    def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
-        """What this rank's flow nodes hold."""
-        held = np.ascontiguousarray(self.state[: len(self.number), kernels.T]), self.given, self.had
-        return {"fluid_heat": {"number": self.number, **dict(zip(_COLUMNS, held))}}
-
     def restore(self, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
         """Inverse of these."""
         self._restore_properties(state["rows"])
         self.rho_c = state["rho_c"]
         assigned.put_back(self.row, tables["heat_channels"])
         assigned.put_back(self.held, tables["heat_flow_nodes"])
-        nodes = tables["fluid_heat"]
-        self.number = nodes["number"].astype(np.int64)
-        self.given, self.had = nodes["given"].copy(), nodes["had"].copy()
-        self.state = np.zeros((len(self.number), kernels.FLUID_STATE))
-        self.state[:, kernels.T] = nodes["temperature"]
+        self._restore_rows(tables)
 
 
 def part(s: np.ndarray) -> np.ndarray:

@@ -20,8 +20,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import connectivity, equilibrium
 from hpcdem.physics.fdem.linear import Direct, Petsc, Pieces, Unknowns
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.field import kernels
-from hpcdem.physics.field.hexes import Hexes
+from hpcdem.physics.field.elements import matrices
 from hpcdem.physics.heat.implicit_fluid import Fluid
 from hpcdem.physics.heat.model import Heat
 
@@ -110,12 +109,11 @@ class Implicit:
         fluid = Fluid.there(heat)
         self._prepare(dt, fluid)
         assert self.solver is not None
-        begin, corner, held = heat.nodes
-        flat, before = heat.t.reshape(-1), sim.cold[heat.quantity].copy()
-        old = flat[corner[begin[:-1]]].copy()
+        at, held, before = heat.at, heat.at.held, sim.cold[heat.quantity].copy()
+        old = heat.t.reshape(-1)[at.first()].copy()
         new = np.where(held >= 0, np.append(heat.held_at(after), 0.0)[held], old)
-        inertia = heat.capacity / dt
-        count = len(heat.leads)
+        inertia = at.capacity / dt
+        count = len(at.leads)
         of_fluid = np.empty(0)
         if fluid is not None:
             of_fluid = np.where(fluid.held >= 0, np.append(heat.held_at(after), 0.0)[fluid.held], fluid.t)
@@ -136,7 +134,7 @@ class Implicit:
                 force[:count, 0] += walls
                 force[count:, 0] = got - fluid.capacity / dt * (of_fluid - fluid.t)
             change = self.solver.solve(force, 0.0)[:, 0]
-            new, of_fluid = new + change[heat.node_ids], of_fluid + change[count:]
+            new, of_fluid = new + change[at.ids], of_fluid + change[count:]
             if turn and settled:
                 break
             if turn and fluid is not None:
@@ -154,39 +152,34 @@ class Implicit:
         if fluid is not None:
             got, walls = fluid.inflow(of_fluid, self._everywhere(new), beyond)
             fluid.take(dt, of_fluid, got)
-        self._book(dt, after, old, new, walls[heat.node_ids])
+        self._book(dt, after, old, new, walls[at.ids])
         return before
 
     def _everywhere(self, mine: np.ndarray) -> np.ndarray:
         """Values of all nodes of the rock from those (n,) of the nodes that this rank's elements have."""
-        out = np.zeros(len(self.heat.leads))
+        out = np.zeros(len(self.heat.at.leads))
         for ids, values in self.sim.comm.allgather((self._ids, mine[self._mine])):
             out[ids] = values
         return out
 
     def _spread(self, values: np.ndarray) -> None:
         """Nodes (n,) have these temperatures."""
-        begin, corner, _ = self.heat.nodes
-        self.heat.t.reshape(-1)[corner] = np.repeat(values, np.diff(begin))
+        self.heat.at.put(values, self.heat.t)
         self.sim.halo.fill(self.heat.t)
 
     def _inflow(self, time: float, dt: float = 0.0) -> np.ndarray:
         """Heat (n,) [W/m] that flows to the nodes; what faces bring in dt [s] is booked."""
-        heat = self.heat
-        begin, corner, _ = heat.nodes
-        out = np.empty(len(begin) - 1)
-        kernels.sums(begin, corner, heat.inflow(time, dt).reshape(-1), out)
-        return out
+        return self.heat.at.sums(self.heat.inflow(time, dt))
 
     def _book(self, dt: float, time: float, old: np.ndarray, new: np.ndarray, walls: np.ndarray) -> None:
         """What conditions brought, beside heat (n,) [W/m] from fluid: on the way to a steady state all that has come
         in."""
         sim, heat = self.sim, self.heat
-        begin, corner, held = heat.nodes
-        brought = heat.capacity * (new - old)
+        at = heat.at
+        brought = at.capacity * (new - old)
         if math.isfinite(dt):
-            brought = np.where(held >= 0, brought - dt * (self._inflow(time, dt) + walls), 0.0)
-        lead = corner[begin[:-1]][self._mine] - sim.owned.start * heat.t.shape[1]
+            brought = np.where(at.held >= 0, brought - dt * (self._inflow(time, dt) + walls), 0.0)
+        lead = at.first()[self._mine] - sim.owned.start * heat.t.shape[1]
         sim.cold[heat.given].reshape(-1)[lead] += brought[self._mine]
 
     # ---- the matrix ------------------------------------------------------------------------------------------------
@@ -194,25 +187,24 @@ class Implicit:
     def _prepare(self, dt: float, fluid: Fluid | None) -> None:
         """Who is unknown, and factors of the matrix, if it is another one than before."""
         sim, heat = self.sim, self.heat
-        begin, corner, _ = heat.nodes
-        width = heat.t.shape[1]
-        row = corner[begin[:-1]] // width
-        lowest = heat.leads[heat.node_ids] // 4
+        at = heat.at
+        row = at.first() // heat.t.shape[1]
+        lowest = at.leads[at.ids] // 4
         self._mine = (row >= sim.owned.start) & (row < sim.owned.stop) & (sim.number[row] == lowest)
-        self._ids = heat.node_ids[self._mine]
-        said = (part.tobytes() for part in (heat.leads, heat.held, heat.face, heat.row))
+        self._ids = at.ids[self._mine]
+        said = (part.tobytes() for part in (at.leads, heat.held, heat.exposed.row, heat.row))
         made_for = dt, sim.alive.tobytes(), *said, *(part.tobytes() for part in heat.contacts)
         if fluid is not None:
             made_for = *made_for, *fluid.made_for()
         if not sim.comm.any(self.solver is None or made_for != self._made_for):
             return
         self.close()
-        owner = np.zeros(len(heat.leads), np.int64)
+        owner = np.zeros(len(at.leads), np.int64)
         for rank, ids in enumerate(sim.comm.allgather(self._ids)):
             owner[ids] = rank
-        there = heat.leads >= 0
-        point = sim.the_mesh().cells.reshape(-1)[np.maximum(heat.leads, 0)]
-        free = there & sim.alive[np.maximum(heat.leads, 0) // 4] & (heat.held[point] == 0)
+        there = at.leads >= 0
+        point = sim.the_mesh().cells.reshape(-1)[np.maximum(at.leads, 0)]
+        free = there & sim.alive[np.maximum(at.leads, 0) // 4] & (heat.held[point] == 0)
         count = len(there)
         number = np.full((count, 2), -1, np.int64)
         number[free, 0] = np.arange(int(free.sum()))
@@ -228,7 +220,7 @@ class Implicit:
             owner = np.concatenate([owner, owner[beside]])
         total = len(number)
         unknowns = Unknowns(number, np.tile(np.eye(2), (total, 1, 1)), np.zeros((total, 2)), np.zeros(total, bool))
-        nodes = equilibrium.Nodes(heat.leads, point, owner, np.empty(0), np.empty(0))
+        nodes = equilibrium.Nodes(at.leads, point, owner, np.empty(0), np.empty(0))
         self.solver = equilibrium.linear_solver(sim, self.wanted, unknowns, nodes)
         self.solver.flows = fluid is not None
         self.solver.factor(pieces)
@@ -237,42 +229,27 @@ class Implicit:
         self._made_for = made_for
 
     def _pieces(self, dt: float) -> list[Pieces]:
-        """Of triangles, of quads or tetrahedra, and of faces of this rank."""
+        """Of the elements and the faces of this rank."""
         sim, heat = self.sim, self.heat
-        own, number = sim.owned, sim.number[sim.owned]
-        quad = sim.the_mesh().cells[number, 3] >= 0
-        g, capacity = heat.conductances[own], sim.cold[heat.capacities]
-        found = []
-        for rows, k, pairs in ((~quad, 3, 3), (quad, 4, 6)):
-            at = np.flatnonzero(rows)
-            stiffness = np.zeros((len(at), 2 * k, 2 * k))
-            for p, (a, b) in enumerate(kernels.PAIRS[:pairs].tolist() if len(at) else []):
-                stiffness[:, 2 * a, 2 * b] -= g[at, p]
-                stiffness[:, 2 * b, 2 * a] -= g[at, p]
-                stiffness[:, 2 * a, 2 * a] += g[at, p]
-                stiffness[:, 2 * b, 2 * b] += g[at, p]
-            for c in range(k if len(at) else 0):
-                stiffness[:, 2 * c, 2 * c] += capacity[at, c] / dt
-            order = np.argsort(number[at])
-            found.append(Pieces(number[at][order], heat.node[number[at]][:, :k][order], stiffness[order]))
-        if heat.hexes is not None:
-            found.append(self._hex_pieces(heat.hexes))
-        at, ends, transfer = heat.transfers()
+        capacity, found = sim.cold[heat.capacities].reshape(-1), []
+        for kind, number, corners, g in heat.conduction.by_kind():
+            row = sim.where[number]
+            mine = np.flatnonzero((row >= sim.owned.start) & (row < sim.owned.stop))
+            mine = mine[np.argsort(number[mine])]
+            corner = corners[mine]
+            stiffness = np.zeros((len(mine), *2 * [2 * kind.corners]))
+            stiffness[:, ::2, ::2] = matrices(kind, g[mine])
+            own = capacity[(sim.where[corner // 4] - sim.owned.start) * heat.t.shape[1] + corner % 4]
+            each = 2 * np.arange(kind.corners)
+            stiffness[:, each, each] += own / dt
+            found.append(Pieces(number[mine], heat.at.number[corner], stiffness))
+        at, ends, transfer = heat.exposed.transfers()
         key = np.repeat(at, ends.shape[1])
         faces = np.zeros((len(key), 2, 2))
         faces[:, 0, 0] = np.repeat(transfer, ends.shape[1])
-        found.append(Pieces(key, heat.node.reshape(-1)[ends.reshape(-1)][:, None], faces))
+        found.append(Pieces(key, heat.at.number[ends.reshape(-1)][:, None], faces))
         found.append(self._contact_pieces())
         return found
-
-    def _hex_pieces(self, hexes: Hexes) -> Pieces:
-        """Of the hexahedra of this rank; their heat capacity is that of their parts."""
-        sim, heat = self.sim, self.heat
-        mine = (hexes.rows[:, 0] >= sim.owned.start) & (hexes.rows[:, 0] < sim.owned.stop)
-        stiffness = np.zeros((int(mine.sum()), 16, 16))
-        stiffness[:, ::2, ::2] = hexes.matrices(mine)
-        corners = hexes.corners[mine]
-        return Pieces(hexes.number[mine], heat.node[sim.number[corners // 4], corners % 4], stiffness)
 
     def _contact_pieces(self) -> Pieces:
         """Of faces that touch, the first of which belongs to this rank, by the numbers of its element."""
@@ -284,7 +261,7 @@ class Implicit:
         corner, weight, row = corner[mine] % width, weight[mine], row[mine]
         stiffness = np.zeros((len(corner), *2 * [2 * corner.shape[1]]))
         stiffness[:, ::2, ::2] = pass_on[mine, None, None] * weight[:, :, None] * weight[:, None, :]
-        return Pieces(sim.number[row[:, 0]], heat.node[sim.number[row], corner], stiffness)
+        return Pieces(sim.number[row[:, 0]], heat.at.number[4 * sim.number[row] + corner], stiffness)
 
     def _refuse_loose(self) -> None:
         """CommandError naming a body whose heat nothing holds."""
@@ -294,7 +271,7 @@ class Implicit:
         holds = np.append(heat.held > 0, False)[cells].any(axis=1) & sim.alive
         bound = np.zeros(int(body.max()) + 1, bool)
         bound[body[holds]] = True
-        at, _, transfer = heat.transfers(everywhere=True)
+        at, _, transfer = heat.exposed.transfers(everywhere=True)
         bound[body[at[transfer > 0.0] // 4]] = True
         if (fluid := heat.flowing) is not None and fluid.held.any():  # fluid comes past these
             lower = fluid.flow.network.channels

@@ -59,7 +59,7 @@ class Fluid:
         exchange = part_of_wall[:, None] * transfers[:, None] * part(s)[ends]
         return Fluid(
             fluid, ends, fluid.lengths(sides, q), q, fluid.constant("conductivity") * aperture * wet / way, exchange,
-            heat.node.reshape(-1)[fluid.walls(network.channels)], fluid.held[network.nodes].astype(np.int64) - 1,
+            heat.at.number[fluid.walls(network.channels)], fluid.held[network.nodes].astype(np.int64) - 1,
             fluid.rho_c * w, t,
         )  # fmt: skip
 

@@ -13,8 +13,8 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.pairs_space import Surface
 from hpcdem.physics.field.assigned import Number
 from hpcdem.physics.field.diffusing import SAFETY, Diffusing
-from hpcdem.physics.field.hexes import facing
 from hpcdem.physics.field.model import Tables
+from hpcdem.physics.field.sides import facing
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat import friction, kernels, kernels_space
 from hpcdem.physics.heat.fluid import FluidHeat
@@ -145,16 +145,10 @@ class Heat(Diffusing):
             for name in ("conductivity", "conductivity_across", "conductivity_angle", "conductivity_dip")
         )
         c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        same = along == across  # no rounding where the angle has no meaning
-        c, s = np.where(same, 1.0, c), np.where(same, 0.0, s)
-        if self.blocks.dim == 2:
-            return np.column_stack([
-                along * c * c + across * s * s, along * s * s + across * c * c, (along - across) * c * s,
-            ])  # fmt: skip
-        normal = np.sin(np.radians(dip))[:, None] * np.column_stack([-s, c, np.zeros(len(s))])
-        normal[:, 2] = np.cos(np.radians(dip))
-        less = np.where(same, 0.0, across - along)
-        x, y, z = normal.T
+        normal = np.sin(np.radians(dip)) * np.array([-s, c, np.zeros(len(s))])
+        normal[2] = np.cos(np.radians(dip))
+        less = np.where(along == across, 0.0, across - along)  # no rounding where the angle has no meaning
+        x, y, z = normal
         one = [along + less * x * x, along + less * y * y, less * x * y]
         return np.column_stack([*one, along + less * z * z, less * x * z, less * y * z])
 
@@ -198,7 +192,7 @@ class Heat(Diffusing):
         if self._pairs_of is not pairs:
             self._pairs_of = pairs
             faces = Surface.of(blocks).faces
-            free = np.zeros(self.face.size, bool)
+            free = np.zeros(self.exposed.row.size, bool)
             free[faces] = True
             face = np.repeat(pairs.face[pairs.first], 4)
             other = (4 * pairs.element[pairs.second][:, None] + np.arange(4)).reshape(-1)
@@ -220,7 +214,7 @@ class Heat(Diffusing):
         most = h[blocks.alive].max()
         at = np.flatnonzero(blocks.face_exists() & ~blocks.closed_faces() & np.repeat(h > 0.0, 4))
         at = at[blocks.where[at // 4] >= 0]
-        at, ends, part = self._parts_of(at)
+        at, ends, part = self.exposed.parts_of(at)
         each = 2.0 * part * h[at // 4] * most / (h[at // 4] + most)
         for end in ends.T:
             np.add.at(corner, (blocks.where[end // 4], end % 4), each)
@@ -263,7 +257,11 @@ class Heat(Diffusing):
         self.check_complete()
         blocks = self.blocks
         passes = np.flatnonzero((self._transfers > 0.0) & blocks.alive)
-        if len(passes) and not blocks.options.collision and all(one.environment is None for one in self.faces):
+        if (
+            len(passes)
+            and not blocks.options.collision
+            and all(one.environment is None for one in self.exposed.conditions)
+        ):
             raise CommandError(
                 f"element {passes[0]} has a transfer-coeficient, but no face ever had an environment-temperature, and "
                 "surfaces do not touch: model option collision on"

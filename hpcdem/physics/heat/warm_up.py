@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from hpcdem.core.comm import SerialComm
@@ -11,7 +9,6 @@ from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.warm_up import ROCK
-from hpcdem.physics.field.kernels_space import HEX_PAIRS, conduct_hexes, conduct_hexes_threaded
 from hpcdem.physics.heat import friction, kernels, kernels_space
 from hpcdem.physics.heat.model import Heat
 
@@ -30,16 +27,14 @@ def warm_up(threads: int = 1) -> None:
 
 
 def in_space(threads: int = 1) -> None:
-    """The same between two tetrahedra, and conduction in a hexahedron."""
+    """The same between two tetrahedra."""
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
     _heated(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
-    kernel: Any = conduct_hexes if threads == 1 else conduct_hexes_threaded
     pairs, one = np.zeros(1, np.int64), np.ones(1)
     kernels_space.rub(
         pairs, pairs, pairs, pairs, pairs, np.zeros(1, np.uint8), np.zeros((1, 16)), np.zeros((1, 21)),
         np.zeros((1, 5)), one, one, 1.0, np.zeros((1, 4)),
     )  # fmt: skip
-    kernel(threads, np.arange(8).reshape(1, 8), np.ones((1, len(HEX_PAIRS))), np.zeros(24), np.zeros(24))
 
 
 def _heated(mesh: Mesh, threads: int) -> Blocks:

@@ -34,7 +34,7 @@ class Moisture(Diffusing):
         density = blocks.element_rows.column("density")[blocks.element_row[elements]]
         k = self.column("diffusivity")[self.row[elements]] * density
         nothing = np.zeros_like(k)
-        return np.column_stack([k, k, nothing] if blocks.dim == 2 else [k, k, nothing, k, nothing, nothing])
+        return np.column_stack([k, k, nothing, k, nothing, nothing])
 
     @property
     def _transfers(self) -> np.ndarray:

@@ -4,7 +4,12 @@ Finite volumes after 7.7 of the manual, (119) to (137). Proppant N [m2] of a nod
 and settles in it: C q and C delta (1 - mean C)^5.65 v (Richardson & Zaki 1954), each of the node that it comes from.
 Two factors per node keep this within bounds and its volume the same: `GIVES`, of all that leaves a node, so that no
 more leaves than is there, and `TAKES`, of all that comes, so that a node is filled to the limit and not beyond. In
-space "channels" are the links of triangles (kernels_space.py), m2 are m3.
+space "channels" are the links of triangles, m2 are m3.
+
+There nodes own their parts of a triangle up to its medians (the median dual). A link carries what crosses the piece of
+median between its two ends, from the middle of their side to the centre. These pieces add up to nothing, so what
+crosses them in a uniform field does too. What flows along the three links (flow/kernels.py) brings the same to each
+node, but for a part that goes around the triangle: what crosses the medians is q minus the mean of its three.
 """
 
 from __future__ import annotations
@@ -35,16 +40,34 @@ NEAR = 0.999
 """Part of the limit beyond which the viscosity of a slurry does not grow."""
 
 
+@njit(cache=True, error_model="numpy")
+def _across(down, ax, ay, az, nx, ny, nz):
+    return (down[0] * (ay * nz - az * ny) + down[1] * (az * nx - ax * nz) + down[2] * (ax * ny - ay * nx)) / 6.0
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def falls(one, other, x, down, out):
-    """How far down each channel goes, out (m,): the cosine of its angle to down (2,), a direction. one, other (m,):
-    where both faces begin in x."""
+    """What a unit velocity down (dim,), a direction, brings along links, out (l,). one, other (m, dim): where the
+    corners of both faces of channels begin in x. Of an edge the cosine of its angle to it; of a triangle what crosses
+    the medians [m]: of the velocity only what is in its plane counts."""
     x = x.reshape(x.size)
-    for c in range(len(one)):
-        i, j = one[c], other[c]
-        wx = (x[i + 2] - x[i]) + (x[j] - x[j + 2])
-        wy = (x[i + 3] - x[i + 1]) + (x[j + 1] - x[j + 3])
-        out[c] = (down[0] * wx + down[1] * wy) / math.sqrt(wx * wx + wy * wy)
+    for k in range(len(one)):
+        a, b, p, q = one[k, 0], one[k, 1], other[k, 0], other[k, 1]
+        if one.shape[1] == 2:  # p is opposite b
+            wx, wy = (x[b] - x[a]) + (x[p] - x[q]), (x[b + 1] - x[a + 1]) + (x[p + 1] - x[q + 1])
+            out[k] = (down[0] * wx + down[1] * wy) / math.sqrt(wx * wx + wy * wy)
+            continue
+        c, r = one[k, 2], other[k, 2]  # p is opposite a, r opposite b, q opposite c
+        mx, my, mz = x[a] + x[p], x[a + 1] + x[p + 1], x[a + 2] + x[p + 2]
+        ux, uy, uz = x[b] + x[r] - mx, x[b + 1] + x[r + 1] - my, x[b + 2] + x[r + 2] - mz
+        wx, wy, wz = x[c] + x[q] - mx, x[c + 1] + x[q + 1] - my, x[c + 2] + x[q + 2] - mz
+        ux, uy, uz, wx, wy, wz = 0.5 * ux, 0.5 * uy, 0.5 * uz, 0.5 * wx, 0.5 * wy, 0.5 * wz
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        size = math.sqrt(nx * nx + (ny * ny + nz * nz))
+        nx, ny, nz = nx / size, ny / size, nz / size
+        out[3 * k] = _across(down, -(ux + wx), -(uy + wy), -(uz + wz), nx, ny, nz)
+        out[3 * k + 1] = _across(down, 2.0 * ux - wx, 2.0 * uy - wy, 2.0 * uz - wz, nx, ny, nz)
+        out[3 * k + 2] = _across(down, 2.0 * wx - ux, 2.0 * wy - uy, 2.0 * wz - uz, nx, ny, nz)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -194,16 +217,21 @@ def weight(state, a, b, heavier):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def thicken(ends, state, factor, permeability, heavier, channels):
-    """What proppant does to channels (m, flowing.CHANNEL): their conductance, of two halves one behind the other, and
-    the weight of what is in them over that of the fluid. factor: aperture of a pack over that of the channel, 0: by its
-    permeability [m2]; heavier: rho_p / rho_f - 1."""
-    for c in range(len(ends)):
-        a, b, delta = ends[c, 0], ends[c, 1], channels[c, flowing.APERTURE]
-        one = resistance(state, a, delta, factor, permeability)
-        other = resistance(state, b, delta, factor, permeability)
-        channels[c, flowing.CONDUCT] *= 2.0 / (one + other)
-        channels[c, flowing.WEIGHT] = weight(state, a, b, heavier)
+def thicken(links, ends, state, factor, permeability, heavier, channels):
+    """What proppant does to the links of channels (l, flowing.CHANNEL): their conductance, and the weight of what is in
+    them over that of the fluid. factor: aperture of a pack over that of the channel, 0: by its permeability [m2];
+    heavier: rho_p / rho_f - 1. The parts of a channel at its corners are one behind the other, so that links of a
+    triangle keep their shares: one of a negative conductance has to be outweighed by the others."""
+    for first in range(0, len(ends), links):
+        delta, total, parts = channels[first, flowing.APERTURE], 0.0, links
+        for c in range(first, first + links):
+            total += resistance(state, ends[c, 0], delta, factor, permeability)
+        if links == 1:  # an edge has two ends
+            total += resistance(state, ends[first, 1], delta, factor, permeability)
+            parts = 2
+        for c in range(first, first + links):
+            channels[c, flowing.CONDUCT] *= parts / total
+            channels[c, flowing.WEIGHT] = weight(state, ends[c, 0], ends[c, 1], heavier)
 
 
 def kozeny_carman(limit: float, size: float) -> float:

@@ -18,66 +18,49 @@ from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.field import assigned
-from hpcdem.physics.field.assigned import Number
-from hpcdem.physics.field.model import Field, Travelling
+from hpcdem.physics.field.model import LOOK, MANY
 from hpcdem.physics.flow import kernels as flowing
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.network import LINKS
-from hpcdem.physics.proppant import kernels, kernels_space, settling
-from hpcdem.physics.proppant.properties import NAMES, PROPPANT
+from hpcdem.physics.proppant import kernels, settling
+from hpcdem.physics.proppant.properties import NAMES
+from hpcdem.physics.proppant.said import RATE, Said
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 COURANT = 0.1
 """Part of its slurry that a node may lose in a sub-step, or a little more where the flow has just changed."""
-LOOK = 100
-"""Cycles of flow, by explicit steps, after which sub-steps are counted again."""
 STALE = 10.0
 """Times, as long as a node needs to lose its slurry, that a step of flow may be without a word."""
 SWEEPS = 4
 """Over the nodes, for the factors of what they take."""
-MANY = 100_000
-"""Sub-steps in one step of flow that are too many to be meant."""
 NO_STOKES = 1.0
 """Reynolds number of a single grain beyond which Stokes' law is far off."""
-CONCENTRATION, RATE = "concentration", "rate"
-_COLUMNS = ("proppant", "came", "left", "room", "volume", "given", "packed")
-"""Of nodes, as they are saved; given: fluid that conditions had given."""
-_SAVED = [kernels.N, kernels.CAME, kernels.LEFT, kernels.ROOM, kernels.VOLUME]
-"""The first of these."""
 
 
-def checked(given: Mapping[str, Any]) -> dict[str, float]:
-    """These properties, with defaults for others."""
-    for name, value in given.items():
-        if not isinstance(value, (int, float)):
-            raise CommandError(f"there is one proppant in all channels: {name} must be a number")
-    return PROPPANT.complete(given)
-
-
-class Proppant(Travelling, Field):
+class Proppant(Said):
     """The proppant of a model with fluid. Methods are collective unless they say otherwise; CommandError, alike on all
     ranks, for what makes no sense.
 
-    values: properties by name; carries (4 ne,) bool: channels that grains can pass, by joint; condition (np,): row of
-    the conditions (kind, value), by node. nodes (n, kernels.NODE), state (n + copies, kernels.STATE): rows of the flow.
+    nodes (n, kernels.NODE), state (n + copies, kernels.STATE): rows of the flow.
     """
 
     name: ClassVar[str] = "proppant"
     kernel_kind: ClassVar[str] = "proppant"
+    of_nodes: ClassVar[str] = "proppant_nodes"
+    columns: ClassVar[Mapping[str, tuple[str, int]]] = {
+        "proppant": ("nodes", kernels.N), "came": ("nodes", kernels.CAME), "left": ("nodes", kernels.LEFT),
+        "room": ("nodes", kernels.ROOM), "volume": ("nodes", kernels.VOLUME), "given": ("given", -1),
+        "packed": ("state", kernels.PACKED),
+    }  # fmt: skip
+    """given: fluid that conditions had given."""
+    widths: ClassVar[Mapping[str, int]] = {"nodes": kernels.NODE, "given": 0, "state": kernels.STATE}
+    nodes: np.ndarray
+    given: np.ndarray
 
     def __init__(self, blocks: Blocks, flow: Flow) -> None:
-        super().__init__()
-        self.blocks, self.flow = blocks, flow
-        mesh = blocks.the_mesh()
-        self.values: dict[str, float] = {}
-        self.carries = np.zeros(mesh.cells.size, bool)
-        self.condition = np.zeros(len(mesh.points), np.int32)
-        self.conditions: list[tuple[str, Number]] = [("", 0.0)]
-        self.nodes = np.empty((0, kernels.NODE))
-        self.state = np.empty((0, kernels.STATE))
-        self.given = np.empty(0)
+        super().__init__(blocks, flow)
         self.accounts = dict.fromkeys(("came", "left", "removed"), 0.0)
         """Of nodes that are gone, and what went with room that is gone [m2]."""
         self._start_clock(flow.time)
@@ -90,78 +73,9 @@ class Proppant(Travelling, Field):
         flow.more["proppant"] = lambda: self.nodes[:, kernels.N]
         flow.more["pack_pressure"] = lambda: self.state[: len(self.number), kernels.PUSHES]
 
-    @property
-    def stays(self) -> bool:
-        """Not if a pack pushes on walls, the less the farther they go."""
-        return not self.values.get("proppant_modulus", 0.0) > 0.0
-
     @classmethod
     def new(cls, blocks: Blocks) -> Proppant:
         return cls(blocks, Flow.of(blocks))
-
-    # ---- what is said --------------------------------------------------------------------------------------------
-
-    def assign(self, joints: np.ndarray | None, given: Mapping[str, Any]) -> None:
-        """Channels among these joints (None: all) carry proppant with these properties."""
-        at = self.blocks.numbers_of_joints(joints)
-        self._say(given, {} if not self.carries.any() else self.values)
-        self.blocks.before_change()
-        self.carries[at] = True
-        self.blocks.changed()
-
-    def leave(self, joints: np.ndarray | None) -> None:
-        """Channels among these joints (None: all) carry none any more."""
-        at = self.blocks.numbers_of_joints(joints)
-        self.blocks.before_change()
-        self.carries[at] = False
-        self.blocks.changed()
-
-    def _nodes(self, points: np.ndarray | None) -> np.ndarray:
-        """Those of these points (None: all) at which a channel ends that carries proppant."""
-        network = self.flow.network
-        asked = self.flow.flow_nodes(points)
-        found = np.intersect1d(asked, network.corners[self.carries[network.channels]])
-        if not len(found):
-            raise CommandError(f"no channel that carries proppant ends at node {asked[0]}" + " nor at the others" * (
-                len(asked) > 1))  # fmt: skip
-        return found
-
-    def adjust(self, given: Mapping[str, Any]) -> None:
-        """Change some properties."""
-        self._say({**self.values, **given}, {})
-        self.blocks.before_change()
-        self.blocks.changed()
-
-    def _say(self, given: Mapping[str, Any], before: Mapping[str, float]) -> None:
-        values = checked(given)
-        for name in before:
-            if before[name] != values[name]:
-                raise CommandError(
-                    f"there is one proppant in all channels, but {name} is {before[name]:g} and {values[name]:g}"
-                )
-        limit = values["proppant_concentration_limit"]
-        for kind, value in assigned.in_use(self.conditions, self.condition):
-            if kind == CONCENTRATION and assigned.checked(self.blocks.tables, value, kind).max() > limit:
-                raise CommandError(f"slurry that comes in would be thicker than a pack, {limit:g}: change it first")
-        self.values = values
-
-    def prescribe(self, nodes: np.ndarray | None, kind: str, value: Number) -> None:
-        """The concentration of slurry that comes in at flow nodes among these points (None: all) from now on, or a
-        volume rate of proppant [m2/s] at each of them."""
-        at = self._nodes(nodes)
-        values = assigned.checked(self.blocks.tables, value, f"the {kind} of proppant")
-        limit = self.values["proppant_concentration_limit"]
-        if values.min() < 0.0 or (kind == CONCENTRATION and values.max() > limit):
-            most = f" and at most that of a pack, {limit:g}" if kind == CONCENTRATION else ""
-            wrong = values.min() if values.min() < 0.0 else values.max()
-            raise CommandError(f"the {kind} of proppant must not be negative{most}, got {wrong:g}")
-        self.blocks.before_change()
-        self.condition[at] = assigned.row_of(self.conditions, (kind, value))
-        self.blocks.changed(stiffness=False)
-
-    def remove_conditions(self, nodes: np.ndarray | None) -> None:
-        """Take back what is prescribed at these points (None: all)."""
-        self._unset(self.condition, nodes)
 
     def fill(self, nodes: np.ndarray | None, concentration: float) -> None:
         """The slurry of flow nodes among these points (None: all) has this concentration now."""
@@ -181,9 +95,6 @@ class Proppant(Travelling, Field):
         self.nodes[mine, kernels.N] = new
         self._settle()
         self.flow.find_geometry()
-
-    def uses_table(self, name: str) -> bool:
-        return any(value == name for _, value in assigned.in_use(self.conditions, self.condition))
 
     # ---- what is asked -------------------------------------------------------------------------------------------
 
@@ -245,9 +156,8 @@ class Proppant(Travelling, Field):
     def _thicken(self, ends: np.ndarray, state: np.ndarray, table: np.ndarray) -> None:
         v = self.values
         limit, size = v["proppant_concentration_limit"], v["proppant_size"]
-        of = kernels if self.blocks.dim == 2 else kernels_space
-        of.thicken(
-            ends, state, v["aperature_factor"], kernels.kozeny_carman(limit, size),
+        kernels.thicken(
+            LINKS[self.blocks.dim], ends, state, v["aperature_factor"], kernels.kozeny_carman(limit, size),
             v["proppant_density"] / self.flow.fluid("fluid_density") - 1.0, table,
         )  # fmt: skip
 
@@ -266,17 +176,10 @@ class Proppant(Travelling, Field):
         self._forget(~network.there[self.number])
         if not len(network.channels):
             return
-        n, mine = len(self.number), flow.number
-        wanted = flow.held[len(mine) :]
-        had = np.column_stack([self.nodes[:, _SAVED], self.given, self.state[:n, kernels.PACKED], np.ones(n)])
-        rows, _ = self._fetch(had, mine, wanted, kernels.STATE)
-        self.nodes = np.zeros((len(mine), kernels.NODE))
-        self.nodes[:, _SAVED] = rows[:, :5]
+        mine = flow.number
+        new, _ = self._fetch(mine, flow.held[len(mine) :])
         self.nodes[:, kernels.ROOM_BEFORE] = self.nodes[:, kernels.ROOM]
-        self.given = rows[:, 5].copy()
-        self.state[: len(mine), kernels.PACKED] = rows[:, 6]
         self._held = flow.held
-        new = rows[:, 7] == 0.0
         if comm.any(bool(new.any())):
             self.given[new] = flow.nodes[new, flowing.GIVEN]
         lost = self.nodes[:, kernels.N] * (1.0 - flow.kept)
@@ -291,16 +194,11 @@ class Proppant(Travelling, Field):
         self._settle()
         flow.find_geometry()
 
-    def _forget(self, gone: np.ndarray) -> None:
-        """Proppant of nodes (n,) bool that are no longer there is gone with them."""
+    def _book_gone(self, gone: np.ndarray) -> None:
         comm = self.blocks.comm
-        if not comm.any(bool(gone.any())):
-            return
         self.accounts["removed"] += exact_sum(self.nodes[gone, kernels.N], comm)
         for name, column in (("came", kernels.CAME), ("left", kernels.LEFT)):
             self.accounts[name] += exact_sum(self.nodes[gone, column], comm)
-        self.state = self.state[: len(gone)][~gone]
-        self.number, self.nodes, self.given = self.number[~gone], self.nodes[~gone], self.given[~gone]
 
     def _settle(self) -> None:
         v = self.values
@@ -388,8 +286,8 @@ class Proppant(Travelling, Field):
         ends, begin, channel, side = flow.links
         assert flow.carried is not None
         q, table, speed = flow.carried / dt, flow.channel_table, self.speed()
-        if self.blocks.dim == 3:
-            q -= np.repeat(q.reshape(-1, 3).mean(axis=1), 3)
+        if (links := LINKS[self.blocks.dim]) > 1:
+            q -= np.repeat(q.reshape(-1, links).mean(axis=1), links)
         self._find_falls()
         fall = self._falls
         if flow.implicit or self.cycles % LOOK == 0:
@@ -440,8 +338,7 @@ class Proppant(Travelling, Field):
         """How far down the channels of this rank go where they are now."""
         down = np.array(self._gravity())
         down /= max(float(np.sqrt((down * down).sum())), 1e-300)
-        of = kernels if self.blocks.dim == 2 else kernels_space
-        of.falls(*self.flow.sides, self.blocks.x, down, self._falls)
+        kernels.falls(*self.flow.sides, self.blocks.x, down, self._falls)
 
     def _sources(self, dt: float, count: int) -> None:
         """What conditions bring or take in each sub-step of the owned nodes."""
@@ -488,13 +385,6 @@ class Proppant(Travelling, Field):
             "proppant_conditions": assigned.numbered(self.condition),
         }
 
-    def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
-        """What this rank's flow nodes hold."""
-
-        held = [*self.nodes[:, _SAVED].T, self.given, self.state[: len(self.number), kernels.PACKED]]
-        columns = {name: np.ascontiguousarray(values) for name, values in zip(_COLUMNS, held)}
-        return {"proppant_nodes": {"number": self.number, **columns}}
-
     @staticmethod
     def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
         """Inverse of these: the blocks have this proppant; nodes go to their owners with the first storage."""
@@ -503,14 +393,6 @@ class Proppant(Travelling, Field):
         made.conditions = [(str(kind), value) for kind, value in state["conditions"]]
         made.accounts = dict(state["accounts"])
         made._restore_clock(state)
-        channels, points, nodes = (tables[f"proppant_{name}"] for name in ("channels", "conditions", "nodes"))
-        made.carries[channels["number"]] = True
-        assigned.put_back(made.condition, points)
-        made.number = nodes["number"].astype(np.int64)
-        n = len(made.number)
-        made.nodes = np.zeros((n, kernels.NODE))
-        for name, column in zip(_COLUMNS, _SAVED):
-            made.nodes[:, column] = nodes[name]
-        made.given = np.array(nodes["given"])
-        made.state = np.zeros((n, kernels.STATE))
-        made.state[:, kernels.PACKED] = nodes["packed"]
+        made.carries[tables["proppant_channels"]["number"]] = True
+        assigned.put_back(made.condition, tables["proppant_conditions"])
+        made._restore_rows(tables)

@@ -1,71 +1,17 @@
-"""A field in hexahedra: the mean of that in the five tetrahedra of each of two overlays, as their stress is.
-
-Heat flows between corners that share an edge of one of these ten: along the twelve edges and both diagonals of each
-side. Corners have the parts of the volume that their masses have, and sides of four corners are those of both ways to
-cut them, half each.
-"""
+"""Sides of hexahedra that are passed by a field: conduction in a hexahedron is the mean of two overlays, which cut each
+side of four corners both ways, so that each way counts half."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.mesh import sizes
-from hpcdem.physics.field import kernels_space
-from hpcdem.physics.field.kernels_space import HEX_PAIRS
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.mesh import Mesh
-    from hpcdem.physics.fdem.simulation import Blocks
-
-
-class Hexes:
-    """All that are held here, ghosts too. number (n,): of their first elements; rows (n, 6): of storage; corners (n,
-    8): in the table of temperatures, flat; g (n, 24) [W/K]: conductances between HEX_PAIRS."""
-
-    def __init__(self, blocks: Blocks, k: np.ndarray) -> None:
-        """k (hexahedra of the mesh, 6): conductivities, see `kernels_space.conductances`."""
-        mesh = blocks.reference
-        held = np.flatnonzero(blocks.where[mesh.hexes[:, 8]] >= 0)
-        hexes = mesh.hexes[held]
-        self.number = hexes[:, 8]
-        self.rows = blocks.where[self.number[:, None] + np.arange(hexahedra.PARTS)]
-        self.corners = hexahedra.Rows(mesh.points, mesh.cells, hexes, self.rows).corners
-        self.g = conductances(mesh.points, hexes, k[held])
-        self.threads = blocks.threads
-
-    def conduct(self, t: np.ndarray, q: np.ndarray) -> None:
-        """Heat that flows to their corners into q (flat), with temperatures t (flat)."""
-        kernel: Any = kernels_space.conduct_hexes if self.threads == 1 else kernels_space.conduct_hexes_threaded
-        kernel(self.threads, self.corners, self.g, t, q)
-
-    def add_sizes(self, out: np.ndarray) -> None:
-        """Add to out (flat) for each corner half the sum of conductances and of their sizes [W/K]."""
-        each = 0.5 * (self.g + np.abs(self.g))
-        for end in HEX_PAIRS.T:
-            np.add.at(out, self.corners[:, end], each)
-
-    def matrices(self, mine: np.ndarray) -> np.ndarray:
-        """(m, 8, 8) [W/K] of some (n,) bool."""
-        g = self.g[mine]
-        out = np.zeros((len(g), 8, 8))
-        for p, (a, b) in enumerate(HEX_PAIRS.tolist()):
-            out[:, a, b] -= g[:, p]
-            out[:, b, a] -= g[:, p]
-            out[:, a, a] += g[:, p]
-            out[:, b, b] += g[:, p]
-        return out
-
-
-def conductances(points: np.ndarray, hexes: np.ndarray, k: np.ndarray) -> np.ndarray:
-    """(n, 24) [W/K] of hexahedra with these points (n, 8 or 9) and conductivities k (n, 6)."""
-    out, one, every = np.zeros((len(hexes), len(HEX_PAIRS))), np.empty((len(hexes), 6)), np.arange(len(hexes))
-    for corners, pairs in zip(hexahedra.OVERLAYS, kernels_space.OVERLAY_PAIRS):
-        kernels_space.conductances(every, points, np.ascontiguousarray(hexes[:, corners]), k, one)
-        out[:, pairs] += 0.5 * one
-    return out
 
 
 def with_other_cuts(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
