@@ -128,9 +128,7 @@ NOTHING = "compiled late: []"
 SLOW, MPI = pytest.mark.slow, pytest.mark.mpi
 
 
-@pytest.mark.parametrize(
-    "ranks", [pytest.param(1, marks=SLOW), pytest.param(2, marks=MPI), pytest.param(3, marks=[MPI, SLOW])]
-)
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=[MPI, SLOW]), pytest.param(3, marks=[MPI, SLOW])])
 def test_particles(late, tmp_path: Path, ranks: int) -> None:
     write_lattice(tmp_path / "bodies.clumps", 3.0, 10, 6)
     for name, text, n in (("model.py", PARTICLES, ranks), ("again.py", AGAIN, ranks), ("followed.py", FOLLOWED, 1)):
@@ -142,9 +140,9 @@ def test_particles(late, tmp_path: Path, ranks: int) -> None:
     ("ranks", "first"),
     [
         pytest.param(1, "particles", marks=SLOW),
-        pytest.param(1, "blocks", marks=SLOW),
+        (1, "blocks"),
         pytest.param(2, "particles", marks=[MPI, SLOW]),
-        pytest.param(2, "blocks", marks=MPI),
+        pytest.param(2, "blocks", marks=[MPI, SLOW]),
     ],
 )
 def test_blocks_and_particles_in_any_order(late, tmp_path: Path, ranks: int, first: str) -> None:

@@ -770,11 +770,11 @@ assert sim.nodes.values("velocity-x", where="id 12")[0] == 0.15
 
 
 @pytest.fixture(scope="module")
-def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def script(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the run of the PCDC script on one rank."""
     folder = tmp_path_factory.mktemp("pcdc")
     (folder / "model.sc").write_text(SCRIPT)
-    done = Launcher()(1, "model.sc", cwd=folder)
+    done = resident(1, "model.sc", cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
@@ -803,11 +803,11 @@ def different(one: Path, other: Path, names: list[str]) -> list[str]:
      pytest.param(4, "hpcdem", "again", marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_python_says_what_the_script_says(
-    script: Path, launch: Launcher, tmp_path: Path, ranks: int, how: str, word: str
+    script: Path, launch: Launcher, resident: Resident, tmp_path: Path, ranks: int, how: str, word: str
 ) -> None:
     (tmp_path / "model.py").write_text(PROGRAM)
     words = ("model.py", *(("--", word) if word and how == "hpcdem" else (word,) if word else ()))
-    done = (launch if how == "hpcdem" else launch.python)(ranks, *words, cwd=tmp_path)
+    done = (resident if how == "hpcdem" else launch.python)(ranks, *words, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     names = sorted(
         path.relative_to(script).as_posix() for path in [*script.glob("*.sav"), *(script / "data").iterdir()]

@@ -387,9 +387,15 @@ def test_three_ranks_write_the_same_files(folder: Path, tmp_path: Path, needs_mp
     assert len(written) == 9
     for path in written:
         assert path.read_bytes() == (folder / "measure" / path.name).read_bytes(), path.name
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+def test_three_ranks_refuse_with_one_message(folder: Path, tmp_path: Path, needs_mpi: None, launch: Any) -> None:
+    (tmp_path / "measure.py").write_text(PROGRAM)
     shutil.copytree(folder, tmp_path / "data")
     (tmp_path / "data" / "all_0000003000_ini.vtkhdf").write_bytes(b"no frame")
-    ended = launch.python(3, program, tmp_path / "data", "layers")
+    ended = launch.python(3, tmp_path / "measure.py", tmp_path / "data", "layers")
     assert ended.returncode == 1 and (ended.stdout + ended.stderr).count("all_0000003000_ini.vtkhdf") == 1
 
 
