@@ -180,7 +180,7 @@ def test_the_account_of_energy_closes() -> None:
     assert abs(rock["work_outside"]) < 1e-6 * abs(rock["work_bolts"])  # bolts alone drive it
 
 
-@pytest.mark.parametrize("at", [0, 150, 400])
+@pytest.mark.parametrize("at", [150, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 400))])
 def test_a_saved_model_goes_on(at, tmp_path) -> None:
     """Before the first step, in mid-run, after rupture: with commands given just before, too."""
     sim = block(True, 5e9)

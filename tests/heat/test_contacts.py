@@ -82,7 +82,8 @@ def test_explicit_steps_come_to_the_same() -> None:
     assert temperatures(sim).max() < 80.1 and temperatures(sim).min() > 0.0
 
 
-@pytest.mark.parametrize("kind", [pytest.param("tri", marks=pytest.mark.slow), "mixed"])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["tri", "mixed"])
 def test_kernel_against_plain_sums(kind: str) -> None:
     """Bodies that lie crooked on each other, apart on one side, deep in each other on the other."""
     turn = np.array([[np.cos(0.004), -np.sin(0.004)], [np.sin(0.004), np.cos(0.004)]])

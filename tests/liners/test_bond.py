@@ -189,7 +189,7 @@ def test_the_account_of_energy_closes() -> None:
     assert rock["work_liners"] == found["work_on_rock"] != 0.0 and rock["relative"] < 1e-6
 
 
-@pytest.mark.parametrize("at", [0, 150, 400])
+@pytest.mark.parametrize("at", [150, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 400))])
 def test_a_saved_model_goes_on(at, tmp_path) -> None:
     sim, liners = slab(True, 5e9, tensile_strength=0.3e6, compressive_strength=1e6, bond_tensile_strength=1e5)
     sim.table("pull", [(0.0, 0.0), (1e-3, 0.5)])

@@ -41,7 +41,10 @@ def closed(closure: float, c: float = 0.6, **changed: float) -> tuple[Blocks, Fl
     return sim, flow, proppant
 
 
-@pytest.mark.parametrize(("modulus", "limit"), [(1e7, 0.6), (4e7, 0.6), (1e7, 0.5)])
+@pytest.mark.parametrize(
+    ("modulus", "limit"),
+    [(1e7, 0.6), *(pytest.param(*one, marks=pytest.mark.slow) for one in ((4e7, 0.6), (1e7, 0.5)))],
+)
 def test_a_pack_carries_its_walls(modulus: float, limit: float) -> None:
     """(137): modulus times the strain of the pack; the rest of what closes is taken by the rock."""
     sim, flow, proppant = closed(6e-5, limit, proppant_modulus=modulus, proppant_concentration_limit=limit)
@@ -144,6 +147,7 @@ def leaking(dim: int, modulus: float) -> tuple[Blocks, Flow, Proppant]:
     return sim, flow, proppant
 
 
+@pytest.mark.some_of_each
 @pytest.mark.some_of_each
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("modulus", [1e7, 1e9])

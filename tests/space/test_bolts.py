@@ -158,7 +158,7 @@ def test_bolts_bring_no_force_or_moment_from_nowhere() -> None:
     assert diagnostics.values(sim, "stress_zz").min() < -1e5
 
 
-@pytest.mark.parametrize("at", [0, 20, 150])
+@pytest.mark.parametrize("at", [20, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 150))])
 def test_a_saved_model_goes_on(at: int, tmp_path: Path) -> None:
     """Before the first step, in mid-run with hosts taken out, after rupture."""
     sim = body(box((3, 3, 3), (1.0, 1.0, 1.0)), young=5e9)

@@ -248,12 +248,12 @@ STOP
 """
 
 
-def test_runs_one_after_the_other(launch: Any, tmp_path: Path) -> None:
+def test_runs_one_after_the_other(resident: Any, tmp_path: Path) -> None:
     """A long one, a short one, and one that goes on from the checkpoint of the short one."""
 
     def run(name: str, text: str) -> list[int]:
         (tmp_path / name).write_text(text)
-        done = launch(1, "--no-figure", name, cwd=tmp_path, timeout=300)
+        done = resident(1, "--no-figure", name, cwd=tmp_path, timeout=300)
         assert done.returncode == 0, done.stdout + done.stderr
         return sorted({file.step for file in list_frames(tmp_path / "data")})
 

@@ -135,7 +135,7 @@ def by_matrix(sim) -> float:
     return math.sqrt(np.linalg.eigvalsh(weight[:, None] * stiffness * weight)[-1])
 
 
-@pytest.mark.parametrize("fric", [0.0, 0.3])
+@pytest.mark.parametrize("fric", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_highest_frequency_against_the_matrix(tmp_path, fric):
     sim = heap(tmp_path, 2e-3, 6.0, fric=fric)
     properties.fix(sim, ("spin",), Ids(0, int(diagnostics.clumps(sim)["id"][2])))
