@@ -509,7 +509,7 @@ MODELS = {
     "backfill": Model(backfill, result, the_fill_carries, fill_up, steps=1100, slow=True),
     "creeping": Model(creeping, result, much_creeps, creep_more, steps=1400, slow=True),
     "plate": Model(plate, result, a_plate_flows, steps=300, middle=131, slow=True),
-    "parting": Model(parting, parted, sides_part, part_more, steps=600, middle=300),
-    "weir": Model(weir, result, the_weir_gives_way, steps=700, middle=401),
-    "shaking": Model(shaking, result, the_ground_shakes, shake_more, steps=700, middle=401),
+    "parting": Model(parting, parted, sides_part, part_more, steps=600, middle=300, slow=True),
+    "weir": Model(weir, result, the_weir_gives_way, steps=700, middle=401, slow=True),
+    "shaking": Model(shaking, result, the_ground_shakes, shake_more, steps=700, middle=401, slow=True),
 }

@@ -102,6 +102,6 @@ def liners_are_torn(found: Found) -> None:
 
 # Checkpoints after excavation and deletion, and the change to motion.
 MODELS = {
-    "liners torn": Model(breaking, result, liners_are_torn, more, steps=1400, middle=1101),
+    "liners torn": Model(breaking, result, liners_are_torn, more, steps=1400, middle=1101, slow=True),
     "liners at rest": Model(relaxing, result, liners_yield_and_part, excavate, steps=1400, middle=1101, slow=True),
 }
