@@ -16,7 +16,10 @@ NAVIGATION = {
         "docs/zdem_reference", "docs/pcdc_reference", "docs/pcdc_online", "docs/options", "docs/python_reference",
         "docs/files", "docs/fields",
     ],
-    "Theory": ["docs/physics", "docs/blocks"],
+    "Theory": [
+        "docs/physics", "docs/blocks", "docs/blocks_joints", "docs/blocks_space", "docs/blocks_fluid", "docs/blocks_heat",
+        "docs/blocks_supports", "docs/blocks_coupling",
+    ],
     "Evidence": [
         "docs/gallery", "docs/validation", "docs/benchmarks", "docs/scaling", "docs/reliability", "docs/wishes",
     ],

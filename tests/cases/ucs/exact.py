@@ -6,7 +6,7 @@ A joint of length h whose normal makes the angle a with the load has the stresse
 s sin a cos a (shearing it). It closes by h s cos2 a / P_overlay and slides by s_p (1 - sqrt(1 - q)),
 q = s |sin a cos a| / t, with
 
-    t = c + s cos2 a tan(phi),   s_p = 2 h t / P_shear           (docs/blocks.md, Joints)
+    t = c + s cos2 a tan(phi),   s_p = 2 h t / P_shear           (docs/blocks_joints.md)
 
 The strain that displacements u across faces add to a body of area A is the sum of h sym(u n) / A, so along the load
 
