@@ -150,7 +150,7 @@ SEAMS = [
     (("3 2 1", "hex"), ("2 3 1", "tet"), 1e-12),
     (("2 2 1", "hex"), ("2 2 1", "tet split 5"), 3e-5),
 ]
-"""Below, above, and how far off [m]: a hexahedron right beside tetrahedra shares loads otherwise (docs/blocks_space.md)."""
+"""Below, above, and how far off [m]: hexahedra next to tetrahedra share loads differently (docs/blocks_space.md)."""
 
 
 @pytest.mark.parametrize(("below", "above", "off"), SEAMS)
