@@ -62,6 +62,9 @@ class Session:
     interpreter: Any = None
     adapts: bool = False
 
+    def __post_init__(self) -> None:
+        self.comm.warns_by(self.log.warn)
+
     def simulation(self, outdir: Path | None = None, log: Log | None = None) -> Simulation:
         """Collective: an empty model; the first one waits for the kernels."""
         self.prepare("")

@@ -7,12 +7,15 @@ operations over MPI are in `halo/comm.py`.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from hpcdem.core.errors import HpcdemError
+from hpcdem.core.errors import CommandError, HpcdemError
 
 if TYPE_CHECKING:
     import numpy as np
+
+T = TypeVar("T")
 
 
 class Comm(Protocol):
@@ -37,6 +40,31 @@ class Comm(Protocol):
     def allgather(self, obj: Any) -> list[Any]:
         """List of the objects of all ranks, on all ranks."""
         ...
+
+    def per_node(self, make: Callable[[], T], once: bool = False) -> T:
+        """The result of `make()`, which is equal on all ranks and calls nothing that is collective.
+
+        The first rank of each node of the machine calls it, and the ranks of the node share one copy of its large
+        arrays (halo/shared.py); pages that a rank writes to become its own. once: rank 0 alone calls it, for what need
+        not be equal to the last bit. An error of it is raised on all ranks. Collective, except from inside of another
+        `make`. Without nodes to tell apart every rank calls it."""
+        if not once or self.size == 1:
+            return make()
+        found: Any = None
+        if self.rank == 0:
+            try:
+                found = make(), None, False
+            except HpcdemError as why:
+                found = None, str(why), why.exit_code == CommandError.exit_code
+        made: T
+        made, error, wrong_use = self.bcast(found)
+        if error is not None:
+            raise (CommandError if wrong_use else HpcdemError)(error)
+        return made
+
+    def warns_by(self, warn: Callable[[str], None]) -> None:
+        """What a user should know of the memory of a node is told by this."""
+        return None
 
     def any(self, flag: bool) -> bool:
         """True everywhere if true anywhere."""

@@ -11,12 +11,14 @@ from __future__ import annotations
 import os
 import pickle
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from hpcdem.core.comm import Comm, SerialComm
+from hpcdem.core.comm import Comm, SerialComm, T
 from hpcdem.core.errors import HpcdemError
+from hpcdem.halo.shared import Nodes
 
 __all__ = ["MpiComm", "SerialComm"]
 
@@ -27,9 +29,9 @@ NAP = 2e-5
 
 
 class MpiComm(Comm):
-    """The same operations over an mpi4py communicator."""
+    """The same operations over an mpi4py communicator. of: of which it is a part, with the same cores."""
 
-    def __init__(self, mpi: Any) -> None:
+    def __init__(self, mpi: Any, of: MpiComm | None = None) -> None:
         from mpi4py import MPI
 
         self._wait_all, self._test_all = MPI.Request.Waitall, MPI.Request.Testall
@@ -37,8 +39,15 @@ class MpiComm(Comm):
         self.mpi = mpi
         self.rank = mpi.Get_rank()
         self.size = mpi.Get_size()
-        self.crowded = _more_ranks_than_cores(mpi)
         self._exchanges = 0
+        self.crowded = False
+        if of is not None:
+            self.crowded = of.crowded
+            return
+        host = mpi.Split_type(MPI.COMM_TYPE_SHARED, self.rank)
+        self.crowded = _more_ranks_than_cores(mpi, host)
+        leads = mpi.Split(MPI.UNDEFINED if host.Get_rank() else 0, self.rank)
+        self.nodes = Nodes(MpiComm(host, self), None if leads == MPI.COMM_NULL else MpiComm(leads, self))
 
     def start_all(self, requests: list[Any]) -> None:
         self._start_all(requests)
@@ -80,6 +89,13 @@ class MpiComm(Comm):
         received = np.empty(int(counts.sum()), np.uint8)
         self.wait(self.mpi.Iallgatherv(payload, [received, (counts, _starts(counts))]))
         return _unpickled(received, counts)
+
+    def per_node(self, make: Callable[[], T], once: bool = False) -> T:
+        made: T = self.nodes.share(make, once)
+        return made
+
+    def warns_by(self, warn: Callable[[str], None]) -> None:
+        self.nodes.warn = warn
 
     def any(self, flag: bool) -> bool:
         return bool(self.max_into(np.array([1 if flag else 0], dtype=np.int64))[0])
@@ -147,15 +163,13 @@ class MpiComm(Comm):
         self.mpi.Abort(code)
 
 
-def _more_ranks_than_cores(mpi: Any) -> bool:
-    """Whether any host has more ranks than cores that they may use between them."""
+def _more_ranks_than_cores(mpi: Any, host: Any) -> bool:
+    """Whether any host has more ranks than cores that they may use between them; host: the ranks of this one."""
     from mpi4py import MPI
 
-    host = mpi.Split_type(MPI.COMM_TYPE_SHARED)
     mine = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set(range(os.cpu_count() or 1))
     cores = set().union(*host.allgather(mine))
     crowded = host.Get_size() > len(cores)
-    host.Free()
     return bool(mpi.allreduce(crowded, op=MPI.LOR))
 
 

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.core.comm import SerialComm
 from hpcdem.halo.comm import MpiComm
-from hpcdem.pre.mesh import geometry, once
+from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
 from hpcdem.pre.mesh.fractures import network
 from hpcdem.pre.mesh.regions import polygon_of
@@ -39,7 +39,7 @@ def make(kind, size=0.3):
 
 
 for kind in ("tri", "quad"):
-    made = once.made_once(comm, lambda: make(kind))
+    made = comm.per_node(lambda: make(kind), once=True)
     mesh = made.mesh
     text = hashlib.sha256()
     for array in (mesh.points, mesh.cells, mesh.cracks, mesh.crack_sets, *mesh.layers.values()):
@@ -51,7 +51,7 @@ for kind in ("tri", "quad"):
         print(*every[0])
 for wrong in (lambda: make("hex"), lambda: make("tri", size=math.nan)):
     try:
-        once.made_once(comm, wrong)
+        comm.per_node(wrong, once=True)
     except CommandError as error:
         said = comm.allgather(str(error))
         assert len(set(said)) == 1
@@ -66,7 +66,7 @@ def unreadable():
 
 
 try:
-    once.made_once(comm, unreadable)
+    comm.per_node(unreadable, once=True)
 except HpcdemError as error:
     assert str(error) == "m.msh: no" and not isinstance(error, CommandError)
 else:

@@ -13,7 +13,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField
 from hpcdem.physics.fdem import changes, node_conditions, sides, user_functions, user_laws
 from hpcdem.physics.fdem.free_field import FreeField
-from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, Around, OnBoundary, Range
+from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, Around, Groups, OnBoundary, Range
 from hpcdem.physics.fdem.properties import COHESIVE
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.fdem.user_laws import UserLaw
@@ -29,7 +29,12 @@ Number = float | str
 def group(project: Project, kind: str, group: str, set_name: str = DEFAULT, where: Range | None = None) -> None:
     """Put objects of a kind (model.blocks.groups) into a group, also of elements that were taken out: these may come
     back. They leave the one of the set that they were in."""
-    found, groups = everything(project, kind, where, null_too=True), project.groups[kind]
+    found = everything(project, kind, where, null_too=True)
+    project.groups[kind] = project.comm.per_node(lambda: _grouped(project, kind, group, set_name, found))
+
+
+def _grouped(project: Project, kind: str, name: str, set_name: str, found: np.ndarray) -> Groups:
+    groups = project.groups[kind]
     known = groups.sets.get(set_name, {})
     if kind == NODE and any(map(sides.are_there, (found, *known.values()))):  # sides of a point that others have
         mesh = project.whole_mesh()
@@ -37,9 +42,10 @@ def group(project: Project, kind: str, group: str, set_name: str = DEFAULT, wher
         new = sides.corners(mesh.cells, found, len(mesh.points))
         for other, members in known.items():
             old = sides.corners(mesh.cells, members, len(mesh.points))
-            known[other] = sides.numbers(mesh.cells, old | new if other == group else old & ~new, every)
-        found = known.get(group, found)
-    groups.assign(found, group, set_name)
+            known[other] = sides.numbers(mesh.cells, old | new if other == name else old & ~new, every)
+        found = known.get(name, found)
+    groups.assign(found, name, set_name)
+    return groups
 
 
 def element_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
@@ -99,7 +105,9 @@ def face_model(project: Project, name: str, properties: Mapping[str, Value], whe
     faces = chosen(project, FACE, where)
     if "penalty_normal" not in properties:
         faces = everything(project, FACE, where)
-        properties = {**properties, "penalty_normal": _usual_penalty(project, faces, faces[:, None])}
+        properties = {**properties, "penalty_normal": project.comm.per_node(
+            lambda: _usual_penalty(project, faces, faces[:, None])
+        )}  # fmt: skip
     blocks.face_model(faces, name, properties)
 
 
@@ -119,9 +127,9 @@ def joint_model(project: Project, name: str, properties: Mapping[str, Value], wh
     joints = chosen(project, JOINT, where)
     if "penalty_normal" not in properties and name == COHESIVE.name:
         joints = everything(project, JOINT, where)
-        edges = project.edges()
-        sides = edges.faces[np.isin(edges.faces[:, 0], joints)]
-        properties = {**properties, "penalty_normal": _usual_penalty(project, joints, sides)}
+        properties = {**properties, "penalty_normal": project.comm.per_node(
+            lambda: _usual_penalty(project, joints, np.column_stack([joints, blocks.partner[joints]]))
+        )}  # fmt: skip
     blocks.joint_model(joints, name, properties)
 
 

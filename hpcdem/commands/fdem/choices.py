@@ -31,6 +31,19 @@ def chosen(project: Project, kind: str, where: g.Range | None, null_too: bool = 
     nothing."""
     if where is None:
         return None
+    return _once(project, where, lambda: _chosen(project, kind, where, null_too))
+
+
+def _once(project: Project, where: g.Range | None, make: Callable[[], np.ndarray]) -> np.ndarray:
+    """Found once per node of the machine, unless all ranks have to be asked where things are now."""
+    project.whole_mesh()
+    if any(isinstance(term, g.Present) for term in where or ()):
+        return make()
+    found: np.ndarray = project.comm.per_node(make)
+    return found
+
+
+def _chosen(project: Project, kind: str, where: g.Range, null_too: bool) -> np.ndarray:
     objects = _Objects(project, kind, null_too)
     mask = objects.all_of(where)
     if project.hidden.any() and not any(isinstance(term, g.UseHidden) and term.on for term in where):
@@ -43,7 +56,7 @@ def chosen(project: Project, kind: str, where: g.Range | None, null_too: bool = 
 def everything(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray:
     """The same as numbers in any case."""
     found = chosen(project, kind, where, null_too)
-    return _Objects(project, kind, null_too).numbers if found is None else found
+    return _once(project, None, lambda: _Objects(project, kind, null_too).numbers) if found is None else found
 
 
 def points(project: Project, where: g.Range | None) -> np.ndarray | None:

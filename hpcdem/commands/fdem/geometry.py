@@ -12,7 +12,6 @@ from hpcdem.core.errors import CommandError
 from hpcdem.io.agreed import on_first
 from hpcdem.pre.mesh import cad, dxf, solids
 from hpcdem.pre.mesh import geometry as shapes
-from hpcdem.pre.mesh.once import made_once
 
 if TYPE_CHECKING:  # brings kernels, and shapes are made when a script is read
     from hpcdem.commands.fdem.project import Project
@@ -85,7 +84,7 @@ def import_file(
         found = dxf.curves(drawing, path, {dxf_layer} if dxf_layer else None)
         return [shapes.transformed(curve, scale=unit) for curves in found.values() for curve in curves], notes
 
-    made, notes = made_once(project.comm, make)
+    made, notes = project.comm.per_node(make, once=True)
     project.layers.add(as_layer, *made)
     if project.log is not None:
         bounds = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -36,7 +36,6 @@ from hpcdem.pre.mesh import (
 )
 from hpcdem.pre.mesh import glue as glue_of
 from hpcdem.pre.mesh import patch as patches
-from hpcdem.pre.mesh.once import made_once
 from hpcdem.pre.mesh.pieces import Piece
 from hpcdem.pre.mesh.regions import polygon_of
 from hpcdem.pre.mesh.sizes import Refinement
@@ -96,10 +95,10 @@ def create(
         irregular=irregular,
         smooth=smooth,
     )
-    made: Meshed = made_once(project.comm, lambda: triangulate(project.layers, wishes))
+    made: Meshed = project.comm.per_node(lambda: triangulate(project.layers, wishes), once=True)
     for note in made.notes:
         _say(project, note)
-    _add(project, made.mesh)
+    _add(project, lambda: made.mesh)
 
 
 def _fill(
@@ -125,14 +124,18 @@ def _fill(
         [(layers[layer], fine, distance) for layer, fine, distance in refine],
         [(layer, layers[layer]) for layer in (*embedded, *cracks)],
     )
-    made: fill.Filled = made_once(project.comm, lambda: fill.filled(wishes, group))
+    made: fill.Filled = project.comm.per_node(lambda: fill.filled(wishes, group), once=True)
     for note in made.notes:
         _say(project, note)
-    mesh = Mesh.of(made.points, made.cells, {set_name: made.groups}, made.faces)
     first = 0 if project.mesh is None else int(project.mesh.crack_sets.max(initial=-1)) + 1
-    for k, layer in enumerate(cracks):
-        mesh = cracks_of.with_cracks(mesh, made.faces[layer], first + k)
-    _add(project, mesh)
+
+    def make() -> Mesh:
+        mesh = Mesh.of(made.points, made.cells, {set_name: made.groups}, made.faces)
+        for k, layer in enumerate(cracks):
+            mesh = cracks_of.with_cracks(mesh, made.faces[layer], first + k)
+        return mesh
+
+    _add(project, make)
 
 
 def brick(
@@ -150,12 +153,15 @@ def brick(
     """A regular mesh of the parallelogram, in space the parallelepiped, whose edges lead from a corner p0 to the other
     points [m]; n: cells along each, and ratio: each is so many times as large as the one before. triangle: into
     triangles or tetrahedra, else quads or hexahedra. Its sides are the layers of `grid`."""
-    grid, name = values.brick(p0, [p1, p2, *([] if p3 is None else [p3])], n, ratio), (set_name, group)
-    if grid.shape[-1] == 2:
-        _add(project, structured.of_grid(grid, "tri" if triangle else "quad", group=name))
-    else:
-        _add(project, structured_space.of_grid(grid, group=name) if triangle else
-             structured_space.hexes_of_grid(grid, name))  # fmt: skip
+    name = (set_name, group)
+
+    def make() -> Mesh:
+        grid = values.brick(p0, [p1, p2, *([] if p3 is None else [p3])], n, ratio)
+        if grid.shape[-1] == 2:
+            return structured.of_grid(grid, "tri" if triangle else "quad", group=name)
+        return structured_space.of_grid(grid, group=name) if triangle else structured_space.hexes_of_grid(grid, name)
+
+    _add(project, make)
 
 
 def patch(
@@ -174,12 +180,12 @@ def patch(
         raise CommandError("lines bound a mesh in two dimensions only")
     shaped = [(piece, shape(*piece.shape) if piece.shape else []) for piece in pieces]
     layers, wishes = patches.wishes(project.layers, shaped, size, tolerance, (set_name, group))
-    made: Meshed = made_once(project.comm, lambda: triangulate(layers, wishes))
+    made: Meshed = project.comm.per_node(lambda: triangulate(layers, wishes), once=True)
     for note in made.notes:
         _say(project, note)
     mesh = made.mesh
     named = {name: rows for name, rows in mesh.layers.items() if name in project.layers}
-    _add(project, Mesh.of(mesh.points, mesh.cells, mesh.groups, named, mesh.cracks, mesh.crack_sets))
+    _add(project, lambda: Mesh.of(mesh.points, mesh.cells, mesh.groups, named, mesh.cracks, mesh.crack_sets))
 
 
 def grid(
@@ -199,11 +205,13 @@ def grid(
     the one before. Its sides are the layers left, right, bottom and top, in space front and back too."""
     lines = values.grid_lines(first, second, cells, ratio or (1.0,) * len(first))
     name = (set_name, group)
-    if len(lines) == 2:
-        made = structured.rectangle(*lines, type or "tri", diagonal, name)
-    else:
-        made = structured_space.hexes(lines, name) if type == "hex" else structured_space.box(lines, split, name)
-    _add(project, made)
+
+    def make() -> Mesh:
+        if len(lines) == 2:
+            return structured.rectangle(*lines, type or "tri", diagonal, name)
+        return structured_space.hexes(lines, name) if type == "hex" else structured_space.box(lines, split, name)
+
+    _add(project, make)
 
 
 def equilateral(
@@ -217,7 +225,7 @@ def equilateral(
     """Nearly equilateral triangles with edges of about `size` [m] in the rectangle between two corners [m]."""
     corner = min(first[0], second[0]), min(first[1], second[1])
     width, height = abs(second[0] - first[0]), abs(second[1] - first[1])
-    _add(project, structured.equilateral(corner, width, height, size, (set_name, group)))
+    _add(project, lambda: structured.equilateral(corner, width, height, size, (set_name, group)))
 
 
 def import_file(
@@ -231,12 +239,11 @@ def import_file(
     """A mesh file of another program. Collective. group: one that all elements are put into; merge: points nearer than
     this are one [m]; scale: metres in a unit of the file."""
     path = project.to_read(file)
-    found = made_once(project.comm, lambda: imported.read(path, merge, scale, project.dim))
-    mesh = found.mesh
+    found = project.comm.per_node(lambda: imported.read(path, merge, scale, project.dim), once=True)
     for included in found.files:
         project.to_read(str(included.absolute()))
     cells, points = (0, 0) if project.mesh is None else (len(project.mesh.cells), len(project.mesh.points))
-    _add(project, mesh)
+    mesh = _add(project, lambda: found.mesh)
     for kind, sets, first in ((NODE, found.nodes, points), (FACE, found.faces, 4 * cells)):
         for of_set, groups in sets.items():
             for name, numbers in groups.items():
@@ -244,7 +251,7 @@ def import_file(
     if group is not None:
         project.groups[ELEMENT].assign(range(cells, cells + len(mesh.cells)), group, set_name)
     low, high = (", ".join(f"{c:g}" for c in at) for at in (mesh.points.min(axis=0), mesh.points.max(axis=0)))
-    apart = int(bodies_of(mesh.face_partners()).max()) + 1
+    apart = project.comm.per_node(lambda: int(bodies_of(mesh.face_partners()).max()) + 1)
     said = f"{apart} bodies, which meet by contact" if apart > 1 else "one body"
     _say(project, f"{path.name}: from ({low}) to ({high}) m, {said}")
     for kind, sets in ((ELEMENT, mesh.groups), (NODE, found.nodes), (FACE, found.faces)):
@@ -253,7 +260,8 @@ def import_file(
             _say(project, f"{path.name}: groups of {kind}s, {'; '.join(names)}")
     if found.notes:
         _say(project, f"{path.name}: left out: " + "; ".join(found.notes))
-    unfit = fit.fit(project.whole_mesh(), cells).said()
+    whole = project.whole_mesh()
+    unfit = project.comm.per_node(lambda: fit.fit(whole, cells).said())
     if unfit and project.log is not None:
         project.log.warn(f"{path.name}: {unfit}")
 
@@ -262,32 +270,38 @@ def intersect(project: Project, layer: str, follow: bool = False) -> None:
     """The joints on a layer become cracks. follow: its lines are no edges of the mesh, those that follow them best are
     taken; in space its surfaces are no faces of the mesh, those between the elements on either side are."""
     mesh = project.whole_mesh()
+    cracked = project.comm.per_node(lambda: _cracked(project, mesh, layer, follow))
+    if len(cracked.cracks) == len(mesh.cracks):
+        advice = "" if follow else "; with follow the nearest edges are taken"
+        raise CommandError(f"no joint lies on layer '{layer}'{advice}")
+    if project.in_use:
+
+        def new() -> np.ndarray:
+            edges = mesh.edges()
+            rows = crack_rows(cracked, edges)
+            joints = edges.faces[rows[~np.isin(rows, crack_rows(mesh, edges))]]
+            return joints[project.alive[joints // 4].all(axis=1), 0]  # others are, once they are back
+
+        changes.crack(project.blocks, project.comm.per_node(new))
+        project.mesh = cracked
+    else:
+        project.replace_mesh(cracked)
+
+
+def _cracked(project: Project, mesh: Mesh, layer: str, follow: bool) -> Mesh:
+    """The mesh with cracks on a layer, see `intersect`."""
     number = int(mesh.crack_sets.max(initial=-1)) + 1
     if mesh.dim == 3:
         if layer in mesh.layers and not follow:
             faces = mesh.layers[layer]
         else:
             faces = (cracks_of.between_sides if follow else cracks_of.faces_on)(mesh, project.layers[layer])
-        cracked = cracks_of.with_layer(cracks_of.with_cracks(mesh, faces, number), layer, faces)
-    elif follow:
+        return cracks_of.with_layer(cracks_of.with_cracks(mesh, faces, number), layer, faces)
+    if follow:
         size = float(np.sqrt(mesh.areas().mean()))
-        cracked = cracks_of.follow(mesh, fractures.of_curves(project.layers[layer], number, size))
-    else:
-        pairs = mesh.layers[layer] if layer in mesh.layers else cracks_of.edges_on(mesh, project.layers[layer])
-        cracked = cracks_of.with_cracks(mesh, pairs, number)
-    if len(cracked.cracks) == len(mesh.cracks):
-        advice = "" if follow else "; with follow the nearest edges are taken"
-        raise CommandError(f"no joint lies on layer '{layer}'{advice}")
-    if project.in_use:
-        edges = mesh.edges()
-        new = ~np.isin(crack_rows(cracked, edges), crack_rows(mesh, edges))
-        joints = edges.faces[crack_rows(cracked, edges)[new]]
-        changes.crack(
-            project.blocks, joints[project.alive[joints // 4].all(axis=1), 0]
-        )  # others are, once they are back
-        project.mesh = cracked
-    else:
-        project.replace_mesh(cracked)
+        return cracks_of.follow(mesh, fractures.of_curves(project.layers[layer], number, size))
+    pairs = mesh.layers[layer] if layer in mesh.layers else cracks_of.edges_on(mesh, project.layers[layer])
+    return cracks_of.with_cracks(mesh, pairs, number)
 
 
 def glue(
@@ -310,7 +324,7 @@ def glue(
     elif where is not None:
         some = np.isin(np.arange(len(mesh.cells)), everything(project, ELEMENT, where))
         sides = some, np.ones(len(some), bool)
-    made: glue_of.Glued = made_once(project.comm, lambda: glue_of.glued(mesh, tolerance, sides))
+    made: glue_of.Glued = project.comm.per_node(lambda: glue_of.glued(mesh, tolerance, sides), once=True)
     if not made.faces:
         _say(project, "glue: the mesh is one body already")
         return
@@ -337,7 +351,7 @@ def delete(project: Project, where: Range | None = None) -> None:
     if project.in_use:
         assignments.null(project, where=where)
         return
-    made = made_once(project.comm, lambda: remade.without(project.whole_mesh(), elements))
+    made = project.comm.per_node(lambda: remade.without(project.whole_mesh(), elements), once=True)
     lost = len(project.whole_mesh().cells) - len(made.parent)
     project.refit(made)
     _say(project, f"element delete: {lost} elements are gone, {len(made.parent)} are left")
@@ -352,7 +366,7 @@ def densify(
     project.refuse_in_use("elements are densified")
     mesh = project.whole_mesh()
     elements, most = everything(project, ELEMENT, where), (maximum_length[0], maximum_length[-1])
-    made = made_once(project.comm, lambda: quadtree.densified(mesh, elements, pattern, most))
+    made = project.comm.per_node(lambda: quadtree.densified(mesh, elements, pattern, most), once=True)
     project.refit(made)
     _say(project, f"element densify: {len(made.parent) - len(mesh.cells)} more elements, {len(made.parent)} in all")
 
@@ -362,7 +376,7 @@ def six_nodes(project: Project) -> None:
     two of a group of nodes is in the group. Collective."""
     project.refuse_in_use("elements get more nodes")
     mesh = project.whole_mesh()
-    made = made_once(project.comm, lambda: quadratic.quadratic(mesh))
+    made = project.comm.per_node(lambda: quadratic.quadratic(mesh), once=True)
     project.refit(made)
     ends = mesh.edges().points
     for sets in project.groups[NODE].sets.values():
@@ -412,14 +426,19 @@ def translate(project: Project, way: tuple[float, ...]) -> None:
 def _move(project: Project, factor: Any, way: Any, what: str) -> None:
     mesh = project.whole_mesh()
     project.refuse_in_use(f"the mesh is {what}")
-    moved = replace(mesh, points=mesh.points * factor + way)
-    check(moved)
-    project.replace_mesh(moved)
+
+    def make() -> Mesh:
+        moved = replace(mesh, points=mesh.points * factor + way)
+        check(moved)
+        return moved
+
+    project.replace_mesh(project.comm.per_node(make))
 
 
 def tell_quality(project: Project) -> None:
     """Sizes and angles of the mesh, in the log."""
-    for line in quality.quality(project.whole_mesh()).lines():
+    mesh = project.whole_mesh()
+    for line in project.comm.per_node(lambda: quality.quality(mesh).lines()):
         _say(project, line)
 
 
@@ -451,7 +470,7 @@ def fracture_network(
     def make() -> fractures.Fractures:
         return fractures.network([one], polygon_of(project.layers, [inside], size, holes), seed, least, number)
 
-    found = made_once(project.comm, make)
+    found = project.comm.per_node(make, once=True)
     project.layers.add(layer, *(geometry.polyline(ends.tolist()) for ends in found.ends))
     _say(project, f"layer '{layer}': {len(found)} fractures of together {found.lengths().sum():g} m")
 
@@ -461,24 +480,32 @@ def disc_network(project: Project, layer: str, inside: str, *, seed: int, **stat
     another. Collective."""
     bodies, one = project.layers[inside], values.disc_set(**statistics)
     number, project.networks = project.networks, project.networks + 1
-    found = made_once(project.comm, lambda: fracture_discs.discs(one, bodies, seed, number))
+    found = project.comm.per_node(lambda: fracture_discs.discs(one, bodies, seed, number), once=True)
     project.layers.add(layer, *found)
     _say(project, f"layer '{layer}': {len(found)} discs of together {fracture_discs.area(found):g} m2")
 
 
-def _add(project: Project, mesh: Mesh) -> None:
-    check(mesh)
+def _add(project: Project, make: Callable[[], Mesh]) -> Mesh:
+    """The mesh that this makes, the same on all ranks, is one more body."""
+
+    def checked() -> tuple[Mesh, str]:
+        mesh = make()
+        check(mesh)
+        macro = mesh.macro
+        kinds = {f"{macro.plural} of {macro.parts} elements each": len(mesh.macros)}
+        alone = mesh.cells[mesh.macro_of() < 0]
+        if mesh.dim == 3:
+            kinds["tetrahedra"] = len(alone)
+        else:
+            triangles = int((alone[:, 3] < 0).sum())
+            kinds |= {"triangles": triangles, "quads": len(alone) - triangles}
+        parts = [f"{count} {kind}" for kind, count in kinds.items() if count]
+        return mesh, f"mesh: {', '.join([*parts, f'{len(mesh.points)} points'])}"
+
+    mesh, text = project.comm.per_node(checked)
     project.add_mesh(mesh)
-    macro = mesh.macro
-    kinds = {f"{macro.plural} of {macro.parts} elements each": len(mesh.macros)}
-    alone = mesh.cells[mesh.macro_of() < 0]
-    if mesh.dim == 3:
-        kinds["tetrahedra"] = len(alone)
-    else:
-        triangles = int((alone[:, 3] < 0).sum())
-        kinds |= {"triangles": triangles, "quads": len(alone) - triangles}
-    parts = [f"{count} {kind}" for kind, count in kinds.items() if count]
-    _say(project, f"mesh: {', '.join([*parts, f'{len(mesh.points)} points'])}")
+    _say(project, text)
+    return mesh
 
 
 def _say(project: Project, text: str) -> None:

@@ -152,13 +152,19 @@ class Project:
             raise CommandError(
                 f"the mesh has {mesh.dim} dimensions, the model {self.dim}: model new dim {mesh.dim} makes one for it"
             )
-        first = 0 if self.mesh is None else len(self.mesh.cells)
-        self.mesh = mesh if self.mesh is None else joined(self.mesh, mesh)
-        for set_name, of in mesh.groups.items():
-            for name, numbers in of.items():
-                self.groups[ELEMENT].assign(numbers + first, name, set_name)
-        self.alive = np.concatenate([self.alive, np.ones(len(mesh.cells), bool)])
-        self.hidden = np.concatenate([self.hidden, np.zeros(len(mesh.cells), bool)])
+        before, groups = self.mesh, self.groups[ELEMENT]
+        first = 0 if before is None else len(before.cells)
+
+        def make() -> tuple[Mesh | None, Groups, np.ndarray, np.ndarray]:
+            for set_name, of in mesh.groups.items():
+                for name, numbers in of.items():
+                    groups.assign(numbers + first, name, set_name)
+            alive = np.concatenate([self.alive, np.ones(len(mesh.cells), bool)])
+            hidden = np.concatenate([self.hidden, np.zeros(len(mesh.cells), bool)])
+            return None if before is None else joined(before, mesh), groups, alive, hidden
+
+        made, self.groups[ELEMENT], self.alive, self.hidden = self.comm.per_node(make)
+        self.mesh = mesh if made is None else made
         self.taken = False
 
     def refuse_in_use(self, what: str) -> None:
@@ -238,21 +244,26 @@ class Project:
         if not points and not cells:
             return
         known = self.mesh
-        at = np.array(points, np.float64).reshape(-1, self.dim)
-        new = np.array([[*cell, -1] if len(cell) == 3 else cell for cell in cells], np.int64).reshape(-1, 4)
-        if known is not None:
-            at, new = np.concatenate([known.points, at]), np.concatenate([known.cells, new])
         self.added = [], []
-        try:
+
+        def make() -> Mesh:
+            at = np.array(points, np.float64).reshape(-1, self.dim)
+            new = np.array([[*cell, -1] if len(cell) == 3 else cell for cell in cells], np.int64).reshape(-1, 4)
+            if known is not None:
+                at, new = np.concatenate([known.points, at]), np.concatenate([known.cells, new])
             mesh = Mesh.of(at, new) if known is None else replace(known, points=at, cells=new)
             check(mesh, "model add")
+            return mesh
+
+        try:
+            mesh = self.comm.per_node(make)
         except HpcdemError as error:
             raise CommandError(str(error)) from None
         count = len(cells)
         self.mesh, self.taken = mesh, False
         self.alive = np.concatenate([self.alive, np.ones(count, bool)])
         self.hidden = np.concatenate([self.hidden, np.zeros(count, bool)])
-        self.groups[ELEMENT].assign(range(len(new) - count, len(new)), DEFAULT)
+        self.groups[ELEMENT].assign(range(len(mesh.cells) - count, len(mesh.cells)), DEFAULT)
 
     def whole_mesh(self) -> Mesh:
         """The mesh. CommandError if there is none."""

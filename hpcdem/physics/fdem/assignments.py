@@ -40,6 +40,8 @@ COMPONENTS = {2: ("xx", "yy", "xy", "zz"), 3: ("xx", "yy", "xy", "zz", "xz", "yz
 """Of stress, in the order of all tables, by dimensions of space."""
 ACROSS = 3
 """Place of zz there."""
+Column = tuple[Any, ...]
+"""Name of an array of rows of tables, and where objects have theirs in it: places (n,), of joints on both sides."""
 SLIDING = (COULOMB_JOINT.name, BARTON_BANDIS.name)
 """Models of joints that slide and never break."""
 
@@ -76,7 +78,7 @@ class Assignments(Settings):
                 f"{model.doc} is not for {self.dim} dimensions: element_law(dim={self.dim}) declares one that is"
             )
         at = self.numbers_of_elements(elements)
-        self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
+        self._assign(self.element_rows, ("element_row", at), at, ELEMENT, name, properties)
         self._note_moduli(at)
 
     def yielding(self) -> np.ndarray:
@@ -90,15 +92,21 @@ class Assignments(Settings):
     def slides(self) -> np.ndarray:
         """(4 ne,) bool: joints, by their lower faces, with a model that slides and never breaks."""
         names = [self.joint_rows.name(row) for row in range(len(self.joint_rows))]
-        return self.joint_exists() & np.isin(names, SLIDING)[self.joint_row]
+        return self._of_rows(np.isin(names, SLIDING), self.joint_row, self.joint_exists)
 
     def _has_model(self, model: Model) -> np.ndarray:
         names = [self.element_rows.name(row) for row in range(len(self.element_rows))]
-        return self.alive & np.array([name == model.name for name in names])[self.element_row]
+        return self._of_rows(np.array([name == model.name for name in names]), self.element_row, lambda: self.alive)
+
+    @staticmethod
+    def _of_rows(rows: np.ndarray, row: np.ndarray, there: Callable[[], np.ndarray]) -> np.ndarray:
+        """(n,) bool: which of the objects that are there have one of these rows (k,) bool. Costs nothing for none."""
+        return there() & rows[row] if rows.any() else sparse_zeros(len(row), bool)
 
     def softens(self) -> bool:
         """Whether an element that is there can yield, and has a strength that follows a table."""
-        return bool(softening_rows(self.element_rows)[self.element_row[self.alive]].any())
+        rows = softening_rows(self.element_rows)
+        return bool(self._of_rows(rows, self.element_row, lambda: self.alive).any())
 
     def warms(self) -> tuple[np.ndarray, np.ndarray]:
         """Elements (ne,) and joints (4 ne,) bool with a property that follows a table over temperature or another
@@ -107,35 +115,43 @@ class Assignments(Settings):
             np.any([rows.column(temperature_table(p.name)) > 0.0 for p in of.properties if p.warms], axis=0)
             for rows, of in ((self.element_rows, MECH_MOHR_COULOMB), (self.joint_rows, COHESIVE))
         )
-        return self.alive & elements[self.element_row], self.joint_exists() & joints[self.joint_row]
+        return (
+            self._of_rows(elements, self.element_row, lambda: self.alive),
+            self._of_rows(joints, self.joint_row, self.joint_exists),
+        )
 
     def _note_moduli(self, at: np.ndarray) -> None:
         """Initial stresses of elements that had no model belong to the moduli of the one that they have now; where
         nothing was said of the stress across the plane, it is that of plane strain, in plane stress 0."""
-        new = at[self.stress0_row[at] == 0]
-        self.stress0_row[new] = self.element_row[new]
-        if self.stress0 is not None:
-            new = at[np.isnan(self.stress0[at, ACROSS]) & (self.element_row[at] > 0)]
-            nu = np.nan_to_num(self.element_rows.column("poisson_ratio"))[self.element_row[new]]
-            nu = 0.0 * nu if self.options.plane_stress else nu
-            self.stress0[new, ACROSS] = nu * (self.stress0[new, 0] + self.stress0[new, 1])
+
+        def note() -> tuple[np.ndarray, np.ndarray | None]:
+            new = at[self.stress0_row[at] == 0]
+            self.stress0_row[new] = self.element_row[new]
+            if self.stress0 is not None:
+                new = at[np.isnan(self.stress0[at, ACROSS]) & (self.element_row[at] > 0)]
+                nu = np.nan_to_num(self.element_rows.column("poisson_ratio"))[self.element_row[new]]
+                nu = 0.0 * nu if self.options.plane_stress else nu
+                self.stress0[new, ACROSS] = nu * (self.stress0[new, 0] + self.stress0[new, 1])
+            return self.stress0_row, self.stress0
+
+        self.stress0_row, self.stress0 = self.per_node(note)
 
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
         """Change some properties of elements that have a model. The stress follows the strain (total form)."""
         at = self.numbers_of_elements(elements)
-        self._adjust(self.element_rows, (self.element_row, at), at, ELEMENT, properties, _keep_moduli)
+        self._adjust(self.element_rows, ("element_row", at), at, ELEMENT, properties, _keep_moduli)
 
     def face_model(self, faces: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a contact model to faces, also to those that will be free only when a joint breaks."""
         at = self.numbers_of_faces(faces)
-        self._assign(self.face_rows, (self.face_row, at), at, FACE, name, properties)
+        self._assign(self.face_rows, ("face_row", at), at, FACE, name, properties)
 
     def face_property(self, faces: Numbers, properties: Mapping[str, Value]) -> None:
         """Change some properties of the contact model of faces; None: of all that have one."""
         if faces is None:
-            faces = np.flatnonzero((self.face_row > 0) & self.face_exists())
+            faces = self.per_node(lambda: np.flatnonzero((self.face_row > 0) & self.face_exists()))
         at = self.numbers_of_faces(faces)
-        self._adjust(self.face_rows, (self.face_row, at), at, FACE, properties)
+        self._adjust(self.face_rows, ("face_row", at), at, FACE, properties)
 
     def joint_model(self, joints: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a cohesive model to inner edges: elements on both sides get nodes of their own, tied by tractions.
@@ -161,36 +177,40 @@ class Assignments(Settings):
     def joint_property(self, joints: Numbers, properties: Mapping[str, Value]) -> None:
         """Change some properties of joints that have a model; None: of all that have one."""
         if joints is None:
-            joints = np.flatnonzero((self.joint_row > 0) & self.joint_exists())
+            joints = self.per_node(lambda: np.flatnonzero((self.joint_row > 0) & self.joint_exists()))
         at = self.numbers_of_joints(joints)
         self._adjust(self.joint_rows, self._both_sides(at), at, JOINT, properties)
 
-    def _both_sides(self, joints: np.ndarray) -> tuple[np.ndarray, ...]:
-        return self.joint_row, joints, self.joint_row, self.partner[joints]
+    def _both_sides(self, joints: np.ndarray) -> Column:
+        return "joint_row", joints, self.per_node(lambda: self.partner[joints])
 
     def _assign(
-        self, rows: Rows, columns: Sequence[np.ndarray], of: np.ndarray, on: str, name: str, given: Mapping[str, Value],
+        self, rows: Rows, column: Column, of: np.ndarray, on: str, name: str, given: Mapping[str, Value],
         topology: bool = False,
     ) -> None:  # fmt: skip
-        """Give objects a model. columns: where the row of each object goes, as (array, places (n,)) in turn."""
+        """Give objects a model."""
         model = properties.model(name, on)
-        all_of_them = np.arange(len(of))
-        made = [(all_of_them, model, self.complete(on, of, model, {}, given))]
-        self._put_rows(rows, columns, made, on, given, all_of_them)
+        values = self.complete(on, of, model, {}, given)
+        which = np.arange(len(of)) if len(values) > 1 else np.zeros(1, np.int64)
+        self._put_rows(rows, column, [(which, model, values)], on, given, which)
         self.changed(topology)
 
     def _adjust(
-        self, rows: Rows, columns: Sequence[np.ndarray], of: np.ndarray, on: str, given: Mapping[str, Value],
+        self, rows: Rows, column: Column, of: np.ndarray, on: str, given: Mapping[str, Value],
         keep: Callable[[dict[str, Any], Mapping[str, Any]], dict[str, Any]] | None = None,
     ) -> None:  # fmt: skip
         """Change properties of objects that have a model; keep: what stays of the old ones beside the new."""
         if not len(of):
             raise CommandError(f"no {on} has a model whose properties could be changed: {on} c-model comes first")
-        old = columns[0][columns[1]]
-        bare = of[old == 0]
-        if len(bare):
-            raise CommandError(f"{on} {bare[0]} has no model whose properties could be changed")
-        present, which = np.unique(old, return_inverse=True)
+
+        def find() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            old = getattr(self, column[0])[column[1]]
+            bare = of[old == 0]
+            if len(bare):
+                raise CommandError(f"{on} {bare[0]} has no model whose properties could be changed")
+            return old, *np.unique(old, return_inverse=True)
+
+        old, present, which = self.per_node(find)
         names = np.array([rows.name(row) for row in present.tolist()])
         which = which.reshape(-1)
         if not all(map(_is_number, given.values())):
@@ -202,21 +222,27 @@ class Assignments(Settings):
             at, model = np.flatnonzero(names == name), properties.MODELS[name]
             before = {p.name: rows.column(p.name)[old[at]] for p in model.properties}
             made.append((at, model, self.complete(on, of[at], model, before, given, keep)))
-        self._put_rows(rows, columns, made, on, given, which)
+        self._put_rows(rows, column, made, on, given, which)
         self.changed()
 
     def _put_rows(
-        self, rows: Rows, columns: Sequence[np.ndarray], made: Sequence[tuple[np.ndarray, Model, np.ndarray]], on: str,
+        self, rows: Rows, column: Column, made: Sequence[tuple[np.ndarray, Model, np.ndarray]], on: str,
         given: Mapping[str, Value], which: np.ndarray,
     ) -> None:  # fmt: skip
         """Make rows of complete sets of properties, (1, k) for all of these places or one for each, and give each
-        object the one at the place `which` (n,)."""
+        object the one at the place `which` (n,), or (1,) for all."""
         self.before_change()
         number = np.zeros(sum(len(at) for at, *_ in made), np.int32)
         for at, model, values in made:
             number[at] = rows.numbers(model, values)
-        for column, at in zip(columns[0::2], columns[1::2]):
-            column[at] = number[which]
+
+        def put() -> np.ndarray:
+            array: np.ndarray = getattr(self, column[0])
+            for at in column[1:]:
+                array[at] = number[which]
+            return array
+
+        setattr(self, column[0], self.per_node(put))
         for name, value in given.items():
             if _differs(value) and [on, name] not in self.varied:
                 self.varied.append([on, name])
@@ -349,6 +375,24 @@ class Assignments(Settings):
         with them, see `initial_stresses`. In the plane zz, if nothing is said of it, is that of plane strain, Poisson's
         ratio times xx + yy, and in space and in plane stress 0."""
         at = self.numbers_of_elements(elements)
+        mesh, values = self._mesh(), self.per_node(lambda: self._initial(at, xx, yy, xy, zz, gradient, xz, yz))
+        self.before_change()
+
+        def put() -> tuple[np.ndarray, np.ndarray]:
+            stress0 = np.zeros((len(mesh.cells), len(COMPONENTS[mesh.dim]))) if self.stress0 is None else self.stress0
+            stress0[at] = values
+            self.stress0_row[at] = self.element_row[at]
+            return stress0, self.stress0_row
+
+        self.stress0, self.stress0_row = self.per_node(put)
+        self._note_moduli(at)
+        self.changed()
+
+    def _initial(
+        self, at: np.ndarray, xx: float, yy: float, xy: float, zz: float | None,
+        gradient: Mapping[str, tuple[float, ...]] | None, xz: float, yz: float,
+    ) -> np.ndarray:  # fmt: skip
+        """What `initial_stress` says of elements (n,), (n, 4) or (n, 6) [Pa]."""
         mesh = self._mesh()
         names = COMPONENTS[mesh.dim]
         if mesh.dim == 2 and (xz != 0.0 or yz != 0.0):
@@ -366,13 +410,7 @@ class Assignments(Settings):
             )
         if mesh.dim == 2 and zz is None and "zz" not in (gradient or {}):
             values[:, ACROSS] = math.nan  # until there are moduli
-        self.before_change()
-        if self.stress0 is None:
-            self.stress0 = np.zeros((len(mesh.cells), len(names)))
-        self.stress0[at] = values
-        self.stress0_row[at] = self.element_row[at]
-        self._note_moduli(at)
-        self.changed()
+        return values
 
     def initial_stresses(self, elements: np.ndarray) -> np.ndarray:
         """Stress [Pa] (n, 4), in space (n, 6), of elements (n,) at zero strain, by their present moduli.

@@ -11,6 +11,9 @@ from hpcdem.physics.fdem.kernels.joints import BROKEN
 from hpcdem.physics.fdem.state import Crack
 from hpcdem.physics.fdem.topology import AGAIN
 
+MANY = 2000
+"""Where one in so many faces has opened, half of the pages that tell of faces are a rank's own."""
+
 
 def waiting(sim: Any) -> list[Crack]:
     """Joints that broke since the last rebuild, in order of steps, see `Crack`. Collective."""
@@ -49,4 +52,7 @@ def collect(sim: Any) -> None:
         sim.broken[joints] = 1
         sim.broken[again] = sim.broken[again] == AGAIN
         sim.open_faces(np.append(joints, again))
+        sim.opened_apart += len(rows) + len(again)
+        if sim.opened_apart > len(sim.open) // MANY:
+            sim.share_changes()
         sim.surface_loads.joints_opened()

@@ -90,10 +90,15 @@ class Conditions(Assignments):
 
     def followed_tables(self) -> list[str]:
         """Tables over time that conditions of nodes and faces follow."""
-        rows = [self.conditions[r] for r in np.unique(self.corner_row)] + [
-            self.loads[r] for r in np.unique(self.load_row)
-        ]
-        said = {value for one in rows for value in asdict(one).values() if isinstance(value, str)}
+        said: set[str] = set()
+        of_both: list[tuple[list[Any], np.ndarray]] = [
+            (self.conditions, self.corner_row), (self.loads, self.load_row)
+        ]  # fmt: skip
+        for rows, column in of_both:
+            for row, one in enumerate(rows):
+                texts = {value for value in asdict(one).values() if isinstance(value, str)}
+                if texts and (column == row).any():
+                    said |= texts
         return [name for name in self.tables if name in said]
 
     def velocity_condition(
@@ -159,22 +164,28 @@ class Conditions(Assignments):
         node = self.clusters()[0].reshape(-1) if some or self.sided else None
         if some and node is not None and _takes_back(changes):
             at = np.flatnonzero(self.with_nodes(chosen, node))
-        rows, column, sided = self.conditions.copy(), self.corner_row[at], self.sided
-        others = np.flatnonzero(self.with_nodes(chosen, node) & ~chosen) if node is not None else at[:0]
-        others = others[self.corner_row[others] > 0]
-        before = self.corner_row[others]
         self.before_change()
-        try:
-            self._say(at, changes, some)
-            self._make_older(others, changes)
-            self.sided |= some
-            self._acting = None
-            if node is not None:
-                self._together(np.unique(node[at]), node)
-        except CommandError:
-            self.conditions, self.sided, self._acting = rows, sided, None
-            self.corner_row[at], self.corner_row[others] = column, before
-            raise
+
+        def say() -> tuple[list[NodeCondition], bool, np.ndarray]:
+            rows, column, sided = self.conditions.copy(), self.corner_row[at], self.sided
+            others = np.flatnonzero(self.with_nodes(chosen, node) & ~chosen) if node is not None else at[:0]
+            others = others[self.corner_row[others] > 0]
+            before = self.corner_row[others]
+            try:
+                self._say(at, changes, some)
+                self._make_older(others, changes)
+                self.sided |= some
+                self._acting = None
+                if node is not None:
+                    self._together(np.unique(node[at]), node)
+            except CommandError:
+                self.conditions, self.sided, self._acting = rows, sided, None
+                self.corner_row[at], self.corner_row[others] = column, before
+                raise
+            return self.conditions, self.sided, self.corner_row
+
+        self.conditions, self.sided, self.corner_row = self.per_node(say)
+        self._acting = None
         self.changed(stiffness=False)
 
     def _say(self, at: np.ndarray, changes: dict[str, Any], some: bool) -> None:
@@ -322,7 +333,8 @@ class Conditions(Assignments):
 
     def most_damped(self) -> float:
         """The largest local damping that a node has of its own."""
-        return max(0.0, *(self.conditions[row].damp for row in np.unique(self.corner_row).tolist()))
+        damped = [one.damp for row, one in enumerate(self.conditions) if one.damp and (self.corner_row == row).any()]
+        return max([0.0, *damped])
 
     def stress_condition(
         self,
@@ -369,7 +381,12 @@ class Conditions(Assignments):
         for name, value in changes.items():
             user_functions.check(f"stress {name}", value, middles, self.time_now())
         self.before_change()
-        self._change_rows(self.loads, self.load_row, at, changes)
+
+        def say() -> tuple[list[Traction], np.ndarray]:
+            self._change_rows(self.loads, self.load_row, at, changes)
+            return self.loads, self.load_row
+
+        self.loads, self.load_row = self.per_node(say)
         self.changed(stiffness=quiet is not None)  # dashpots limit the time step
 
     @staticmethod
@@ -383,11 +400,16 @@ class Conditions(Assignments):
         that have no element at this moment."""
         at = self.corners_of_nodes(nodes, whole=True) if nodes is not None else slice(None)
         self.before_change()
-        column = self.corner_row[at]
-        for row in np.unique(column).tolist():
-            left = node_conditions.without(self.conditions[row], kinds)
-            column[self.corner_row[at] == row] = _row_of(self.conditions, left)
-        self.corner_row[at] = column
+
+        def take_back() -> tuple[list[NodeCondition], np.ndarray]:
+            column = self.corner_row[at]
+            for row in np.unique(column).tolist():
+                left = node_conditions.without(self.conditions[row], kinds)
+                column[self.corner_row[at] == row] = _row_of(self.conditions, left)
+            self.corner_row[at] = column
+            return self.conditions, self.corner_row
+
+        self.conditions, self.corner_row = self.per_node(take_back)
         self._acting = None
         self.changed(stiffness=False)
 
@@ -439,7 +461,8 @@ class Conditions(Assignments):
 
     def quiet_faces(self) -> np.ndarray:
         """(4 ne,) bool: faces with dashpots."""
-        return np.array([one.quiet for one in self.loads])[self.load_row]
+        quiet = np.array([one.quiet for one in self.loads])
+        return self._of_rows(quiet, self.load_row, lambda: np.ones(1, bool))
 
 
 def _row_of(rows: list, wanted: Any) -> int:

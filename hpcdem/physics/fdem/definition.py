@@ -53,10 +53,10 @@ class ModelDefinition(Conditions):
         self.mesh = mesh
         for make in (self._make_topology, self._make_assignments, self._make_conditions):
             make(len(mesh.cells))
-        self.partner = mesh.face_partners()
+        mesh.share(self.per_node)
+        self.partner = self.per_node(mesh.face_partners)
         if len(mesh.cracks):
-            rows = meshes.crack_rows(mesh, mesh.edges())
-            self.open_faces(mesh.edges().faces[rows, 0])
+            self.open_faces(self.per_node(lambda: mesh.edges().faces[meshes.crack_rows(mesh, mesh.edges()), 0]))
 
     def definition_state(self) -> dict[str, Any]:
         """All but the arrays, as JSON values."""

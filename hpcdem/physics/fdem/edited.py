@@ -76,12 +76,12 @@ class Edited(State):
             self.rebuild_state.dt = 0.0
 
     def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
-        before = self.element_row.copy()
+        before = self.element_row.copy() if self.stress0 is not None and self.log is not None else None
         super().set_element_model(elements, name, properties)
         self._state_given |= self.clock.step == 0
         if name == MECH_BURGERS.name:
             self._take_kelvin_strain(elements, KELVIN_STRAIN[self.dim])
-        if self.log is None or self.stress0 is None:
+        if self.log is None or self.stress0 is None or before is None:
             return
         at = np.flatnonzero((before != self.element_row) & (before > 0))
         other = at[(self.initial_stresses(at) != self.stress0[at]).any(axis=1)]

@@ -166,6 +166,11 @@ class Mesh:
         found: np.ndarray = (number >= 0) & inside
         return found
 
+    def share(self, per_node: Callable[[Callable[[], Any]], Any]) -> None:
+        """Tables that are made when they are asked for become one copy per node of the machine. Collective."""
+        if len(self.hexes):
+            self.__dict__["_other_half"] = per_node(lambda: self._other_half)
+
     @cached_property
     def _other_half(self) -> np.ndarray:
         """(4 ne,) i8: of half a side of a hexahedron the face that is the other half, -1 of other faces."""

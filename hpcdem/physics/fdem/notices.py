@@ -86,28 +86,40 @@ def _tell_beyond(sim: Any, least: float, of: np.ndarray, what: str) -> None:
 
 def warn_of_locking(sim: State) -> None:
     """A line in the log about tetrahedra that hardly change their volume."""
-    if sim.log is None or sim.dim == 2:
+    if sim.dim == 2:
         return
     bulk, shear = (np.array(sim.element_rows.column(name)) for name in ("bulk", "shear"))
     with np.errstate(divide="ignore", invalid="ignore"):
         nu = (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
-    of = np.where(sim.alive & (sim.the_mesh().macro_of() < 0), nu[sim.element_row], 0.0)
-    if (of > LOCKS).any():
+
+    def find() -> tuple[int, float]:
+        of = np.where(sim.alive & (sim.the_mesh().macro_of() < 0), nu[sim.element_row], 0.0)
+        return int((of > LOCKS).sum()), float(of.max(initial=0.0))
+
+    count, most = sim.per_node(find) if (nu > LOCKS).any() else (0, 0.0)
+    if count and sim.log is not None:
         sim.log.warn_once(
             "locking",
-            f"{int((of > LOCKS).sum())} tetrahedra have a Poisson's ratio up to {of.max():.3g}: as they have one "
+            f"{count} tetrahedra have a Poisson's ratio up to {most:.3g}: as they have one "
             "strain each they are much too stiff near 0.5 (they lock); hexahedra are not",
         )
 
 
 def warn_of_snap_back(sim: State) -> None:
-    """A line in the log about joints so brittle that they are gone within a tenth of their elastic opening."""
-    if sim.log is None or not len(sim.joint_rows) > 1:
+    """A line in the log about joints so brittle that they are gone within a tenth of their elastic opening.
+    Collective."""
+    if not len(sim.joint_rows) > 1:
         return
-    mesh = sim.the_mesh()
-    faces = np.flatnonzero(sim.closed_faces() & (sim.joint_row > 0))
-    longest = np.zeros(len(sim.joint_rows))
-    np.maximum.at(longest, sim.joint_row[faces], mesh.joint_lengths(faces, sim.partner))
+
+    def find() -> np.ndarray:
+        faces = np.flatnonzero(sim.closed_faces() & (sim.joint_row > 0))
+        longest = np.zeros(len(sim.joint_rows))
+        np.maximum.at(longest, sim.joint_row[faces], sim.the_mesh().joint_lengths(faces, sim.partner))
+        return longest
+
+    longest = sim.per_node(find)
+    if sim.log is None:
+        return
     for strength, penalty, energy in (
         ("tensile_strength", "penalty_normal", "gf1"), ("cohesion", "penalty_shear", "gf2"),
     ):  # fmt: skip

@@ -81,17 +81,19 @@ def smallest_overlay(sim: State, numbers: np.ndarray) -> np.ndarray:
 
 
 class Kinds(NamedTuple):
-    """What tells properties of faces in contact apart: by face the row of its contact model, and the kind of joint; by
-    element its kind; alike: all faces of the model are of one kind."""
+    """What tells properties of faces in contact apart: by face the rows of its contact model and of its joint, by
+    element that of its model, and the kinds of rows; alike: all faces of the model are of one kind."""
 
     model: np.ndarray
+    joint_row: np.ndarray
     joint: np.ndarray
+    element_row: np.ndarray
     body: np.ndarray
     alike: bool
 
     @staticmethod
     def of(sim: State) -> Kinds:
-        """Of a model."""
+        """Of a model. Collective."""
 
         def kind(rows: Rows, *names: str) -> np.ndarray:
             return np.unique(np.column_stack([rows.column(n) for n in names]), axis=0, return_inverse=True)[1].reshape(
@@ -100,15 +102,20 @@ class Kinds(NamedTuple):
 
         joint = kind(sim.joint_rows, "friction", "penalty_overlay") + 1
         joint[0] = 0
-        joint = joint[sim.joint_row]
-        body = kind(sim.element_rows, "friction", "penalty", "damp_b")[sim.element_row]
-        faces = np.flatnonzero(sim.face_exists())
-        one = faces[:1]
-        alike = (sim.face_row[faces] == sim.face_row[one]).all() and bool(
-            (sim.face_row[one] > 0).all()
-            or ((joint[faces] == joint[one]).all() and (body[faces // 4] == body[one // 4]).all())
-        )
-        return Kinds(sim.face_row, joint, body, bool(alike))
+        body = kind(sim.element_rows, "friction", "penalty", "damp_b")
+
+        def alike() -> bool:
+            faces = np.flatnonzero(sim.face_exists())
+            model, of_joints = sim.face_row[faces], joint[sim.joint_row[faces]]
+            of_bodies = body[sim.element_row[faces // 4]]
+            return bool(
+                (model == model[:1]).all()
+                and (
+                    (model[:1] > 0).all() or ((of_joints == of_joints[:1]).all() and (of_bodies == of_bodies[:1]).all())
+                )
+            )
+
+        return Kinds(sim.face_row, sim.joint_row, joint, sim.element_row, body, sim.per_node(alike))
 
 
 class Surfaces:
@@ -272,9 +279,8 @@ class ContactPairs(Bodies):
         assert mesh is not None
         rows = np.empty(0, np.int64)
         if sim.options.collision:
-            on_surface, flags = np.zeros(len(mesh.points), bool), np.empty(len(sim.number), bool)
-            surface_points(mesh.cells, sim.alive, sim.closed_faces(), on_surface)
-            touched_rows(sim.number, mesh.cells, on_surface, flags)
+            _, flags = tables.kinds, np.empty(len(sim.number), bool)  # collective: not only where there is contact
+            touched_rows(sim.number, mesh.cells, sim.per_node(lambda: points_of_surface(sim)), flags)
             rows = np.flatnonzero(flags)
         super().__init__(sim, tables, rows)
         own = sim.owned
@@ -514,6 +520,14 @@ class ContactPairs(Bodies):
         return np.concatenate(owners), np.concatenate(parts)
 
 
+def points_of_surface(sim: State) -> np.ndarray:
+    """(np,) bool: points of the mesh at which a free face ends."""
+    mesh = sim.the_mesh()
+    out = np.zeros(len(mesh.points), bool)
+    surface_points(mesh.cells, sim.alive, sim.closed_faces(), out)
+    return out
+
+
 MOST_FACES = 9
 """At which a body can be touched: its own edges, and two at each of its corners."""
 
@@ -539,11 +553,13 @@ def touched_rows(number, cells, on_surface, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _like(f, g, model, joint, body):
+def _like(f, g, model, joint_row, joint, element_row, body):
     """Whether two faces have the same properties: see `Kinds`."""
     if model[f] != model[g]:
         return False
-    return model[f] > 0 or (joint[f] == joint[g] and body[f >> 2] == body[g >> 2])
+    return model[f] > 0 or (
+        joint[joint_row[f]] == joint[joint_row[g]] and body[element_row[f >> 2]] == body[element_row[g >> 2]]
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -554,7 +570,8 @@ def _wrapped(k, n):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def touched_faces(
-    element, start, points, cells, partner, closed, model, joint, body, alike, free, face, several, found
+    element, start, points, cells, partner, closed, model, joint_row, joint, element_row, body, alike, free, face,
+    several, found
 ):  # fmt: skip
     """At which faces bodies can be touched: their own free edges, and the free faces that end, or begin, where a corner
     of theirs is on the surface (found from element to element through closed faces). model ... alike: see `Kinds`.
@@ -599,7 +616,7 @@ def touched_faces(
                     continue
             if face[i] < 0:
                 face[i] = f
-            elif not _like(face[i], f, model, joint, body):
+            elif not _like(face[i], f, model, joint_row, joint, element_row, body):
                 several[i] = 1
             if len(found) > 0:
                 p = points[cells[e, start[i] % n]]

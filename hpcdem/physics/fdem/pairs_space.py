@@ -28,10 +28,11 @@ OF_CONTACTOR = [0, 1, 2, 3, 5, 6]
 
 
 class Surface(NamedTuple):
-    """The surface of a whole model, known to all ranks. mesh, closed, closed_faces: of which it is; clusters (ne, 4):
-    numbers of the corners, those that hang together have one; faces (k,): free faces, ascending; first (ne,): of each
-    element with a corner on the surface its lowest free face, else the lowest of those that hang on its corners, -1: of
-    others; begin, around: faces by cluster; length (ne,) [m]: median altitude of the elements of its body in the mesh.
+    """The surface of a whole model, one copy per node of the machine. mesh, closed, closed_faces: of which it is;
+    clusters (ne, 4): numbers of the corners, those that hang together have one; faces (k,): free faces, ascending;
+    first (ne,): of each element with a corner on the surface its lowest free face, else the lowest of those that hang
+    on its corners, -1: of others; begin, around: faces by cluster; length (ne,) [m]: median altitude of the elements of
+    its body in the mesh.
     """
 
     mesh: object
@@ -46,11 +47,21 @@ class Surface(NamedTuple):
 
     @staticmethod
     def of(sim: State) -> Surface:
-        """The present one; it is found again only if faces have opened, or the mesh is another."""
+        """The present one; it is found again only if faces have opened, or the mesh is another: collective then."""
         mesh, closed, known = sim.the_mesh(), sim.closed_faces(), sim.surface
         count = int(closed.sum())
         if known is not None and known.mesh is mesh and known.closed is closed and known.closed_faces == count:
             return known
+        same = known is not None and known.mesh is mesh
+        length = known.length if same else sim.per_node(lambda: lengths(sim))
+        clusters, faces, first, begin, around = sim.per_node(lambda: Surface._found(sim))
+        sim.surface = Surface(mesh, closed, count, clusters, faces, first, begin, around, length)
+        return sim.surface
+
+    @staticmethod
+    def _found(sim: State) -> tuple[np.ndarray, ...]:
+        """clusters, faces, first, begin, around."""
+        mesh, closed = sim.the_mesh(), sim.closed_faces()
         clusters, lead = mesh.corner_clusters(sim.partner, ~closed)
         faces = np.flatnonzero(sim.face_exists() & ~closed)
         element = faces // 4
@@ -67,9 +78,7 @@ class Surface(NamedTuple):
         np.minimum.at(own, element, faces)
         first = np.where(own < nobody, own, first)
         first[(first == nobody) | ~sim.alive] = -1
-        length = known.length if known is not None and known.mesh is mesh else lengths(sim)
-        sim.surface = Surface(mesh, closed, count, clusters, faces, first, begin, around, length)
-        return sim.surface
+        return clusters, faces, first, begin, around
 
     def near(self, elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Faces that hang on the corners of elements (n,), each once: which element (k,), ascending, and face (k,)."""
@@ -83,11 +92,10 @@ class Surface(NamedTuple):
 
     def several(self, kinds: Kinds) -> np.ndarray:
         """(ne,) bool: elements that can be touched at faces with different properties."""
-        if kinds.alike:
-            return np.zeros(len(self.first), bool)
         own = kinds.model[self.around] == 0
         keys = np.column_stack([
-            kinds.model[self.around], own * kinds.joint[self.around], own * (1 + kinds.body[self.around // 4]),
+            kinds.model[self.around], own * kinds.joint[kinds.joint_row[self.around]],
+            own * (1 + kinds.body[kinds.element_row[self.around // 4]]),
         ])  # fmt: skip
         kind = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
         some = np.flatnonzero(np.diff(self.begin))
@@ -173,7 +181,7 @@ class ContactSpace:
     def _make_list(self, sim: State) -> None:
         """Pairs that may touch, and their properties."""
         self.first, self.second = first, second = self._near(sim, sim.rebuild_state.skin)
-        m = len(first)
+        m, several = len(first), self._several(sim)
         self.law, self.length = np.zeros((m, contact.LAW)), np.zeros(len(self.row))
         self.chosen, self.choice_begin = np.zeros(0, np.int64), np.zeros(1, np.int64)
         self.choices = np.zeros((0, contact.CHOICE))
@@ -190,11 +198,19 @@ class ContactSpace:
         targets = Surfaces(sim, shapes, surface.first[self.element], np.arange(len(self.row)))
         shared, overlay = shared_faces(sim, self.face[first] // 4, self.element[second])
         self.law = faces.of_pairs(first, targets, second, shared, overlay)[:, OF_CONTACTOR]
-        varied = np.flatnonzero(surface.several(Kinds.of(sim))[self.element[second]])
+        varied = np.flatnonzero(several[self.element[second]]) if several is not None else second[:0]
         if len(varied):
             self._vary(sim, surface, shapes, faces, varied, shared, overlay)
         if not dynamic:
             self.law[:, contact.DASHPOT] = self.choices[:, 9 + contact.DASHPOT] = 0.0
+
+    @staticmethod
+    def _several(sim: State) -> np.ndarray | None:
+        """See `Surface.several`; None: no element can. Collective."""
+        if not sim.options.collision:
+            return None
+        kinds, surface = Kinds.of(sim), Surface.of(sim)
+        return None if kinds.alike else sim.per_node(lambda: surface.several(kinds))
 
     def _vary(
         self, sim: State, surface: Surface, shapes: ShapesSpace, faces: Surfaces, varied: np.ndarray,

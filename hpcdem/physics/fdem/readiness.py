@@ -40,6 +40,8 @@ def check(sim: State) -> None:
 def _check_warmth(sim: State) -> None:
     """CommandError where properties follow temperatures that are not there, or surroundings that cannot follow."""
     elements, joints = sim.warms()
+    if not elements.any() and not joints.any():
+        return
     for what, at, rows, row in (("element", elements, sim.element_rows, sim.element_row),
                                 ("joint", joints, sim.joint_rows, sim.joint_row)):  # fmt: skip
         for over, which in by_temperature.followed(sim, rows, row, at):

@@ -85,7 +85,7 @@ class Blocks(Edited):
     def take_births(self, born: np.ndarray, places: np.ndarray) -> None:
         """Elements (n,) have come back, their corners at places (n, 4, dim) [m]."""
         super().take_births(born, places)
-        self.areas = self.reference.areas()
+        self.areas = self.per_node(self.reference.areas)
 
     def _tables(self) -> type[Local]:
         return LocalSpace if self.dim == 3 else Local
@@ -112,8 +112,9 @@ class Blocks(Edited):
         self.budget = None
         if mesh.dim == 3:
             self.prepare_kernels("space")
-        self.areas, self.mean_edge = mesh.areas(), mesh.mean_edge()
-        self.cut = cut_corner(mesh) if mesh.dim == 2 else np.empty(0, np.int64)
+        self.areas, self.mean_edge, self.cut = self.per_node(
+            lambda: (mesh.areas(), mesh.mean_edge(), cut_corner(mesh) if mesh.dim == 2 else np.empty(0, np.int64))
+        )
         n, size, rank = len(mesh.cells), self.comm.size, self.comm.rank
         self.number = np.arange(n * rank // size, n * (rank + 1) // size)
         if mesh.dim == 3:
@@ -426,20 +427,34 @@ class Blocks(Edited):
 
     def renew_topology(self) -> None:
         """Which corners are one node."""
-        mesh = self.the_mesh()
-        node, lead = self.clusters()
         self._acting = None
-        self.node = node.astype(np.int32, copy=False)
-        sizes = np.bincount(node[node >= 0], minlength=len(lead))
-        self.shared_nodes = sizes > 1
-        self.member_begin = np.zeros(len(lead) + 1, np.int32)
-        self.member = np.empty(int(sizes[self.shared_nodes].sum()), np.int32)
-        if len(self.member):  # else zeros that nobody has written to: nothing of them is in the memory
-            build.cluster_members(self.node, sizes, self.member_begin, self.member)
-        cells = mesh.cells[self.alive]
-        self.point_corners = np.bincount(cells[cells >= 0], minlength=len(mesh.points))
-        self.where = np.full(len(mesh.cells), -1, np.int64)
+        self.share_changes()
+        self.node, self.shared_nodes, self.member_begin, self.member, self.point_corners, self.where = self.per_node(
+            self._nodes_of_corners
+        )
         self._topology_stale = False
+
+    def share_changes(self) -> None:
+        """Of what changed in place, alike on all ranks, there is one copy per node again. Collective."""
+        names = ("alive", "touches", "joint_row", "open", "broken", "_closed")
+        self.closed_faces()
+        for name, array in zip(names, self.per_node(lambda: [getattr(self, one) for one in names])):
+            setattr(self, name, array)
+        self.opened_apart = 0
+
+    def _nodes_of_corners(self) -> tuple[np.ndarray, ...]:
+        mesh = self.the_mesh()
+        node, lead = self._clusters()
+        sizes = np.bincount(node[node >= 0], minlength=len(lead))
+        shared, node = sizes > 1, node.astype(np.int32, copy=False)
+        begin = np.zeros(len(lead) + 1, np.int32)
+        member = np.empty(int(sizes[shared].sum()), np.int32)
+        if len(member):  # else zeros that nobody has written to: nothing of them is in the memory
+            build.cluster_members(node, sizes, begin, member)
+        cells = mesh.cells[self.alive]
+        at_points = np.bincount(cells[cells >= 0], minlength=len(mesh.points))
+        # A rank has pages of its own of `where` only around the elements that it holds.
+        return node, shared, begin, member, at_points, np.full(len(mesh.cells), -1, np.int64)
 
     def _costs(self) -> np.ndarray:
         """Relative cost of the owned elements: broken zones cost more."""

@@ -6,6 +6,7 @@ Its parts say what is in it; the step that moves it, and the rebuild of lists an
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -24,6 +25,7 @@ from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep, plasticity
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.surface_loads import SurfaceLoads
+from hpcdem.physics.fdem.topology import T
 
 NARROW, WIDE = 0.1, 0.3
 """Buffer of the contact search over the mean edge, at rest and in fast motion."""
@@ -111,6 +113,8 @@ class State(ModelDefinition, Model):
     member: np.ndarray
     point_corners: np.ndarray
     """(np,) corners of elements that are there at each point of the mesh."""
+    opened_apart: int = 0
+    """Joints opened in place since `share_changes`: each rank has pages of its own for them."""
     origin: np.ndarray
     """Positions of the owned elements when the storage was made."""
     listed: np.ndarray
@@ -188,6 +192,9 @@ class State(ModelDefinition, Model):
     def the_mesh(self) -> Mesh:
         """The mesh; CommandError if there is none."""
         return self._mesh()
+
+    def per_node(self, make: Callable[[], T]) -> T:
+        return self.comm.per_node(make)
 
     ahead: int = 0
     """Static steps that are about to be done at once."""

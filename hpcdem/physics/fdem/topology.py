@@ -3,8 +3,8 @@ numbers of the mesh, equal on all ranks."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from hpcdem.core.memory import sparse_zeros
 from hpcdem.physics.fdem import sides
 from hpcdem.physics.fdem.mesh import Mesh
 
+T = TypeVar("T")
 Numbers = np.ndarray | Sequence[int] | None
 """Numbers of elements, nodes, faces or joints; None: all."""
 AGAIN, CRACK = 2, 3
@@ -70,6 +71,10 @@ class Topology:
     def note(self, text: str) -> None:
         """A line for the log."""
 
+    def per_node(self, make: Callable[[], T]) -> T:
+        """The result of `make()`, which does not depend on the rank, see `Comm.per_node`."""
+        return make()
+
     @property
     def dim(self) -> int:
         """Dimensions of space; without a mesh 2."""
@@ -97,6 +102,9 @@ class Topology:
 
     def numbers_of_elements(self, elements: Any) -> np.ndarray:
         """Checked element numbers, ascending; None: all that are there. CommandError for others."""
+        return self.per_node(lambda: self._elements(elements))
+
+    def _elements(self, elements: Any) -> np.ndarray:
         at = self.existing(elements, self.alive, "element")
         if elements is not None:
             self.refuse_parts(at)
@@ -119,6 +127,9 @@ class Topology:
     def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
         """Checked numbers of points of the mesh with an element that is there; None: all of them. Of sides (sides.py)
         their points."""
+        return self.per_node(lambda: self._nodes(nodes))
+
+    def _nodes(self, nodes: Any) -> np.ndarray:
         asked = None if nodes is None else np.asarray(nodes)
         if asked is not None and np.issubdtype(asked.dtype, np.integer):
             asked = sides.points(self._mesh().cells, asked.reshape(-1))
@@ -127,8 +138,11 @@ class Topology:
     def corners_of_nodes(self, nodes: Any, whole: bool = False) -> np.ndarray:
         """(4 ne,) bool: corners at these nodes (sides.py), those of elements that were taken out too; None: all. whole:
         and those that are one node with them."""
+        return self.per_node(lambda: self._corners_of_nodes(nodes, whole))
+
+    def _corners_of_nodes(self, nodes: Any, whole: bool) -> np.ndarray:
         mesh = self._mesh()
-        self.numbers_of_nodes(nodes)
+        self._nodes(nodes)
         if nodes is None:
             return mesh.cells.reshape(-1) >= 0
         given = np.asarray(nodes, np.int64).reshape(-1)
@@ -148,6 +162,9 @@ class Topology:
     def clusters(self) -> tuple[np.ndarray, np.ndarray]:
         """Nodes of corners (ne, 4), as faces hang together now, -1 of elements that were taken out, and their lowest
         corners."""
+        return self.per_node(self._clusters)
+
+    def _clusters(self) -> tuple[np.ndarray, np.ndarray]:
         mesh = self._mesh()
         apart = (self.joint_row > 0) | self.open
         apart |= np.repeat(~self.alive, 4)
@@ -164,11 +181,12 @@ class Topology:
 
     def numbers_of_faces(self, faces: Any) -> np.ndarray:
         """Checked face numbers; None: all faces of elements that are there."""
-        return self.existing(faces, self.face_exists(), "face")
+        return self.per_node(lambda: self.existing(faces, self.face_exists(), "face"))
 
     def numbers_of_joints(self, joints: Any) -> np.ndarray:
         """Checked numbers of inner edges (lower faces); None: all between elements that are there."""
-        return self.existing(joints, self.joint_exists(), "joint (the lower face of an inner edge)")
+        what = "joint (the lower face of an inner edge)"
+        return self.per_node(lambda: self.existing(joints, self.joint_exists(), what))
 
     def joint_exists(self) -> np.ndarray:
         """(4 ne,) bool: lower faces of edges between elements that are there."""

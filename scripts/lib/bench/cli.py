@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from bench import blocks, coupled, fracture, launch, other, runs, strain_stress, tables, view
+from bench import block_memory, blocks, coupled, fracture, launch, other, runs, strain_stress, tables, view
 from bench.launch import Layout
 from bench.peers import PEERS
 from bench.workloads import PEER_WORKLOADS, cache_folder, workloads
@@ -133,6 +133,29 @@ def blocks_(names: tuple[str, ...], layouts: list[Layout], repeats: int, seconds
         lines.close()
         if warning := tables.disturbed(lines.rows):
             runs.say(f"warning: {warning}")
+
+
+@bench.command("block-memory", context_settings=HELP)
+@click.option(
+    "--kind", "kinds", multiple=True, type=click.Choice(list(block_memory.KINDS)), metavar="NAME",
+    help=f"Only this one; several times [{', '.join(block_memory.KINDS)}].",
+)  # fmt: skip
+@click.option("--elements", type=click.IntRange(100), default=100_000, metavar="N", help="About so many [100000].")
+@click.option("--steps", type=click.IntRange(1), default=4, metavar="N", help="Steps [4].")
+@click.option(
+    "--arrays", type=click.IntRange(0), default=0, metavar="N", help="List the N largest arrays of a rank [0]."
+)
+@layouts_option("1x1", "2x1", "4x1")
+@JSON
+def block_memory_(
+    kinds: tuple[str, ...], elements: int, steps: int, arrays: int, layouts: list[Layout], json_file: str | None
+) -> None:
+    """Memory of a model of blocks: of the busiest rank, and the one copy per node of what all ranks share."""
+    lines = tables.Lines(json_file)
+    try:
+        block_memory.measure(list(kinds or block_memory.KINDS), elements, layouts, steps, arrays, lines)
+    finally:
+        lines.close()
 
 
 @bench.command("coupled", context_settings=HELP)

@@ -54,26 +54,39 @@ def versions() -> dict[str, str]:
 
 def solver_arrays(sim: hpcdem.Simulation) -> int:
     """Bytes of all numpy arrays that the engine holds, those inside its parts too; views are counted once."""
+    return sum(array.nbytes for _, array in arrays(sim.engine))
+
+
+def arrays(whole: Any, name: str = "") -> list[tuple[str, Any]]:
+    """All numpy arrays in an object of hpcdem and in its parts, each once, with where they are found."""
     import numpy as np
 
     seen: set[int] = set()
+    found: list[tuple[str, Any]] = []
 
-    def weigh(thing: Any) -> int:
+    def look(at: str, thing: Any) -> None:
         if id(thing) in seen:
-            return 0
+            return
         seen.add(id(thing))
         if isinstance(thing, np.ndarray):
-            return weigh(thing.base) if isinstance(thing.base, np.ndarray) else thing.nbytes
-        if isinstance(thing, dict):
-            return sum(weigh(v) for v in thing.values())
-        if isinstance(thing, list | tuple):
-            return sum(weigh(v) for v in thing)
-        if type(thing).__module__.startswith("hpcdem"):
-            slots = [getattr(thing, name, None) for kind in type(thing).__mro__ for name in _slots(kind)]
-            return sum(weigh(v) for v in [*getattr(thing, "__dict__", {}).values(), *slots] if v is not None)
-        return 0
+            if isinstance(thing.base, np.ndarray):
+                look(at, thing.base)
+            else:
+                found.append((at, thing))
+        elif isinstance(thing, dict):
+            for key, part in thing.items():
+                look(f"{at}.{key}", part)
+        elif isinstance(thing, list | tuple):
+            names = getattr(thing, "_fields", range(len(thing)))
+            for key, part in zip(names, thing):
+                look(f"{at}.{key}", part)
+        elif type(thing).__module__.startswith("hpcdem"):
+            slots = {key: getattr(thing, key, None) for kind in type(thing).__mro__ for key in _slots(kind)}
+            for key, part in {**slots, **getattr(thing, "__dict__", {})}.items():
+                look(f"{at}.{key}", part)
 
-    return weigh(sim.engine)
+    look(name, whole)
+    return found
 
 
 def _slots(kind: type) -> tuple[str, ...]:

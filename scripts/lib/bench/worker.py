@@ -14,7 +14,7 @@ from typing import Any
 
 import hpcdem
 from bench import bed as beds
-from bench import blocks, coupled, fracture, strain_stress
+from bench import block_memory, blocks, coupled, fracture, strain_stress
 from bench.measured import contacts, digest, forget_peak, no_first_frame, peak, solver_arrays, versions
 from bench.scaling import measure as scaling
 from bench.workloads import MATERIAL, Bed
@@ -146,7 +146,7 @@ def memory(job: dict[str, Any]) -> dict[str, Any]:
 
 TASKS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
     "run": run, "bed": beds.make, "memory": memory, "strain-stress": strain_stress.work, "scaling": scaling.work,
-    "blocks": blocks.work, "coupled": coupled.work, "fracture": fracture.work,
+    "blocks": blocks.work, "block-memory": block_memory.work, "coupled": coupled.work, "fracture": fracture.work,
 }  # fmt: skip
 
 if __name__ == "__main__":
