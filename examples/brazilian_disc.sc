@@ -1,7 +1,7 @@
 # Brazilian test: a disc of rock, 50 mm wide and 20 mm thick, is compressed between two strips until it splits, in three
 # dimensions: tetrahedra with a joint on every inner face. The crack runs through the middle, between wedges of crushed
 # rock under the strips. 2 P / (pi D t) at the peak is the indirect tensile strength. It exceeds that of the joints
-# (5 MPa), because the path is rough and the test is fast. A minute on one core.
+# (5 MPa), because the crack follows a rough path along faces. A minute on one core.
 # Needs the extra [mesh].
 #
 #   hpcdem brazilian_disc.sc      data/split_<step>.png: the halves; brazilian_disc.png: force over shortening
