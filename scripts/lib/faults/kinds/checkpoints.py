@@ -97,7 +97,7 @@ def foreign(case: Case) -> None:
     _damaged(case, lambda data: case.rng.choice(texts))
 
 
-@kind(".sav of the future", "the last checkpoint has a later version of the layout: it is passed over")
+@kind(".sav of the future", "the last checkpoint has a later format version: it is skipped")
 def future(case: Case) -> None:
     found = _stopped(case)
     case.moments.append(case.reached())
@@ -115,7 +115,7 @@ def missing(case: Case) -> None:
 
 
 @kind(".sav of another script", "a later checkpoint of another script lies in the folder: refused by the line in which "
-      "the two differ, and the run goes on when it is gone")  # fmt: skip
+      "the two differ, and the run resumes when it is gone")  # fmt: skip
 def another(case: Case) -> None:
     _stopped(case)
     if case.done():  # before it could be killed: nobody will look at checkpoints any more

@@ -73,7 +73,7 @@ class SmallDisk:
 
 
 @kind("disk full", "the disk of the output folder is made so small in mid-run that a random number of bytes is left; "
-      "the run ends with a message, and goes on when there is space again")  # fmt: skip
+      "the run ends with a message, and resumes when there is space again")  # fmt: skip
 def full(case: Case) -> None:
     disk = SmallDisk(case)
     job = case.start()
@@ -166,7 +166,7 @@ def removed(case: Case) -> None:
 
 
 @kind("a folder in the place of a file", "a folder has the name of a later frame, checkpoint, series, or of its "
-      "temporary file; the run ends with a message, and goes on when the folder is gone")  # fmt: skip
+      "temporary file; the run ends with a message, and resumes when the folder is gone")  # fmt: skip
 def folder(case: Case) -> None:
     job = case.start()
     if not case.until(lambda: case.reached() > 0, job):

@@ -42,7 +42,7 @@ def sigint(case: Case) -> None:
     _stop(case, signal.SIGINT)
 
 
-@kind("SIGUSR2", "to one rank or all: a checkpoint, and the run goes on to its end")
+@kind("SIGUSR2", "to one rank or all: a checkpoint, and the run continues to its end")
 def sigusr2(case: Case) -> None:
     job = case.start()
     if case.moment(job, begins=False):
@@ -99,7 +99,7 @@ def hanging(case: Case) -> None:
         case.problem("took 20 s to end", end)
 
 
-@kind("suspended", "all ranks stopped for a while (SIGSTOP, SIGCONT), as a queue suspends a job: the run goes on")
+@kind("suspended", "all ranks stopped for a while (SIGSTOP, SIGCONT), as a queue suspends a job: the run continues")
 def suspended(case: Case) -> None:
     job = case.start()
     if case.moment(job, begins=False):

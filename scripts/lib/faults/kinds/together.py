@@ -35,7 +35,7 @@ def two(case: Case) -> None:
 
 
 @kind("a new run in an old folder", "the folder holds later checkpoints and frames of another script; the run is "
-      "killed and gone on with: its own checkpoint is taken")  # fmt: skip
+      "killed and resumed: its own checkpoint is used")  # fmt: skip
 def old_folder(case: Case) -> None:
     if case.data.exists():
         raise AssertionError("must be the first fault of a case")
@@ -69,7 +69,7 @@ def old_folder(case: Case) -> None:
 
 
 @kind("locks of HDF5", "HDF5_USE_FILE_LOCKING TRUE, FALSE or BEST_EFFORT, and another program that holds a lock on the "
-      "newest checkpoint while the run goes on from it or passes it over", most=1)  # fmt: skip
+      "newest checkpoint while the run resumes from it or skips it", most=1)  # fmt: skip
 def locks(case: Case) -> None:
     how = case.rng.choice(("TRUE", "FALSE", "BEST_EFFORT"))
     job = case.start(HDF5_USE_FILE_LOCKING=how)
