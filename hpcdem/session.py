@@ -226,6 +226,7 @@ KINDS = {
     "coupled": Kernels("physics.coupling.warm_up", after=("energy",)),
     "bolts": Kernels("physics.bolts.warm_up"),
     "liners": Kernels("physics.liners.warm_up"),
+    "liners-space": Kernels("physics.liners.warm_up", "in_space", after=("space",)),
     "flow": Kernels("physics.flow.warm_up"),
     "flow-space": Kernels("physics.flow.warm_up", "in_space", after=("space", "flow")),
     "proppant": Kernels("physics.proppant.warm_up", after=("flow",)),

@@ -2225,10 +2225,10 @@ class Liners(Objects):
     """Liners: `sim.liners["axial-force"]` is that of their elements, see `Objects`."""
     def __getitem__(
         self,
-        name: Literal["axial-force", "shear-force", "moment-first", "moment-last", "axial-strain", "plastic-strain", "plastic-rotation", "liner-state", "bond-pressure", "bond-shear", "gap", "slip", "bond-state", "host"] | str,
+        name: Literal["axial-force", "shear-force", "moment-first", "moment-last", "membrane-largest", "membrane-smallest", "membrane-xx", "membrane-yy", "membrane-xy", "membrane-zz", "membrane-xz", "membrane-yz", "bending-largest", "bending-smallest", "bending-xx", "bending-yy", "bending-xy", "bending-zz", "bending-xz", "bending-yz", "transverse-shear", "axial-strain", "plastic-strain", "plastic-rotation", "plastic-curvature", "liner-state", "bond-pressure", "bond-shear", "gap", "slip", "bond-state", "host"] | str,
     ) -> np.ndarray: ...
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """In the plane: put them into a group; each is in one group of a set at most.
+        """Put them into a group; each is in one group of a set at most.
 
         Parameters
         ----------
@@ -2237,10 +2237,10 @@ class Liners(Objects):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def create(self, *, group: str | None = None, set: str | None = None, where: Where | None = None) -> None:
-        """In the plane: puts a liner on the free faces that the range chooses, as things are now: at any stage of a
-        run, without force in it. A face has one beam; where faces or liners meet at a point of the mesh they are
-        joined, also around a closed opening. Liners have weight, and no contact of their own: what pushes them is
-        the rock of their faces.
+        """Puts a liner on the free faces that the range chooses, as things are now: at any stage of a run, without
+        force in it. A face has one beam, in space a triangle; where faces or liners meet at a point, in space along
+        an edge, of the mesh they are joined, also around a closed opening. Liners have weight, and no contact of
+        their own: what pushes them is the rock of their faces.
 
         Parameters
         ----------
@@ -2250,7 +2250,7 @@ class Liners(Objects):
         """
     def model(
         self,
-        name: Literal["beam"],
+        name: Literal["beam", "shell", "sh"],
         *,
         density: float,
         young: float,
@@ -2268,10 +2268,11 @@ class Liners(Objects):
         bond_friction: float | None = None,
         where: Where | None = None,
     ) -> None:
-        """In the plane: beams in plane strain, elastic and perfectly plastic, of a metre of thickness of the plane.
-        Either a shell of a thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0.
-        The axial force is held between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N +
-        Nc) / (Nt + Nc)^2: what a rectangle bears that is plastic all over. The bond to the rock is elastic, slips at
+        """In the plane beams in plane strain, of a metre of its thickness, elastic and perfectly plastic. Either a
+        shell of a thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0. The axial
+        force is held between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N + Nc) / (Nt
+        + Nc)^2: what a rectangle bears that is plastic all over. In space flat shells of a thickness, whose forces
+        and moments are held so in their principal directions. The bond to the rock is elastic, slips at
         bond-cohesion + pressure tan(bond-friction), and parts for good above bond-tensile-strength. Given again,
         what elements carry stays.
 
@@ -2282,8 +2283,9 @@ class Liners(Objects):
         poisson_ratio : Poisson's ratio: E / (1 - nu^2) counts in plane strain; 0 for steel sets (default: 0).
         thickness : thickness of the shell; without area and inertia it gives both [m] (default: that of a rectangle
             of this area and inertia).
-        area : area of the section over the spacing of steel sets [m2/m] (default: the thickness).
-        inertia : second moment of the section over the spacing of steel sets [m4/m] (default: thickness^3 / 12).
+        area : area of the section over the spacing of steel sets [m2/m] (in the plane; default: the thickness).
+        inertia : second moment of the section over the spacing of steel sets [m4/m] (in the plane; default:
+            thickness^3 / 12).
         tensile_strength : strength in tension; with compressive_strength [Pa] (default: never).
         compressive_strength : strength in compression; with tensile_strength [Pa] (default: never).
         plastic_moment : largest moment at the axial force that allows most [N m/m] (default: that of a rectangle).
@@ -2295,8 +2297,8 @@ class Liners(Objects):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def delete(self, *, where: Where | None = None) -> None:
-        """In the plane: takes elements of liners out at once. Their numbers go with them, those of the others stay;
-        without RANGE all of them.
+        """Takes elements of liners out at once. Their numbers go with them, those of the others stay; without RANGE all
+        of them.
 
         Parameters
         ----------
@@ -2307,10 +2309,10 @@ class LinerNodes(Objects):
     """Nodes of liners: `sim.liner_nodes["rotation"]`, see `Objects`."""
     def __getitem__(
         self,
-        name: Literal["position-x", "position-y", "displacement-x", "displacement-y", "velocity-x", "velocity-y", "rotation", "spin", "reaction-x", "reaction-y", "reaction-moment", "distance"] | str,
+        name: Literal["position-x", "position-y", "position-z", "displacement-x", "displacement-y", "displacement-z", "velocity-x", "velocity-y", "velocity-z", "rotation", "rotation-x", "rotation-y", "rotation-z", "spin", "spin-x", "spin-y", "spin-z", "reaction-x", "reaction-y", "reaction-z", "reaction-moment", "reaction-moment-x", "reaction-moment-y", "reaction-moment-z", "distance"] | str,
     ) -> np.ndarray: ...
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """In the plane: put them into a group; each is in one group of a set at most.
+        """Put them into a group; each is in one group of a set at most.
 
         Parameters
         ----------
@@ -2323,16 +2325,24 @@ class LinerNodes(Objects):
         *,
         vx: Number | None = None,
         vy: Number | None = None,
+        vz: Number | None = None,
         spin: Number | None = None,
+        spin_x: Number | None = None,
+        spin_y: Number | None = None,
+        spin_z: Number | None = None,
         where: Where | None = None,
     ) -> None:
-        """In the plane: velocity of nodes of liners. Components that are not given stay free.
+        """Velocity of nodes of liners. Components that are not given stay free.
 
         Parameters
         ----------
         vx : velocity along x [m/s].
         vy : velocity along y [m/s].
-        spin : rate of rotation, counter-clockwise [rad/s].
+        vz : velocity along z [m/s] (in three dimensions).
+        spin : rate of rotation, counter-clockwise [rad/s] (in the plane).
+        spin_x : rate of rotation about x [rad/s] (in three dimensions).
+        spin_y : rate of rotation about y [rad/s] (in three dimensions).
+        spin_z : rate of rotation about z [rad/s] (in three dimensions).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def force(
@@ -2340,20 +2350,28 @@ class LinerNodes(Objects):
         *,
         fx: Number | None = None,
         fy: Number | None = None,
+        fz: Number | None = None,
         moment: Number | None = None,
+        moment_x: Number | None = None,
+        moment_y: Number | None = None,
+        moment_z: Number | None = None,
         where: Where | None = None,
     ) -> None:
-        """In the plane: force and moment on each node of a liner, of a metre of thickness.
+        """Force and moment on each node of a liner, in the plane of a metre of thickness.
 
         Parameters
         ----------
         fx : force along x [N/m].
         fy : force along y [N/m].
-        moment : moment, counter-clockwise [N m/m].
+        fz : force along z [N] (in three dimensions).
+        moment : moment, counter-clockwise [N m/m] (in the plane).
+        moment_x : moment about x [N m] (in three dimensions).
+        moment_y : moment about y [N m] (in three dimensions).
+        moment_z : moment about z [N m] (in three dimensions).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def remove_boundary(self, *, where: Where | None = None) -> None:
-        """In the plane: take back what was prescribed.
+        """Take back what was prescribed.
 
         Parameters
         ----------

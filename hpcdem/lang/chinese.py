@@ -5,6 +5,7 @@ from __future__ import annotations
 FIELDS = {
     "stress": "应力", "principal": "主应力", "displacement": "位移", "velocity": "速度", "acceleration": "加速度",
     "force": "力", "contact_force": "接触力", "nodal_force": "节点力", "axial_force": "轴力", "shear_force": "剪力",
+    "membrane": "薄膜力", "bending": "板弯矩", "transverse": "横向剪力", "plastic_curvature": "塑性曲率",
     "bond_force": "粘结力", "reaction": "反力", "moment": "弯矩", "torque": "力矩", "spin": "角速度", "angle": "转角",
     "rotation": "转动", "temperature": "温度", "moisture": "含水量", "mean_moisture": "平均含水量", "suction": "基质吸力",
     "mean_temperature": "平均温度", "fluid_temperature": "流体温度",
@@ -21,7 +22,7 @@ FIELDS = {
     "fs": "切向力", "overlap": "重叠量", "number": "编号", "gid": "编号", "id": "编号", "id1": "颗粒一",
     "id2": "颗粒二", "node": "节点", "corners": "角点数", "element_model": "单元本构", "joint_model": "节理本构",
     "element_1": "单元一", "element_2": "单元二", "first": "起点", "last": "终点", "second": "第二点",
-    "first_node": "起始节点", "last_node": "末端节点", "bolt_state": "锚杆状态", "liner_state": "衬砌状态",
+    "first_node": "起始节点", "second_node": "第二节点", "last_node": "末端节点", "bolt_state": "锚杆状态", "liner_state": "衬砌状态",
     "bond_state": "粘结状态", "bolt": "锚杆", "liner": "衬砌", "host": "所在单元", "fixed": "固定方向",
     "constraint": "约束类型", "quiet": "无反射", "incoming": "入射波", "group": "组", "color": "颜色", "colour": "颜色",
     "material": "材料", "birth": "生成步", "fix": "固定", "clump": "颗粒簇", "members": "成员数", "kind": "类型",
@@ -32,7 +33,7 @@ FIELDS = {
 """Fields of frames, by their names without component."""
 COMPONENTS = {
     "max": "最大", "middle": "中间", "min": "最小", "mean": "平均", "mises": "Mises", "deviator": "偏", "shear": "剪切",
-    "normal": "法向", "first": "起点", "last": "终点", "largest": "最大",
+    "normal": "法向", "first": "起点", "last": "终点", "largest": "最大", "smallest": "最小",
 }  # fmt: skip
 """Ends of their names; xx, x and so on stay."""
 LEGEND = {

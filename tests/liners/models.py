@@ -14,6 +14,7 @@ from tests.blocks.models import COHESIVE, WEAK
 from tests.blocks.support import ROCK, near, rectangle, shaken
 from tests.liners.support import SHOTCRETE, state
 from tests.parallel.model import Found, Model
+from tests.space.support import box, faces_on
 
 WEAKER = {
     **SHOTCRETE, "young": 2e9, "thickness": 0.02, "tensile_strength": 3e5, "compressive_strength": 2e6,
@@ -36,6 +37,35 @@ def breaking(sim: Blocks) -> None:
     _, elements = liners.create(near(mesh, 1, 0.6))
     liners.assign(elements, WEAKER)
     diagnostics.account_energy(sim)
+
+
+def in_space(sim: Blocks) -> None:
+    """A jointed body with a liner on two of its sides is torn apart and turns, through the strips of the ranks."""
+    mesh = box((14, 2, 2), (2.8, 0.4, 0.4), shaken=0.2)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
+    inner = sim.mesh.edges()
+    sim.joint_model(inner.faces[inner.inner][:, 0], COHESIVE, WEAK)
+    x, y, _ = mesh.points.T
+    for i in range(len(x)):
+        changes.set_velocity(sim, np.array([i]), vx=150.0 + 12.0 * x[i], vy=8.0 * x[i], vz=20.0 * y[i])
+    liners = Liners.of(sim)
+    _, elements = liners.create(np.concatenate([faces_on(mesh, "top"), faces_on(mesh, "front")]))
+    liners.assign(elements, WEAKER)
+    diagnostics.account_energy(sim)
+
+
+def more_in_space(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 60:  # another one in the middle of the run, and a force
+        liners = Liners.of(sim)
+        _, elements = liners.create(faces_on(sim.mesh, "bottom"))
+        liners.assign(elements, {**WEAKER, "thickness": 0.04})
+        liners.condition(np.array([0]), force_z=-500.0, moment_x=20.0)
+    if sim.clock.step == 90:  # hosts go, and elements
+        liners = Liners.of(sim)
+        changes.null(sim, liners.elements["host"][4:8].copy())
+        liners.delete(np.array([10, 18]))
 
 
 def more(sim: Blocks) -> None:
@@ -100,8 +130,18 @@ def liners_are_torn(found: Found) -> None:
     assert found["liners_work_on_rock"] == found["energy_work_liners"] != 0.0
 
 
+def liners_in_space_are_torn(found: Found) -> None:
+    liners_yield_and_part(found)
+    assert found["counts"][2] > 5 and found["element_ends"].shape[1] == 3
+    assert found["liners_relative"] < 0.01 and found["liners_work_on_rock"] == found["energy_work_liners"] != 0.0
+    assert found["liners_lost_in_beams"] > 1.0 and found["liners_lost_in_bond"] > 0.1
+
+
 # Checkpoints after excavation and deletion, and the change to motion.
 MODELS = {
     "liners torn": Model(breaking, result, liners_are_torn, more, steps=1400, middle=1101, slow=True),
+    "liners in space": Model(
+        in_space, result, liners_in_space_are_torn, more_in_space, steps=140, middle=101, slow=True
+    ),
     "liners at rest": Model(relaxing, result, liners_yield_and_part, excavate, steps=1400, middle=1101, slow=True),
 }

@@ -239,7 +239,7 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing() -> None:
     with pytest.raises(CommandError, match="has a liner already"):
         liners.create(near(sim.mesh, 1, 0.5))
     for given, message in (
-        ({"thickness": None}, "needs its thickness, or area and inertia"),
+        ({"thickness": None}, "needs its thickness"),
         ({"tensile_strength": 1e6}, "go together"),
         ({"tensile_strength": 0.0, "compressive_strength": 0.0}, "carry nothing"),
         ({"plastic_moment": 1e3}, "goes with tensile_strength and compressive_strength"),
@@ -260,3 +260,12 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing() -> None:
     _, elements = Liners.of(other).create(near(other.mesh, 1, 1.0))
     with pytest.raises(CommandError, match=r"liner-element 0 has no model \(2 in all\): liner c-model comes first"):
         other.step()
+
+
+def test_a_hole_in_a_liner_is_filled_with_the_nodes_around_it() -> None:
+    _, liners = slab()
+    face = int(liners.elements["face"][2])
+    liners.delete(np.array([2]))
+    nodes, elements = liners.create(np.array([face]))
+    assert len(nodes) == 0 and elements.tolist() == [5]
+    assert liners.elements["ends"][5].tolist() == liners.elements["ends"][2].tolist()

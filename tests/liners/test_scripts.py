@@ -10,7 +10,8 @@ import pytest
 from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.liners.model import QUANTITIES, Liners
+from hpcdem.physics.liners.beams import Beams
+from hpcdem.physics.liners.model import Liners
 from hpcdem.post import blocks as pictures
 from hpcdem.post import liners as of_liners
 from tests.pcdc.fake import Bench
@@ -75,7 +76,7 @@ def test_frames_hold_a_table_and_figures_show_it(bench: Bench, tmp_path: Path) -
     liners = Liners.of(bench.blocks)
     state = read_mesh_frame(tmp_path / "data" / "f_0000000030.vtkhdf")
     for kind, name in (("liner-node", "nodes"), ("liner-element", "elements")):
-        for quantity in QUANTITIES[kind]:
+        for quantity in Beams.quantities[kind]:
             assert np.array_equal(state.supports["liners"][name][quantity], liners.values(kind, quantity)), quantity
     first, last = (state.supports["liners"]["elements"][f"{end}_node"] for end in ("first", "last"))
     assert np.array_equal(np.column_stack([first, last]), liners.elements["ends"])

@@ -263,7 +263,6 @@ REFUSED_IN_SPACE = [
      "'geometry create rectangle' is for two dimensions; in three there is geometry create box"),
     ("element densify maximum-length 1", "'element densify' is for two dimensions; in three there is mesh create"),
     ("element-face boundary m-s-b-c dip 1e5", "'dip' is for two dimensions; in three there is stress-xy"),
-    ("liner create range x 0 1", "'liner create' is for two dimensions"),
 ]  # fmt: skip
 
 

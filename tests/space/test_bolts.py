@@ -265,7 +265,6 @@ pcdc model step 10
     [
         ("bolt create polyline (0.5,1) (0.5,0.3)", "vector"),
         ("bolt create polyline (5,5,5) (6,6,6)", "no node of the bolt is in an element"),
-        ("liner create range z 1 1", "'liner create' is for two dimensions"),
     ],
 )
 def test_errors_name_file_and_line(bench: Bench, line: str, message: str) -> None:

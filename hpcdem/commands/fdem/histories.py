@@ -24,7 +24,7 @@ from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids
 from hpcdem.physics.fdem.sides import SIDE
 from hpcdem.physics.flow.model import Flow
 
-IN_SPACE = tuple(name for name in UNITS[MODEL] if name not in ("disc_work", "liner_work"))
+IN_SPACE = tuple(name for name in UNITS[MODEL] if name != "disc_work")
 """What a history of a model in three dimensions can follow."""
 ON_IT = 1e-6
 """A place that is no farther from a node, over the size of the model, is that of the node: of all its sides."""

@@ -38,9 +38,15 @@ def velocity(
     vy: Number | None = None,
     spin: Number | None = None,
     where: Range | None = None,
+    vz: Number | None = None,
+    spin_x: Number | None = None,
+    spin_y: Number | None = None,
+    spin_z: Number | None = None,
 ) -> None:
-    """Velocity [m/s] and rate of rotation [rad/s] of nodes of liners; a text is the name of a table of time."""
-    given = {"x": vx, "y": vy, "turn": spin}
+    """Velocity [m/s] and rate of rotation [rad/s] of nodes of liners, in the plane spin, in space about the axes; a
+    text is the name of a table of time."""
+    turn = spin if spin_z is None else spin_z
+    given = {"x": vx, "y": vy, "z": vz, "turn_x": spin_x, "turn_y": spin_y, "turn": turn}
     changes: dict[str, Number] = {}
     for part, value in given.items():
         if value is not None:
@@ -54,8 +60,15 @@ def force(
     fy: Number | None = None,
     moment: Number | None = None,
     where: Range | None = None,
+    fz: Number | None = None,
+    moment_x: Number | None = None,
+    moment_y: Number | None = None,
+    moment_z: Number | None = None,
 ) -> None:
-    """Force [N/m] and moment [N m/m] on each of these nodes."""
-    given = {"force_x": fx, "force_y": fy, "moment": moment}
+    """Force [N/m] and moment [N m/m] on each of these nodes, in space [N] and [N m] about the axes."""
+    about_z = moment if moment_z is None else moment_z
+    given = {
+        "force_x": fx, "force_y": fy, "force_z": fz, "moment_x": moment_x, "moment_y": moment_y, "moment": about_z,
+    }  # fmt: skip
     changes = {name: value for name, value in given.items() if value is not None}
     supports.condition(project, LINER_NODE, changes, where)

@@ -46,13 +46,20 @@ UNITS: dict[str, dict[str, str]] = {
                      "temperature": "K", "concentration": "1", "pack_pressure": "Pa"},
     WELL: {"pressure": "Pa", "rate": "m2/s", "injected": "m2", "stage": "1"},
     g.LINER_NODE: {
-        "position_x": "m", "position_y": "m", "displacement_x": "m", "displacement_y": "m", "velocity_x": "m/s",
-        "velocity_y": "m/s", "rotation": "rad", "spin": "rad/s", "reaction_x": "N/m", "reaction_y": "N/m",
-        "reaction_moment": "N m/m", "distance": "m",
+        "position_x": "m", "position_y": "m", "position_z": "m", "displacement_x": "m", "displacement_y": "m",
+        "displacement_z": "m", "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s", "rotation": "rad",
+        "rotation_x": "rad", "rotation_y": "rad", "rotation_z": "rad", "spin": "rad/s", "spin_x": "rad/s",
+        "spin_y": "rad/s", "spin_z": "rad/s", "reaction_x": "N/m", "reaction_y": "N/m", "reaction_z": "N/m",
+        "reaction_moment": "N m/m", "reaction_moment_x": "N m/m", "reaction_moment_y": "N m/m",
+        "reaction_moment_z": "N m/m", "distance": "m",
     },
     g.LINER_ELEMENT: {
         "axial_force": "N/m", "shear_force": "N/m", "moment_first": "N m/m", "moment_last": "N m/m",
-        "axial_strain": "1", "plastic_strain": "1", "plastic_rotation": "rad", "liner_state": "1",
+        **{f"{name}_{part}": unit for name, unit in (("membrane", "N/m"), ("bending", "N m/m"))
+           for part in ("largest", "smallest", "xx", "yy", "xy", "zz", "xz", "yz")},
+        "transverse_shear": "N/m",
+        "axial_strain": "1", "plastic_strain": "1", "plastic_rotation": "rad", "plastic_curvature": "1/m",
+        "liner_state": "1",
         "bond_pressure": "Pa", "bond_shear": "Pa", "gap": "m", "slip": "m", "bond_state": "1", "host": "1",
     },
     MODEL: {

@@ -12,7 +12,7 @@ import numpy as np
 from hpcdem.commands.fdem.recorded import MODEL, UNITS, WELL
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
-from hpcdem.physics.fdem.groups import CHANNEL, NODE, SUPPORTS
+from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE, CHANNEL, LINER_ELEMENT, NODE, SUPPORTS
 from hpcdem.physics.fields import kinds
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.values import QUANTITIES as OF_FLOW
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 _FORCES = ("reaction_x", "reaction_y", "reaction_z")
+OF_LENGTHS = (CHANNEL, BOLT_ELEMENT, BOLT_NODE, LINER_ELEMENT)
+"""Objects whose values are those of a metre, or of one bolt, in space too."""
 
 
 def _of_joints(kind: int) -> Callable[[Any], float]:
@@ -115,7 +117,7 @@ class History:
     @property
     def unit(self) -> str:
         unit = UNITS[self.kind].get(self.value) or user_laws.unit(self.value)
-        if self.dim == 2 or self.kind == CHANNEL or self.kind in SUPPORTS:  # of a metre of a channel; of one bolt
+        if self.dim == 2 or self.kind in OF_LENGTHS:
             return unit
         return {**diagnostics.PER_METRE, "m2": "m3"}.get(unit, unit)
 

@@ -606,29 +606,36 @@ BOLT_FORCE = Model(
 
 LINER = Model(
     "beam", "",
-    "Beams in plane strain, elastic and perfectly plastic, of a metre of thickness of the plane. Either a shell of a "
-    "thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0. The axial force is held "
+    "In the plane beams in plane strain, of a metre of its thickness, elastic and perfectly plastic. Either a shell of "
+    "a thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0. The axial force is held "
     "between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N + Nc) / (Nt + Nc)^2: what a "
-    "rectangle bears that is plastic all over. The bond to the rock is elastic, slips at bond-cohesion + pressure "
+    "rectangle bears that is plastic all over. In space flat shells of a thickness, whose forces and moments are held "
+    "so in their principal directions. The bond to the rock is elastic, slips at bond-cohesion + pressure "
     "tan(bond-friction), and parts for good above bond-tensile-strength. Given again, what elements carry stays.",
     declared(
         LINER_PROPERTIES, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "th{ickness}", "area", "inertia",
         "t{ensile}-s{trength}", "c{ompressive}-s{trength}", "pl{astic}-m{oment}", "n{ormal}-s{tiffness}",
         "s{hear}-s{tiffness}", "b{ond}-t{ensile}-s{trength}", "b{ond}-c{ohesion}", "b{ond}-f{riction}", uniform=True,
     ),
-    of=LINER_PROPERTIES, does="supports.assign",
+    of=LINER_PROPERTIES, dims=BOTH, also=("sh{ell}",), does="supports.assign",
 )  # fmt: skip
 LINER_VELOCITY = Model(
     "l{iner}-n{ode}-c{onstrain}", "", "Velocity of nodes of liners. Components that are not given stay free.",
     (Option("v{elocity}-x", (TABLED,), "velocity along x", "m/s"),
      Option("v{elocity}-y", (TABLED,), "velocity along y", "m/s"),
-     Option("spin", (TABLED,), "rate of rotation, counter-clockwise", "rad/s")), any_of=True, does="liners.velocity",
+     Option("v{elocity}-z", (TABLED,), "velocity along z", "m/s", dims=SPACE),
+     Option("spin", (TABLED,), "rate of rotation, counter-clockwise", "rad/s", dims=PLANE),
+     *(Option(f"spin-{axis}", (TABLED,), f"rate of rotation about {axis}", "rad/s", dims=SPACE) for axis in "xyz")),
+    any_of=True, dims=BOTH, does="liners.velocity",
 )  # fmt: skip
 LINER_FORCE = Model(
-    "l{iner}-n{ode}-f{orce}-b{oundary}-c{ondition}", "", "Force and moment on each node of a liner, of a metre of "
-    "thickness.",
+    "l{iner}-n{ode}-f{orce}-b{oundary}-c{ondition}", "", "Force and moment on each node of a liner, in the plane "
+    "of a metre of thickness.",
     (Option("f{orce}-x", (TABLED,), "force along x", "N/m"), Option("f{orce}-y", (TABLED,), "force along y", "N/m"),
-     Option("m{oment}", (TABLED,), "moment, counter-clockwise", "N m/m")), any_of=True, does="liners.force",
+     Option("f{orce}-z", (TABLED,), "force along z", "N", dims=SPACE),
+     Option("m{oment}", (TABLED,), "moment, counter-clockwise", "N m/m", dims=PLANE),
+     *(Option(f"m{{oment}}-{axis}", (TABLED,), f"moment about {axis}", "N m", dims=SPACE) for axis in "xyz")),
+    any_of=True, dims=BOTH, does="liners.force",
 )  # fmt: skip
 
 # ---- RANGE ---------------------------------------------------------------------------------------------------------
@@ -701,8 +708,7 @@ def _group_command(kind: str, notation: str, also: str = "") -> Command:
     return Command(
         f"{notation} g{{roup}}", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the "
         "one it was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
-        (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
-        dims=BOTH if kind in ("element", "element-face", "face-joint", "node", "bolt-element", "bolt-node") else PLANE,
+        (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind, dims=BOTH,
         also=(f"{also} g{{roup}}",) if also else (), does="assignments.group",
     )  # fmt: skip
 
@@ -1493,28 +1499,29 @@ _OBJECTS = (
             ("pcdc bolt delete range group 'roof'",), ranged="bolt-element", dims=BOTH, does="supports.delete"),
     Command("liner cr{eate}",
             "Puts a liner on the free faces that the range chooses, as things are now: at any stage of a run, "
-            "without force in it. A face has one beam; where faces or liners meet at a point of the mesh they are "
-            "joined, also around a closed opening. Liners have weight, and no contact of their own: what pushes "
+            "without force in it. A face has one beam, in space a triangle; where faces or liners meet at a point, in "
+            "space along an edge, of the mesh they are joined, also around a closed opening. Liners have weight, and "
+            "no contact of their own: what pushes "
             "them is the rock of their faces.",
             ("pcdc liner create group 'shotcrete' range geometry 'tunnel'", "pcdc liner create range boundary y 2 3"),
             options=(Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
-                            more=(SET,)),), ranged="element-face", does="liners.create"),
+                            more=(SET,)),), ranged="element-face", dims=BOTH, does="liners.create"),
     Command("liner c-m{odel}", "The properties of elements of liners, which act from then on.",
             ("pcdc liner c-model beam property density 2400 young 20e9 poisson-ratio 0.2 thickness 0.2 "
              "tensile-strength 2e6 compressive-strength 25e6 normal-stiffness 1e10 shear-stiffness 1e10 "
              "bond-tensile-strength 0.5e6 bond-cohesion 1e6 bond-friction 35 range group 'shotcrete'",),
-            models=(LINER,), ranged="liner-element"),
+            models=(LINER,), ranged="liner-element", dims=BOTH),
     Command("liner del{ete}", "Takes elements of liners out at once. Their numbers go with them, those of the others "
             "stay; without RANGE all of them.", ("pcdc liner delete range group 'shotcrete'",), ranged="liner-element",
-            does="supports.delete"),
+            dims=BOTH, does="supports.delete"),
     _group_command("liner-element", "liner-e{lement}"),
     _group_command("liner-node", "liner-n{ode}"),
     Command("liner-n{ode} bou{ndary}", "What is prescribed at nodes of liners.",
             ("pcdc liner-node boundary l-n-c velocity-x 0 velocity-y 0 spin 0 range group 'footing'",
              "pcdc liner-node boundary l-n-f-b-c force-y -50e3 moment 1e3 range id 3"),
-            models=(LINER_VELOCITY, LINER_FORCE), ranged="liner-node"),
+            models=(LINER_VELOCITY, LINER_FORCE), ranged="liner-node", dims=BOTH),
     Command("liner-n{ode} bou{ndary} rem{ove}", "Takes it back.",
-            ("pcdc liner-node boundary remove range group 'footing'",), ranged="liner-node",
+            ("pcdc liner-node boundary remove range group 'footing'",), ranged="liner-node", dims=BOTH,
             does="supports.remove_conditions"),
 )  # fmt: skip
 

@@ -54,7 +54,7 @@ class Structure(SurfaceLoad):
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
-        self.nodes, self.elements = empty(self.node_columns(blocks.dim), 0), empty(self.of_elements, 0)
+        self.nodes, self.elements = (empty(of(blocks.dim), 0) for of in (self.node_columns, self.element_columns))
         self.rows: list[tuple[float, ...]] = []
         self.conditions: list[Any] = [self.condition_type()]
         self.work = np.zeros(self.flows)
@@ -73,6 +73,11 @@ class Structure(SurfaceLoad):
     def node_columns(cls, dim: int) -> Columns:
         """Columns of the nodes in a model of so many dimensions."""
         return cls.of_nodes
+
+    @classmethod
+    def element_columns(cls, dim: int) -> Columns:
+        """The same of the elements."""
+        return cls.of_elements
 
     # ---- what each kind does its way -----------------------------------------------------------------------------
 
@@ -102,7 +107,7 @@ class Structure(SurfaceLoad):
 
     @abstractmethod
     def ends(self) -> np.ndarray:
-        """(m, 2) nodes of each element. Not collective."""
+        """(m, k) nodes of each element. Not collective."""
 
     @abstractmethod
     def _let_go(self, elements: np.ndarray) -> None:
@@ -296,7 +301,7 @@ class Structure(SurfaceLoad):
         """Inverse of both: the blocks, whose budget is back already, have these."""
         made = cls.of(blocks)
         made.nodes = _wide(tables[f"{cls.word}_nodes"], cls.node_columns(blocks.dim))
-        made.elements = _wide(tables[f"{cls.word}_elements"], cls.of_elements)
+        made.elements = _wide(tables[f"{cls.word}_elements"], cls.element_columns(blocks.dim))
         made.rows = [tuple(row) for row in state["rows"]]
         made.conditions = [cls.condition_type(**one) for one in state["conditions"]]
         made.work = np.array(state["work"])

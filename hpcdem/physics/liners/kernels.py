@@ -1,8 +1,9 @@
-"""Arithmetic of liners: beams that may turn by any angle, their bond to the rock, and the motion of their nodes.
+"""Arithmetic of liners that does not depend on what their elements are: the bond to the rock, the motion of the nodes.
 
-Element e of (m,) is a beam from node ends[e, 0] to ends[e, 1], the rock to its left. Point 2 e + k of (2 m,) is where
-half of it is bound to the rock: its end k on a corner of the host. Forces, moments and masses are per metre of
-thickness. Angles and moments count counter-clockwise; pressure of the bond is positive.
+Elements (m,) have k nodes each, ends (m, k), and point k e + j is where the part of element e at its end j is bound to
+the rock: on a corner of the host. There frame (k m, d, d) has the unit vector across the rock, away from it, and those
+along it. Nodes have d components of translation and one or three of rotation; in the plane forces, moments and masses
+are per metre of thickness. Pressure of the bond is positive.
 """
 
 from __future__ import annotations
@@ -14,23 +15,170 @@ from numba import njit
 
 from hpcdem.physics.fdem.kernels import laws
 
-# Columns of the table of conditions (n, 9): what x, y and the rotation do, at which value; forces and moment.
-DOES_X, AT_X, DOES_Y, AT_Y, DOES_TURN, AT_TURN, FORCE_X, FORCE_Y, MOMENT = range(9)
+# Columns of the table of conditions (n, 18), of component c of x, y, z and the rotations about x, y, z: what it does is
+# DOES + 2 c, at which value AT + 2 c, the force or moment on the node FORCE + c.
+DOES, AT, FORCE = 0, 1, 12
 # Bits of the state of an element, and of the bond at a point.
 IN_TENSION, IN_COMPRESSION, BENDS, HAS_YIELDED, REMOVED = 1, 2, 4, 8, 32
 SLIPS, SLIPPED, PARTED, OPEN = 1, 2, 4, 8
-# Columns of the table of elements (m, 5): E A / L0, E I / L0; forces and moment at which they yield.
-AXIAL, BENDING, TENSION, COMPRESSION, PLASTIC_MOMENT = range(5)
-# Columns of the table of points (2 m, 5): stiffness across and along, tensile strength, cohesion [N/m], tan(friction).
+# Columns of the table of points (k m, 5): stiffness across and along, tensile strength, cohesion [N], tan(friction).
 ACROSS, ALONG, BOND_TENSION, COHESION, FRICTION = range(5)
-# Columns of the table of nodes (n, 4): mass, rotational inertia, weight along x and y [N/m].
-MASS, INERTIA, WEIGHT_X, WEIGHT_Y = range(4)
-# Work (5,) [J/m]: on the rock; lost in beams and in the bond; by conditions; by gravity.
+# Columns of the table of beams (m, 5): E A / L0, E I / L0; forces and moment at which they yield.
+AXIAL, BENDING, TENSION, COMPRESSION, PLASTIC_MOMENT = range(5)
+# Columns of the table of nodes (n, 5): mass, rotational inertia, weight along x, y and z [N].
+MASS, INERTIA, WEIGHT = range(3)
+# Work (5,) [J]: on the rock; lost in elements and in the bond; by conditions; by gravity.
 ON_ROCK, IN_BEAMS, IN_BOND, BY_CONDITIONS, BY_GRAVITY = range(5)
 WORK = 5
 SMOOTH = 22.5
-"""Beams that meet at twice this angle [degrees] or more make a corner."""
+"""Elements that lean from the mean of those at a node by this angle [degrees] or more make a corner there."""
 COS_SMOOTH = math.cos(math.radians(SMOOTH))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def largest_moment(force, tension, compression, plastic):
+    """At a force across the section: M = 4 Mp (Nt - N) (N + Nc) / (Nt + Nc)^2, of a rectangle the exact limit."""
+    if math.isinf(tension):
+        return math.inf
+    both = tension + compression
+    return max(0.0, 4.0 * plastic * (tension - force) * (force + compression) / (both * both))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def apart(one, other, way):
+    """(one - other) . way, of vectors (d,)."""
+    found = 0.0
+    for c in range(len(way)):
+        found += (one[c] - other[c]) * way[c]
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bond(ends, frame, state, bound, points, step, rock, gap, slip, pressure, shear, bond_state, work):
+    """New pressures (k m,) and shear forces (k m, d - 1) [N] of the bond, from the ways of the nodes and of the rock.
+
+    p = -K_n gap, 0 where a parted one is open; it parts where p < -T. f -= K_s ds, |f| <= C + p tan(phi), without C
+    where it has parted. On the liner act p away from the rock and f along it; slip: plastic part of s [m].
+    """
+    corners, along = ends.shape[1], shear.shape[1]
+    slid, trial = np.zeros(along), np.zeros(along)
+    for q in range(len(gap)):
+        e = q // corners
+        bond_state[q] &= ~(SLIPS | OPEN)
+        if not bound[q] or state[e] & REMOVED:
+            continue
+        i = ends[e, q % corners]
+        open_by = apart(step[i], rock[q], frame[q, 0])
+        k, p = points[q, ACROSS], pressure[q]
+        gap[q] += open_by
+        new = -k * gap[q]
+        if not bond_state[q] & PARTED and new < -points[q, BOND_TENSION]:
+            bond_state[q] |= PARTED
+        if bond_state[q] & PARTED and new < 0.0:
+            new = 0.0
+            bond_state[q] |= OPEN
+        work[IN_BOND] -= 0.5 * (p + new) * open_by + 0.5 * (new * new - p * p) / k
+        pressure[q] = new
+        k = points[q, ALONG]
+        if k == 0.0:
+            continue
+        most = max(0.0, (0.0 if bond_state[q] & PARTED else points[q, COHESION]) + new * points[q, FRICTION])
+        for a in range(along):
+            slid[a] = apart(step[i], rock[q], frame[q, 1 + a])
+            trial[a] = shear[q, a] - k * slid[a]
+        size = abs(trial[0]) if along == 1 else math.sqrt(trial[0] * trial[0] + trial[1] * trial[1])
+        slips = size > most
+        if slips:
+            bond_state[q] |= SLIPS | SLIPPED
+        for a in range(along):
+            held, f = trial[a], shear[q, a]
+            if slips:
+                held = math.copysign(most, trial[a]) if along == 1 else trial[a] * (most / size)
+                slip[q, a] += (held - trial[a]) / k
+            work[IN_BOND] -= 0.5 * (f + held) * slid[a] + 0.5 * (held * held - f * f) / k
+            shear[q, a] = held
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def given(conditions, nodes, parts, dim, total, on_rock):
+    """What conditions and gravity do, total (n, len(parts)); nothing on the rock, on_rock (k m, d) [N]."""
+    for i in range(len(total)):
+        for c in range(len(parts)):
+            total[i, c] = conditions[i, FORCE + parts[c]]
+        for c in range(dim):
+            total[i, c] += nodes[i, WEIGHT + c]
+    on_rock[:] = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def hold(q, i, frame, pressure, shear, total, on_rock):
+    """Add what the bond at point q does on node i, and the opposite on the rock."""
+    for c in range(frame.shape[1]):
+        f = pressure[q] * frame[q, 0, c]
+        for a in range(shear.shape[1]):
+            f += shear[q, a] * frame[q, 1 + a, c]
+        total[i, c] += f
+        on_rock[q, c] = -f
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def move(x, v, spin, parts, total, conditions, nodes, dt, alpha, reaction, step, work):
+    """Move the nodes over a step dt with the forces and moments on them, and give them new rates of rotation; parts:
+    components of the conditions that there are; alpha: local damping. Fills step (n, d), the way of each, and reaction
+    (n, len(parts)), what conditions had to add."""
+    dim = x.shape[1]
+    for i in range(len(x)):
+        if nodes[i, MASS] == 0.0:
+            step[i] = 0.0
+            continue
+        by_gravity = 0.0
+        for c in range(len(parts)):
+            does, at, force = DOES + 2 * parts[c], AT + 2 * parts[c], FORCE + parts[c]
+            inert, old = nodes[i, MASS if c < dim else INERTIA], v[i, c] if c < dim else spin[i, c - dim]
+            new = old + dt / inert * laws.damped(total[i, c], old, alpha)
+            reaction[i, c] = 0.0
+            if conditions[i, does] != 0.0:
+                new = conditions[i, at]
+                reaction[i, c] = inert * (new - old) / dt - total[i, c]
+            mean = 0.5 * dt * (old + new)
+            work[BY_CONDITIONS] += (reaction[i, c] + conditions[i, force]) * mean
+            if c < dim:
+                by_gravity += nodes[i, WEIGHT + c] * mean
+                step[i, c], v[i, c] = new * dt, new
+                x[i, c] += new * dt
+            else:
+                spin[i, c - dim] = new
+        work[BY_GRAVITY] += by_gravity
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def host_points(point, row, corner, x, stride, seen):
+    """Where the rock is at points (k,) whose host is held here: corner of storage row of x, of which one begins every
+    `stride` words; fills seen (all points, d)."""
+    for m in range(len(point)):
+        q = point[m]
+        for c in range(seen.shape[1]):
+            seen[q, c] = x[row[m], stride * corner[q] + c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def add(point, row, corner, on_rock, stride, applied):
+    """Add forces of points (k,) on the rock to the corners of their hosts, applied (rows, 4 stride) [N]."""
+    for m in range(len(point)):
+        q = point[m]
+        for c in range(on_rock.shape[1]):
+            applied[row[m], stride * corner[q] + c] += on_rock[q, c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def work_on_rock(before, after, rock, work):
+    """Add what the mean of the forces (points, d) at both ends of a step did on the rock."""
+    for q in range(len(rock)):
+        for c in range(rock.shape[1]):
+            work[ON_ROCK] += 0.5 * (before[q, c] + after[q, c]) * rock[q, c]
+
+
+# ---- beams, the elements in the plane: the rock is to the left on the way from the first node to the last ------------
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -47,9 +195,10 @@ def shape(ax, ay, bx, by, turn_a, turn_b, angle):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def tangents(ends, along, state, mean, tangent):
-    """Unit vectors along the rock at points, tangent (2 m, 2): the mean of both beams at a node, or else a liner could
-    not slide along a polygon; where it has a corner, more than SMOOTH from the mean, that of the beam itself."""
+def frames(ends, along, state, mean, frame):
+    """Unit vectors across and along the rock at points, frame (2 m, 2, 2): along the mean of both beams at a node, or
+    else a liner could not slide along a polygon; where it has a corner, more than SMOOTH from the mean, along the beam
+    itself."""
     mean[:] = 0.0
     for e in range(len(ends)):
         if not state[e] & REMOVED:
@@ -60,18 +209,11 @@ def tangents(ends, along, state, mean, tangent):
         for k in range(2):
             i, q = ends[e, k], 2 * e + k
             size = math.sqrt(mean[i, 0] * mean[i, 0] + mean[i, 1] * mean[i, 1])
-            tangent[q, 0], tangent[q, 1] = along[e, 0], along[e, 1]
+            tx, ty = along[e, 0], along[e, 1]
             if size > 0.0 and (mean[i, 0] * along[e, 0] + mean[i, 1] * along[e, 1]) > COS_SMOOTH * size:
-                tangent[q, 0], tangent[q, 1] = mean[i, 0] / size, mean[i, 1] / size
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def largest_moment(force, tension, compression, plastic):
-    """At an axial force: M = 4 Mp (Nt - N) (N + Nc) / (Nt + Nc)^2, of a rectangle the exact plastic limit."""
-    if math.isinf(tension):
-        return math.inf
-    both = tension + compression
-    return max(0.0, 4.0 * plastic * (tension - force) * (force + compression) / (both * both))
+                tx, ty = mean[i, 0] / size, mean[i, 1] / size
+            frame[q, 0, 0], frame[q, 0, 1] = ty, -tx
+            frame[q, 1, 0], frame[q, 1, 1] = tx, ty
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -134,51 +276,8 @@ def bend(ends, x, turn, elements, angle, along, form, force, plastic, state, wor
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def bond(ends, tangent, state, bound, points, step, rock, gap, slip, pressure, shear, bond_state, work):
-    """New pressures and shear forces (2 m,) [N/m] of the bond, from the ways of the nodes and of the rock.
-
-    p = -K_n gap, 0 where a parted one is open; it parts where p < -T. f -= K_s ds, |f| <= C + p tan(phi), without C
-    where it has parted. On the liner act p away from the rock and f along it; slip: plastic part of s [m].
-    """
-    for q in range(len(gap)):
-        e = q // 2
-        bond_state[q] &= ~(SLIPS | OPEN)
-        if not bound[q] or state[e] & REMOVED:
-            continue
-        i, tx, ty = ends[e, q % 2], tangent[q, 0], tangent[q, 1]
-        dx, dy = step[i, 0] - rock[q, 0], step[i, 1] - rock[q, 1]
-        open_by, slid = dx * ty - dy * tx, dx * tx + dy * ty
-        k, p = points[q, ACROSS], pressure[q]
-        gap[q] += open_by
-        new = -k * gap[q]
-        if not bond_state[q] & PARTED and new < -points[q, BOND_TENSION]:
-            bond_state[q] |= PARTED
-        if bond_state[q] & PARTED and new < 0.0:
-            new = 0.0
-            bond_state[q] |= OPEN
-        work[IN_BOND] -= 0.5 * (p + new) * open_by + 0.5 * (new * new - p * p) / k
-        pressure[q] = new
-        k, f = points[q, ALONG], shear[q]
-        if k == 0.0:
-            continue
-        most = max(0.0, (0.0 if bond_state[q] & PARTED else points[q, COHESION]) + new * points[q, FRICTION])
-        trial = f - k * slid
-        held = min(max(trial, -most), most)
-        if held != trial:
-            bond_state[q] |= SLIPS | SLIPPED
-            slip[q] += (held - trial) / k
-        work[IN_BOND] -= 0.5 * (f + held) * slid + 0.5 * (held * held - f * f) / k
-        shear[q] = held
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def node_forces(ends, along, tangent, form, force, state, pressure, shear, nodes, conditions, total, on_rock):
-    """Forces and moments on nodes, total (n, 3), and of points on the rock, on_rock (2 m, 2) [N/m]."""
-    for i in range(len(total)):
-        total[i, 0] = conditions[i, FORCE_X] + nodes[i, WEIGHT_X]
-        total[i, 1] = conditions[i, FORCE_Y] + nodes[i, WEIGHT_Y]
-        total[i, 2] = conditions[i, MOMENT]
-    on_rock[:] = 0.0
+def push(ends, along, frame, form, force, state, pressure, shear, total, on_rock):
+    """Add forces and moments of beams and bond on nodes, total (n, 3), and of points on the rock, on_rock (2 m, 2)."""
     for e in range(len(ends)):
         if state[e] & REMOVED:
             continue
@@ -193,76 +292,4 @@ def node_forces(ends, along, tangent, form, force, state, pressure, shear, nodes
         total[b, 1] -= fy
         total[b, 2] -= force[e, 2]
         for k in range(2):
-            q, i = 2 * e + k, ends[e, k]
-            tx, ty = tangent[q, 0], tangent[q, 1]
-            fx, fy = pressure[q] * ty + shear[q] * tx, shear[q] * ty - pressure[q] * tx
-            total[i, 0] += fx
-            total[i, 1] += fy
-            on_rock[q, 0], on_rock[q, 1] = -fx, -fy
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def move(x, v, turn, spin, total, conditions, nodes, dt, alpha, reaction, step, work):
-    """Move and turn the nodes over a step dt with the forces and moments on them; alpha: local damping. Fills step
-    (n, 2), the way of each, and reaction (n, 3), what conditions had to add."""
-    for i in range(len(x)):
-        m, j = nodes[i, MASS], nodes[i, INERTIA]
-        if m == 0.0:
-            step[i, 0] = step[i, 1] = 0.0
-            continue
-        vx = v[i, 0] + dt / m * laws.damped(total[i, 0], v[i, 0], alpha)
-        vy = v[i, 1] + dt / m * laws.damped(total[i, 1], v[i, 1], alpha)
-        w = spin[i] + dt / j * laws.damped(total[i, 2], spin[i], alpha)
-        reaction[i, 0] = reaction[i, 1] = reaction[i, 2] = 0.0
-        if conditions[i, DOES_X] != 0.0:
-            vx = conditions[i, AT_X]
-            reaction[i, 0] = m * (vx - v[i, 0]) / dt - total[i, 0]
-        if conditions[i, DOES_Y] != 0.0:
-            vy = conditions[i, AT_Y]
-            reaction[i, 1] = m * (vy - v[i, 1]) / dt - total[i, 1]
-        if conditions[i, DOES_TURN] != 0.0:
-            w = conditions[i, AT_TURN]
-            reaction[i, 2] = j * (w - spin[i]) / dt - total[i, 2]
-        mean_x, mean_y, mean_w = 0.5 * dt * (v[i, 0] + vx), 0.5 * dt * (v[i, 1] + vy), 0.5 * dt * (spin[i] + w)
-        work[BY_CONDITIONS] += (reaction[i, 0] + conditions[i, FORCE_X]) * mean_x
-        work[BY_CONDITIONS] += (reaction[i, 1] + conditions[i, FORCE_Y]) * mean_y
-        work[BY_CONDITIONS] += (reaction[i, 2] + conditions[i, MOMENT]) * mean_w
-        work[BY_GRAVITY] += nodes[i, WEIGHT_X] * mean_x + nodes[i, WEIGHT_Y] * mean_y
-        step[i, 0], step[i, 1] = vx * dt, vy * dt
-        v[i, 0], v[i, 1], spin[i] = vx, vy, w
-        x[i, 0] += vx * dt
-        x[i, 1] += vy * dt
-        turn[i] += w * dt
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def host_points(point, row, corner, x, seen):
-    """Where the rock is at points (k,) whose host is held here: corner of storage row of x; fills seen (2 m, 2)."""
-    for m in range(len(point)):
-        q = point[m]
-        seen[q, 0], seen[q, 1] = x[row[m], 2 * corner[q]], x[row[m], 2 * corner[q] + 1]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def add(point, row, corner, on_rock, applied):
-    """Add forces of points (k,) on the rock to the corners of their hosts, applied (rows, 8) [N/m]."""
-    for m in range(len(point)):
-        q = point[m]
-        applied[row[m], 2 * corner[q]] += on_rock[q, 0]
-        applied[row[m], 2 * corner[q] + 1] += on_rock[q, 1]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def work_on_rock(before, after, rock, work):
-    """Add what the mean of the forces (2 m, 2) at both ends of a step did on the rock."""
-    for q in range(len(rock)):
-        work[ON_ROCK] += 0.5 * (before[q, 0] + after[q, 0]) * rock[q, 0]
-        work[ON_ROCK] += 0.5 * (before[q, 1] + after[q, 1]) * rock[q, 1]
-
-
-def stored(force: np.ndarray, elements: np.ndarray) -> np.ndarray:
-    """Elastic energy (m,) [J/m] of beams: N^2 L / (2 E A) + L (Ma^2 - Ma Mb + Mb^2) / (6 E I)."""
-    n, a, b = force.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found = n**2 / (2.0 * elements[:, AXIAL]) + (a * a - a * b + b * b) / (6.0 * elements[:, BENDING])
-    return np.where(elements[:, AXIAL] > 0.0, found, 0.0)
+            hold(2 * e + k, ends[e, k], frame, pressure, shear, total, on_rock)

@@ -74,3 +74,57 @@ def closing(points: np.ndarray, goes_on: np.ndarray) -> list[tuple[int, int]]:
         for a, b in zip(starts, np.append(starts[1:], len(points)), strict=True)
         if points[a, 0] == points[b - 1, 1] and b - a > 2
     ]
+
+
+def joined(
+    points: np.ndarray, places: np.ndarray, old: np.ndarray, old_nodes: np.ndarray, at: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Nodes of triangles, which are joined along an edge of the mesh where two meet.
+
+    points (m, 3): of the mesh, of each face, counter-clockwise; places (m, 3, 3) [m]: where these are now; old,
+    old_nodes (k, 3): points and nodes of triangles of before; at (n, 3) [m]: where their nodes are.
+
+    Returns the nodes of the faces (m, 3), new ones from n on; a label of each face (m,), equal where faces hang
+    together; and how many edges where more than two faces meet, or that have come apart, part them.
+    """
+    m, n = len(points), len(at)
+    place = np.concatenate([places.reshape(-1, 3), at])
+    of_corner = np.concatenate([np.arange(3 * m).reshape(-1, 3), 3 * m + old_nodes])
+    parent, label = np.arange(3 * m + n), np.arange(m)
+    known = np.concatenate([np.full(3 * m, -1), np.arange(n)])  # node of before of each set of corners
+
+    def root(of: np.ndarray, i: int) -> int:
+        while of[i] != i:
+            of[i] = i = of[of[i]]
+        return i
+
+    sides = defaultdict(list)
+    for t, three in enumerate(np.concatenate([points, old]).tolist()):
+        for k in range(3):
+            a, b = three[k], three[(k + 1) % 3]
+            sides[min(a, b), max(a, b)].append((t, k, a < b))
+    parted = 0
+    for found in sides.values():
+        if len(found) == 1 or all(t >= m for t, _, _ in found):
+            continue
+        (t, k, up), (s, j, other_up) = found[:2]
+        mine, others = of_corner[t, [k, (k + 1) % 3]], of_corner[s, [(j + 1) % 3, j]]
+        gap = np.linalg.norm(place[mine] - place[others], axis=1).max()
+        pairs = [(root(parent, a), root(parent, b)) for a, b in zip(mine.tolist(), others.tolist(), strict=True)]
+        both = any(a != b and known[a] >= 0 and known[b] >= 0 for a, b in pairs)
+        if len(found) > 2 or up == other_up or both or gap > NEAR * np.linalg.norm(np.subtract(*place[mine])):
+            parted += 1
+            continue
+        for a, b in pairs:
+            a, b = root(parent, a), root(parent, b)
+            parent[max(a, b)] = min(a, b)
+            known[min(a, b)] = max(known[a], known[b])
+        if s < m:
+            label[root(label, s)] = root(label, t)
+    node: dict[int, int] = {}
+    out = np.empty(3 * m, np.int64)
+    for i in range(3 * m):
+        top = root(parent, i)
+        out[i] = known[top] if known[top] >= 0 else node.setdefault(top, n + len(node))
+    _, labels = np.unique([root(label, t) for t in range(m)], return_inverse=True)
+    return out.reshape(-1, 3), labels.reshape(-1), parted

@@ -1,4 +1,4 @@
-"""The property of liners: all of a metre of thickness of the plane."""
+"""The property of liners: in the plane of a metre of its thickness, in space of a shell."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ def _section(values: dict[str, Any]) -> None:
     """Area and second moment from the thickness, the plastic moment of the rectangle from its strengths."""
     thick = values.get("thickness")
     if thick is None and not {"area", "inertia"} <= values.keys():
-        raise CommandError("a liner needs its thickness, or area and inertia of its section (of steel sets)")
+        raise CommandError(
+            "a liner needs its thickness, in the plane or area and inertia of its section (of steel sets)"
+        )
     values.setdefault("area", thick)
     values.setdefault("inertia", thick * thick * thick / 12.0 if thick is not None else None)
     values.setdefault("thickness", math.sqrt(12.0 * values["inertia"] / values["area"]))
@@ -36,7 +38,7 @@ def _section(values: dict[str, Any]) -> None:
 LINER = Model(
     "beam",
     LINER_ELEMENT,
-    "beam, elastic and perfectly plastic in force and moment, on springs that part and slip",
+    "beam, in space flat shell, elastic and perfectly plastic in force and moment, on springs that part and slip",
     (
         Property("density", "kg/m3", "density", low_itself=False),
         Property("young", "Pa", "Young's modulus E", low_itself=False),
@@ -45,9 +47,9 @@ LINER = Model(
         Property("thickness", "m", "thickness of the shell; without area and inertia it gives both", optional=True,
                  otherwise="that of a rectangle of this area and inertia", low_itself=False),
         Property("area", "m2/m", "area of the section over the spacing of steel sets", optional=True,
-                 otherwise="the thickness", low_itself=False),
+                 otherwise="the thickness", low_itself=False, dims=(2,)),
         Property("inertia", "m4/m", "second moment of the section over the spacing of steel sets", optional=True,
-                 otherwise="thickness^3 / 12", low_itself=False),
+                 otherwise="thickness^3 / 12", low_itself=False, dims=(2,)),
         Property("tensile_strength", "Pa", "strength in tension; with compressive_strength", math.inf,
                  otherwise="never"),
         Property("compressive_strength", "Pa", "strength in compression; with tensile_strength", math.inf,

@@ -20,8 +20,18 @@ SHOTCRETE = {
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
+    _step(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]), threads)
+
+
+def in_space(threads: int = 1) -> None:
+    """The same of those of a model in space. Writes nothing."""
+    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
+    _step(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
+
+
+def _step(mesh: Mesh, threads: int) -> None:
     sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]))
+    sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     liners = Liners.of(sim)
     _, elements = liners.create(np.array([0, 1]))

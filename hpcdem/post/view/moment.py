@@ -35,7 +35,9 @@ UNITS = {
     "Pa": ("stress", "pressure", "suction", "ebmod", "gbmod", "tstrength", "sstrength"),
     "m": ("x", "y", "radius", "displacement", "opening", "slip", "length", "aperture", "overlap", "position",
           "distance"),
-    "m/s": ("velocity", "vx", "vy", "incoming"), "m/s2": ("acceleration",), "N/m": ("contact_force", "nodal_force"),
+    "m/s": ("velocity", "vx", "vy", "incoming"), "m/s2": ("acceleration",),
+    "N/m": ("contact_force", "nodal_force", "membrane", "transverse"),
+    "N m/m": ("bending",), "1/m": ("curvature",),
     "W/m2": ("heat_flux",), "W/(m2 K)": ("transfer_coefficient",),
     "rad/s": ("spin",), "rad": ("angle", "rotation"), "s": ("time",),
     "N": ("force", "fx", "fy", "fn", "fs"), "N m": ("torque", "moment"), "K": ("temperature",), "kg": ("mass",),
@@ -43,14 +45,16 @@ UNITS = {
     "m2/s": ("flow_rate", "inflow"),
 }  # fmt: skip
 """Units by the word, or the end of the word, that says what a field is."""
+OF_LENGTHS = ("flow_rate", "membrane", "transverse", "bending")
+"""Beginnings of fields that are of a metre in space too: of a channel, of a shell."""
 
 KEPT = 40e6
 """Bytes of columns of a kind of object that are kept: those of the colours on show, and a few more."""
 CHUNK = 1 << 16
 """Rows that are looked at at a time."""
 PARTS = {
-    "x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "middle", "min", "mean", "mises", "largest", "first",
-    "last", "shear",
+    "x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "middle", "min", "mean", "mises", "largest",
+    "smallest", "first", "last", "shear",
 }  # fmt: skip
 """Ends of the names of fields that change no unit."""
 
@@ -61,7 +65,7 @@ _Reader = Callable[[slice], np.ndarray]
 
 def unit_of(name: str, dim: int = 2) -> str:
     """The unit of a field of a frame, "" for numbers without one, and for those that are not known here."""
-    if dim == 3 and name != "flow_rate":  # of a metre of a channel
+    if dim == 3 and not name.startswith(OF_LENGTHS):
         unit = unit_of(name)
         return PER_METRE.get(unit, unit)
     words = name.split("_")
@@ -553,13 +557,16 @@ def _supports(name: str, tables: Mapping[str, Mapping[str, np.ndarray]]) -> Obje
     rows = np.arange(len(first))
     if name == "liners":
         rows = np.flatnonzero(elements["liner_state"].astype(np.int64) & liners.DELETED == 0)
-    last = elements.get("last_node", first + 1)
-    ends = np.stack([at[first[rows]], at[last[rows]]], axis=1)
-    kind = RODS if ends.shape[2] == 3 else LINES
+    between = [elements["second_node"]] if "second_node" in elements else []
+    nodes_of = np.column_stack([first, *between, elements.get("last_node", first + 1)])[rows].astype(np.int64)
+    ends = at[nodes_of]
+    kind = RODS if at.shape[1] == 3 else LINES
+    shape: tuple[np.ndarray, ...] = (ends,)
+    if between:  # triangles
+        kind, shape = FACES, (at, np.column_stack([nodes_of, np.full(len(rows), -1)]))
     vectors = {}
     for stem in VECTORS:
         parts = [nodes[f"{stem}_{axis}"] for axis in "xyz"[: at.shape[1]] if f"{stem}_{axis}" in nodes]
-        if parts:  # means of both ends
-            values = np.column_stack(parts)
-            vectors[stem] = 0.5 * (values[first[rows]] + values[last[rows]])
-    return Objects(kind, len(rows), lambda: (ends,), {k: v[rows] for k, v in elements.items()}, vectors)
+        if parts:
+            vectors[stem] = np.column_stack(parts)[nodes_of].mean(axis=1)
+    return Objects(kind, len(rows), lambda: shape, {k: v[rows] for k, v in elements.items()}, vectors)

@@ -155,8 +155,10 @@ STILL = 1e-9
 def default_view(moment: Moment) -> ModelView:
     """Everything that the frame has, as it is usually shown: discs by their colours, elements by what has happened to
     them (`telling`), channels by the pressure in them, joints by the way they broke; `HIDDEN` is there, and hidden.
-    Rods shine through the elements around them. Of many frames the last one says what is shown in all of them."""
-    inside = any(objects.kind == RODS and name not in HIDDEN for name, objects in moment.objects.items())
+    Rods and shells shine through the elements around them. Of many frames the last one says what is shown in all of
+    them."""
+    shells = moment.dim == 3 and "liners" in moment.objects
+    inside = shells or any(objects.kind == RODS and name not in HIDDEN for name, objects in moment.objects.items())
     looks: dict[str, dict[str, Any]] = {}
     if "elements" in moment.objects:
         field = telling(moment)
@@ -166,6 +168,8 @@ def default_view(moment: Moment) -> ModelView:
         }  # fmt: skip
     if "channels" in moment.objects and _varies(moment.of("channels"), "fluid_pressure"):
         looks["channels"] = {"field": "fluid_pressure", "colours": "blue-red"}
+    if shells and _varies(moment.of("liners"), "membrane_smallest"):
+        looks["liners"] = {"field": "membrane_smallest", "colours": "blue-red"}
     return ModelView(
         layers=tuple(
             Layer(object=name, visible=name not in HIDDEN, **looks.get(name, {}))
