@@ -126,7 +126,7 @@ class Session:
         if self.ends_with_frame and sim.timers.steps and (sim.last_frame or (-1,))[0] != sim.clock.step:
             from hpcdem.commands.dem import output
 
-            sim.close()
+            sim.close_model()
             output.Snapshot(sim).write_print()
         if sim.timers.steps:
             report_end(sim)
@@ -307,7 +307,7 @@ def draw_last_state(sim: Simulation, log: Log) -> None:
         from hpcdem.commands.dem import output
         from hpcdem.physics.dem import diagnostics
 
-        sim.close()
+        sim.close_model()
         output.folder(sim)
         frame = diagnostics.frame(sim)
         frame.tables = {"particles": frame.tables["particles"]}

@@ -463,7 +463,7 @@ class Simulation(ParticleCommands, BlockCommands):
     def _set_field(self, name: str, values: Any) -> None:
         engine = self.engine
         if name in ("x", "y", "radius"):
-            engine.open()
+            engine.open_model()
         values = np.asarray(values)
         if name == "group":
             names = np.unique(np.concatenate([np.unique(v) for v in engine.comm.allgather(values.astype(str))]))
@@ -772,7 +772,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     def _ready(self) -> None:
         """Lists, ghosts and masses in place, as kernels that look at contacts need them."""
-        self.engine.close()
+        self.engine.close_model()
 
     def _existing(self, file: str | Path) -> str:
         """A file to read: in `directory`, then in data below it; looked for by rank 0."""

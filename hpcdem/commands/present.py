@@ -24,7 +24,7 @@ def particles(sim: Simulation) -> Path | None:
     """`now/all_<step>.vtkhdf` of particles; None if there are none. Collective, for one rank."""
     if not len(sim.particles.hot[sim.particles.owned]):
         return None
-    sim.close()
+    sim.close_model()
     output.settle(sim)
     path = output.folder(sim) / run_folder.PRESENT / frame_name(sim.clock.step, ".vtkhdf")
     return _alone(path, lambda: write_vtkhdf(path, diagnostics.frame(sim), sim.comm))

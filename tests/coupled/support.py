@@ -63,7 +63,7 @@ def momentum(both: Coupled) -> np.ndarray:
     """Momentum in x and y, and about the origin, of all there is (on one rank)."""
     blocks, p = both.blocks, both.particles.particles
     blocks.close_model()
-    both.particles.close()
+    both.particles.close_model()
     single = p.clump < 0 if both.particles.clumps else np.ones(len(p), bool)
     bodies = {"mass": both.particles.body[single, 0], "inertia": both.particles.body[single, 1],
               **{name: p[name][single] for name in ("x", "y", "vx", "vy", "spin")}}  # fmt: skip

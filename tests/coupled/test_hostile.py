@@ -65,7 +65,7 @@ def test_the_smaller_time_step_is_chosen(tmp_path):
     for kn in (1e4, 1e12):
         sim = discs([(0.5, 0.71, 0.1)], tmp_path)
         properties.prop(sim, kn=kn)
-        sim.close()
+        sim.close_model()
         both = Coupled(sim, body(rectangle(6, 3, 1.2, 0.6)))
         steps[kn] = both.settle_time_step()
         alone = both.blocks.local.critical_time_step()

@@ -93,7 +93,7 @@ def test_who_runs_away_through_the_box_between_two_looks_stops_the_run(tmp_path,
     )  # nobody has told it to look, or to glance
     for _ in range(5):
         sim.step()
-    sim.open()
+    sim.open_model()
     if speed < 500.0:
         cycles.cycle(sim, 1)
         assert "1 particles left the BOX" in said.getvalue() and len(sim.particles) == 1

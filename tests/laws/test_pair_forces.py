@@ -42,7 +42,7 @@ def heap(folder: Path, law: str, bonded: str, threads: int = 1) -> Simulation:
     properties.prop(sim, Interval("x", 0.0, 20.0), fric=0.1)
     for half in BONDS[bonded]:
         bonds.bond(sim, HALVES[half], tolerate=0.1, **STRENGTHS[half])
-    sim.open()
+    sim.open_model()
     p, rng = sim.particles, np.random.default_rng(7)
     for name, size in (("x", 0.035), ("y", 0.035), ("vx", 1.0), ("vy", 1.0), ("spin", 2.0)):
         p[name][:] += size * rng.uniform(-1.7, 1.7, len(p))[p["gid"]]

@@ -32,7 +32,7 @@ def cloud(folder: Path, hertz: bool, seed: int, **options: float | str) -> Simul
     walls.box(sim, 0.1, 30.1, 0.1, 30.0)
     sim.settings.wallside = "left"
     walls.wall(sim, 30, ((3.0, 25.0), (20.0, 12.0)), kn=2e6, ks=1e6, fric=0.1)
-    sim.open()
+    sim.open_model()
     p, rng = sim.particles, np.random.default_rng(seed)
     for name, size in (("x", 0.5), ("y", 0.5), ("vx", 1.0), ("vy", 1.0), ("spin", 2.0)):
         p[name][:] += size * rng.uniform(-1.0, 1.0, len(p))[p["gid"]]

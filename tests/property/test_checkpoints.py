@@ -74,7 +74,7 @@ def busy(folder: Path, number: int, steps: int) -> Simulation:
     bonds.bond(sim, n_bond=rng.choice([1e3, 1e9]), s_bond=1e9, tolerate=0.3)
     cycles.cycle(sim, steps)
     if rng.random() < 0.5:  # an open model
-        sim.open()
+        sim.open_model()
     return sim
 
 

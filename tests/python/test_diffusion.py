@@ -44,7 +44,8 @@ def test_modes_of_a_row_decay_as_computed(tmp_path, threads, conductance, capaci
     sim = row_of_discs(tmp_path, threads, conductance, capacity)
     mode = np.cos(math.pi * q * (np.arange(N) + 0.5) / N)
     sim.particles["temperature"][:] = 10.0 + mode
-    sim.close()
+    with pytest.warns(DeprecationWarning, match="close_model"):
+        sim.close()  # its name before
     for _ in range(50):
         sim.step()
     rate = 4.0 * conductance / (capacity * MASS) * math.sin(math.pi * q / (2 * N)) ** 2
@@ -58,7 +59,7 @@ def test_heat_is_kept_and_sources_give_theirs(tmp_path):
     diffusion = sim.physics[0]
     sim.particles["temperature"][3] = 100.0
     sim.particles["heat_source"][20] = 7.0
-    sim.close()
+    sim.close_model()
     before = diffusion.diagnostics()["heat"][1](sim)
     for _ in range(40):
         sim.step()
@@ -71,7 +72,7 @@ def test_discs_apart_keep_their_heat(tmp_path):
     sim = row_of_discs(tmp_path)
     sim.particles["x"][12:] += 0.05
     sim.particles["temperature"][:12] = 1.0
-    sim.close()
+    sim.close_model()
     for _ in range(10):
         sim.step()
     assert np.ptp(sim.particles["temperature"][:12]) == 0.0 and not sim.particles["temperature"][12:].any()
@@ -106,7 +107,7 @@ def test_the_limit_of_the_time_step(tmp_path):
     from hpcdem.commands.dem import cycles
 
     sim = row_of_discs(tmp_path)
-    sim.close()
+    sim.close_model()
     limit = sim.physics[0].stable_time_step(sim)
     assert limit == pytest.approx(2.0 * MASS / 6.0, rel=1e-12)
     sim.settings.dt = 1.01 * limit
@@ -119,7 +120,7 @@ def test_a_limit_that_falls_in_mid_run_stops_it(tmp_path):
     sim = row_of_discs(tmp_path)
     sim.particles["x"][:] *= 1.5
     sim.settings.dt = sim.clock.dt = 1.0
-    sim.close()
+    sim.close_model()
     sim.step()
     sim.particles["x"][:] /= 1.5
     with pytest.raises(PhysicsError, match=r"time step 1 s is beyond the stability limit of diffusion, 0\.52"):
@@ -160,7 +161,7 @@ def test_new_particles_have_initial_values_and_the_removed_take_theirs_along(tmp
 def test_state_and_its_fingerprint(tmp_path):
     sim = row_of_discs(tmp_path)
     sim.particles["temperature"][:] = np.arange(N)
-    sim.close()
+    sim.close_model()
     sim.step()
     before = diagnostics.fingerprint(sim)
     saved_state.save(sim, tmp_path / "a.sav")

@@ -81,8 +81,8 @@ def bond(
         return 0
 
     # Lists that are sure to hold every pair within the search distance, made at the present positions.
-    sim.open()
-    sim.close(least_skin=reach)
+    sim.open_model()
+    sim.close_model(least_skin=reach)
     lists, p = sim.lists, sim.particles
     which = _flags_with_ghosts(sim, where)
     renewed = _renewed(sim, kind, given).astype(np.int32)
@@ -211,7 +211,7 @@ def warn_of_two_stiffnesses(sim: Simulation) -> None:
 def break_bonds(sim: Simulation, where: Selection | None = None) -> int:
     """BOND break: remove the bonds with both ends in `where`; how many. Shear forces stay, limited by friction from
     then on."""
-    sim.close()
+    sim.close_model()
     lists = sim.lists
     which = _flags_with_ghosts(sim, where)
     gone = sum(

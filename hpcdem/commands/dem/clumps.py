@@ -135,7 +135,7 @@ def join(sim: Simulation, where: Selection | None = None, group: str | None = No
     """
     _need_discs(sim)
     sim.prepare_kernels("clumps")
-    sim.open()
+    sim.open_model()
     p = sim.particles
     which = chosen(sim, where)
     mine = tuple(p[name][which].copy() for name in ("gid", "x", "y", "radius", "vx", "vy", "spin", "material", "fix"))

@@ -107,7 +107,7 @@ def prepare(sim: Simulation, dt_known: bool = False) -> None:
             f"there are clumps, and SET disk is {sim.settings.disk}: their mass is density times area, so they need "
             "SET disk on"
         )
-    sim.close()
+    sim.close_model()
     _check_laws(sim)
     dt = sim.clock.dt if dt_known else time_step(sim)
     if dt != sim.clock.dt:

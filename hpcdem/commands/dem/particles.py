@@ -258,7 +258,7 @@ def delete(sim: Simulation, where: Selection | None = None) -> int:
     which = chosen(sim, where)
     if not sim.comm.any(bool(which.any())):
         return 0
-    sim.open()
+    sim.open_model()
     return sim.remove(chosen(sim, where))
 
 
@@ -338,7 +338,7 @@ def add_part(
 ) -> int:
     """The same for rows of which each rank has a part of its own: the `before`-th to the last of them, of `total`;
     group: of all or (n,) i8 of each of these rows."""
-    sim.open()
+    sim.open_model()
     first = sim.next_gid if first_gid is None else first_gid
     sim.next_gid = max(sim.next_gid, first + total)
     sim.note_maker(first)

@@ -156,7 +156,7 @@ def _added(sim: Simulation, law: str, parameter: Mapping[str, float], folder: Pa
             raise CommandError(f"HIST energy: {unknown}")
     values = user_laws.given(new, parameter, whole=True)
     if not sim.own_laws.number(new.name):
-        sim.open()
+        sim.open_model()
     return sim.own_laws.add(new, sim), values
 
 

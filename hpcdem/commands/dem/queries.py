@@ -17,32 +17,32 @@ def extents(sim: Simulation) -> dict[str, float]:
 def wall_force(sim: Simulation, id: int) -> tuple[float, float]:
     """Force on a wall (x, y) [N], exactly summed."""
     row = sim.walls.row(id)
-    sim.close()
+    sim.close_model()
     x, y = diagnostics.wall_forces(sim)[row]
     return float(x), float(y)
 
 
 def wall_forces(sim: Simulation) -> dict[int, tuple[float, float]]:
     """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
-    sim.close()
+    sim.close_model()
     force = diagnostics.wall_forces(sim)
     return {int(i): (float(x), float(y)) for i, (x, y) in zip(sim.walls.id, force, strict=True)}
 
 
 def kinetic_energy(sim: Simulation) -> float:
     """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
-    sim.close()
+    sim.close_model()
     return diagnostics.kinetic_energy(sim)
 
 
 def unbalanced(sim: Simulation) -> float:
     """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
-    sim.close()
+    sim.close_model()
     return output.unbalanced(sim)
 
 
 def clumps(sim: Simulation) -> dict[str, np.ndarray]:
     """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
     spin, angle, area, mass, inertia, members (how many)."""
-    sim.close()
+    sim.close_model()
     return diagnostics.clumps(sim)

@@ -89,7 +89,7 @@ def box(
 
 def forget(sim: Simulation, row: int | None) -> None:
     """Open the model for a new or replaced wall; contacts with the old one are forgotten."""
-    sim.open()
+    sim.open_model()
     if row is not None:
         sim.hist = sim.hist.keep(sim.hist.partner != -1 - row)
 

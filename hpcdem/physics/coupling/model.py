@@ -101,7 +101,7 @@ class Coupled(SurfaceLoad):
         request = max(request, blocks.step())
         if work is not None:
             work.book_faces()
-        particles.close()
+        particles.close_model()
         blocks.close_model()
         self._stepping = False
         due = self._check_interval.passed()
@@ -123,7 +123,7 @@ class Coupled(SurfaceLoad):
             self._replay()
 
     def _close(self) -> None:
-        self.particles.close()
+        self.particles.close_model()
         self.blocks.close_model()
         if self._link_holds() and not self._changed and self.particles.clock.dt == self.blocks.clock.dt:
             return
@@ -346,7 +346,7 @@ class Coupled(SurfaceLoad):
         joints and contacts give, and the same bound 2 k/m for each of two discs; k: the stiffness of the contact, of
         Hertz at an overlap of 1 % of the radius. dt = 0.8 * 2 / omega."""
         particles, blocks = self.particles, self.blocks
-        particles.close()
+        particles.close_model()
         blocks.close_model()
         self._renew_laws()
         p, local = particles.particles, blocks.local

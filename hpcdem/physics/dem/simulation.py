@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import bisect
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -270,7 +271,7 @@ class Simulation(Model):
         taken = [name for name in physics.fields if name in known]
         if taken or any(physics.name == other.name for other in self.physics):
             raise CommandError(f"the model has {f'a field {taken[0]}' if taken else physics.name} already")
-        self.open()
+        self.open_model()
         self.particles.extend(physics.fields)
         self.physics.append(physics)
         self.tables_changed()
@@ -311,12 +312,22 @@ class Simulation(Model):
                     f"{physics.name}, {limit:g} s: particles touch more neighbours than at the start"
                 )
 
-    def open(self) -> None:
+    def open_model(self) -> None:
         """Make the model free to be changed: owned particles, their histories and forces only."""
         if not self.closed:
             return
         self.particles.cold[:, FX : TORQUE + 1] = self.lists.owned_forces()
         self._open_lists()
+
+    def open(self) -> None:
+        """Deprecated name of `open_model`."""
+        warnings.warn("open of a Simulation is called open_model", DeprecationWarning, stacklevel=2)
+        self.open_model()
+
+    def close(self, least_skin: float = 0.0) -> None:
+        """Deprecated name of `close_model`."""
+        warnings.warn("close of a Simulation is called close_model", DeprecationWarning, stacklevel=2)
+        self.close_model(least_skin)
 
     def _open_lists(self) -> None:
         p = self.particles
@@ -330,7 +341,7 @@ class Simulation(Model):
         self.clumps.open()
         self._lists, self.closed = None, False
 
-    def close(self, least_skin: float = 0.0) -> None:
+    def close_model(self, least_skin: float = 0.0) -> None:
         """Make the model ready to step: lists and ghosts at the present positions, stored forces in place.
 
         least_skin [m]: pairs up to this gap will be in the lists, if the model was open.

@@ -99,5 +99,5 @@ class Diffusion:
         sim.particles.append(x=np.array([0.0, 1.0]), y=0.0, radius=0.5, material=np.full(2, row), gid=np.arange(2))
         sim.hist = sim.hist.extended(2)
         sim.clock.dt = 1e-3
-        sim.close()
+        sim.close_model()
         sim.step()
