@@ -6,6 +6,8 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import pytest
+
 from tests.conftest import sources
 from tests.docs.pages import PAGES, ROOT, prose
 from tests.tables import each
@@ -103,6 +105,11 @@ def test_pages_use_the_words_of_the_field(page: Path) -> None:
     text = written(page)
     wrong = [f"{re.findall(rf'.*(?:{phrase}).*', text)[:1]}: write {PHRASES[phrase]}" for phrase in found(text)]
     assert not wrong, wrong
+
+
+@pytest.mark.parametrize("name", ["README.md", "README.zh.md"])
+def test_a_reader_finishes_the_readme(name: str) -> None:
+    assert len((ROOT / name).read_text(encoding="utf-8").splitlines()) <= 120
 
 
 def test_sources_lose_their_private_words() -> None:
