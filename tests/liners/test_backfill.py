@@ -53,6 +53,7 @@ def closure(sim: Blocks) -> float:
     return float(moved[floor] - moved[roof])
 
 
+@pytest.mark.slow
 def test_support_takes_what_comes_after_it_and_fill_what_comes_after_that() -> None:
     bare, _ = drift(False)
     sim, core = drift()

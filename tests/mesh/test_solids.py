@@ -210,6 +210,7 @@ gmsh.write(sys.argv[2])
 """
 
 
+@pytest.mark.slow
 def test_solids_of_a_cad_file_hang_together_and_are_groups(tmp_path: Path, gmsh: object) -> None:
     subprocess.run([sys.executable, "-c", PARTS, tmp_path / "parts.brep", tmp_path / "flat.brep"], check=True)
     (small, _), (one, other) = cad.read(tmp_path / "parts.brep", scale=1e-3), cad.read(tmp_path / "parts.brep")
