@@ -98,6 +98,7 @@ def test_a_liner_is_put_on_without_force() -> None:
     assert np.array_equal(liners.values("liner-element", "axial_force"), force)
 
 
+@pytest.mark.slow
 def test_rock_and_liner_together_are_as_stiff_as_both() -> None:
     """A strip of 0.1 m pulled along x with a liner of 0.1 m on each side: E A in plane strain adds up."""
     mesh = rectangle(20, 2, 2.0, 0.1)

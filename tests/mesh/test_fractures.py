@@ -143,7 +143,7 @@ def test_p20_counts_centres(field):
     assert abs(count - expected) < CONFIDENCE * math.sqrt(expected) + SEEDS * 0.5 * 60 * 0.01  # rim: perimeter x l
 
 
-@pytest.mark.parametrize("scanline", [0.0, 45.0, 90.0])
+@pytest.mark.parametrize("scanline", [0.0, *(pytest.param(angle, marks=pytest.mark.slow) for angle in (45.0, 90.0))])
 def test_p10_counts_what_a_scan_line_meets(field, scanline):
     """A line of 8 m through the middle meets P10 * 8 traces in the mean, whatever its direction."""
     one = replace(JOINTS, measure="p10", density=1.5, scanline=scanline)

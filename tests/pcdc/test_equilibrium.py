@@ -154,11 +154,11 @@ def test_the_usual_window_grows_with_the_way_of_a_wave():
 
 
 @pytest.mark.mpi
-def test_all_ranks_end_together_with_exit_code_3(launch, tmp_path):
+def test_all_ranks_end_together_with_exit_code_3(resident, tmp_path):
     (tmp_path / "loose.sc").write_text("young = 50e9\n" + TWO + "pcdc model solve window 2000\n")
     said = []
     for ranks in (1, 2):
-        done = launch(ranks, "--no-figure", "loose.sc", cwd=tmp_path, timeout=600)
+        done = resident(ranks, "--no-figure", "loose.sc", cwd=tmp_path, timeout=600)
         assert done.returncode == 3 and "loose.sc:8" in done.stderr
         said.append([line for line in done.stderr.splitlines() if "no equilibrium" in line])
     assert len(said[0]) == 1 and said[0] == said[1]
