@@ -78,7 +78,7 @@ def test_seeds_and_kinds_are_independent():
 
 
 @pytest.mark.parametrize(("seeds", "near"), [(8, 0.1), pytest.param(40, 0.035, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("covariance", ["exponential", "gaussian"])
+@pytest.mark.parametrize("covariance", [pytest.param("exponential", marks=pytest.mark.slow), "gaussian"])
 def test_the_variogram_of_a_correlated_field(covariance, seeds, near):
     """gamma(h) = 1 - C(h), over many seeds; along x, along y and across."""
     length = 0.4

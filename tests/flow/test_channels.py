@@ -182,6 +182,7 @@ def test_a_lattice_has_the_permeability_of_its_rule() -> None:
     assert exact.lattice(1e-5, 0.1) == pytest.approx(1.443e-15, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_water_finds_its_level_in_a_dam() -> None:
     """9.11, Dupuit: 16 m between levels of 8 and 4 m. Levels within 4 % up to x = 12 m (the exact ones lie above
     Dupuit's, as there is a seepage face), discharge within 3 % of Charny's."""

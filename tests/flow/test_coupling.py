@@ -182,6 +182,7 @@ def test_excavation_takes_its_fluid_away() -> None:
     assert flow.values("flow-node", "pressure") == pytest.approx(1e5, rel=1e-6)  # what stays is as it was
 
 
+@pytest.mark.slow
 def test_pressure_breaks_joints_and_lists_follow() -> None:
     """A jointed block that bursts: the fluid's account closes, and the energy's, in which it is work from outside. Its
     pieces turn as they fly apart: channels get short, and flow needs ever more sub-steps within 100 cycles."""

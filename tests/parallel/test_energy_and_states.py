@@ -70,7 +70,7 @@ def test_the_log_tells(one: tuple[Path, str]) -> None:
         (2, 1),
         pytest.param(3, 1, marks=pytest.mark.slow),
         pytest.param(4, 1, marks=pytest.mark.slow),
-        (1, 2),
+        pytest.param(1, 2, marks=pytest.mark.slow),
         pytest.param(1, 3, marks=pytest.mark.slow),
         pytest.param(2, 2, marks=pytest.mark.slow),
     ],

@@ -122,7 +122,7 @@ def test_models_that_once_failed(pair: Pair, name: str) -> None:
         ("a bit", AssertionError, "differ"),
         pytest.param("leaves a file", AssertionError, "all_7.dat.tmp", marks=pytest.mark.slow),
         pytest.param("is ours", AssertionError, "Traceback", marks=pytest.mark.slow),
-        ("dies", Lost, "died"),
+        pytest.param("dies", Lost, "died", marks=pytest.mark.slow),
         pytest.param("hangs", Lost, "hangs: no answer within 3 s", marks=pytest.mark.slow),
         pytest.param("alone", Lost, "failed alone: hpcdem: .*something against it", marks=pytest.mark.slow),
     ],

@@ -30,7 +30,7 @@ def test_sizes_of_waves_have_the_spectrum_of_the_covariance():
     assert np.sqrt(_SQUARES[GAUSSIAN, 3](exact)) == pytest.approx(q, rel=1e-7)
 
 
-@pytest.mark.parametrize("covariance", [EXPONENTIAL, GAUSSIAN])
+@pytest.mark.parametrize("covariance", [EXPONENTIAL, pytest.param(GAUSSIAN, marks=pytest.mark.slow)])
 def test_the_variogram_of_a_correlated_field(covariance):
     """gamma(h) = 1 - C(h), over many seeds; along the axes and across."""
     length = 0.4

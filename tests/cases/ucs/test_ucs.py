@@ -70,6 +70,7 @@ def test_a_cylinder(launch, tmp_path, overlay):
     assert found.result["energy_error"] < 0.01 and found.curve[-1, 1] < 0.6 * found.result["peak"]
 
 
+@pytest.mark.slow
 def test_joints_across_and_askew_in_space():
     """One that lies across the load closes only; one at 45 degrees slides as well."""
     flat = np.array([[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]]])
