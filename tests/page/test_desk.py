@@ -83,6 +83,7 @@ def test_python_and_commands(viewing: Viewing):
     assert talk(viewing, "a") == ["3"]
 
 
+@pytest.mark.slow
 def test_a_script_runs_as_it_does_by_itself(viewing: Viewing, folder: Path):
     """The same frame, and the present state beside it; errors name the line of the script."""
     talk(viewing, SCRIPT, name="block.sc")
@@ -121,6 +122,7 @@ def test_a_run_is_interrupted_and_the_model_stays(viewing: Viewing):
     assert refused(lambda: viewing.ask("interrupt", {}))[0] == 422
 
 
+@pytest.mark.slow
 def test_zdem_line_by_line(viewing: Viewing, folder: Path):
     """A command at a time; a wrong line is told and does not count, a new model begins after STOP."""
     assert talk(viewing, "START", language="zdem")[:1] != ["2"]
