@@ -114,7 +114,10 @@ def test_as_the_plain_loop(name):
     assert len(regions) >= {"clay": 4, "sand": 3}.get(name, 6), regions
 
 
-@pytest.mark.parametrize("name", list(FLOWS))
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(one, marks=[pytest.mark.slow] * (one not in ("usual", "no tension", "sand"))) for one in FLOWS],
+)
 def test_nothing_is_outside_and_work_is_lost(name):
     """f <= 0 afterwards, plastic work >= 0, and a stress that is inside stays as it is, bit for bit."""
     rock = FLOWS[name]

@@ -14,6 +14,7 @@ from tests.conftest import ROOT
 EXAMPLE = ROOT / "examples" / "rock_into_sand.sc"
 
 
+@pytest.mark.slow
 def test_shortened(resident, tmp_path):
     """Less time to settle, a tenth of the fall: frames of both, the boulder has moved down."""
     text = EXAMPLE.read_text()

@@ -144,6 +144,7 @@ def test_natural_frequency_of_a_cantilever() -> None:
     assert coarse / fine == pytest.approx(4.0, rel=0.1)  # the error falls with the square of the length
 
 
+@pytest.mark.slow
 def test_yield_in_tension_compression_and_bending() -> None:
     """Nt = 0.2 MN, Nc = 3 MN; a rectangle bears Mp = (ft + fc) t^2 / 8 = 40 kN m at N = (Nt - Nc) / 2 and
     ft fc t^2 / (2 (ft + fc)) = 9.375 kN m at N = 0."""

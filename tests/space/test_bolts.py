@@ -85,6 +85,7 @@ def test_yield_and_rupture_along_the_diagonal() -> None:
     assert bolts.values("bolt-element", "axial_force")[0] == 0.0
 
 
+@pytest.mark.slow
 def test_pressure_across_the_bar_adds_friction() -> None:
     """sigma_n = (tr sigma - t . sigma t) / 2, worked out for a bar along z, x and the diagonal."""
     stress = {"xx": -1e6, "yy": -3e6, "zz": -8e6, "xy": 5e5, "xz": -4e5, "yz": 3e5}

@@ -255,6 +255,7 @@ def written(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_step_by_step_in_a_script(resident, written, tmp_path):
     (tmp_path / "a.sc").write_text(STEPWISE)
     done = resident(1, "a.sc", "--no-figure", cwd=tmp_path, timeout=600)

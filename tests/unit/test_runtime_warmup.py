@@ -373,6 +373,7 @@ def test_a_process_that_is_killed_leaves_what_it_has_compiled(many, tmp_path, af
     assert not [path for path in (tmp_path / "cache").rglob(".*") if path.stat().st_size]
 
 
+@pytest.mark.slow
 def test_many_processes_at_once_compile_once(many, tmp_path):
     processes = [many() for _ in range(3)]
     assert sum(compiled(process) for process in processes) == 6

@@ -380,6 +380,7 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 NAMES = ["all_0000000000_ini.jpg", "all_0000001000.jpg", "all_0000002000.jpg"]
 
 
+@pytest.mark.slow
 def test_the_same_bytes_by_one_and_two_processes(three: Path) -> None:
     made = {}
     for workers in ("1", "2"):

@@ -11,6 +11,7 @@ BRITTLE = {"tensile_strength": 2e6, "gf1": 1e-4, "gf2": 0.2}
 """Fracture energies of the manual's example: 0.1 and 200 uN/mm."""
 
 
+@pytest.mark.slow
 def test_strength_of_a_bar(resident, tmp_path):
     """Rows of joints across the load, the same stress everywhere: force over section is the strength. 1 %: a viscosity
     of 2 L sqrt(rho E) times the strain rate is 0.2 % of it; the regular mesh breaks in one row or in several."""

@@ -30,6 +30,7 @@ def chen(angle: float, number: float, factor: float, **more: float) -> SlopeStab
     return SlopeStability(**given)
 
 
+@pytest.mark.slow
 def test_a_steep_slope(resident, tmp_path):
     """A coarse mesh, above the bound by some percent; one trial in balance, one not."""
     done = results(resident, tmp_path, chen(60.0, 10.39, 1.2, size=1.0, precision=0.05))
