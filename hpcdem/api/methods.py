@@ -323,10 +323,16 @@ def _called(arguments: Iterable[Argument], option: str, words: Mapping[str, Any]
 # ---- methods ---------------------------------------------------------------------------------------------------------
 
 
+_DRESSED: set[type] = {object}
+"""Classes whose methods tell errors so."""
+
+
 def commands(cls: Kind) -> Kind:
-    """Rows become methods. Errors in public methods of the class leave with file and line of the program, and the name
-    of the method."""
-    for name, found in list(vars(cls).items()):
+    """Rows become methods. Errors in public methods of the class, and of those that it stands on and that are no such
+    class, leave with file and line of the program, and the name of the method."""
+    _DRESSED.add(cls)
+    others = (of for of in cls.__mro__[:0:-1] if of not in _DRESSED)
+    for name, found in [item for of in (*others, cls) for item in vars(of).items()]:
         if isinstance(found, Row | Models):
             found = found.method(cls, name)
         if inspect.isfunction(found) and (name == "__getitem__" or not name.startswith("_")):

@@ -18,6 +18,7 @@ from hpcdem.lang.pcdc.bindings import Call, carry_out
 from hpcdem.lang.pcdc.keywords import matching
 from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.table import PCDC, RECORDED
+from hpcdem.lang.pcdc.views import Accounts
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
@@ -290,8 +291,11 @@ class Recorded(Words):
 
 
 @commands
-class Clocks(Words):
+class Clocks(Words, Accounts):
     """The parts of a calculation, and the state of the blocks."""
+
+    def _now(self, ask: Callable[[Any], Any]) -> Any:
+        return ask(self._do.project())
 
     def cycle_option(
         self,
@@ -329,51 +333,9 @@ class Clocks(Words):
         return fdem.fields.account(self._do.project(), name)
 
     @property
-    def wet_faces(self) -> dict[str, np.ndarray]:
-        """Free faces before which water stands: number (element * 4 + face), size [m], in space [m2], and the mean
-        pressure that pushes on each [Pa]. Collective."""
-        return fdem.queries.wet_faces(self._do.project())
-
-    @property
-    def fluid(self) -> dict[str, float]:
-        """The account of the fluid [m2]: given, stored, leaked, removed; what does not add up. Collective."""
-        return fdem.queries.fluid(self._do.project())
-
-    @property
-    def fluid_energies(self) -> dict[str, float]:
-        """The energy of blocks and fluid in implicit steps [J/m], in space [J]: pumped, leaked, viscous, fluid, strain,
-        joints, fracture, outside; what does not add up. Collective."""
-        return fdem.queries.fluid_energies(self._do.project())
-
-    @property
-    def proppant(self) -> dict[str, float]:
-        """The account of proppant [m2]: came, stored, packed, left, removed; what does not add up. Collective."""
-        return fdem.queries.proppant(self._do.project())
-
-    @property
-    def heat(self) -> dict[str, float]:
-        """The account of heat [J/m]: given, commands, stored, fluid, removed; what does not add up. Collective."""
-        return fdem.queries.heat(self._do.project())
-
-    @property
-    def creep_time(self) -> float:
-        """Time that the elements have crept [s]."""
-        return float(self._do.project().blocks.creep.time)
-
-    @property
     def solved(self) -> Solved:
         """How the last `solve` ended: reason, ratio (NaN if nobody looked), steps. Empty before the first."""
         return cast(Solved, dict(self._do.project().solved))
-
-    @property
-    def ratio(self) -> float:
-        """Unbalanced over all forces of the nodes. Collective."""
-        return fdem.queries.ratio(self._do.project())
-
-    @property
-    def energies(self) -> dict[str, float]:
-        """The energy budget of the blocks [J/m], in space [J], after ``option(energy=True)``. Collective."""
-        return fdem.queries.energies(self._do.project())
 
     @property
     def block_time(self) -> float:

@@ -456,6 +456,10 @@ def carry_out(sim: Simulation, text: str) -> Any:
 
 
 IN_SPACE: list[tuple[str, str]] = [
+    ("pcdc liner-node boundary l-n-c velocity-z 0 spin-x 1 spin-y 0 spin-z table 'v' range id 1",
+     "sim.liner_nodes.velocity(vz=0, spin_x=1, spin_y=0, spin_z='v', where='id 1')"),
+    ("pcdc liner-node boundary l-n-f-b-c force-z 1 moment-x 2 moment-y 3 moment-z 4",
+     "sim.liner_nodes.force(fz=1, moment_x=2, moment_y=3, moment_z=4)"),
     ("pcdc geometry create circle c (0,1,0) rad 2 normal (1,0,0) as-layer 'l'",
      "sim.geometry.circle((0, 1, 0), 2, 'l', normal=(1, 0, 0))"),
     ("pcdc element create brick p0 (0,0,0) p1 (2,0,0) p2 (1,1,0) p3 (0,0,2) n 4 2 2",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time as clocks
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -57,17 +58,11 @@ def resume(project: Project) -> None:
     if command is None:
         raise CommandError("the checkpoint does not tell which command it was written in")
     name, given = command
-    match name:
-        case "step":
-            step(project, **given)
-        case "solve":
-            solve(project, **given)
-        case "solve elastic":
-            solve_elastic(project, **given)
-        case "solve hydraulic":
-            solve_hydraulic(project, **given)
-        case "solve thermal":
-            solve_thermal(project, **given)
+    of: dict[str, Callable[..., None]] = {
+        "step": step, "solve": solve, "solve elastic": solve_elastic, "solve hydraulic": solve_hydraulic,
+        "solve thermal": solve_thermal,
+    }  # fmt: skip
+    of[name](project, **given)
 
 
 def solve(

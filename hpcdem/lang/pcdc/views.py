@@ -19,24 +19,72 @@ KINDS = {
     "element": g.ELEMENT, "node": g.NODE, "joint": g.JOINT, "face": g.FACE,
     **{kind: kind for kind in (*g.SUPPORTS, *g.FLOW)},
 }  # fmt: skip
-_VECTORS = {"position": "position", "displacement": "displacement", "velocity": "velocity", "reaction": "reaction"}
+_VECTORS = ("position", "displacement", "velocity", "reaction")
 
 
-class Model:
+class Accounts:
+    """What blocks tell of themselves now, in scripts and in Python programs."""
+
+    def _now(self, ask: Callable[[Any], Any]) -> Any:
+        """What a function says of the project. Collective."""
+        raise NotImplementedError
+
+    @property
+    def creep_time(self) -> float:
+        """Time that the elements have crept [s]."""
+        return self._now(lambda project: float(project.blocks.creep.time))
+
+    @property
+    def energies(self) -> dict[str, float]:
+        """The energy budget of the blocks [J/m], in space [J], once option energy is on. Collective."""
+        return self._now(fdem.queries.energies)
+
+    @property
+    def ratio(self) -> float:
+        """Unbalanced over all forces of the nodes. Collective."""
+        return self._now(fdem.queries.ratio)
+
+    @property
+    def wet_faces(self) -> dict[str, np.ndarray]:
+        """Free faces before which water stands: number (element * 4 + face), size [m], in space [m2], and the mean
+        pressure that pushes on each [Pa]. Collective."""
+        return self._now(fdem.queries.wet_faces)
+
+    @property
+    def fluid(self) -> dict[str, float]:
+        """The account of the fluid [m2]: given, stored, leaked, removed; what does not add up. Collective."""
+        return self._now(fdem.queries.fluid)
+
+    @property
+    def fluid_energies(self) -> dict[str, float]:
+        """The energy of blocks and fluid in implicit steps [J/m], in space [J]: pumped, leaked, viscous, fluid, strain,
+        joints, fracture, outside; what does not add up. Collective."""
+        return self._now(fdem.queries.fluid_energies)
+
+    @property
+    def proppant(self) -> dict[str, float]:
+        """The account of proppant [m2]: came, stored, packed, left, removed; what does not add up. Collective."""
+        return self._now(fdem.queries.proppant)
+
+    @property
+    def heat(self) -> dict[str, float]:
+        """The account of heat [J/m]: given, commands, stored, fluid, removed; what does not add up. Collective."""
+        return self._now(fdem.queries.heat)
+
+
+class Model(Accounts):
     """`pcdc.time`, `pcdc.node(3).velocity`, `pcdc.values('element', 'stress-yy', group='rock')`."""
 
     def __init__(self, project: Any, look: Callable[[Callable[[], Any]], Any]) -> None:
         self._project, self._look = project, look
 
+    def _now(self, ask: Callable[[Any], Any]) -> Any:
+        return self._look(lambda: ask(self._project))
+
     @property
     def time(self) -> float:
         """Model time [s]."""
         return self._look(lambda: float(self._project.blocks.clock.time))
-
-    @property
-    def creep_time(self) -> float:
-        """Time that the elements have crept [s]."""
-        return self._look(lambda: float(self._project.blocks.creep.time))
 
     @property
     def cycle(self) -> int:
@@ -55,46 +103,9 @@ class Model:
         return int(self._project.comm.rank)
 
     @property
-    def energies(self) -> dict[str, float]:
-        """The energy budget [J/m], in space [J]."""
-        return self._look(lambda: fdem.queries.energies(self._project))
-
-    @property
-    def ratio(self) -> float:
-        """Unbalanced over all forces of the nodes."""
-        return self._look(lambda: float(fdem.queries.ratio(self._project)))
-
-    @property
     def wells(self) -> dict[str, dict[str, float]]:
         """Wells by name: pressure [Pa], rate [m2/s], injected [m2], stage."""
         return self._look(lambda: fdem.queries.wells(self._project))
-
-    @property
-    def wet_faces(self) -> dict[str, np.ndarray]:
-        """Free faces before which water stands: number (element * 4 + face), size [m], in space [m2], and the mean
-        pressure that pushes on each [Pa]."""
-        return self._look(lambda: fdem.queries.wet_faces(self._project))
-
-    @property
-    def fluid(self) -> dict[str, float]:
-        """The account of the fluid [m2]: given, stored, leaked, removed, closing, relative."""
-        return self._look(lambda: fdem.queries.fluid(self._project))
-
-    @property
-    def fluid_energies(self) -> dict[str, float]:
-        """The energy of blocks and fluid in implicit steps [J/m], in space [J]: pumped, leaked, viscous, fluid, strain,
-        joints, fracture, outside, closing, relative."""
-        return self._look(lambda: fdem.queries.fluid_energies(self._project))
-
-    @property
-    def proppant(self) -> dict[str, float]:
-        """The account of proppant [m2]: came, stored, packed, left, removed, closing, relative."""
-        return self._look(lambda: fdem.queries.proppant(self._project))
-
-    @property
-    def heat(self) -> dict[str, float]:
-        """The account of heat [J/m]: given, commands, stored, fluid, removed, closing, relative."""
-        return self._look(lambda: fdem.queries.heat(self._project))
 
     def field(self, name: str) -> dict[str, float]:
         """The account of a field of elements, as "moisture": given, commands, stored, removed, closing, relative."""
