@@ -101,6 +101,11 @@ class FakeBlocks:
         return np.ones(len(self.mesh.cells), np.int64)
 
     @property
+    def partner(self) -> np.ndarray:
+        assert self.mesh is not None
+        return self.mesh.face_partners()
+
+    @property
     def element_rows(self) -> Any:
         """One material, with the moduli that it was given last."""
         rows = Rows()
