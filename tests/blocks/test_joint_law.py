@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import quad
 
 from hpcdem.numerics.lanes import CAPACITY, U
+from hpcdem.physics.fdem.joints import tables as joint_tables
 from hpcdem.physics.fdem.kernels import elements, joint_law, joints, softening
-from hpcdem.physics.fdem.local import joint_tables
 from hpcdem.physics.fdem.properties import COHESIVE, Rows
 
 H = 2e-3

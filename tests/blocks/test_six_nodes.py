@@ -246,19 +246,46 @@ def sim_dt(sim: Blocks) -> float:
     return sim.clock.dt
 
 
+def test_a_geostatic_column_stays_at_rest():
+    """Initial stress is linear over the depth, and so is what a six-node triangle bears of it at its Gauss points."""
+    mesh, rho, g = quadratic(rectangle(2, 4, 2.0, 4.0)).mesh, ROCK["density"], 9.81
+    sim = static(mesh, large_strain=True)
+    for axis, at in ((0, 0.0), (0, 2.0), (1, 0.0)):
+        hold(sim, axis, at)
+    sim.gravity(0.0, -g)
+    slope = {"xx": 0.5 * rho * g, "yy": rho * g, "zz": 0.5 * rho * g}
+    top = {name: -4.0 * value for name, value in slope.items()}
+    sim.initial_stress(None, **top, gradient={name: (0.0, value) for name, value in slope.items()})
+    equilibrium.solve_elastic(sim)
+    assert np.abs(moved(sim)).max() < 1e-19
+    depth = 4.0 - mesh.points[mesh.cells[sim.number[sim.owned], :3]].mean(axis=1)[:, 1]
+    assert sim.local.stresses()[0][:, 1] == pytest.approx(-rho * g * depth, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("law", "properties", "why"),
     [
-        ("mech_mohr_coulomb", {"cohesion": 1e6, "friction": 30.0}, "can be elastic only"),
-        ("mech_burgers", {"maxwell_viscosity": 1e12}, "can be elastic only"),
-        ("mech_iso_elastic", {"young": Over("t", TEMPERATURE)}, "can have no young that follows a table"),
+        ("mech_mohr_coulomb", {"cohesion": 1e6, "friction": 30.0}, "element c-model mech-iso-elastic only"),
+        ("mech_burgers", {"maxwell_viscosity": 1e12}, "element c-model mech-iso-elastic only"),
+        ("mech_iso_elastic", {"young": Over("t", TEMPERATURE)}, "a number for young only"),
     ],
 )
-def test_what_they_cannot_have_is_refused(law, properties, why):
+def test_what_they_cannot_have_is_refused_when_it_is_assigned(law, properties, why):
     sim = Blocks()
     sim.take_mesh(patch())
     sim.table("t", [(0.0, 1e9), (100.0, 2e9)])
-    changes.element_model(sim, None, law, {**ROCK, **properties})
-    sim.cold["temperature"] = np.zeros((len(sim.number), 3))
-    with pytest.raises(CommandError, match=f"six-node triangle of elements 0 to 3 {why}"):
+    with pytest.raises(CommandError, match=f"six-node triangle of elements 0 to 3 can have {why}"):
+        changes.element_model(sim, None, law, {**ROCK, **properties})
+    assert not sim.element_row.any()
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    if law == "mech_iso_elastic":
+        with pytest.raises(CommandError, match=why):
+            sim.element_property([0, 1, 2, 3], properties)
+
+
+def test_parts_of_several_materials_are_refused_before_the_first_step():
+    sim = Blocks()
+    sim.take_mesh(patch())
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": np.linspace(1e9, 2e9, len(sim.mesh.cells))})
+    with pytest.raises(CommandError, match="elements 0 to 3 has several materials"):
         sim.close_model()

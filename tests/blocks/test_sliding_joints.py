@@ -10,8 +10,8 @@ import pytest
 
 from hpcdem.core.errors import CommandError, PhysicsError, ScriptError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem.joints import tables as joint_tables
 from hpcdem.physics.fdem.kernels import joint_law
-from hpcdem.physics.fdem.local import joint_tables
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import BARTON_BANDIS, COULOMB_JOINT, Model, Rows
 from hpcdem.physics.fdem.simulation import Blocks

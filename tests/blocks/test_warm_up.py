@@ -20,12 +20,12 @@ from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.kernels import contact, creep, detect, elements, energy
 from hpcdem.physics.fdem.kernels import limits, nodes, plasticity, softening
 from hpcdem.physics.fdem.elements import tangent as of_elements
-from hpcdem.physics.fdem.kernels import joint_tangents
+from hpcdem.physics.fdem.kernels import joint_points
 from tests.blocks.support import jointed, model, rectangle
 
 def compiled():
     modules = (build, connectivity, contact, creep, detect, elements, energy, limits, histories, nodes, pairs,
-               plasticity, softening, joint_tangents, of_elements)
+               plasticity, softening, joint_points, of_elements)
     found = ((m.__name__, name, f) for m in modules for name, f in vars(m).items())
     return {(module, name): len(f.signatures) for module, name, f in found if hasattr(f, "signatures")}
 

@@ -10,6 +10,7 @@ from hpcdem.physics.fdem import changes, creep, diagnostics, equilibrium, saved_
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import TEMPERATURE, Over
 from hpcdem.physics.heat.model import Heat
+from hpcdem.pre.mesh.quadratic import quadratic
 from tests.blocks.support import ROCK, rectangle, shaken
 from tests.blocks.test_user_laws import LAWS as USERS
 from tests.flow.support import at
@@ -67,6 +68,28 @@ def test_a_free_block_expands_without_stress_in_its_plane(law: str) -> None:
     for name in ("stress_xx", "stress_yy", "stress_xy"):
         assert np.abs(diagnostics.values(sim, name)).max() < 1e-6 * E * ALPHA * 50.0
     assert diagnostics.values(sim, "stress_zz") == pytest.approx(-E * ALPHA * 50.0, rel=2e-3)
+
+
+def test_six_node_triangles_bend_without_stress_where_temperature_is_linear() -> None:
+    """They bear it at their Gauss points; what is stored is that of the stress -E alpha T along the third axis."""
+    sim = Blocks()
+    sim.take_mesh(quadratic(rectangle(3, 2, 1.2, 0.8)).mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "expansion_coeficient": ALPHA})
+    heat.initial(None, 0.0)
+    sim.option(dynamic=False, collision=False, large_strain=False)
+    sim.velocity_condition(at(sim, x=0.0, y=0.0), vx=0.0, vy=0.0)
+    sim.velocity_condition(at(sim, x=1.2, y=0.0), vy=0.0)
+    for y in np.unique(sim.mesh.points[:, 1]).tolist():
+        heat.prescribe(at(sim, y=y), 100.0 * y)
+    sim.heat_clock(dt=1.0)
+    warm(sim)
+    equilibrium.solve_elastic(sim)
+    for name in ("stress_xx", "stress_yy", "stress_xy"):
+        assert np.abs(diagnostics.values(sim, name)).max() < 1e-9 * E * ALPHA * 80.0
+    whole = 0.5 * E * (ALPHA * 100.0) ** 2 * 1.2 * 0.8**3 / 3.0
+    assert sim.local.stresses()[1].sum() == pytest.approx(whole, rel=1e-9)
 
 
 @pytest.mark.parametrize("law", LAWS)

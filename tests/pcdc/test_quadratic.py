@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import HpcdemError
+from hpcdem.lang.pcdc import check
 from hpcdem.physics.fdem import groups as g
 from hpcdem.pre.mesh import imported
 
@@ -58,3 +59,31 @@ def test_an_import_of_second_order_names_the_command(tmp_path):
     found = imported.read(tmp_path / "a.inp")
     assert len(found.mesh.points) == 3
     assert any("their edges are straight; mesh quadratic makes six-node triangles" in note for note in found.notes)
+
+
+ELEMENTS = "element c-model {} property den 2500 young 1e9 poisson-r 0.2"
+
+
+@pytest.mark.parametrize(
+    ("line", "refused"),
+    [
+        (ELEMENTS.format("mech-mohr-coulomb") + " cohesion 1e6 friction 30", True),
+        (ELEMENTS.format("mech-burgers") + " maxwell-viscosity 1e15", True),
+        (ELEMENTS.format("user 'clay.py:clay'"), True),
+        ("element property young table 't' over temperature", True),
+        (ELEMENTS.format("mech-iso-elastic"), False),
+        ("element c-model thermal-iso-heat property conductivity 2.5 capacity 900", False),
+        ("element c-model null range group 'hole'", False),
+    ],
+)
+def test_check_knows_what_six_node_triangles_cannot_have(line, refused):
+    """Before anything is run; where a range, a loop or a choice leaves it open, as a warning."""
+    said = "line 5, mesh quadratic, makes six-node triangles, which can have"
+    if not refused:
+        assert said not in check.summary(f"{MESH}pcdc {line}\n", "a.sc")
+        return
+    with pytest.raises(HpcdemError, match=rf"^a.sc:6: .*{said}"):
+        check.summary(f"{MESH}pcdc {line}\n", "a.sc")
+    assert f"warning: line 6: {said}" in check.summary(f"{MESH}pcdc {line} range x 0 1\n", "a.sc")
+    assert f"warning: line 7: {said}" in check.summary(f"{MESH}if True:\n    pcdc {line}\n", "a.sc")
+    assert said not in check.summary(f"{MESH}pcdc model new\npcdc {line}\n", "a.sc")

@@ -492,7 +492,7 @@ def _add(project: Project, make: Callable[[], Mesh]) -> Mesh:
         mesh = make()
         check(mesh)
         macro = mesh.macro
-        kinds = {f"{macro.plural} of {macro.parts} elements each": len(mesh.macros)}
+        kinds = {f"{macro.plural} of {macro.stored} elements each": len(mesh.macros)}
         alone = mesh.cells[mesh.macro_of() < 0]
         if mesh.dim == 3:
             kinds["tetrahedra"] = len(alone)

@@ -353,7 +353,7 @@ def joined(one: Mesh, other: Mesh) -> Mesh:
     layers = dict(one.layers)
     for name, pairs in other.layers.items():
         layers[name] = np.concatenate([layers.get(name, np.empty((0, one.dim), np.int64)), pairs + n_points])
-    sets, behind = one.crack_sets.max(initial=-1) + 1, np.append(np.full(one.macro.nodes, n_points), n_cells)
+    sets, behind = one.crack_sets.max(initial=-1) + 1, np.append(np.full(one.macro.corners, n_points), n_cells)
     return Mesh.of(
         np.concatenate([one.points, other.points]),
         np.concatenate([one.cells, np.where(other.cells >= 0, other.cells + n_points, -1)]),

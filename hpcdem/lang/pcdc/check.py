@@ -14,7 +14,9 @@ from hpcdem.lang.pcdc import source
 from hpcdem.lang.pcdc.kinds import Pending, TableName
 from hpcdem.lang.pcdc.source import Source
 from hpcdem.lang.pcdc.statement import Statement
-from hpcdem.physics.fdem.tables import Drawn, Over
+from hpcdem.lang.pcdc.trial import HEAT, MODELS, OF_FIELDS
+from hpcdem.physics.fdem.elements.kind import SIX_NODE_TRIANGLE
+from hpcdem.physics.fdem.tables import TEMPERATURE, Drawn, Over
 
 
 def read(text: str, file: str) -> Source:
@@ -29,7 +31,34 @@ def read(text: str, file: str) -> Source:
             raise ScriptError(file, line, f"{script.line(line)}: this is not correct Python: {error.msg}") from None
         except (RecursionError, MemoryError):
             raise source.too_deep(script, lambda text: compile(text, file, "exec")) from None
+    for statement, what, surely in _not_of_six_nodes(script):
+        if surely:
+            raise statement.error(what)
     return script
+
+
+def _not_of_six_nodes(script: Source) -> Iterator[tuple[Statement, str, bool]]:
+    """Lines that give elements what six-node triangles cannot have, behind `mesh quadratic`; whether they surely do: to
+    all elements, and neither line stands in a loop, a choice or a function."""
+    made: Statement | None = None
+    for statement in script.statements:
+        match statement.command.name:
+            case "model new" | "model restore":
+                made = None
+            case "mesh quadratic":
+                made = statement
+            case "element c-model" | "element property" if made is not None:
+                given = statement.arguments.get("properties", statement.arguments)
+                model = MODELS.get(statement.arguments.get("model", ""))
+                law = "" if model in (None, HEAT, *OF_FIELDS) else model.name
+                follow = [
+                    name for name, value in given.items() if isinstance(value, Over) and value.axis >= TEMPERATURE
+                ]
+                only = SIX_NODE_TRIANGLE.only(law, follow)
+                if only:
+                    at_the_margin = all(not script.lines[one.line - 1][:1].isspace() for one in (made, statement))
+                    what = f"line {made.line}, mesh quadratic, makes {SIX_NODE_TRIANGLE.plural}, which can have {only}"
+                    yield statement, what, statement.range is None and at_the_margin
 
 
 def packages(script: Source) -> None:
@@ -70,6 +99,7 @@ def summary(text: str, file: str) -> str:
     lines = [f"{file}: {len(script.statements)} commands read, nothing was run"]
     lines += [f"  {number:4d} {name}" for name, number in sorted(counts.items())]
     lines += [f"warning: {text}" for text in _loose_names(script)]
+    lines += [f"warning: line {one.line}: {what}" for one, what, _ in _not_of_six_nodes(script)]
     if missing := missing_packages(script):
         lines.append(f"warning: line {next(iter(missing.values())).line}: {_in_one(list(missing))}")
     return "\n".join(lines)

@@ -78,8 +78,20 @@ class Assignments(Settings):
                 f"{model.doc} is not for {self.dim} dimensions: element_law(dim={self.dim}) declares one that is"
             )
         at = self.numbers_of_elements(elements)
+        self.refuse_laws(at, name, properties)
         self._assign(self.element_rows, ("element_row", at), at, ELEMENT, name, properties)
         self._note_moduli(at)
+
+    def refuse_laws(self, at: np.ndarray, name: str, properties: Mapping[str, Value]) -> None:
+        """CommandError if a macro-element among these elements (n,) cannot have this model ("": the one that it has)
+        with these properties."""
+        mesh = self._mesh()
+        only = mesh.macro.only(name, [word for word, value in properties.items() if _follows_field(value)])
+        if only and len(bad := at[mesh.macro_of()[at] >= 0]):
+            first = mesh.of_one(bad[:1])[0]
+            raise CommandError(
+                f"the {mesh.macro.name} of elements {first} to {first + mesh.macro.stored - 1} can have {only}"
+            )
 
     def yielding(self) -> np.ndarray:
         """(ne,) bool: elements that are there and have a model that can yield."""
@@ -139,6 +151,7 @@ class Assignments(Settings):
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
         """Change some properties of elements that have a model. The stress follows the strain (total form)."""
         at = self.numbers_of_elements(elements)
+        self.refuse_laws(at, "", properties)
         self._adjust(self.element_rows, ("element_row", at), at, ELEMENT, properties, _keep_moduli)
 
     def face_model(self, faces: Numbers, name: str, properties: Mapping[str, Value]) -> None:
@@ -292,7 +305,7 @@ class Assignments(Settings):
                 if self.followed[number - 1].times[0] < 0.0:
                     raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
                 out[name], out[softening_table(name)] = self.followed[number - 1](0.0), float(number)
-            elif isinstance(value, Over) and value.axis >= TEMPERATURE:
+            elif isinstance(value, Over) and _follows_field(value):
                 if not model.has(temperature_table(name)):
                     raise CommandError(f"{name} of {model.name} cannot follow a table over {AXES[value.axis]}")
                 number = self._kept(model, name, value.table, AXES[value.axis] if value.axis > TEMPERATURE else "")
@@ -371,9 +384,9 @@ class Assignments(Settings):
         yz: float = 0.0,
     ) -> None:
         """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y, in space in z)
-        at the centroid as it lies in the mesh. It is the stress of a strain by the moduli of this moment, and changes
-        with them, see `initial_stresses`. In the plane zz, if nothing is said of it, is that of plane strain, Poisson's
-        ratio times xx + yy, and in space and in plane stress 0."""
+        at the centroid as it lies in the mesh, of six-node triangles at their Gauss points. It is the stress of a
+        strain by the moduli of this moment, and changes with them, see `initial_stresses`. In the plane zz, if nothing
+        is said of it, is that of plane strain, Poisson's ratio times xx + yy, and in space and in plane stress 0."""
         at = self.numbers_of_elements(elements)
         mesh, values = self._mesh(), self.per_node(lambda: self._initial(at, xx, yy, xy, zz, gradient, xz, yz))
         self.before_change()
@@ -402,7 +415,7 @@ class Assignments(Settings):
         for name, slope in (gradient or {}).items():
             if name not in names:
                 raise CommandError(f"a stress gradient is one of {', '.join(names)}, got {name}")
-            values[:, names.index(name)] += mesh.centroids(at) @ self._vector(f"gradient of {name}", slope)
+            values[:, names.index(name)] += mesh.stress_points(at) @ self._vector(f"gradient of {name}", slope)
         if self.options.plane_stress and (values[:, ACROSS] != 0.0).any():
             raise CommandError(
                 f"an initial stress zz of {values[values[:, ACROSS] != 0.0, ACROSS][0]:g} Pa cannot be in plane "
@@ -468,6 +481,11 @@ class Assignments(Settings):
 
 def _is_number(value: Value) -> bool:
     return not isinstance(value, (Over, Drawn, np.ndarray))
+
+
+def _follows_field(value: Value) -> bool:
+    """A table over temperature or another field."""
+    return isinstance(value, Over) and value.axis >= TEMPERATURE
 
 
 def _differs(value: Value) -> bool:

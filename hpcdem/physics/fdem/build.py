@@ -9,7 +9,6 @@ from numba import njit
 
 from hpcdem.physics.fdem.kernels import joints
 from hpcdem.physics.fdem.kernels.elements import (
-    BLOCK,
     ETA,
     INVERSE,
     LAMBDA,
@@ -287,23 +286,21 @@ def longest_link(middle, slots, face, partner, where, state):
         if state[s] == NONE:
             continue
         a, b = where[face[s] // 4], where[partner[face[s]] // 4]
-        longest2 = max(longest2, (middle[a, 0] - middle[b, 0]) ** 2 + (middle[a, 1] - middle[b, 1]) ** 2)
+        d2 = 0.0
+        for c in range(middle.shape[1]):
+            d2 += (middle[a, c] - middle[b, c]) ** 2
+        longest2 = max(longest2, d2)
     return longest2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def edges_now(slots, face, at, kind, history, where, cells, x, table, beyond, out):
-    """Forces on the ends of joints (4), mean opening and slip [m], mean normal and shear stress [Pa], normal (3) and
-    shear (3) stress at the points along the edge, into out (n, 14); histories stay as they are. Shear as this side
+def edges_now(slots, own, over, per_h, kind, state, history, x, table, beyond, out):
+    """Mean opening and slip [m], mean normal and shear stress [Pa], normal (3) and shear (3) stress at the points along
+    the edge, and forces on the ends (4) of joints, into out (n, 14); histories stay as they are. Shear as this side
     feels it along its edge."""
-    flat = x.reshape(x.size)
     for i in range(len(slots)):
-        s = slots[i]
-        f, p = face[s], at[s]
-        r, k = where[f // 4], f % 4
-        k2 = (k + 1) % (4 if cells[f // 4, 3] >= 0 else 3)
-        ax, ay, bx, by = x[r, 2 * k], x[r, 2 * k + 1], x[r, 2 * k2], x[r, 2 * k2 + 1]
-        px, py, qx, qy = flat[p], flat[p + 1], flat[p + 2], flat[p + 3]
+        s, a, b, p, q = slots[i], own[i, 0], own[i, 1], over[i, 0], over[i, 1]
+        ax, ay, bx, by, px, py, qx, qy = x[a], x[a + 1], x[b], x[b + 1], x[p], x[p + 1], x[q], x[q + 1]
         tx, ty, s0, s1, s2, t0, t1, t2 = joints.points_now(
             ax, ay, bx, by, px, py, qx, qy, table[kind[s]], beyond[kind[s]], history[s]
         )
@@ -311,10 +308,10 @@ def edges_now(slots, face, at, kind, history, where, cells, x, table, beyond, ou
         _, _, h2, oa, sa, ob, sb = joints.openings(ax, ay, bx, by, px, py, qx, qy)
         h = math.sqrt(h2)
         fx, fy = fax + fbx, fay + fby
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = fax, fay, fbx, fby
-        out[i, 4], out[i, 5] = 0.5 * (oa + ob) / h, 0.5 * (sa + sb) / h
-        out[i, 6], out[i, 7] = (fx * ty - fy * tx) / h2, (fx * tx + fy * ty) / h2
-        out[i, 8], out[i, 9], out[i, 10], out[i, 11], out[i, 12], out[i, 13] = s0, s1, s2, t0, t1, t2
+        out[i, 0], out[i, 1] = 0.5 * (oa + ob) / h, 0.5 * (sa + sb) / h
+        out[i, 2], out[i, 3] = (fx * ty - fy * tx) / h2, (fx * tx + fy * ty) / h2
+        out[i, 4], out[i, 5], out[i, 6], out[i, 7], out[i, 8], out[i, 9] = s0, s1, s2, t0, t1, t2
+        out[i, 10], out[i, 11], out[i, 12], out[i, 13] = fax, fay, fbx, fby
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -338,11 +335,12 @@ def stresses(x, triangle_rows, quad_rows, c, q, s0, quad_s0, small, first, stres
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def relink(state, of_triangles, head, follow):
-    """The lists of joints behind their peak, one per block of triangles, from the states of the slots."""
+def relink(state, slots, each, lists, head, follow):
+    """The lists of joints behind their peak, `lists` of them for each block of `each` slots, from the states of these
+    (slots,)."""
     for b in range(len(head)):
         head[b] = -1
-    for s in range(of_triangles):
+    for s in range(slots):
         if state[s] > INTACT:
-            b = s // (3 * BLOCK)
+            b = lists * (s // each) + s % lists
             follow[s], head[b] = head[b], s

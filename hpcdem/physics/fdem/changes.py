@@ -84,6 +84,7 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
             "model option energy off comes first"
         )
     if elements is not None:
+        sim.refuse_laws(asked, name, given)
         sim.complete(ELEMENT, asked, model(name, ELEMENT), {}, given)  # refused before anything is done
         back = asked[~sim.alive[asked]]
         if len(back):

@@ -9,8 +9,8 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import connectivity, diagnostics
+from hpcdem.physics.fdem.joints import laws_of
 from hpcdem.physics.fdem.kernels import joint_law
-from hpcdem.physics.fdem.local import laws_of
 from hpcdem.physics.fdem.simulation import Blocks
 
 RATIO = 1e-5

@@ -1,7 +1,7 @@
 """The static solve: equilibrium of blocks at once, by Newton's method with the tangent of the forces.
 
 The unbalanced forces are those of the kernels that step, so the answer is a state of the explicit code at rest; only
-the tangent is of its own (physics/fdem/elements/tangent.py, kernels/joint_tangents.py).
+the tangent is of its own (physics/fdem/elements/tangent.py, kernels/joint_points.py).
 Positions of all nodes are known to every rank meanwhile. Below dim is 2, in space 3; forces are in N/m, in space in N.
 
 What elements that yield remember is that of the last balance while Newton's method looks for the next one, whatever it
@@ -16,7 +16,6 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -35,7 +34,7 @@ from hpcdem.physics.fdem.by_temperature import TEMPERATURE
 from hpcdem.physics.fdem.elements import tangent as tangent_kernels
 from hpcdem.physics.fdem.elements.block import ElementBlock
 from hpcdem.physics.fdem.histories import Histories
-from hpcdem.physics.fdem.kernels import joint_tangents, space
+from hpcdem.physics.fdem.kernels import joint_points, space
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
 from hpcdem.physics.fdem.kernels.plasticity import STRENGTH
@@ -82,11 +81,6 @@ BEFORE, AFTER = "temperature before", "temperature after"
 PASSES = 100
 """Most balances at one load, each after the flow of the one before."""
 TANGENT = {2: "tangent", 3: "tangent-space"}
-JOINTS: dict[int, tuple[Any, Any]] = {
-    2: (joint_tangents.intact_edges, joint_tangents.yielded_edges),
-    3: (joint_tangents.intact_triangles, joint_tangents.yielded_triangles),
-}
-"""Kernels of their stiffness, before their peak and behind it."""
 SOLVERS = ("auto", "direct", "petsc")
 
 
@@ -838,22 +832,14 @@ def of_joints(sim: Blocks, softening: bool = False) -> tuple[list[Pieces], int]:
     """Stiffness of the owned joints at the present positions, and how many are behind their peak; with softening, those
     that pass it now."""
     sim.prepare_kernels(TANGENT[sim.dim])
-    intact, yielded = JOINTS[sim.dim]
-    local, slots = sim.local, _lower_slots(sim)
+    local, slots, size = sim.local, _lower_slots(sim), 2 * sim.dim * sim.dim
     found: list[Pieces] = []
     past = 0
     for which, joints in local.joints(slots):
-        (at, face, *of), size = joints, 2 * sim.dim * sim.dim
-        made, left, laws = np.empty((len(at), size, size)), np.empty(len(at)), (local.joint_table, local.joint_beyond)
-        intact(at, face, *of, *laws, made, left)
-        behind, state = left < 0.0, joints.state[at]
-        slides = state > BROKEN
-        past += int((behind & ~slides & ~(softening & (state >= YIELDED))).sum())
-        behind &= softening | slides
-        if behind.any():
-            soft = np.empty((int(behind.sum()), size, size))
-            yielded(at[behind], face, *of, *laws, soft)
-            made[behind] = soft
+        made, left = np.empty((len(which), size, size)), np.empty(len(which))
+        joint_points.stiffness(*joints, local.joint_table, local.joint_beyond, softening, made, left)
+        state = joints.state[joints.slots]
+        past += int(((left < 0.0) & (state <= BROKEN) & ~(softening & (state >= YIELDED))).sum())
         ends, way = local.joint_ends(slots[which], of_sides=len(found) > 0)
         if way is not None:
             made = np.einsum("nai,nab,nbj->nij", way, made, way, optimize=True)

@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from hpcdem.physics.fdem.kernels import elements, joint_law, joints
+from hpcdem.physics.fdem.kernels import joint_law, joints
 
 WORDS = 20
 KEY, STATE, FIRST = 0, 1, 2
@@ -91,22 +90,3 @@ class Histories:
         torn = np.flatnonzero(chosen & (state == joints.BROKEN + joint_law.COULOMB))
         self.rows[torn, FIRST + joint_law.OWN : FIRST + joint_law.OWN + 3] = 0.0
         return self.keep(~chosen | (state > joints.BROKEN))
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def place_joints(slot, rows, of_triangles, law, state, history, head, follow):
-    """Give slots their histories; triangles' slots go to the list of their block."""
-    for i in range(len(slot)):
-        s = slot[i]
-        was = np.uint8(rows[i, STATE])
-        if state[s] == joints.NONE:  # opened meanwhile, or its partner was taken out
-            continue
-        if state[s] != was and max(state[s], was) > joints.BROKEN:  # has another law now
-            continue
-        law[s] = 0
-        state[s] = was
-        for m in range(joint_law.HISTORY):
-            history[s, m] = rows[i, FIRST + m]
-        if s < of_triangles:
-            b = s // (3 * elements.BLOCK)
-            follow[s], head[b] = head[b], s

@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.physics.fdem.joints import Joints
 from hpcdem.physics.fdem.kernels import joints_hexes
 from hpcdem.physics.fdem.kernels.joints import NONE
 from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.laws_space import LawsSpace
-
-
-class Faces(NamedTuple):
-    """What the kernels ask of joints (n,): slot, and by slots face, link, 1 / h [1/m], row of the law, state, history;
-    storage rows by element, and positions."""
-
-    slots: np.ndarray
-    face: np.ndarray
-    link: np.ndarray
-    size: np.ndarray
-    kind: np.ndarray
-    state: np.ndarray
-    history: np.ndarray
-    where: np.ndarray
-    x: np.ndarray
 
 
 OPPOSITE = np.array([0, 2, 1])
@@ -84,23 +70,20 @@ class HexJoints:
             of_joints, force, sim.clock.step, local.tally,
         )  # fmt: skip
 
-    def moved(self, which: np.ndarray) -> Faces:
-        """Some of them (n,) as joints of triangles, with corners shifted as the bilinear opening has it: slots from 0
-        to n - 1 are the first faces of the elements in these rows, the opposite corners are in the rows behind."""
+    def moved(self, which: np.ndarray) -> Joints:
+        """Some of them (n,) as joints of triangles, with corners shifted as the bilinear opening has it."""
         local, n = self.local, len(which)
         at = local.sim.x.reshape(-1)[self.at[which][:, :, None] + np.arange(3)]
         near, far = at[:, :4], at[:, 4:]
         g, e = self.weights[which, :4, None], self.weights[which, 4:7, None]
         u = g * (far - near)
         way = e * (0.5 * ((u[:, 0] + (u[:, 1] + u[:, 2])) + u[:, 3]))[:, None]
-        x = np.zeros((2 * n, 4, STRIDE))
-        x[:n, FACES[0], :3] = near[:, :3] + way
-        x[n:, :3, :3] = (far[:, :3] - way)[:, OPPOSITE]
-        link = ROW * (n + np.arange(n))[:, None] + STRIDE * np.arange(3)
+        x = np.concatenate([near[:, :3] + way, (far[:, :3] - way)[:, OPPOSITE]], axis=1)
+        corner = np.arange(18 * n).reshape(n, 6, 3)[:, :, 0]
         slots = self.slot[which]
-        return Faces(
-            np.arange(n), 4 * np.arange(n), link.astype(np.int32), local.slot_size[slots], local.slot_kind[slots],
-            local.slot_state[slots], local.slot_history[slots], np.arange(2 * n), x.reshape(2 * n, ROW),
+        return Joints(
+            np.arange(n), corner[:, :3].copy(), corner[:, 3:].copy(), local.slot_size[slots], local.slot_kind[slots],
+            local.slot_state[slots], local.slot_history[slots], x.reshape(-1),
         )  # fmt: skip
 
     def ways(self, which: np.ndarray) -> np.ndarray:

@@ -41,8 +41,6 @@ class LawsSpace(Local):
 
     rows: np.ndarray
     hexes: Hexes | None
-    slot_link: np.ndarray
-    slot_size: np.ndarray
     stiff_hexes: np.ndarray
     _stress: np.ndarray
     """Initial stress (n_own, 6) [Pa]."""
@@ -181,13 +179,6 @@ class LawsSpace(Local):
             self.creep(sim.cold["creep"], [of.s0 for of in self.solids], keep=sim.options.dynamic)
         if self.laws:
             self._obey(sim.cold[user_laws.COLUMN], self.s0, self.quad_s0)
-
-    def obeyed_state(self) -> list[np.ndarray]:
-        """What `obey` changes."""
-        found = [*self.plastic_state()] if self.yields else []
-        if self.laws:
-            found += [self.sim.cold[user_laws.COLUMN], self.s0, self.quad_s0]
-        return found + ([self.sim.cold["creep"], self.s0, self.quad_s0] if self._creeps_now() else [])
 
     def _obey(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, every: bool = True) -> None:
         """As in the plane, all laws at once."""

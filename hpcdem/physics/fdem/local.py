@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, by_temperature, connectivity, user_laws
 from hpcdem.physics.fdem.conditions import TRACTIONS
 from hpcdem.physics.fdem.elements import flow as plastic_flow
 from hpcdem.physics.fdem.elements.block import ElementBlock
 from hpcdem.physics.fdem.elements.kind import QUAD, TETRAHEDRON, TRIANGLE
-from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
+from hpcdem.physics.fdem.histories import FIRST, KEY, WORDS, Histories
+from hpcdem.physics.fdem.joints import JointTables, laws_of
 from hpcdem.physics.fdem.kernels import (
     creep,
     elements,
@@ -31,21 +31,16 @@ from hpcdem.physics.fdem.kernels import (
 )
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joint_law import HISTORY
-from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE
-from hpcdem.physics.fdem.macros import SIX_NODE_TRIANGLE
+from hpcdem.physics.fdem.kernels.joints import BROKEN
 from hpcdem.physics.fdem.moduli import moduli
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
 from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.properties import (
-    BARTON_BANDIS,
-    COHESIVE,
-    COULOMB_JOINT,
     MECH_MOHR_COULOMB,
     SOFTENS,
     Rows,
     softening_rows,
     softening_table,
-    temperature_table,
 )
 from hpcdem.physics.fdem.six.elements import SixNodes
 from hpcdem.physics.fdem.tables import Table
@@ -57,25 +52,6 @@ if TYPE_CHECKING:
 
 ALPHA = 0.8
 """Local damping of the static mode."""
-WHOLES = {SIX_NODE_TRIANGLE.name: SixNodes}
-"""Of macro-elements of the plane, what has forces in place of their parts."""
-JOINT_LAWS = {COULOMB_JOINT.name: joint_law.COULOMB, BARTON_BANDIS.name: joint_law.BARTON_BANDIS}
-_WARM_JOINT = tuple(one.name for one in COHESIVE.properties if one.warms)
-
-
-def joint_tables(rows: Rows, warm: Mapping[str, np.ndarray] | None = None, row: Any = slice(None)) -> tuple[
-    np.ndarray, np.ndarray
-]:  # fmt: skip
-    """The tables of joint laws (n, 8) and (n, 4) of joint_law.py; row 0 is no joint. warm: properties (n,) that take
-    the place of those of these rows (n,)."""
-    return joint_law.tables(
-        lambda name: warm[name] if warm and name in warm else rows.column(name)[row], laws_of(rows)[row]
-    )
-
-
-def laws_of(rows: Rows) -> np.ndarray:
-    """(rows,) Numbers of their laws in joint_law.py."""
-    return np.array([JOINT_LAWS.get(rows.name(row), 0) for row in range(len(rows))])
 
 
 def element_table(sim: State) -> np.ndarray:
@@ -149,21 +125,6 @@ class Evaluation:
     """Velocities after this moment's kick (n, w) [m/s]."""
 
 
-class Edges(NamedTuple):
-    """What the kernels ask of joints (n,): slot, and by slots face and where the other side begins, corners of the
-    elements, row of the law, state, history; storage rows by element, and positions."""
-
-    slots: np.ndarray
-    face: np.ndarray
-    at: np.ndarray
-    cells: np.ndarray
-    kind: np.ndarray
-    state: np.ndarray
-    history: np.ndarray
-    where: np.ndarray
-    x: np.ndarray
-
-
 @dataclass(frozen=True)
 class LawHere:
     """A law of the user on this rank: its table of properties, which blocks of triangles have an element with it, how
@@ -185,7 +146,7 @@ class LawHere:
         return Obeying(self.some, row, self.table, dt, sim.n_left, memory, (memory.shape[1] - 1) // sim.element_parts)
 
 
-class Local:
+class Local(JointTables):
     """Tables of one rank between two rebuilds, in the plane (in space: local_space.py). The model is in storage order,
     ghosts in place. Collective.
 
@@ -193,9 +154,10 @@ class Local:
     from one corner of a row to the next.
     """
 
-    dim, force_width, stride = 2, elements.FORCE, 2
+    dim, force_width, stride, listed = 2, elements.FORCE, 2, 3 * elements.BLOCK
     without_moduli: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]] = ()
     whole: SixNodes | None = None
+    """Macro-elements of the plane, whose forces stand in place of those of their parts."""
     pulled: tuple[np.ndarray, np.ndarray] | None = None
     """In place of node_begin and node_corner: corners with forces, where some have none."""
 
@@ -216,11 +178,15 @@ class Local:
         self._make_laws()
         self._make_joints()
         self._put_histories()
-        self.pairs = ContactPairs(sim, self, *ContactPairs.remembered(sim))
+        self.pairs = self._contact(*ContactPairs.remembered(sim))
         self._make_loads()
         self._make_nodes()
         self._set_masses()
         self._bind()
+
+    def _contact(self, low: np.ndarray, high: np.ndarray, values: np.ndarray) -> Any:
+        """Contact lists, with what is remembered of contacts."""
+        return ContactPairs(self.sim, self, low, high, values)
 
     @cached_property
     def shapes(self) -> Shapes:
@@ -256,7 +222,7 @@ class Local:
         self.c[count:] = self.c[count - 1] if count else 1.0
         self.warms = any(bool(one.any()) for one in sim.warms())
         self.stiff, self.stiff_q = (self.c.copy(), self.q.copy()) if self.warms else (self.c, self.q)
-        self.whole = WHOLES[mesh.macro.name](self) if len(mesh.macros) else None
+        self.whole = SixNodes(self) if len(mesh.macros) else None
         self.plastic, self.creeps = "plastic" in sim.cold, "creep" in sim.cold
         self.yields = bool(sim.yielding().any())
         rows = self.triangle_rows[:count]
@@ -346,22 +312,6 @@ class Local:
         first, second = self._said_initial
         triangles, quads = self.triangle_rows[: self.count] - self.sim.n_left, self.quad_rows - self.sim.n_left
         self._of_initial = first * ratio[triangles, None], second * ratio[quads, None]
-
-    def _follow_joints(self) -> None:
-        """The laws of joints at their temperatures."""
-        sim, slots = self.sim, self.warm_slots
-        face = self.slot_face[slots]
-        own, corners = sim.where[face // 4] - sim.n_left, (sim.the_mesh().face_corners(face) % 4).T
-
-        @cache
-        def mean(name: str) -> np.ndarray:
-            first, *others = (sim.cold[name][own, k] for k in corners)
-            # Both sides of a face in space begin at one corner and go round it the other way.
-            return 0.5 * (first + others[0]) if len(others) == 1 else (first + (others[0] + others[1])) / 3.0
-
-        rows, of = sim.joint_rows, self.warm_of
-        warm = {name: by_temperature.values(sim, rows, name, of, mean) for name in _WARM_JOINT}
-        self.joint_table[len(rows) :], self.joint_beyond[len(rows) :] = joint_tables(rows, warm, of)
 
     def _find_stress_without_strain(self) -> bool:
         """Of all elements: what was said of it, and what heat brings, less the part of plastic and creep strain.
@@ -512,18 +462,18 @@ class Local:
     def _make_joints(self) -> None:
         """Slots of the edges: three per triangle, then four per quad."""
         sim, count = self.sim, self.count
-        self.slots_of_triangles = 3 * count
+        self.slots_of_triangles = self.in_lists = 3 * count
         self.slots = 3 * count + 4 * len(self.quad_rows)
         padded = self.slots + 9  # lanes are filled four at a time
         self.slot_face = np.zeros(padded, np.int64)
-        self.slot_at, self.slot_law, self.slot_kind = (np.zeros(padded, np.int32) for _ in range(3))
+        self.slot_link, self.slot_law, self.slot_kind = (np.zeros(padded, np.int32) for _ in range(3))
         self.slot_state = np.zeros(padded, np.uint8)
         closed = sim.closed_faces()
         lost = -1
         for rows, n, first in ((self.triangle_rows[:count], 3, 0), (self.quad_rows, 4, 3 * count)):
             found = build.links(
                 sim.number, rows, n, first, sim.x.shape[1], sim.where, sim.partner, closed, sim.joint_row,
-                self.slot_face, self.slot_at, self.slot_law, self.slot_kind, self.slot_state,
+                self.slot_face, self.slot_link, self.slot_law, self.slot_kind, self.slot_state,
             )  # fmt: skip
             lost = max(lost, int(found))
         self._agree_on_lost(lost, "the joint of face")
@@ -534,49 +484,6 @@ class Local:
         blocks = -(-count // elements.BLOCK)
         self.head, self.follow = np.full(blocks, -1, np.int32), np.full(padded, -1, np.int32)
         self._make_joint_laws()
-
-    def _make_joint_laws(self) -> None:
-        """Their tables; joints that follow temperature have a row of their own on each side, behind those of the
-        properties."""
-        rows = self.sim.joint_rows
-        tables = [rows.column(temperature_table(name)) > 0.0 for name in _WARM_JOINT]
-        self.warm_slots = np.flatnonzero(np.any(tables, axis=0)[self.slot_kind])
-        self.warm_of = self.slot_kind[self.warm_slots].astype(np.int64)
-        own = len(rows) + np.arange(len(self.warm_slots))
-        self.slot_law[self.warm_slots] = self.slot_kind[self.warm_slots] = own
-        every = np.concatenate([np.arange(len(rows)), self.warm_of])
-        self.joint_table, self.joint_beyond = joint_tables(rows, row=every)
-        if (law := laws_of(rows)).any():
-            slides = np.flatnonzero(law[self.slot_kind[: self.slots]])
-            self.slot_law[slides], self.slot_state[slides] = 0, BROKEN + law[self.slot_kind[slides]]
-            self._relink()
-        if self.warms:
-            self._follow_joints()
-
-    def _agree_on_lost(self, lost: int, what: str) -> None:
-        sim = self.sim
-        found = int(sim.comm.max_into(np.array([lost], np.int64))[0])
-        if found >= 0:
-            raise PhysicsError(
-                f"step {sim.clock.step}: {what} {found} spans more than a column of {sim.rebuild_state.side:g} m; "
-                "elements move too far in a step: the time step is probably too large"
-            )
-
-    def _put_histories(self) -> None:
-        """Joints behind their peak take their places; histories are in storage order."""
-        histories = self.sim.histories
-        key = histories.keys()
-        at = np.flatnonzero(key < 0)
-        slot = self.first_slot[histories.owners()[at]] - 1 - key[at]
-        place_joints(
-            slot, histories.rows[at], self.slots_of_triangles, self.slot_law, self.slot_state, self.slot_history,
-            self.head, self.follow,
-        )  # fmt: skip
-        if (self.slot_state > BROKEN).any():
-            self._relink()
-
-    def _relink(self) -> None:
-        build.relink(self.slot_state, self.slots_of_triangles, self.head, self.follow)
 
     def _make_loads(self) -> None:
         """Tractions on owned faces, and forces that die down."""
@@ -860,14 +767,14 @@ class Local:
         stressed = sim.stress0 is not None or self.plastic or self.creeps or self.heated
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
-            stressed or any(one is not self.law_of_triangles for one in self.laws), small, self.slot_at,
+            stressed or any(one is not self.law_of_triangles for one in self.laws), small, self.slot_link,
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
             self.joint_table, self.joint_beyond, pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
             stressed or any(one is not self.law_of_quads for one in self.laws), small, self.slots_of_triangles,
-            self.slot_at, self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.joint_table,
+            self.slot_link, self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.joint_table,
             self.joint_beyond, pairs.quad_slot, pairs.pushed,
         )  # fmt: skip
 
@@ -924,12 +831,11 @@ class Local:
 
     def open_joints(self) -> None:
         """Joints remember the present positions: those beyond their peak pass it, or break. Elements do not flow."""
-        total, every = len(self.sim.number), np.ones(self.count, bool)
-        scratch, of_joints = np.zeros((total, elements.FORCE)), np.zeros((total, elements.FORCE))
+        scratch, of_joints = (np.zeros((len(self.sim.number), self.force_width)) for _ in range(2))
         self.pairs.pushed[:] = 0.0
         v = self.sim.v.copy()  # triangles kick their corners
         with self.without_flow():
-            self._elements(every, np.ones(len(self.head), bool), scratch, of_joints, True)
+            self._fill(scratch, of_joints, True)
         self.sim.v[:] = v
 
     @contextmanager
@@ -1060,17 +966,6 @@ class Local:
                 found[k] = c, flowed
         return found
 
-    def joints(self, slots: np.ndarray) -> list[tuple[np.ndarray, Any]]:
-        """Joints (n,) by their shape: which of them, and what they are."""
-        of = self.slot_face, self.slot_at, self.sim.the_mesh().cells, self.slot_kind, self.slot_state
-        return [(np.arange(len(slots)), Edges(slots, *of, self.slot_history, self.sim.where, self.sim.x))]
-
-    def joint_ends(self, slots: np.ndarray, of_sides: bool) -> tuple[np.ndarray, np.ndarray | None]:
-        """Corners (n, k), element * 4 + k, that the stiffness of these joints is of, and how their movements become
-        those that its kernel knows, if they are not the same. of_sides: they are the second of `joints`."""
-        face, corners = self.slot_face[slots], self.sim.the_mesh().face_corners
-        return np.column_stack([corners(faces) for faces in (face, self.sim.partner[face])]), None
-
     def creep_strains(self) -> np.ndarray:
         """Creep strain and strain of the Kelvin unit, xx, yy, xy, in space zz, xz, yz besides, each (n_own, 6 or 12),
         along the axes of space; means over the parts of elements by volume."""
@@ -1133,6 +1028,8 @@ class Local:
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""
         sim, clock = self.sim, self.sim.clock
+        if not (self.some_special or self.shared):
+            return
         if self.some_applied:
             self.applied[:] = 0.0
             loads = self.loads_now(self.load_functions, sim.time_now())
@@ -1182,41 +1079,39 @@ class Local:
     def evaluation(self, contact: bool = True) -> Evaluation:
         """Forces at the present positions; everything is put back as it was. contact: with those of contact.
         Collective."""
-        sim, pairs = self.sim, self.pairs
-        kept = [
-            (table, table.copy())
-            for table in (
-                sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
-                self.follow, self.tally, self.outside, self.felt,
-                *(self.plastic_state() if self.yields else ()),
-                *((sim.cold["creep"],) if self._creeps_now() else ()),
-                *((sim.cold[user_laws.COLUMN],) if self.laws else ()),
-                *((self.s0, self.quad_s0) if self.laws or self._creeps_now() else ()),
-            )
-        ]  # fmt: skip
-        behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
-        remembered = self.slot_history[behind]
-        stored = self.force
-        total = len(sim.number)
-        self.force, of_joints = np.zeros((total, elements.FORCE)), np.zeros((total, elements.FORCE))
-        if not contact:
-            pairs.pushed[:] = 0.0
-        elif len(pairs):
-            pairs.forces(sim.x, sim.v, sim.clock.dt)
-        every, blocks = np.ones(self.count, bool), np.ones(len(self.head), bool)
-        self._elements(every, blocks, self.force, of_joints, True)
-        if self.some_special or self.shared:
+        sim, pairs, total = self.sim, self.pairs, len(self.sim.number)
+        changed = sim.v, self.outside, self.felt, *pairs.changed_by_forces(), *self.changed_by_forces()
+        kept = [(table, table.copy()) for table in changed]
+        with self.joints_kept():
+            stored = self.force
+            self.force, of_joints = np.zeros((total, self.force_width)), np.zeros((total, self.force_width))
+            if not contact:
+                pairs.pushed[:] = 0.0
+            elif len(pairs):
+                pairs.forces(sim.x, sim.v, sim.clock.dt)
+            self._fill(self.force, of_joints, True)
             self.move_nodes()
-        found = Evaluation(
-            self.force, of_joints, pairs.pushed.copy(), pairs.touching.copy(), pairs.out.copy(), self.outside.copy(),
-            self.felt.copy(), sim.v.copy(),
-        )  # fmt: skip
-        self.force = stored
-        self.slot_history[self.slot_state > INTACT] = 0.0
-        self.slot_history[behind] = remembered
+            found = Evaluation(
+                self.force, of_joints, pairs.pushed.copy(), pairs.touching.copy(), pairs.out.copy(),
+                self.outside.copy(), self.felt.copy(), sim.v.copy(),
+            )  # fmt: skip
+            self.force = stored
         for table, values in kept:
             table[...] = values
         return found
+
+    def changed_by_forces(self) -> list[np.ndarray]:
+        """What elements remember, and their stress without strain, as far as computing forces changes them."""
+        found = [*self.plastic_state()] if self.yields else []
+        if self.laws:
+            found.append(self.sim.cold[user_laws.COLUMN])
+        if self._creeps_now():
+            found.append(self.sim.cold["creep"])
+        return found + ([self.s0, self.quad_s0] if self.laws or self._creeps_now() else [])
+
+    def _fill(self, force: np.ndarray, of_joints: np.ndarray, keep: bool) -> None:
+        """All forces into the rows of all corners."""
+        self._elements(np.ones(self.count, bool), np.ones(len(self.head), bool), force, of_joints, keep)
 
     def first_corners(self) -> np.ndarray:
         """Lowest corner (element * 4 + k) of each special node. Not to be changed."""
@@ -1361,17 +1256,10 @@ class Local:
         if self.initial_part is not None:
             said = said * self.initial_part[:, None]
         mean = said[:, of.normal].sum(axis=1) / len(of.normal)
-        return stress * (0.5 * stress + mean) / bulk * sim.areas[number]
-
-    def stored_in_joints(self) -> np.ndarray:
-        """What the joints of the owned elements give back when they are unloaded, half to each side (n_own,) [J/m]."""
-        sim = self.sim
-        out = np.zeros(sim.n_own)
-        energy.stored_in_joints(
-            self.slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_history, sim.where,
-            sim.the_mesh().cells, sim.x, self.joint_table, self.joint_beyond, sim.n_left, out,
-        )  # fmt: skip
-        return out
+        energy = stress * (0.5 * stress + mean) / bulk * sim.areas[number]
+        if self.whole is not None:
+            self.whole.gather(energy)
+        return energy
 
     def book(
         self, before: np.ndarray, after: np.ndarray, a: float, b: float, of_joints: np.ndarray, pushed: np.ndarray,
@@ -1398,40 +1286,6 @@ class Local:
         sim = self.sim
         energy.kinetic(sim.n_left, sim.n_own, sim.the_mesh().cells, sim.number, before, after, self.mass, out)
 
-    def slot_of(self, faces: np.ndarray) -> np.ndarray:
-        """Slots of faces of owned elements."""
-        return self.first_slot[self.sim.where[faces // 4] - self.sim.n_left] + faces % 4
-
-    def edge_forces(self, slots: np.ndarray) -> np.ndarray:
-        """Joint forces (n, 4) [N/m] on the first and the last corner of the edges of slots."""
-        return self._edges(slots)[:, :4]
-
-    def corner_forces(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (element * 4 + k) of the faces of slots (n, dim), and the joint forces on them (n, dim, dim) [N/m],
-        in space [N]."""
-        face = self.slot_face[slots]
-        n = connectivity.corner_counts(self.sim.the_mesh().cells[face // 4])
-        corners = np.column_stack([face, 4 * (face // 4) + (face % 4 + 1) % n])
-        return corners, self.edge_forces(slots).reshape(-1, 2, 2)
-
-    def joint_means(self, slots: np.ndarray) -> np.ndarray:
-        """Mean opening, slip [m], normal and shear stress [Pa] of joints (n, 4)."""
-        return self._edges(slots)[:, 4:8]
-
-    def joint_points(self, slots: np.ndarray) -> np.ndarray:
-        """Normal (3) and shear (3) stress [Pa] at the points of joints, from the first corner of the slot's face to the
-        last (n, 6)."""
-        return self._edges(slots)[:, 8:]
-
-    def _edges(self, slots: np.ndarray) -> np.ndarray:
-        sim = self.sim
-        out = np.zeros((len(slots), 14))
-        build.edges_now(
-            slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_history, sim.where, sim.the_mesh().cells,
-            sim.x, self.joint_table, self.joint_beyond, out,
-        )  # fmt: skip
-        return out
-
     # ---- what is taken out of the tables ---------------------------------------------------------------------------
 
     def histories(self, transfer: bool) -> Histories:
@@ -1445,21 +1299,6 @@ class Local:
         return Histories.of(
             self.sim.n_own, np.concatenate([owner for owner, _ in parts]), np.concatenate([rows for _, rows in parts])
         )
-
-    def _joint_histories(self, transfer: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Owned element (0 ..) and row (histories.py) of each joint behind its peak; with `transfer` without those that
-        are broken."""
-        state = self.slot_state
-        slots = np.flatnonzero((state > INTACT) & ((state != BROKEN) | (not transfer)))
-        rows = np.zeros((len(slots), WORDS))
-        rows.view(np.int64)[:, KEY] = -1 - self.slot_face[slots] % 4
-        rows[:, STATE] = state[slots]
-        rows[:, FIRST : FIRST + HISTORY] = self.slot_history[slots]
-        return self.slot_element(slots), rows
-
-    def slot_element(self, slots: np.ndarray) -> np.ndarray:
-        """Owned element (0 ..) of slots."""
-        return self.sim.where[self.slot_face[slots] // 4] - self.sim.n_left
 
     def handed_over(self) -> tuple[np.ndarray, np.ndarray]:
         """Contact histories of joints that have just broken: the joint's shear force, half to each of the two edges.
@@ -1495,18 +1334,13 @@ class Local:
     def renew_contacts(self, handed_over: tuple[np.ndarray, np.ndarray]) -> None:
         """New contact lists; joints on faces that have been opened are gone. Collective."""
         sim = self.sim
-        self.tally[:, elements.NEW_BROKEN] = 0
-        opened = np.flatnonzero((self.slot_state != NONE) & ~sim.closed_faces()[self.slot_face])
-        if len(opened):
-            self.slot_state[opened] = NONE
-            self.slot_law[opened] = self.slot_kind[opened] = 0
-            self._relink()
-        low, high, values = self.pairs.known()
+        self._forget_opened()
+        known = self.pairs.known()
         owner, rows = handed_over
         if len(owner):
-            more = ContactPairs.named(sim.number[sim.owned][owner], rows)
-            low, high, values = (np.concatenate(parts) for parts in zip((low, high, values), more))
-        self.pairs = ContactPairs(sim, self, low, high, values)
+            more = self.pairs.named(sim.number[sim.owned][owner], rows)
+            known = tuple(np.concatenate(parts) for parts in zip(known, more))
+        self.pairs = self._contact(*known)
         self._bind()
         if sim.masses_change():
             if sim.budget is not None:

@@ -11,14 +11,14 @@ from hpcdem.physics.fdem import user_laws
 from hpcdem.physics.fdem.conditions import TRACTIONS
 from hpcdem.physics.fdem.elements import tangent
 from hpcdem.physics.fdem.hexes import Hexes, place_masses
-from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
-from hpcdem.physics.fdem.joints_hexes import Faces, HexJoints
+from hpcdem.physics.fdem.histories import FIRST, KEY, WORDS
+from hpcdem.physics.fdem.joints_hexes import HexJoints
 from hpcdem.physics.fdem.kernels import elements, energy_space, joint_law, joints_space, space, tets
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joint_law import HISTORY
-from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE
+from hpcdem.physics.fdem.kernels.joints import BROKEN, NONE
 from hpcdem.physics.fdem.laws_space import LawsSpace
-from hpcdem.physics.fdem.local import ALPHA, Evaluation, element_table, laws_of
+from hpcdem.physics.fdem.local import ALPHA, element_table, laws_of
 from hpcdem.physics.fdem.pairs import Surfaces
 from hpcdem.physics.fdem.pairs_space import ContactSpace, ShapesSpace, face_areas
 from hpcdem.physics.fdem.tetrahedra import FACES
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 class LocalSpace(LawsSpace):
     """See `Local`; count, rows: tetrahedra and their storage rows, with three more at the end."""
 
-    dim, force_width, stride = 3, tets.ROW, tets.STRIDE
+    dim, force_width, stride, listed, lists = 3, tets.ROW, tets.STRIDE, 4 * tets.BLOCK, 4
 
     def __init__(self, sim: State) -> None:
         self.sim = sim
@@ -46,11 +46,14 @@ class LocalSpace(LawsSpace):
         self._make_memories()
         self._make_joints()
         self._put_histories()
-        self.pairs: Any = ContactSpace(sim, *ContactSpace.remembered(sim))
+        self.pairs: Any = self._contact(*ContactSpace.remembered(sim))
         self._make_loads()
         self._make_nodes()
         self._set_masses()
         self._bind()
+
+    def _contact(self, low: np.ndarray, high: np.ndarray, values: np.ndarray) -> Any:
+        return ContactSpace(self.sim, low, high, values)
 
     @property
     def true_mass(self) -> np.ndarray:
@@ -98,7 +101,7 @@ class LocalSpace(LawsSpace):
     def _make_joints(self) -> None:
         """Slots of the faces, four per tetrahedron."""
         sim, mesh = self.sim, self.sim.the_mesh()
-        self.slots = 4 * self.count
+        self.slots = self.in_lists = 4 * self.count
         padded = self.slots + 12  # lanes are filled four tetrahedra at a time
         self.slot_face, self.slot_link = sparse_zeros(padded, np.int32), sparse_zeros((padded, 3), np.int32)
         some = bool((sim.joint_row > 0).any())
@@ -121,34 +124,18 @@ class LocalSpace(LawsSpace):
             self.sides = HexJoints(self)
             lost = max(int(lost), self.sides.lost)
         self._agree_on_lost(int(lost), "the joint of face")
-        self.jointed = bool(self._of_tetrahedra(self.slot_state).any())
+        self.jointed = bool(self._in_loops().any())
         self._make_joint_laws()
         if self.sides is not None:
             self.slot_law[self.sides.slot] = 0
 
-    def _of_tetrahedra(self, state: np.ndarray) -> np.ndarray:
-        """State of slots, those on sides of hexahedra left out."""
+    def _in_loops(self) -> np.ndarray:
+        """Those on sides of hexahedra are left out."""
         if self.sides is None:
-            return state
-        out = state.copy()
+            return self.slot_state
+        out = self.slot_state.copy()
         out[self.sides.slot] = NONE
         return out
-
-    def _put_histories(self) -> None:
-        histories = self.sim.histories
-        at = np.flatnonzero(histories.keys() < 0)
-        slot = 4 * histories.owners()[at] - 1 - histories.keys()[at]
-        now = self.slot_state[slot]
-        there = now != NONE  # else opened meanwhile, or its partner was taken out
-        was = histories.rows[at, STATE]
-        there &= (now == was) | (np.maximum(now, was) <= BROKEN)  # else it has another law now
-        slot, rows = slot[there], histories.rows[at[there]]
-        self.slot_law[slot], self.slot_state[slot] = 0, rows[:, STATE]
-        self.slot_history[slot] = rows[:, FIRST : FIRST + HISTORY]
-        self._relink()
-
-    def _relink(self) -> None:
-        joints_space.relink(self._of_tetrahedra(self.slot_state), self.slots, tets.BLOCK, self.head, self.follow)
 
     def _make_loads(self) -> None:
         sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
@@ -341,16 +328,6 @@ class LocalSpace(LawsSpace):
                     of_joints[hexes.rows.reshape(-1)] = 0.0
                 self.sides.forces(force, v, keep, of_joints)
 
-    def open_joints(self) -> None:
-        """See `Local.open_joints`."""
-        scratch, of_joints = (np.zeros((len(self.sim.number), tets.ROW)) for _ in range(2))
-        self.pairs.pushed[:] = 0.0
-        (yields, self.yields), (laws, self.laws) = (self.yields, False), (self.laws, [])
-        try:
-            self._fill(scratch, of_joints, False)
-        finally:
-            self.yields, self.laws = yields, laws
-
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""
         sim, clock = self.sim, self.sim.clock
@@ -400,37 +377,6 @@ class LocalSpace(LawsSpace):
 
         return placed.filled(self.sim.conditions_at(time, middle, dt), how)
 
-    def evaluation(self, contact: bool = True) -> Evaluation:
-        """Forces at the present positions; everything is put back as it was. Collective."""
-        sim, pairs = self.sim, self.pairs
-        kept = [
-            (table, table.copy())
-            for table in (
-                sim.v, self.outside, self.felt, pairs.history, pairs.touching, self.slot_law, self.slot_state,
-                self.head, self.follow, self.tally, *self.obeyed_state(),
-            )
-        ]  # fmt: skip
-        behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
-        remembered = self.slot_history[behind]
-        stored, self.force = self.force, np.zeros((len(sim.number), tets.ROW))
-        of_joints = np.zeros((len(sim.number), tets.ROW))
-        if not contact:
-            pairs.pushed[:] = 0.0
-        elif len(pairs):
-            pairs.forces(sim.x, sim.v, sim.clock.dt)
-        self._fill(self.force, of_joints, True)
-        self.move_nodes()
-        found = Evaluation(
-            self.force, of_joints, pairs.pushed.copy(), pairs.touching.copy(), pairs.out.copy(),
-            self.outside.copy(), self.felt.copy(), sim.v.copy(),
-        )  # fmt: skip
-        self.force = stored
-        self.slot_history[self.slot_state > INTACT] = 0.0
-        self.slot_history[behind] = remembered
-        for table, values in kept:
-            table[...] = values
-        return found
-
     def stresses(
         self, at: np.ndarray | None = None, energies: bool = True, flow: bool = True
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -461,22 +407,6 @@ class LocalSpace(LawsSpace):
             energy[own.rows - self.sim.n_left] *= own.volumes_over_parts()[:, None]
         return energy
 
-    def stored_in_joints(self) -> np.ndarray:
-        """As in the plane (n_own,) [J]."""
-        sim = self.sim
-        out = np.zeros(sim.n_own)
-        laws = self.joint_table, self.joint_beyond
-        energy_space.stored_in_joints(
-            self.slots, self.slot_face, self.slot_link, self.slot_size, self.slot_kind,
-            self._of_tetrahedra(self.slot_state), self.slot_history, sim.where, sim.x, *laws, sim.n_left, out,
-        )  # fmt: skip
-        if self.sides is not None:
-            of_sides = np.zeros(len(self.sides.slot))
-            joints = self.sides.moved(np.arange(len(of_sides)))
-            energy_space.stored_in_joints(len(of_sides), *joints[1:], *laws, 0, of_sides)
-            np.add.at(out, self.sides.slot // 4, of_sides)
-        return out
-
     def book(
         self, before: np.ndarray, after: np.ndarray, a: float, b: float, of_joints: np.ndarray, pushed: np.ndarray,
         felt: np.ndarray, outside: np.ndarray, work: np.ndarray,
@@ -500,85 +430,17 @@ class LocalSpace(LawsSpace):
         """As in the plane."""
         energy_space.kinetic(self.sim.n_left, self.sim.n_own, before, after, self.mass, out)
 
-    def slot_of(self, faces: np.ndarray) -> np.ndarray:
-        """As in the plane."""
-        return 4 * (self.sim.where[faces // 4] - self.sim.n_left) + faces % 4
-
-    def _edges(self, slots: np.ndarray) -> np.ndarray:
-        """See `joints_space.faces_now`."""
-        out = np.zeros((len(slots), 22))
-        kernel: Any = joints_space.faces_now
-        for which, joints in self.joints(slots):
-            found = np.zeros((len(which), 22))
-            kernel(*joints, self.joint_table, self.joint_beyond, found)
-            out[which] = found
-        return out
-
-    def joints(self, slots: np.ndarray) -> list[tuple[np.ndarray, Any]]:
-        """Joints (n,) as those of triangles: which of them, and what they are; last those on sides of hexahedra."""
-        sim, which = self.sim, np.arange(len(slots))
-        tables = self.slot_face, self.slot_link, self.slot_size, self.slot_kind, self.slot_state, self.slot_history
-        if self.sides is None:
-            return [(which, Faces(slots, *tables, sim.where, sim.x))]
-        on_side = np.isin(slots, self.sides.slot)
-        of_sides = np.searchsorted(self.sides.slot, slots[on_side])
-        return [
-            (which[~on_side], Faces(slots[~on_side], *tables, sim.where, sim.x)),
-            (which[on_side], self.sides.moved(of_sides)),
-        ]
-
-    def joint_ends(self, slots: np.ndarray, of_sides: bool) -> tuple[np.ndarray, np.ndarray | None]:
-        if not of_sides or self.sides is None:
-            return super().joint_ends(slots, of_sides)
-        of = np.searchsorted(self.sides.slot, slots)
-        return self.sides.corners(of), self.sides.ways(of)
-
-    def corner_forces(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As in the plane; beside hexahedra of four corners, -1 for the fourth of a triangle."""
-        face = self.slot_face[slots]
-        corner, force = 4 * (face // 4)[:, None] + FACES[face % 4], self._edges(slots)[:, 13:].reshape(-1, 3, 3)
-        return (corner, force) if self.sides is None else self.sides.shared(slots, corner, force)
-
-    def joint_means(self, slots: np.ndarray) -> np.ndarray:
-        """Mean opening, size of the mean slip [m], mean normal stress and size of the mean shear stress [Pa] (n, 4)."""
-        return self._edges(slots)[:, :4]
-
-    def joint_points(self, slots: np.ndarray) -> np.ndarray:
-        """Normal (3) and size of the shear (3) stress [Pa] at the points near the corners of the slot's face (n, 6)."""
-        return self._edges(slots)[:, 4:10]
-
     def handed_over(self) -> tuple[np.ndarray, np.ndarray]:
         """As in the plane: the shear force on this side, half to each of the two faces."""
         slots = np.flatnonzero(self.slot_state == BROKEN)
-        found = self._edges(slots)
-        slots, shear = slots[found[:, 2] < 0.0], found[found[:, 2] < 0.0, 10:13]
+        found = self._joints_now(slots)
+        slots, shear = slots[found[:, 2] < 0.0], found[found[:, 2] < 0.0, joints_space.SHEAR :]
         mine, other = self.slot_face[slots], self.sim.partner[self.slot_face[slots]]
         rows = np.zeros((2, len(slots), WORDS))
         rows.view(np.int64)[0, :, KEY] = 8 * (other // 4) + mine % 4
         rows.view(np.int64)[1, :, KEY] = 8 * (other // 4) + 4 + other % 4
         rows[0, :, FIRST : FIRST + 3], rows[1, :, FIRST : FIRST + 3] = 0.5 * shear, -0.5 * shear
         return np.tile(self.slot_element(slots), 2), rows.reshape(-1, WORDS)
-
-    def renew_contacts(self, handed_over: tuple[np.ndarray, np.ndarray]) -> None:
-        """New contact lists; joints on faces that have been opened are gone. Collective."""
-        sim = self.sim
-        self.tally[:, elements.NEW_BROKEN] = 0
-        opened = np.flatnonzero((self.slot_state != NONE) & ~sim.closed_faces()[self.slot_face])
-        if len(opened):
-            self.slot_state[opened] = NONE
-            self.slot_law[opened] = self.slot_kind[opened] = 0
-            self._relink()
-        known = self.pairs.known()
-        owner, rows = handed_over
-        if len(owner):
-            more = ContactSpace.named(sim.number[sim.owned][owner], rows)
-            known = tuple(np.concatenate(parts) for parts in zip(known, more))
-        self.pairs = ContactSpace(sim, *known)
-        self._bind()
-        if sim.masses_change():
-            if sim.budget is not None:
-                sim.budget.pause(sim)
-            self._set_masses()
 
 
 def _quarters(sim: State, number: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from hpcdem.core.errors import HpcdemError
 from hpcdem.physics.fdem import connectivity, hexahedra, tetrahedra
 from hpcdem.physics.fdem.connectivity import Edges, areas, centroids, edges_of, find_edges
-from hpcdem.physics.fdem.macros import HEXAHEDRON, OF_DIMENSION, SIX_INSIDE, Macro
+from hpcdem.physics.fdem.elements.kind import HEXAHEDRON, MACROS, Kind
 
 FLAT = 1e-9
 """A corner spans less than this much of the square of the longest edge: the element is flat."""
@@ -50,21 +50,21 @@ class Mesh:
     crack_sets: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     """(k,) i8 number of the fracture set of each crack edge."""
     macros: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
-    """(n, nodes + 1) i8 of macro-elements (macros.py), in space hexahedra, in the plane six-node triangles: their
-    points, and the first of the elements that store each."""
+    """(n, corners + 1) i8 of macro-elements (elements/kind.py), in space hexahedra, in the plane six-node triangles:
+    their points, and the first of the elements that store each."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "macros", self.macros.reshape(-1, self.macro.nodes + 1))
+        object.__setattr__(self, "macros", self.macros.reshape(-1, self.macro.corners + 1))
 
     @property
-    def macro(self) -> Macro:
+    def macro(self) -> Kind:
         """The kind of macro-element that there can be."""
-        return OF_DIMENSION[self.dim]
+        return MACROS[self.dim]
 
     @property
     def hexes(self) -> np.ndarray:
         """(nh, 9) i8 of hexahedra: their points, and the first of their six elements."""
-        return self.macros if self.dim == 3 else np.empty((0, HEXAHEDRON.nodes + 1), np.int64)
+        return self.macros if self.dim == 3 else np.empty((0, HEXAHEDRON.corners + 1), np.int64)
 
     @staticmethod
     def of_hexes(points: Any, hexes: Any, layers: Any = None, more: Any = None) -> Mesh:
@@ -162,7 +162,7 @@ class Mesh:
         number = of[faces // 4]
         if self.dim == 3:
             return (number >= 0) & (self._other_half[faces] < 0)
-        inside = SIX_INSIDE[faces // 4 - np.append(self.macros[:, -1], 0)[number], faces % 4]
+        inside = self.macro.inside()[faces // 4 - np.append(self.macros[:, -1], 0)[number], faces % 4]
         found: np.ndarray = (number >= 0) & inside
         return found
 
@@ -274,8 +274,13 @@ class Mesh:
         out = centres(self.points, self.cells[elements])
         if len(self.macros):
             of = self.macro_of()[elements]
-            out[of >= 0] = self.points[self.macros[of[of >= 0], : self.macro.corners]].mean(axis=1)
+            out[of >= 0] = self.points[self.macros[of[of >= 0], : self.macro.shape]].mean(axis=1)
         return out
+
+    def stress_points(self, elements: np.ndarray) -> np.ndarray:
+        """(n, dim) [m] where the initial stress of these elements is theirs: at their centroids, see
+        `Kind.said_of_parts`."""
+        return centres(self.points, self.cells[elements]) if self.macro.said_of_parts else self.centroids(elements)
 
     def nearest_element(self, points: np.ndarray, cells: np.ndarray, at: tuple[float, ...], among: np.ndarray) -> int:
         """Which of the cells (n, 4) of points (m, dim) holds the point `at`, or is nearest to it; among: of these."""

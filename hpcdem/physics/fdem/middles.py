@@ -27,7 +27,7 @@ def _gather_macros(sim: State, middle: np.ndarray) -> float:
     """Parts of a macro-element get one middle (n, dim), the mean of theirs, so that they go together. Returns the
     largest distance of their corners from it. Collective."""
     mesh = sim.the_mesh()
-    of, parts_of_one, dim = mesh.macro_of()[sim.number], mesh.macro.parts, sim.dim
+    of, parts_of_one, dim = mesh.macro_of()[sim.number], mesh.macro.stored, sim.dim
     mine = np.flatnonzero(of >= 0)
     parts = [(sim.number[mine], middle[mine])]
     if sim.comm.size > 1:

@@ -415,6 +415,10 @@ class ContactPairs(Bodies):
                 self.largest, self.touching,
             )  # fmt: skip
 
+    def changed_by_forces(self) -> tuple[np.ndarray, ...]:
+        """What contacts remember, as far as computing forces changes it."""
+        return self.history, self.largest, self.touching
+
     def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Numbers of the bodies of pairs that remember something, and what."""
         m = len(self)

@@ -289,6 +289,10 @@ class ContactSpace:
         if len(self.rows):
             contact.add(self.rows, self.pushed, force)
 
+    def changed_by_forces(self) -> tuple[np.ndarray, ...]:
+        """What contacts remember, as far as computing forces changes it."""
+        return self.history, self.touching
+
     def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Faces and targets of pairs that remember something, and what."""
         used = np.flatnonzero(self.history.any(axis=1))

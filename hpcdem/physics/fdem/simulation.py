@@ -38,7 +38,7 @@ from hpcdem.physics.fdem import (
 )
 from hpcdem.physics.fdem.edited import Edited
 from hpcdem.physics.fdem.histories import Histories
-from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
+from hpcdem.physics.fdem.kernels import elements, space, tets
 from hpcdem.physics.fdem.kernels.strength import HISTORY as STRENGTH_HISTORY
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.local_space import LocalSpace
@@ -282,8 +282,9 @@ class Blocks(Edited):
         with self.timers("neighbour"):
             middle, _ = middles(self)
             local = self.local
-            longest_link = joints_space.longest_link if self.dim == 3 else build.longest_link
-            longest2 = longest_link(middle, local.slots, local.slot_face, self.partner, self.where, local.slot_state)
+            longest2 = build.longest_link(
+                middle, local.slots, local.slot_face, self.partner, self.where, local.slot_state
+            )
             self._longest = math.sqrt(float(self.comm.max_into(np.array([longest2]))[0]))
             self.histories = local.histories(transfer=True)
             breaks.collect(self)

@@ -116,11 +116,11 @@ class Topology:
         if len(mesh.macros):
             of, macro = mesh.macro_of()[at], mesh.macro
             count = np.bincount(of[of >= 0], minlength=len(mesh.macros))
-            part = np.flatnonzero((count > 0) & (count < macro.parts))
+            part = np.flatnonzero((count > 0) & (count < macro.stored))
             if len(part):
                 first = mesh.macros[part[0], -1]
                 raise CommandError(
-                    f"elements {first} to {first + macro.parts - 1} are one {macro.name}: they go together, only "
+                    f"elements {first} to {first + macro.stored - 1} are one {macro.name}: they go together, only "
                     f"{count[part[0]]} of them were given"
                 )
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes, connectivity, convergence, creep, diagnostics, equilibrium, overlaps
-from hpcdem.physics.fdem.macros import SIX_NODES
+from hpcdem.physics.fdem.elements.kind import SIX_NODE_TRIANGLE
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over, Value
@@ -55,7 +55,7 @@ def tangent(threads: int = 1) -> None:
 
 def six_nodes(threads: int = 1) -> None:
     """Those of six-node triangles."""
-    mesh = Mesh.of([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)], SIX_NODES,
+    mesh = Mesh.of([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)], SIX_NODE_TRIANGLE.cells,
                    macros=[[0, 1, 2, 3, 4, 5, 0]])  # fmt: skip
     sim = _jointed(mesh, threads)
     convergence.advance(sim, 2)

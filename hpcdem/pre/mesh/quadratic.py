@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.macros import SIX_NODES
+from hpcdem.physics.fdem.elements.kind import SIX_NODE_TRIANGLE
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.pre.mesh.remade import Moved, Remade, named
 
@@ -30,7 +30,7 @@ def quadratic(mesh: Mesh) -> Remade:
     made = named(
         mesh,
         np.concatenate([mesh.points, mesh.points[edges.points].mean(axis=1)]),
-        np.insert(nodes[:, SIX_NODES].reshape(-1, 3), 3, -1, axis=1),
+        np.insert(nodes[:, np.array(SIX_NODE_TRIANGLE.cells)].reshape(-1, 3), 3, -1, axis=1),
         parent,
         moved,
         np.column_stack([nodes, 4 * np.arange(len(mesh.cells))]),

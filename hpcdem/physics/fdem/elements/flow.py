@@ -376,6 +376,8 @@ def _share(kind: Kind) -> Any:
 def _flow(kind: Kind) -> Any:
     if kind is QUAD:
         return plastic_quads.flow
+    if kind.laws:  # that can only be elastic
+        return None
     block, size, more, gather, look = {
         TRIANGLE.name: _of_triangles, TETRAHEDRON.name: _of_tetrahedra, HEXAHEDRON.name: _of_hexahedra,
     }[kind.name]()  # fmt: skip

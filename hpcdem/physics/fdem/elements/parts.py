@@ -17,6 +17,7 @@ from hpcdem.physics.fdem.elements.kind import KINDS, Kind
 from hpcdem.physics.fdem.kernels import hexes, laws, tets
 from hpcdem.physics.fdem.kernels.elements import _part
 from hpcdem.physics.fdem.kernels.tets import _product
+from hpcdem.physics.fdem.six import kernels as six
 
 SHARED = 1e-12
 """Difference of pressures in an overlay, over its stresses, that is put down to rounding."""
@@ -49,7 +50,7 @@ components = _by_kind(lambda kind: _constant(len(kind.components)))
 
 def _corner(kind: Kind) -> Any:
     stride = kind.stride
-    if kind.corners == 8:
+    if kind.stored > 1:
         return njit(error_model="numpy", forceinline=True)(lambda g, i, k: np.int64(g.place[i, k]))
     return njit(error_model="numpy", forceinline=True)(lambda g, i, k: np.int64(g.rows[i]) * g.width + stride * k)
 
@@ -201,6 +202,13 @@ def _strain(kind: Kind) -> Any:
         e11, e22, e12, e33, e13, e23 = tets.in_frame(r, f)
         return (e11 - 1.0, e22 - 1.0, e12, e33 - 1.0, e13, e23), r
 
+    @njit(error_model="numpy", forceinline=True)
+    def of_six_nodes(g, i, p, small):
+        _, frame, (e11, e22, e12) = six.strain(i, p, g.place, g.x, g.c, small)
+        return (e11, e22, e12, 0.0), frame
+
+    if len(kind.parts[0]) > kind.dim + 1:
+        return of_six_nodes
     return plane if kind.dim == 2 else space
 
 

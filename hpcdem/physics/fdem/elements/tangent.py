@@ -9,7 +9,7 @@ its stress sigma has, with the trace of its strain taken as the mean over its ov
 and where there are two overlays each counts half (mixed discretisation: Marti & Cundall 1982). With small strains
 gradients are those of the mesh and the term with the stress, which turns with the element, is left out: then K is the
 exact derivative of the forces. With large strains gradients and volumes are the present ones, and K the derivative up
-to terms of the order of the strain.
+to terms of the order of the strain. A part of a six-node triangle is a Gauss point of all its nodes.
 
 Where stresses flow, K loses sum V B^T C B: C is what the derivative of the return of stresses (plasticity.py) lacks of
 the elastic stiffness (the consistent tangent of Simo & Taylor 1985, for a return in principal stresses: Clausen,
@@ -46,6 +46,7 @@ from hpcdem.physics.fdem.kernels.plasticity import (
     principal_return,
 )
 from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW, TENSION_NOW
+from hpcdem.physics.fdem.six import kernels as six
 
 KEPT = 1e-6
 """Part of the elastic stiffness that an element keeps in the tangent: at the tip of the surface there is none."""
@@ -107,12 +108,23 @@ def _gradients(kind: Kind) -> Any:
                 out[0, j] -= a[k, j]
         return volume
 
-    return gradients
+    @njit(error_model="numpy")
+    def of_six_nodes(g, i, p, small, out):
+        m11, m12, m21, m22 = parts.inverse(g, i, p)
+        f11, f12, f21, f22 = six.gradient(i, p, g.place, g.x, g.c)
+        volume, det = parts.volume(g, i, p), f11 * f22 - f12 * f21
+        for a in range(6):
+            d, e = six.SLOPES[p, a, 0], six.SLOPES[p, a, 1]
+            x, y = d * m11 + e * m21, d * m12 + e * m22
+            out[a, 0], out[a, 1] = (x, y) if small else ((x * f22 - y * f21) / det, (y * f11 - x * f12) / det)
+        return volume if small else volume * det
+
+    return gradients if len(kind.parts[0]) == dim + 1 else of_six_nodes
 
 
 gradients = by_kind(_gradients)
-"""gradients(g, i, p, small, out): of the shape functions of a part into out (d + 1, d) [1/m], those of the mesh or the
-present ones, and its volume."""
+"""gradients(g, i, p, small, out): of the shape functions of a part into out (its nodes, d) [1/m], those of the mesh or
+the present ones, and its volume."""
 
 
 @njit(error_model="numpy")
@@ -132,13 +144,13 @@ def trial(g, i, s0, small, s, frames):
 
 def _elastic(kind: Kind) -> Any:
     dim, corners, overlays, each, counts = kind.dim, np.array(kind.parts), kind.overlays, kind.each, 1.0 / kind.overlays
-    size = dim * kind.corners
+    size, nodes = dim * kind.corners, corners.shape[1]
     normal, shear = ((0, 1), ((0, 1, 2),)) if dim == 2 else ((0, 1, 3), ((0, 1, 2), (0, 2, 4), (1, 2, 5)))
 
     @njit(error_model="numpy")
     def elastic(g, who, s0, small, out):
         s, frames = parts.room(g)
-        slope, whole, t = np.empty((dim + 1, dim)), np.empty(size), np.zeros((dim, dim))
+        slope, whole, t = np.empty((nodes, dim)), np.empty(size), np.zeros((dim, dim))
         for n in range(len(who)):
             i, k = who[n], out[n]
             lame, two_mu, _ = parts.moduli(g, i)
@@ -158,9 +170,9 @@ def _elastic(kind: Kind) -> Any:
                             t[a, a] = turned[normal[a]]
                         for a, b, c in shear:
                             t[a, b] = t[b, a] = turned[c]
-                    for a in range(dim + 1):
+                    for a in range(nodes):
                         at = dim * corners[p, a]
-                        for b in range(dim + 1):
+                        for b in range(nodes):
                             to, both = dim * corners[p, b], 0.0
                             for q in range(dim):
                                 both += slope[a, q] * slope[b, q]
@@ -216,12 +228,12 @@ def trials(g, who, s0, small, stress, turn):
 
 def _soften(kind: Kind) -> Any:
     dim, corners, overlays, each, counts = kind.dim, np.array(kind.parts), kind.overlays, kind.each, 1.0 / kind.overlays
-    size = dim * kind.corners
+    size, nodes = dim * kind.corners, corners.shape[1]
 
     @njit(error_model="numpy")
     def soften(g, who, principal, axes, law, table, small, out):
         slope, lost, b, along = np.empty((3, 3)), np.empty((6, 6)), np.empty((6, size)), np.empty(3)
-        slopes, volumes, mean = np.empty((each, dim + 1, dim)), np.empty(each), np.empty(size)
+        slopes, volumes, mean = np.empty((each, nodes, dim)), np.empty(each), np.empty(size)
         for n in range(len(who)):
             i = who[n]
             lame, two_mu, free = parts.moduli(g, i)
@@ -232,7 +244,7 @@ def _soften(kind: Kind) -> Any:
                     p = each * overlay + j
                     volumes[j] = gradients(g, i, p, small, slopes[j])
                     total += volumes[j]
-                    for a in range(dim + 1):
+                    for a in range(nodes):
                         for q in range(dim):
                             mean[dim * corners[p, a] + q] += volumes[j] * slopes[j, a, q]
                 for j in range(each):
@@ -247,10 +259,10 @@ def _soften(kind: Kind) -> Any:
                             share += axis[r, q] * axis[r, q]
                         for m in range(size):
                             b[q, m] = share / dim * mean[m] / total
-                        for a in range(dim + 1):
+                        for a in range(nodes):
                             for r in range(dim):
                                 b[q, dim * corners[p, a] + r] -= share / dim * slopes[j, a, r]
-                    for a in range(dim + 1):
+                    for a in range(nodes):
                         for q in range(3):
                             along[q] = 0.0
                             for r in range(dim):

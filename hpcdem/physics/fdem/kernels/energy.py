@@ -8,12 +8,9 @@ energy at t_n is m v- . v+ / 2. For an undamped linear model the sum with the po
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 
-from hpcdem.physics.fdem.kernels import joints
 from hpcdem.physics.fdem.kernels.elements import (
     ETA,
     LAMBDA,
@@ -29,7 +26,6 @@ from hpcdem.physics.fdem.kernels.elements import (
     _rate,
     part_stretch,
 )
-from hpcdem.physics.fdem.kernels.joints import FAR, NEAR
 
 # Columns of the work of an element (n_own, 8) [J/m]; the last are for nodes of which it has the lowest corner.
 BY_JOINTS, BY_CONTACT, VISCOUS, GRAVITY, OUTSIDE = range(5)
@@ -140,25 +136,3 @@ def kinetic(first, n_own, cells, number, before, after, mass, out):
         for k in range(2 * n):
             total += mass[r, k // 2] * before[r, k] * after[r, k]
         out[i] = 0.5 * total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def stored_in_joints(slots, face, at, kind, state, history, where, cells, x, table, beyond, first, out):
-    """Half of what each joint stores, added to the element of the slot: out (n_own,) [J/m]."""
-    flat = x.reshape(x.size)
-    for s in range(slots):
-        if state[s] == joints.NONE:
-            continue
-        f, p = face[s], at[s]
-        r, k = where[f // 4], f % 4
-        k2 = (k + 1) % (4 if cells[f // 4, 3] >= 0 else 3)
-        _, _, h2, oa, sa, ob, sb = joints.openings(
-            x[r, 2 * k], x[r, 2 * k + 1], x[r, 2 * k2], x[r, 2 * k2 + 1], flat[p], flat[p + 1], flat[p + 2], flat[p + 3]
-        )
-        h = math.sqrt(h2)
-        oa, sa, ob, sb = oa / h, sa / h, ob / h, sb / h
-        law, more = table[kind[s]], beyond[kind[s]]
-        ends = joints.stored(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, law, more, history[s], 0)
-        ends += joints.stored(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, law, more, history[s], 2)
-        middle = joints.stored(0.5 * (oa + ob), 0.5 * (sa + sb), h, law, more, history[s], 1)
-        out[r - first] += 0.5 * h * (5.0 / 18.0 * ends + 8.0 / 18.0 * middle)

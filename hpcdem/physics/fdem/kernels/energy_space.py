@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
-from hpcdem.physics.fdem.kernels import joints_space
 from hpcdem.physics.fdem.kernels.energy import BY_CONTACT, BY_JOINTS, GRAVITY, OUTSIDE, VISCOUS
-from hpcdem.physics.fdem.kernels.joints import NONE
-from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
+from hpcdem.physics.fdem.tetrahedra import ROW, STRIDE
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -72,25 +70,3 @@ def kinetic(first, n_own, before, after, mass, out):
                 q = STRIDE * k + m
                 total += mass[r, k] * before[r, q] * after[r, q]
         out[i] = 0.5 * total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def stored_in_joints(slots, face, link, sizes, kind, state, history, where, x, table, beyond, first, out):
-    """Half of what each joint stores, added to the element of the slot: out (n_own,) [J]."""
-    flat = x.reshape(x.size)
-    for s in range(slots):
-        if state[s] == NONE:
-            continue
-        r, k = where[face[s] // 4], face[s] % 4
-        a, b, c = (ROW * r + STRIDE * FACES[k, 0], ROW * r + STRIDE * FACES[k, 1], ROW * r + STRIDE * FACES[k, 2])
-        p, q, t = link[s, 0], link[s, 1], link[s, 2]
-        nx, ny, nz, area, d0x, d0y, d0z, d1x, d1y, d1z, d2x, d2y, d2z = joints_space.opened(
-            flat[a], flat[a + 1], flat[a + 2], flat[b], flat[b + 1], flat[b + 2], flat[c], flat[c + 1], flat[c + 2],
-            flat[p], flat[p + 1], flat[p + 2], flat[q], flat[q + 1], flat[q + 2], flat[t], flat[t + 1], flat[t + 2],
-        )  # fmt: skip
-        h, law, more = 1.0 / sizes[s], table[kind[s]], beyond[kind[s]]
-        mid = joints_space.mid_edges(flat, a, b, c, p, q, t)
-        one = joints_space.stored(d0x, d0y, d0z, nx, ny, nz, h, mid, law, more, history[s], 0)
-        two = joints_space.stored(d1x, d1y, d1z, nx, ny, nz, h, mid, law, more, history[s], 1)
-        three = joints_space.stored(d2x, d2y, d2z, nx, ny, nz, h, mid, law, more, history[s], 2)
-        out[r - first] += 0.5 * area / 3.0 * (one + (two + three))

@@ -92,24 +92,3 @@ def sliding_edge(x, at, over, law, beyond, history):
         True,
     )  # fmt: skip
     return end_forces(tx, ty, s0, s1, s2, t0, t1, t2)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def slopes(o, s, h, law, beyond, history, g):
-    """Derivatives [Pa/m] of sigma and tau at a point by opening and slip: sigma by o, by s, tau by o, by s."""
-    if law[LAW] == COHESIVE:
-        sigma_o, sigma_s, tau_o, tau_s, _ = joint_law.slopes(o, s, h, law, beyond, history, g)
-        return sigma_o, sigma_s, tau_o, tau_s
-    s -= history[STAYS + g]
-    sigma_o, sigma_s, tau_o, tau_s, _ = joint_law.slide_slopes(
-        o, abs(s), law, beyond, history[OWN + g], history[PATH + g]
-    )
-    return sigma_o, math.copysign(1.0, s) * sigma_s, math.copysign(1.0, s) * tau_o, tau_s
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def stored(o, s, h, law, beyond, history, g):
-    """Energy per area [J/m2] that a point gives back when it is unloaded."""
-    if law[LAW] == COHESIVE:
-        return joint_law.stored(o, s, h, law, beyond, history, g)
-    return joint_law.slide_stored(o, abs(s - history[STAYS + g]), law, beyond, history[OWN + g], history[PATH + g])

@@ -408,58 +408,27 @@ def links(number, rows, points, cells, where, partner, closed, joint_row, face, 
     return lost
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def relink(state, slots, block, head, follow):
-    """The lists of joints behind their peak, four per block of tetrahedra, from the states of the slots."""
-    for b in range(len(head)):
-        head[b] = -1
-    for s in range(slots):
-        if state[s] > INTACT:
-            b = 4 * (s // (4 * block)) + s % 4
-            follow[s], head[b] = head[b], s
+SHEAR = 19
+"""Column of `faces_now`: the shear force on this side."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def longest_link(middle, slots, face, partner, where, state):
-    """See `build.longest_link`."""
-    longest2 = 0.0
-    for s in range(slots):
-        if state[s] == NONE:
-            continue
-        a, b = where[face[s] // 4], where[partner[face[s]] // 4]
-        d2 = 0.0
-        for c in range(3):
-            d2 += (middle[a, c] - middle[b, c]) ** 2
-        longest2 = max(longest2, d2)
-    return longest2
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def faces_now(slots, face, link, sizes, kind, state, history, where, x, table, beyond, out):
+def faces_now(slots, own, over, per_h, kind, state, history, x, table, beyond, out):
     """Mean opening and slip [m], normal and shear stress [Pa] of joints, normal (3) and shear stress (3) at the points
-    near the corners of the slot's face, and on this side the shear force (3) and the forces on these corners (9) [N],
+    near the corners of the slot's face, and on this side the forces on these corners (9) and the shear force (3) [N],
     into out (n, 22); histories stay."""
-    flat = x.reshape(x.size)
-    own, found, part = rooms()
+    _, found, part = rooms()
     remembered = np.empty(HISTORY)
     for i in range(len(slots)):
         s = slots[i]
-        f = face[s]
-        r, k = where[f // 4], f % 4
-        for m in range(3):
-            own[m] = ROW * r + STRIDE * FACES[k, m]
         for m in range(HISTORY):
             remembered[m] = history[s, m] if state[s] > INTACT else 0.0
-        face_now(flat, own, link[s], sizes[s], table[kind[s]], beyond[kind[s]], remembered, part, found)
+        face_now(x, own[i], over[i], per_h[i], table[kind[s]], beyond[kind[s]], remembered, part, found)
         nx, ny, nz, area = found[9], found[10], found[11], found[12]
         dx = dy = dz = 0.0
-        for m, over in ((0, 0), (1, 2), (2, 1)):
-            at, to = own[m], link[s, over]
-            dx, dy, dz = (
-                dx + (flat[to] - flat[at]),
-                dy + (flat[to + 1] - flat[at + 1]),
-                dz + (flat[to + 2] - flat[at + 2]),
-            )
+        for m, other in ((0, 0), (1, 2), (2, 1)):
+            at, to = own[i, m], over[i, other]
+            dx, dy, dz = dx + (x[to] - x[at]), dy + (x[to + 1] - x[at + 1]), dz + (x[to + 2] - x[at + 2])
         o, _, _, _, size = parted(dx / 3.0, dy / 3.0, dz / 3.0, nx, ny, nz)
         out[i, 0], out[i, 1] = o, size
         for g in range(3):
@@ -470,28 +439,6 @@ def faces_now(slots, face, link, sizes, kind, state, history, where, x, table, b
         tz = (found[15] + (found[18] + found[21])) / 3.0
         sigma, sx, sy, sz, tau = parted(tx, ty, tz, nx, ny, nz)
         out[i, 2], out[i, 3] = sigma, tau
-        out[i, 10], out[i, 11], out[i, 12] = area * sx, area * sy, area * sz
         for m in range(9):
-            out[i, 13 + m] = found[m]
-
-
-# ---- slopes and energy ---------------------------------------------------------------------------------------------
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def slopes(o, s, h, law, beyond, history, g):
-    """Derivatives [Pa/m] of sigma and tau at a point by opening and slip, less what stays of it: sigma by o, by s, tau
-    by o, by s; and tau [Pa]."""
-    if law[joint_law.LAW] == COHESIVE:
-        return joint_law.slopes(o, s, h, law, beyond, history, g)
-    return joint_law.slide_slopes(o, s, law, beyond, history[OWN + g], history[PATH + g])
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def stored(dx, dy, dz, nx, ny, nz, h, mid, law, beyond, history, g):
-    """Energy per area [J/m2] that a point gives back when it is unloaded."""
-    o, sx, sy, sz, size = parted(dx, dy, dz, nx, ny, nz)
-    if law[joint_law.LAW] == COHESIVE:
-        return joint_law.stored(o, size, h, law, beyond, history, g)
-    _, _, _, size = unloaded(sx, sy, sz, size, mid, law, history, g)
-    return joint_law.slide_stored(o, size, law, beyond, history[OWN + g], history[PATH + g])
+            out[i, 10 + m] = found[m]
+        out[i, SHEAR], out[i, SHEAR + 1], out[i, SHEAR + 2] = area * sx, area * sy, area * sz

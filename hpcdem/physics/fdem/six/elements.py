@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.elements import tangent
+from hpcdem.physics.fdem.elements.block import ElementBlock
+from hpcdem.physics.fdem.elements.kind import SIX_NODE_TRIANGLE
 from hpcdem.physics.fdem.kernels import elements, limits
 from hpcdem.physics.fdem.linear import Pieces
-from hpcdem.physics.fdem.properties import MECH_ISO_ELASTIC, temperature_table
 from hpcdem.physics.fdem.six import kernels
 
 if TYPE_CHECKING:
@@ -17,19 +19,15 @@ if TYPE_CHECKING:
 
 
 def check(sim: State) -> None:
-    """CommandError where six-node triangles cannot have what was assigned."""
+    """CommandError where six-node triangles cannot have what was assigned, all of it taken together."""
     mesh = sim.the_mesh()
     if mesh.dim == 3 or not len(mesh.macros):
         return
     parts = mesh.macro.elements(mesh.macros)
     parts = parts[sim.alive[parts[:, 0]]]
-    rows, row = sim.element_rows, sim.element_row[parts]
-    elastic = np.array([rows.name(k) in ("", MECH_ISO_ELASTIC.name) for k in range(len(rows))])
-    warm = rows.column(temperature_table("young")) > 0.0
+    row = sim.element_row[parts]
     for wrong, what in (
         (row != row[:, :1], "has several materials: its parts have one"),
-        (~elastic[row], "can be elastic only, element c-model mech-iso-elastic"),
-        (warm[row], "can have no young that follows a table"),
         ((row >= 0) & ("free_field" in sim.surface_loads), "cannot stand beside free-field sides"),
     ):
         bad = np.flatnonzero(wrong.any(axis=1))
@@ -39,8 +37,8 @@ def check(sim: State) -> None:
 
 class SixNodes:
     """Of the `Local` that makes it. rows (n, 4): storage rows of their parts; parts (n, 4): of these in the table of
-    triangles; row, corner (n, 6): where the forces of each node go, the first corner at it; c (n, 35), s0 (n, 4):
-    constants and stress without strain [Pa], see kernels.py."""
+    triangles; from_v, to (n, 6): where the velocity of each node is, and its forces go, of the first corner at it;
+    block: themselves; c (n, 23), s0 (n, 3, 4): constants and stress without strain [Pa], see kernels.py."""
 
     def __init__(self, local: Any) -> None:
         self.local, self.sim = local, local.sim
@@ -54,11 +52,15 @@ class SixNodes:
         self.rows = sim.where[element]
         self.parts = local.triangle_of_row[self.rows - sim.n_left]
         first, self._node = mesh.macro.places(mesh.cells, table)
-        self.corner = first % 4
-        self.row = np.take_along_axis(self.rows, first // 4, axis=1)
-        self.nodes = sim.node[np.take_along_axis(element, first // 4, axis=1), self.corner]
-        self.s0 = np.zeros((len(table), 4))
+        row, corner = np.take_along_axis(self.rows, first // 4, axis=1), 2 * (first % 4)
+        self.from_v, self.to = (width * row + corner for width in (sim.v.shape[1], elements.FORCE))
+        self.nodes = sim.node[np.take_along_axis(element, first // 4, axis=1), first % 4]
+        self.s0 = np.zeros((len(table), kernels.GAUSS, 4))
         self._make_constants(mesh.points[table[:, :-1]])
+        self.block = ElementBlock(
+            sim, SIX_NODE_TRIANGLE, self.rows[:, 0], self.c, self.s0, self.rows - sim.n_left,
+            np.full(self.rows.shape, 1.0 / kernels.PARTS), (sim.x.shape[1] * row + corner).astype(np.int32),
+        )  # fmt: skip
         self._take_over()
 
     def _make_constants(self, points: np.ndarray) -> None:
@@ -68,7 +70,7 @@ class SixNodes:
             j = sum(points[:, a, :, None] * slopes[a] for a in range(6))
             self.c[:, 4 * p : 4 * p + 4] = np.linalg.inv(j).reshape(-1, 4)
             if p < kernels.GAUSS:
-                self.c[:, kernels.WEIGHT + p] = np.linalg.det(j) / 6.0
+                self.c[:, kernels.AREA + p] = np.linalg.det(j) / 2.0
         of_part = self.local.c[self.parts[:, 0]]
         self.c[:, kernels.LAMBDA :] = of_part[:, [elements.LAMBDA, elements.TWO_MU, elements.ETA, elements.FREE]]
 
@@ -101,7 +103,7 @@ class SixNodes:
         """Largest eigenvalue (n,) of M^-1 K in the mesh, with these masses of corners (rows, 4) and constants."""
         if not c[:, kernels.TWO_MU].any():  # without viscosity
             return np.zeros(len(c))
-        at_nodes = np.zeros(self.row.shape)
+        at_nodes = np.zeros(self.to.shape)
         np.add.at(at_nodes, (np.arange(len(at_nodes))[:, None], self._node), mass[self.rows].reshape(-1, 16))
         scale = 1.0 / np.sqrt(np.repeat(at_nodes, 2, axis=1))
         return np.asarray(np.linalg.eigvalsh(self._stiffness(c, True) * scale[:, :, None] * scale[:, None, :])[:, -1])
@@ -111,22 +113,28 @@ class SixNodes:
         return Pieces(self.number, self.nodes, self._stiffness(self.c, not self.sim.options.large_strain))
 
     def _stiffness(self, c: np.ndarray, small: bool) -> np.ndarray:
-        out = np.empty((len(self.row), 12, 12))
-        kernels.stiffness(self.row, self.corner, self.sim.x, c, self.s0, small, out)
+        out = np.empty((len(self.to), 12, 12))
+        tangent.elastic(self.block.tables._replace(c=c), self.block.alone, self.s0, small, out)
         return out
 
     def take_stress(self, s0: np.ndarray) -> None:
-        """Stress without strain is the mean of that of the parts, which have none left in s0 (count + 3, 4) [Pa]."""
-        of = s0[self.parts]
-        self.s0[:] = 0.25 * (of[:, 0] + of[:, 1] + of[:, 2] + of[:, 3])
+        """Stress without strain at their Gauss points, the centroids of the first three parts; the parts have none left
+        in s0 (count + 3, 4) [Pa]."""
+        self.s0[:] = s0[self.parts[:, : kernels.GAUSS]]
         s0[self.parts] = 0.0
+
+    def gather(self, energy: np.ndarray) -> None:
+        """What the parts store by their heat (n_own,) [J/m] is that at the Gauss points, a third of the area each; a
+        quarter of it goes to each part."""
+        at = self.rows - self.sim.n_left
+        energy[at] = (energy[at[:, : kernels.GAUSS]].sum(axis=1) / kernels.GAUSS)[:, None]
 
     def add_forces(self, v: np.ndarray, elastic: float, force: np.ndarray) -> None:
         """Add to the rows of the parts (n, 8) [N/m], with these velocities; elastic: see `kernels.forces`."""
         sim, o = self.sim, self.sim.options
         kernel: Any = kernels.forces if sim.threads == 1 else kernels.forces_threaded
         kernel(
-            sim.threads, self.row, self.corner, sim.x, v, self.c, self.s0, elastic, not o.large_strain,
+            sim.threads, self.block.tables, self.from_v, self.to, v, self.s0, elastic, not o.large_strain,
             o.stiffness_damping, force,
         )  # fmt: skip
 
@@ -141,8 +149,8 @@ class SixNodes:
     def put_stresses(self, at: np.ndarray | None, stress: np.ndarray, energy: np.ndarray) -> None:
         """Stress [Pa] of the parts among these owned elements, all if None, and a quarter of the energy each [J/m]."""
         small, which = not self.sim.options.large_strain, np.full(self.sim.n_own, -1)
-        found, whole = np.empty((len(self.row), 4, 4)), np.empty(len(self.row))
-        kernels.stresses(self.row, self.corner, self.sim.x, self.c, self.s0, small, found, whole)
+        found, whole = np.empty((len(self.to), 4, 4)), np.empty(len(self.to))
+        kernels.stresses(self.block.tables, self.s0, small, found, whole)
         which[self.rows.reshape(-1) - self.sim.n_left] = np.arange(self.rows.size)
         which = which if at is None else which[at]
         here = which >= 0
