@@ -25,7 +25,7 @@ def mesh(request):
 def test_parts_fill_the_whole_and_share_its_number(mesh):
     check(mesh)
     macro = mesh.macro
-    assert (np.bincount(mesh.macro_of()) == macro.parts).all()
+    assert (np.bincount(mesh.macro_of()) == macro.stored).all()
     assert mesh.areas().sum() == pytest.approx(1.0, rel=1e-14)
     first, of = macro.places(mesh.cells, mesh.macros)
     own = mesh.cells[macro.elements(mesh.macros)].reshape(len(mesh.macros), -1)
@@ -43,15 +43,15 @@ def test_faces_inside_are_those_between_two_parts_of_one(mesh):
 
 
 def test_parts_of_one_have_one_centroid(mesh):
-    middles = mesh.centroids().reshape(len(mesh.macros), mesh.macro.parts, -1)
-    corners = mesh.points[mesh.macros[:, : mesh.macro.corners]]
+    middles = mesh.centroids().reshape(len(mesh.macros), mesh.macro.stored, -1)
+    corners = mesh.points[mesh.macros[:, : mesh.macro.shape]]
     assert (middles == corners.mean(axis=1)[:, None]).all()
 
 
 def test_what_loses_a_part_is_gone(mesh):
     left = without(mesh, np.array([1]))
     assert len(left.mesh.macros) == len(mesh.macros) - 1
-    assert (left.parent >= mesh.macro.parts).all()
+    assert (left.parent >= mesh.macro.stored).all()
     check(left.mesh)
 
 

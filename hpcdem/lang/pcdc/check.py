@@ -50,7 +50,7 @@ def _not_of_six_nodes(script: Source) -> Iterator[tuple[Statement, str, bool]]:
             case "element c-model" | "element property" if made is not None:
                 given = statement.arguments.get("properties", statement.arguments)
                 model = MODELS.get(statement.arguments.get("model", ""))
-                law = "" if model in (None, HEAT, *OF_FIELDS) else model.name
+                law = "" if model is None or model in (HEAT, *OF_FIELDS) else model.name
                 follow = [
                     name for name, value in given.items() if isinstance(value, Over) and value.axis >= TEMPERATURE
                 ]
