@@ -57,8 +57,6 @@ os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
 os.environ.setdefault("NUMBA_THREADING_LAYER", "omp" if openmp_runtime_found() else "workqueue")
 kept.install()
 
-gc.disable()  # collecting tests makes a million objects that stay
-
 # --- what this machine has -------------------------------------------------------------------------------------
 
 
@@ -235,6 +233,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if GREEN.is_file():
         passed = set(GREEN.read_text().splitlines())
         items[:] = [item for item in items if item.nodeid not in passed]
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Collecting tests makes a million objects that stay: no garbage. With xdist only its workers collect."""
+    if hasattr(session.config, "workerinput") or session.config.getoption("dist", "no") == "no":
+        gc.disable()
 
 
 def pytest_collection_finish() -> None:
