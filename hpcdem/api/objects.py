@@ -14,6 +14,7 @@ from hpcdem.api.program import place
 from hpcdem.api.types import Number, Point, Solved, Where
 from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
+from hpcdem.core.nearest import quoted
 from hpcdem.lang.pcdc.bindings import Call, carry_out
 from hpcdem.lang.pcdc.keywords import matching
 from hpcdem.lang.pcdc.kinds import FunctionName
@@ -212,8 +213,7 @@ class Named(Words):
     def __getitem__(self, name: str) -> dict[str, float]:
         found = fdem.queries.wells(self._do.project())
         if name not in found:
-            known = ", ".join(f"'{other}'" for other in found) or "none so far"
-            raise CommandError(f"there is no well '{name}'; there is {known}")
+            raise CommandError(f"there is no well '{name}'; there is {quoted(found)}")
         return found[name]
 
 

@@ -18,6 +18,11 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     return by_lower[found[0]] if found else None
 
 
+def quoted(names: Iterable[str], none: str = "none so far") -> str:
+    """``'a', 'b'``, what there is, for a message."""
+    return ", ".join(f"'{name}'" for name in names) or none
+
+
 def hint(word: str, known: Iterable[str]) -> str:
     """``; did you mean 'xmove'?`` or nothing, to be put into a message."""
     best = nearest(word, known)

@@ -10,6 +10,7 @@ import numpy as np
 from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
+from hpcdem.core.nearest import quoted
 from hpcdem.numerics.random_field import RandomField
 from hpcdem.physics.fdem import changes, node_conditions, sides, user_functions, user_laws
 from hpcdem.physics.fdem.free_field import FreeField
@@ -296,8 +297,7 @@ def remove_face_conditions(project: Project, where: Range | None = None) -> None
 def _known(project: Project, *values: Number | None) -> None:
     for value in values:
         if isinstance(value, str) and value not in project.blocks.tables and value not in user_functions.FUNCTIONS:
-            known = ", ".join(f"'{name}'" for name in project.blocks.tables) or "none so far"
-            raise CommandError(f"there is no table '{value}'; there is {known}")
+            raise CommandError(f"there is no table '{value}'; there is {quoted(project.blocks.tables)}")
 
 
 # ---- tables --------------------------------------------------------------------------------------------------------

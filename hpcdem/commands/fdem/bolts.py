@@ -8,6 +8,7 @@ import numpy as np
 
 from hpcdem.commands.fdem import supports
 from hpcdem.commands.fdem.choices import everything
+from hpcdem.commands.fdem.needed import begun
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.bolts import kernels, layout
@@ -32,18 +33,9 @@ def create(
     set_name: str = DEFAULT,
 ) -> None:
     """Install a bolt, as things are now, see `Bolts.create`; group: that its elements and nodes are put into."""
-    blocks = project.ready()
-    known = Bolts.there(blocks)
-    bolts = Bolts.of(blocks)
-    try:
+    with begun(project, Bolts) as bolts:
         nodes, elements = bolts.create(points, segments, length, grout, plate)
-    except CommandError:
-        if known is None:
-            blocks.surface_loads.remove(bolts)
-        raise
-    if group is not None:
-        project.groups[BOLT_NODE].assign(nodes, group, set_name)
-        project.groups[BOLT_ELEMENT].assign(elements, group, set_name)
+    supports.put_into(project, group, set_name, {BOLT_NODE: nodes, BOLT_ELEMENT: elements})
 
 
 def between(

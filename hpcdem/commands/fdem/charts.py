@@ -15,6 +15,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import Chart, Curve
 from hpcdem.commands.fdem.values import figure_name
 from hpcdem.core.errors import CommandError
+from hpcdem.core.nearest import quoted
 from hpcdem.core.units import label as unit_label
 from hpcdem.io.agreed import atomic_path, make_folder, on_first
 from hpcdem.io.files import write_sections
@@ -158,6 +159,5 @@ def _named(project: Project, name: str) -> str:
 
 def _chart(project: Project, name: str) -> Chart:
     if name not in project.charts:
-        known = ", ".join(f"'{other}'" for other in project.charts) or "none so far"
-        raise CommandError(f"there is no chart '{name}'; there is {known}")
+        raise CommandError(f"there is no chart '{name}'; there is {quoted(project.charts)}")
     return project.charts[name]

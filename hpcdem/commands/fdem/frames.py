@@ -15,6 +15,7 @@ from hpcdem.commands.fdem import frame_tables
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.values import frames_name
 from hpcdem.core.errors import CommandError
+from hpcdem.core.nearest import quoted
 from hpcdem.core.units import declared
 from hpcdem.io import vtkhdf_mesh
 from hpcdem.io.behind import Deliveries, under_way
@@ -35,7 +36,7 @@ def vtk(project: Project, file: str, every: int | None = None, off: bool = False
     name. Collective."""
     if off:
         if file not in project.frames:
-            known = ", ".join(f"'{other}'" for other in project.frames) or "none"
+            known = quoted(project.frames, "none")
             raise CommandError(f"there are no frames '{file}' to stop; there is {known}")
         del project.frames[file]
         return

@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcdem.commands.fdem import assignments
 from hpcdem.commands.fdem.choices import chosen, points
-from hpcdem.commands.fdem.needed import needed
+from hpcdem.commands.fdem.needed import begun, needed
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, OnBoundary, Range
@@ -32,15 +32,8 @@ def assign(
     CommandError beside particles, where blocks do not have `what`."""
     if project.coupled is not None:
         raise CommandError(f"blocks that are coupled to particles have no {what} in this version")
-    blocks = project.ready()
-    known = physics.there(blocks)
-    found = physics.of(blocks)
-    try:
+    with begun(project, physics) as found:
         found.assign(numbers, properties)
-    except CommandError:
-        if known is None:
-            blocks.surface_loads.remove(found)
-        raise
 
 
 def element_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:

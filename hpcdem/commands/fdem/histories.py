@@ -13,6 +13,7 @@ from hpcdem.commands.fdem.recorded import LAW_STATE, MODEL, UNITS, WELL
 from hpcdem.commands.fdem.records import ENERGIES, History
 from hpcdem.commands.fdem.values import history_name, result_name
 from hpcdem.core.errors import CommandError
+from hpcdem.core.nearest import quoted
 from hpcdem.core.units import label
 from hpcdem.io.agreed import make_folder
 from hpcdem.io.columns import append_rows
@@ -151,8 +152,7 @@ def delete(project: Project, name: str) -> None:
 def find(project: Project, name: str) -> History:
     """A history by its name. CommandError if there is none."""
     if name not in project.histories:
-        known = ", ".join(f"'{other}'" for other in project.histories) or "none so far"
-        raise CommandError(f"there is no history '{name}'; there is {known}")
+        raise CommandError(f"there is no history '{name}'; there is {quoted(project.histories)}")
     return project.histories[name]
 
 

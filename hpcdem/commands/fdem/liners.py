@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from hpcdem.commands.fdem import supports
 from hpcdem.commands.fdem.choices import everything
+from hpcdem.commands.fdem.needed import begun
 from hpcdem.commands.fdem.project import Project
-from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import DEFAULT, FACE, LINER_ELEMENT, LINER_NODE, Range
 from hpcdem.physics.fdem.structures import VELOCITY
 from hpcdem.physics.liners.model import Liners
@@ -18,18 +18,9 @@ def create(project: Project, group: str | None = None, set_name: str = DEFAULT, 
     """Put a liner on the free faces of a range, as things are now, see `Liners.create`; group: that its elements and
     nodes are put into."""
     faces = everything(project, FACE, where)
-    blocks = project.ready()
-    known = Liners.there(blocks)
-    liners = Liners.of(blocks)
-    try:
+    with begun(project, Liners) as liners:
         nodes, elements = liners.create(faces)
-    except CommandError:
-        if known is None:
-            blocks.surface_loads.remove(liners)
-        raise
-    if group is not None:
-        project.groups[LINER_NODE].assign(nodes, group, set_name)
-        project.groups[LINER_ELEMENT].assign(elements, group, set_name)
+    supports.put_into(project, group, set_name, {LINER_NODE: nodes, LINER_ELEMENT: elements})
 
 
 def velocity(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 from hpcdem.commands.fdem.project import Project
@@ -25,3 +27,16 @@ def needed(project: Project, physics: type[_P], use: bool = True) -> _P:
     if found is None:
         raise CommandError(LACKS[physics])
     return found
+
+
+@contextmanager
+def begun(project: Project, physics: type[_P]) -> Iterator[_P]:
+    """That of the model, or a new one, which is taken out again if what follows is refused."""
+    blocks = project.ready()
+    known, found = physics.there(blocks), physics.of(blocks)
+    try:
+        yield found
+    except CommandError:
+        if known is None:
+            blocks.surface_loads.remove(found)
+        raise

@@ -6,11 +6,20 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from hpcdem.commands.fdem.assignments import from_now
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.physics.fdem.groups import Range
 from hpcdem.physics.supports import of
+
+
+def put_into(project: Project, group: str | None, set_name: str, of: Mapping[str, np.ndarray]) -> None:
+    """Objects by their kinds into a group; None: into none."""
+    if group is not None:
+        for kind, numbers in of.items():
+            project.groups[kind].assign(numbers, group, set_name)
 
 
 def assign(project: Project, kind: str, properties: Mapping[str, float], where: Range | None) -> None:
