@@ -2510,10 +2510,10 @@ class Charts(Words):
         ----------
         name : name.
         file : name of the figure: .png, .pdf or .svg.
-        cracks : beside it the model as it is now, with its cracks by the way they broke (in the plane).
-        plastic : beside it the model as it is now, with contours of plastic shear strain (in the plane).
-        fluid : beside it the model as it is now, its channels coloured by that (in the plane).
-        temperature : beside it the model as it is now, with contours of temperature, and cracks (in the plane).
+        cracks : beside it the model as it is now, with its cracks by the way they broke.
+        plastic : beside it the model as it is now, with contours of plastic shear strain.
+        fluid : beside it the model as it is now, its channels coloured by that.
+        temperature : beside it the model as it is now, with contours of temperature, and cracks.
         """
 
 class Output(Words):

@@ -17,6 +17,15 @@ SIZE = 5.5, 3.9
 """Of the diagram, in inches."""
 FONT = 9.0
 """Points, beside a model."""
+BAR = 0.85
+"""Width of a bar of colours beside a body, with its numbers and name, in inches."""
+IN_SPACE = {
+    "plastic": ("elements", "plastic_shear_strain"), "temperature": ("elements", "mean_temperature"),
+    "pressure": ("joints", "fluid_pressure"), "saturation": ("joints", "saturation"),
+    "aperture": ("joints", "aperture"), "velocity": ("joints", "fluid_velocity"),
+    "concentration": ("joints", "proppant_concentration"), "cracks": ("joints", ""),
+}  # fmt: skip
+"""What colours a body beside a diagram, by the panel: objects and a field of theirs."""
 COLOURS = ("#202020", "#2a8c5a", "#8c5aa8", "#9a6b2f")
 """Of curves beside a model: none that a crack has."""
 Points = Sequence[tuple[float, float]]
@@ -43,7 +52,7 @@ def draw(
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.add_subplot()
     else:
-        figure, axes = _beside(model, beside)
+        figure, axes = (_beside if model.points.shape[1] == 2 else _body_beside)(model, beside)
     every = np.array([point for *_, points in curves for point in points]).reshape(-1, 2)
     (x_size, x_label), (y_size, y_label) = (_axis(*both) for both in zip((x_label, y_label), every.T, strict=True))
     for label, style, points in curves:
@@ -121,8 +130,7 @@ def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
                  transform=bar.transAxes)  # fmt: skip
     else:
         modes = blocks.panel(left, model, seen, 2.54 * width)
-    for axes, label in ((left, "(a)"), (right, "(b)")):
-        axes.set_title(label, loc="left", fontsize=FONT, pad=3.0)
+    _lettered(left, right)
     if modes and coloured:
         left.legend(handles=modes, loc="lower right", fontsize=0.75 * FONT, borderaxespad=0.3, framealpha=0.9,
                     edgecolor="none", handlelength=1.2, handletextpad=0.4)  # fmt: skip
@@ -134,8 +142,52 @@ def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
             handlelength=1.2, columnspacing=0.8 if tight else 1.0,
             handletextpad=0.4,
         )  # fmt: skip
+    return figure, right
+
+
+def _lettered(left: Any, right: Any) -> None:
+    """Letters over a model and a diagram, and the looks of the diagram."""
+    for axes, label in ((left, "(a)"), (right, "(b)")):
+        axes.set_title(label, loc="left", fontsize=FONT, pad=3.0)
     right.set_prop_cycle(color=COLOURS)
     right.tick_params(labelsize=FONT)
     right.xaxis.label.set_fontsize(FONT)
     right.yaxis.label.set_fontsize(FONT)
+
+
+def _body_beside(model: MeshState, panel: str) -> tuple[Any, Any]:
+    """The same of a body in space, painted as `hpcdem draw` does: joints are seen through its elements."""
+    from matplotlib.figure import Figure
+
+    from hpcdem.post.view import paper
+    from hpcdem.post.view.moment import of_blocks
+    from hpcdem.post.view.scene import PALE, THROUGH, default_view, scene
+
+    moment, (kind, name) = of_blocks(model), IN_SPACE[panel]
+    view = default_view(moment).with_layer("elements", field="", colour=PALE[0], edges=False, opacity=THROUGH)
+    if kind == "elements":
+        view = view.with_layer("elements", field=name if moment.of(kind).has(name) else "", colour="", opacity=1.0)
+        view = view.changed(layers=[layer for layer in view.model_dump()["layers"] if layer["object"] != "joints"])
+    elif kind in moment.objects:
+        view = view.with_layer("joints", field=name)
+    shown = scene(moment, view)
+    bars = [layer.scale for layer in shown.layers if layer.scale is not None]
+    height = SIZE[1] - 0.75
+    width = min(max(height * shown.seen.width / shown.seen.height, 0.3 * height), 1.5 * height)
+    begin = 0.2 + width + BAR * len(bars) + 0.55
+    page = begin + SIZE[0] - 1.4 + 0.15, SIZE[1]
+    figure = Figure(figsize=page)
+    left = figure.add_axes((0.2 / page[0], 0.5 / page[1], width / page[0], height / page[1]))
+    right = figure.add_axes((begin / page[0], 0.5 / page[1], (SIZE[0] - 1.4) / page[0], height / page[1]))
+    left.set_axis_off()
+    paper.body(left, shown, 200.0 * width, 200.0)
+    for number, scale in enumerate(bars):
+        at = (0.3 + width + BAR * number) / page[0], 0.5 / page[1], 0.1 / page[0], height / page[1]
+        paper.colour_bar(figure, figure.add_axes(at), scale, FONT)
+    handles = [handle for layer in shown.layers for handle in paper.handles_of(layer)]
+    if handles:
+        words, patches = zip(*handles, strict=True)
+        left.legend(patches, words, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=3, frameon=False,
+                    fontsize=0.75 * FONT)  # fmt: skip
+    _lettered(left, right)
     return figure, right

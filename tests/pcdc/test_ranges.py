@@ -272,5 +272,5 @@ def test_terms_of_space(bench):
     assert by_words(bench, g.NODE, "in-circle (0,0,0) 1.2") == inside != []
     faces = by_words(bench, g.FACE, "area 0.4 0.6")
     assert faces and set(faces) < set(by_words(bench, g.FACE, "area 0 9"))
-    with pytest.raises(ScriptError, match="geometry-along' is for two dimensions"):
-        bench("pcdc element group 'a' range geometry-along 's'\n")
+    with pytest.raises(ScriptError, match="geometry-location' is for two dimensions"):
+        bench("pcdc element group 'a' range geometry-location 's'\n")

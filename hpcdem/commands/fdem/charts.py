@@ -118,6 +118,8 @@ def export(
     write_sections(figure.with_suffix(".csv"), project.comm, lambda: [text.encode()])
     if beside:
         project.ready(use=False)
+        if project.dim == 3:
+            project.blocks.prepare_kernels("pictures")
     model = frames.whole(project) if beside else None
 
     def picture() -> None:

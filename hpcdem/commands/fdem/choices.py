@@ -92,6 +92,8 @@ _ONLY_JOINTS = (g.Between, g.OnCrack, g.Around)
 _NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
 _NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer, g.Along, g.Near, g.Crossed, g.Sized)
 _BY_PLACE = (g.Span, g.OnLayer, g.InCircle, g.Near, g.Crossed, g.Along)
+ASIDE = 1e-4
+"""Over the size of a face: how far aside a surface is looked for, and so how well the cosine of its angle is known."""
 STRAIGHT = 1e-6
 """Degrees by which an angle that is 0 may be off: coordinates of meshes are rounded."""
 
@@ -343,7 +345,7 @@ class _Objects:
     def _along(self, layer: str, distance: float, angle: float) -> np.ndarray:
         """Near a line of the layer, and, what has a direction, at a small angle to it there."""
         if self.mesh.dim == 3:
-            raise CommandError("geometry-along is for two dimensions; geometry-distance chooses near a surface")
+            return self._along_surfaces(layer, distance, angle)
         places, found = self.places(), np.zeros(len(self.numbers), bool)
         slack, least = self._slack(TOLERANCE), math.cos(math.radians(angle + STRAIGHT)) if angle < 90.0 else 0.0
         way = places[:, -1] - places[:, 0]
@@ -355,6 +357,27 @@ class _Objects:
                 near = (away <= distance + slack).all(axis=1)
                 along = np.abs(way @ (b - a)) >= least * size * np.hypot(*(b - a))
                 found |= near & along
+        return found
+
+    def _along_surfaces(self, layer: str, distance: float, angle: float) -> np.ndarray:
+        """The same of the surfaces of a layer in space: a face that leans from one by an angle comes away from it along
+        its normal by the cosine of that."""
+        places, found = self.places(), np.zeros(len(self.numbers), bool)
+        slack = self._slack(TOLERANCE)
+        middle, along = places.mean(axis=1), places.shape[1] > 1 and self.kind not in g.SUPPORTS and angle < 90.0
+        normal = np.zeros_like(middle)
+        if along:
+            normal = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
+            normal *= (ASIDE * np.sqrt(np.linalg.norm(normal, axis=1)) / np.linalg.norm(normal, axis=1))[:, None]
+        size, least = np.linalg.norm(normal, axis=1), math.cos(math.radians(angle)) - ASIDE
+        for one in self._solids(layer):
+            near = (np.abs(one.distance(places.reshape(-1, 3))).reshape(places.shape[:2]) <= distance + slack).all(
+                axis=1
+            )
+            if along:
+                here, above, below = (np.abs(one.distance(middle + way * normal)) for way in (0.0, 1.0, -1.0))
+                near &= np.maximum(above, below) - here >= least * size
+            found |= near
         return found
 
     def _layer(self, layer: str) -> np.ndarray:

@@ -656,8 +656,9 @@ RANGE_TERMS = (
            more=(Option("c{enter}", (VECTOR,), "the centre", "m"), Option("rad{ius}", (POSITIVE,), "the radius", "m"))),
     Option("geom{etry}", (STRING,), "lies on the lines, in three dimensions on the surfaces, of the geometry layer; "
            "elements: their centre is inside of it; in the mesh", only=("element", *_FACES)),
-    Option("geom{etry}-a{long}", (STRING,), "lies along the lines of the layer: within a distance of them and at an "
-           "angle to them; elements and nodes by the distance; in the mesh", only=("element", *_FACES), dims=PLANE,
+    Option("geom{etry}-a{long}", (STRING,), "lies along the lines, in space the surfaces, of the layer: within a "
+           "distance of them and at an angle to them; elements and nodes by the distance; in the mesh",
+           only=("element", *_FACES),
            more=(Option("dis{tance}-offset", (NOT_NEGATIVE,), "distance of its points at most", "m", "0"),
                  Option("ang{le}-offset", (NOT_NEGATIVE,), "angle at most", "degrees", "0"))),
     Option("geom{etry}-d{istance}", (STRING,), "all its points are near the lines, in space the surfaces, of the "
@@ -1607,14 +1608,11 @@ _RECORDS = (
             ("pcdc chart export 'ucs' 'ucs.png'", "pcdc chart export 'ucs' 'ucs.png' cracks",
             "pcdc chart export 'slope' 'slope.png' plastic", "pcdc chart export 'crack' 'crack.png' fluid aperture"),
             (_NAME, _leading("file", FILE, "name of the figure: .png, .pdf or .svg")),
-            (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke",
-                    dims=PLANE),
-             Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain",
-                    dims=PLANE),
-             Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks",
-                    dims=PLANE),
+            (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),
+             Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain"),
+             Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks"),
              Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity", "concentration"),),
-                    "beside it the model as it is now, its channels coloured by that", dims=PLANE)), dims=BOTH,
+                    "beside it the model as it is now, its channels coloured by that")), dims=BOTH,
             does="charts.export"),
     Command("output vtk", "Frames for ParaView: now, and every so many steps.",
             ("pcdc output vtk 'blast' every 1000", "pcdc output vtk 'last'"),

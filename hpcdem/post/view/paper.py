@@ -99,7 +99,7 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
     if not view.axes or oblique:
         axes.set_axis_off()
     if shown.turn is not None:
-        _body(axes, shown, width * CM * paper.dpi, paper.dpi)
+        body(axes, shown, width * CM * paper.dpi, paper.dpi)
         if along is not None:
             _named(axes, seen, along, paper.font)
         elif view.axes:
@@ -109,7 +109,7 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
     for place, layer in enumerate(shown.layers):
         if shown.turn is None:
             _draw(axes, layer, place)
-        handles += _handles(layer) if view.legend else []
+        handles += handles_of(layer) if view.legend else []
     _bars(figure, bars, (left + width, bottom, height), k, paper.font, page)
     if handles:
         _legend(axes, handles, 1.0 + arrow_row / height, 0.9 * paper.font)
@@ -145,7 +145,7 @@ def _legend(axes: Any, handles: list[tuple[str, Any]], bottom: float, font: floa
     )  # fmt: skip
 
 
-def _body(axes: Any, shown: Scene, pixels: float, dpi: float) -> None:
+def body(axes: Any, shown: Scene, pixels: float, dpi: float) -> None:
     """What is seen of bodies in space, so many pixels wide."""
     from hpcdem.post.view.screen import paint
 
@@ -250,7 +250,7 @@ def _draw(axes: Any, layer: Painted, order: int) -> None:
         )  # fmt: skip
 
 
-def _handles(layer: Painted) -> list[Any]:
+def handles_of(layer: Painted) -> list[Any]:
     from matplotlib.patches import Patch
 
     return [(word, tuple(Patch(color=one) for one in shades.split())) for word, shades in layer.legend]
