@@ -1,12 +1,12 @@
 # Not built here (no Spack). As packages/py_hpcdem/package.py of a repository of your own, then in the sources:
-#   spack dev-build py-hpcdem@0.1.0
+#   spack dev-build py-hpcdem@0.2.0
 from spack.package import *
 
 
 class PyHpcdem(PythonPackage):
     """Parallel discrete-element modelling of geological structures."""
 
-    version("0.1.0")
+    version("0.2.0")
 
     depends_on("python@3.11:", type=("build", "run"))
     depends_on("py-setuptools@64:", type="build")

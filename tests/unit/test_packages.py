@@ -36,7 +36,7 @@ def test_recipes_need_what_the_project_needs(name):
 
 
 VERSIONED = [
-    "conda-forge/recipe.yaml", "spack/package.py", "modules/0.1.0.lua", "easybuild/hpcdem-0.1.0-foss-2023b.eb",
+    "conda-forge/recipe.yaml", "spack/package.py", "modules/0.2.0.lua", "easybuild/hpcdem-0.2.0-foss-2023b.eb",
     "../CITATION.cff",
 ]  # fmt: skip
 
