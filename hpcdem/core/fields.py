@@ -78,3 +78,9 @@ FIELDS: dict[str, Field] = {
 
 PER_METRE = {"N/m": "N", "J/m": "J", "N m/m": "N m", "m2/s": "m3/s", "kg/m": "kg"}
 """Units in the plane, where everything is that of a metre of thickness, and in space."""
+
+
+def unit_in(unit: str, dim: int, content: bool = False) -> str:
+    """A unit of the plane in so many dimensions of space; content: m2 is a volume of fluid there."""
+    units = {**PER_METRE, "m2": "m3"} if content else PER_METRE
+    return units.get(unit, unit) if dim == 3 else unit

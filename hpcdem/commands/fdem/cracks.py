@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hpcdem.commands.fdem.project import Project
+from hpcdem.core.fields import unit_in
 from hpcdem.io.columns import append_rows
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.state import Crack
@@ -14,7 +15,8 @@ NAME = "cracks.csv"
 
 def columns(dim: int) -> dict[str, str]:
     """Names of `diagnostics.events` and of the columns, in their order, by dimensions of space."""
-    joule, size = ("J", {"joint_area": "joint_area [m2]"}) if dim == 3 else ("J/m", {"length": "length [m]"})
+    joule = unit_in("J/m", dim)
+    size = {2: {"length": "length [m]"}, 3: {"joint_area": "joint_area [m2]"}}[dim]
     return {
         "step": "step", "time": "time [s]", "joint": "joint", **{axis: f"{axis} [m]" for axis in "xyz"[:dim]},
         "mode": "mode", **size, "kinetic": f"kinetic_energy [{joule}]", "peak_step": "peak_step",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.commands.fdem.recorded import MODEL, UNITS, WELL
+from hpcdem.core.fields import unit_in
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE, CHANNEL, LINER_ELEMENT, NODE, SUPPORTS
@@ -117,9 +118,7 @@ class History:
     @property
     def unit(self) -> str:
         unit = UNITS[self.kind].get(self.value) or user_laws.unit(self.value)
-        if self.dim == 2 or self.kind in OF_LENGTHS:
-            return unit
-        return {**diagnostics.PER_METRE, "m2": "m3"}.get(unit, unit)
+        return unit if self.kind in OF_LENGTHS else unit_in(unit, self.dim, content=True)
 
     @property
     def waits(self) -> bool:

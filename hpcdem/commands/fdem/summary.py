@@ -12,6 +12,7 @@ from hpcdem.commands.fdem import frames, histories
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
+from hpcdem.core.fields import unit_in
 from hpcdem.core.units import with_prefix
 from hpcdem.io.agreed import on_first
 from hpcdem.physics import supports
@@ -93,7 +94,7 @@ def close(project: Project, figure: bool = True) -> None:
     stepped = blocks.timers.steps or (both is not None and both.particles.timers.steps)
     if log is None or not (stepped or project.solved):
         return
-    joule = "J" if blocks.dim == 3 else "J/m"
+    joule, volume = unit_in("J/m", blocks.dim), unit_in("m2", blocks.dim, content=True)
     if blocks.budget is not None:
         energies = diagnostics.energies(blocks)
         told = {
@@ -110,7 +111,7 @@ def close(project: Project, figure: bool = True) -> None:
                 found = there.energies()
                 told = {SUPPORT_WORDS[name]: found[name] for name in SUPPORT_WORDS if name in found}
                 log.account(f"energy of {support.name}", "energy", joule, told, project.units)
-    flow, volume = Flow.there(blocks), "m2" if blocks.dim == 2 else "m3"
+    flow = Flow.there(blocks)
     if flow is not None:
         found = flow.account()
         log.account("fluid", "volume", volume, {FLUID_WORDS[k]: found[k] for k in FLUID_WORDS}, project.units)

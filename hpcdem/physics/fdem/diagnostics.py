@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.core.fields import PER_METRE
+from hpcdem.core.fields import unit_in
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import breaks, by_temperature, connectivity, floors, overlaps, sides, user_laws
 from hpcdem.physics.fdem.assignments import COMPONENTS
@@ -47,7 +47,7 @@ DIFFUSING = ("temperature", *FIELDS)
 def unit_of(sim: Blocks, name: str) -> str:
     """The unit of a quantity in this model."""
     unit = quantity(sim, name).unit
-    return PER_METRE.get(unit, unit) if sim.dim == 3 else unit
+    return unit_in(unit, sim.dim)
 
 
 def _vector(name: str, on: str, unit: str, doc: str, framed: bool = True) -> dict[str, Quantity]:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.fields import unit_in
 from hpcdem.io.frames import FrameFile, list_mesh_frames
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.numerics.clusters import united
@@ -340,13 +341,17 @@ OF_CRACKS = {"mode": "mode", "aperture[m]": "aperture", "time[s]": "break_time"}
 """Columns of broken joints, and in frames; apertures are there with fluid."""
 
 
+SIZES = {2: ("length[m]", "p21"), 3: ("area[m2]", "p32")}
+"""By dimensions of space: what is measured of joints, and their density."""
+
+
 def cracks_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) -> list[Sheet]:
     """Over time; in space also each broken joint of a frame, the last one."""
     dim = state.points.shape[1]
-    size, density, joule = ("length[m]", "p21", "J/m") if dim == 2 else ("area[m2]", "p32", "J")
+    size, density = SIZES[dim]
     head = (
         *HEAD, "joints", "yielded", *MODES, "broken", size, f"yielded_{size}", *(f"{name}_{size}" for name in MODES),
-        f"broken_{size}", "damage", f"{density}[1/m]", f"kinetic_energy[{joule}]",
+        f"broken_{size}", "damage", f"{density}[1/m]", f"kinetic_energy[{unit_in('J/m', dim)}]",
     )  # fmt: skip
 
     def rows() -> Iterable[Sequence[Any]]:
@@ -407,7 +412,7 @@ OF_CHANNELS = {
 def fluid_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) -> list[Sheet]:
     """Over time, and each channel of a frame, the last one."""
     dim = state.points.shape[1]
-    size, volume = ("length[m]", "volume[m3/m]") if dim == 2 else ("area[m2]", "volume[m3]")
+    size, volume = SIZES[dim][0], {2: "volume[m3/m]", 3: "volume[m3]"}[dim]
     most = "pressure[Pa]", "aperture[m]", "velocity[m/s]"
     head = *HEAD, "channels", "wet", f"wet_{size}", f"open_wet_{size}", volume, *most
     some = [(one, one.fluid) for one in parts if one.fluid is not None]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.core.fields import PER_METRE
+from hpcdem.core.fields import unit_in
 from hpcdem.core.units import label
 from hpcdem.io.frame import Columns, Frame, Table, part
 from hpcdem.io.frames import list_frames, read_frame
@@ -66,8 +66,7 @@ _Reader = Callable[[slice], np.ndarray]
 def unit_of(name: str, dim: int = 2) -> str:
     """The unit of a field of a frame, "" for numbers without one, and for those that are not known here."""
     if dim == 3 and not name.startswith(OF_LENGTHS):
-        unit = unit_of(name)
-        return PER_METRE.get(unit, unit)
+        return unit_in(unit_of(name), dim)
     words = name.split("_")
     while len(words) > 1 and words[-1] in PARTS:
         words.pop()
