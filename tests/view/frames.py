@@ -11,7 +11,6 @@ from hpcdem.core.comm import SerialComm
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame
-from hpcdem.physics.fdem import tetrahedra
 from hpcdem.pre.mesh import structured_space
 
 
@@ -144,7 +143,7 @@ def body(
         pairs = mesh.edges().faces
         lower, upper = pairs[pairs[:, 1] >= 0].T
         apart = roof[lower // 4] != roof[upper // 4]
-        corner_of = dict(zip(CORNERS, tetrahedra.face_corners(lower).T, strict=True))
+        corner_of = dict(zip(CORNERS, mesh.face_corners(lower).T, strict=True))
         joints = {"number": lower, **corner_of, "state": np.where(apart, 3.0, 1.0), "damage": np.where(apart, 1.0, 0.0),
                   "mode": np.where(apart, 2.0, 0.0), "joint_area": areas(mesh.points[mesh.face_points(lower)]),
                   "break_time": np.where(apart, 2e-3, np.nan),

@@ -120,6 +120,12 @@ def face_points(cells: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.column_stack([cells[e, k], cells[e, after]])
 
 
+def face_corners(cells: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(n, 2) i8 the same by corners, element * 4 + k."""
+    e, k = np.divmod(faces, 4)
+    return np.column_stack([faces, 4 * e + (k + 1) % corner_counts(cells[e])])
+
+
 def corner_counts(cells: np.ndarray) -> np.ndarray:
     """(ne,) i8: 3 or 4."""
     return np.where(cells[:, 3] >= 0, 4, 3)

@@ -19,9 +19,10 @@ from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.physics.fdem import connectivity, hexahedra, tetrahedra
-from hpcdem.physics.fdem.connectivity import Edges, areas, centroids, edges_of, find_edges
+from hpcdem.physics.fdem.connectivity import Edges, centroids
 from hpcdem.physics.fdem.elements.kind import HEXAHEDRON, MACROS, Kind
 
+CONNECTIVITY = {2: connectivity, 3: tetrahedra}
 FLAT = 1e-9
 """A corner spans less than this much of the square of the longest edge: the element is flat."""
 SAME = 1e-9
@@ -226,26 +227,29 @@ class Mesh:
         return np.sqrt(size)
 
     @property
+    def _of(self) -> Any:
+        """What is done with elements of these dimensions, by the same names."""
+        return CONNECTIVITY[self.dim]
+
+    @property
     def dim(self) -> int:
         """Dimensions of space: 2 or 3."""
         return int(self.points.shape[1])
 
     def face_partners(self) -> np.ndarray:
         """(4 ne,) i8, see `connectivity.face_partners`. Computed again at each call."""
-        if self.dim == 3:
-            return tetrahedra.face_partners(self.cells)
-        return connectivity.face_partners(self.cells, len(self.points))
+        found: np.ndarray = self._of.face_partners(self.cells, len(self.points))
+        return found
 
     def face_points(self, faces: np.ndarray) -> np.ndarray:
         """(n, 2) i8 first and last point of each face; in space its three points (n, 3)."""
-        return (tetrahedra if self.dim == 3 else connectivity).face_points(self.cells, faces)
+        found: np.ndarray = self._of.face_points(self.cells, faces)
+        return found
 
     def face_corners(self, faces: np.ndarray) -> np.ndarray:
         """The same by corners, element * 4 + k."""
-        if self.dim == 3:
-            return tetrahedra.face_corners(faces)
-        e, k = np.divmod(faces, 4)
-        return np.column_stack([faces, 4 * e + (k + 1) % connectivity.corner_counts(self.cells[e])])
+        found: np.ndarray = self._of.face_corners(self.cells, faces)
+        return found
 
     def face_sizes(self, faces: np.ndarray) -> np.ndarray:
         """(n,) length of each face [m]; in space its area [m2]."""
@@ -253,21 +257,23 @@ class Mesh:
 
     def edges(self) -> Edges:
         """All edges, in space all faces, ascending by number. Computed again at each call."""
-        return tetrahedra.faces_of(self.cells) if self.dim == 3 else edges_of(self.cells, len(self.points))
+        found: Edges = self._of.edges_of(self.cells, len(self.points))
+        return found
 
     def find_edges(self, edges: Edges, points: np.ndarray) -> np.ndarray:
         """(k,) i8 rows of `edges` with these points (k, 2), in space (k, 3); -1 where there is none."""
-        if self.dim == 3:
-            return tetrahedra.find_faces(edges, points)
-        return find_edges(edges, points, len(self.points))
+        found: np.ndarray = self._of.find_edges(edges, points, len(self.points))
+        return found
 
     def corner_clusters(self, partner: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Nodes, see `connectivity.corner_clusters`."""
-        return (tetrahedra if self.dim == 3 else connectivity).corner_clusters(self.cells, partner, apart)
+        found: tuple[np.ndarray, np.ndarray] = self._of.corner_clusters(self.cells, partner, apart)
+        return found
 
     def areas(self) -> np.ndarray:
         """(ne,) [m2], in space volumes [m3]."""
-        return (tetrahedra.volumes if self.dim == 3 else areas)(self.points, self.cells)
+        found: np.ndarray = self._of.areas(self.points, self.cells)
+        return found
 
     def centroids(self, elements: np.ndarray | slice = slice(None)) -> np.ndarray:
         """(n, 2) [m], in space (n, 3), of these elements; parts of a macro-element have that of its corners."""
@@ -284,9 +290,7 @@ class Mesh:
 
     def nearest_element(self, points: np.ndarray, cells: np.ndarray, at: tuple[float, ...], among: np.ndarray) -> int:
         """Which of the cells (n, 4) of points (m, dim) holds the point `at`, or is nearest to it; among: of these."""
-        if self.dim == 3:
-            return tetrahedra.nearest_element(points, cells, at, among)
-        return connectivity.nearest_element(points, cells, (at[0], at[1]), among)
+        return int(self._of.nearest_element(points, cells, at, among))
 
     def mean_edge(self) -> float:
         """Mean length of an edge [m]."""

@@ -53,7 +53,7 @@ def face_points(cells: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return cells[e[:, None], FACES[k]]
 
 
-def face_corners(faces: np.ndarray) -> np.ndarray:
+def face_corners(_cells: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(n, 3) i8 corners (element * 4 + k) of each face."""
     e, k = np.divmod(faces, 4)
     return 4 * e[:, None] + FACES[k]
@@ -71,8 +71,9 @@ def pair_faces(cells: np.ndarray, partner: np.ndarray) -> int:
     return int(bad.min()) if len(bad) else -1
 
 
-def face_partners(cells: np.ndarray) -> np.ndarray:
-    """(4 ne,) i8: the face on the other side of each face, -1 at a surface. ValueError if three elements share one."""
+def face_partners(cells: np.ndarray, _points: int = 0) -> np.ndarray:
+    """(4 ne,) i8: the face on the other side of each face, -1 at a surface. ValueError if three elements share one.
+    (Arguments of what the plane has too are those of connectivity.py, which asks for the number of points.)"""
     partner = np.empty(4 * len(cells), np.int64)
     bad = pair_faces(cells, partner)
     if bad >= 0:
@@ -80,7 +81,7 @@ def face_partners(cells: np.ndarray) -> np.ndarray:
     return partner
 
 
-def faces_of(cells: np.ndarray, partner: np.ndarray | None = None) -> Edges:
+def edges_of(cells: np.ndarray, _points: int = 0, partner: np.ndarray | None = None) -> Edges:
     """All faces, each once, ascending by number."""
     partner = face_partners(cells) if partner is None else partner
     face = np.arange(len(partner))
@@ -88,7 +89,7 @@ def faces_of(cells: np.ndarray, partner: np.ndarray | None = None) -> Edges:
     return Edges(np.column_stack([lower, partner[lower]]), face_points(cells, lower))
 
 
-def find_faces(faces: Edges, points: np.ndarray) -> np.ndarray:
+def find_edges(faces: Edges, points: np.ndarray, _points: int = 0) -> np.ndarray:
     """(k,) i8 rows of `faces` with these points (k, 3) in any order; -1 where there is none."""
     points = np.sort(np.asarray(points, np.int64).reshape(-1, 3), axis=1)
     if not len(points) or not len(faces):
@@ -140,6 +141,10 @@ def volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """(ne,) [m3], negative if the corners run the other way."""
     u, w, t = np.moveaxis(sides(points, cells), 1, 0)
     return (np.cross(u, w) * t).sum(axis=1) / 6.0
+
+
+areas = volumes
+"""What the plane calls so."""
 
 
 def nearest_element(points: np.ndarray, cells: np.ndarray, at: tuple[float, ...], among: np.ndarray) -> int:

@@ -578,7 +578,8 @@ def _compact(
 
 def _only_existing(mesh: Mesh, edges: Any) -> Mesh:
     """Cracks that were moved onto the rim are no cracks; a line inside that gmsh has not kept is its failure."""
-    from hpcdem.physics.fdem.mesh import crack_rows, find_edges
+    from hpcdem.physics.fdem.connectivity import find_edges
+    from hpcdem.physics.fdem.mesh import crack_rows
 
     for name, pairs in mesh.layers.items():
         if (find_edges(edges, pairs, len(mesh.points)) < 0).any():
