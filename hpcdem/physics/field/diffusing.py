@@ -55,7 +55,7 @@ class Diffusing(Conditions):
         self._stale = True
         self._checked = False
         self._stiffness_of: np.ndarray | None = None
-        self._stiffness = np.empty(0)
+        self._stiffness, self._wide = np.empty(0), np.empty(0, bool)
         self._found_for: tuple[float, ...] = ()
         self._told = 0.0
         self._told_obtuse = False
@@ -99,8 +99,12 @@ class Diffusing(Conditions):
             of = moduli(blocks.element_rows, blocks.options.plane_stress)
             bulk = of.bulk[blocks.element_row[number]]
             self._stiffness = len(of.normal) * bulk * self.column(self.expansion)[self.row[number]]
-            self._stiffness_of = blocks.number
-        out: np.ndarray = self._stiffness * (blocks.cold[self.unstressed][:, 0] - self.means())
+            self._wide, self._stiffness_of = blocks.the_mesh().cells[number, 3] >= 0, blocks.number
+        t, free, out = blocks.cold[self.quantity], blocks.cold[self.unstressed][:, 0], np.empty(blocks.n_own)
+        kernels.eigenstress(self._wide, t, self._stiffness, free, out)
+        if len(blocks.the_mesh().hexes):
+            of = blocks.hex_rows()
+            out[of.rows] = self._stiffness[of.rows] * (free[of.rows] - of.means(t)[:, None])
         part = by_temperature.part_of_young(blocks)
         return out if part is None else out * part
 

@@ -96,3 +96,14 @@ def sums(begin, corner, values, out):
         for m in range(begin[i], begin[i + 1]):
             total += values[corner[m]]
         out[i] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def eigenstress(wide, t, stiffness, unstressed, out):
+    """-d K alpha (T - T_0) (n,) [Pa] of elements, T: mean of the corners t (n, w), of those that are wide of four; d:
+    directions in which they are held, 3, in plane stress 2; stiffness (n,): d K alpha [Pa/K]. Stress after Duhamel and
+    Neumann."""
+    for i in range(len(t)):
+        total = (t[i, 0] + t[i, 1]) + t[i, 2]
+        mean = (total + t[i, 3]) / 4.0 if wide[i] else total / 3.0
+        out[i] = stiffness[i] * (unstressed[i] - mean)

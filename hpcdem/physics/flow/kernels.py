@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit, prange
 
 from hpcdem.physics.fdem.kernels import joints, joints_space
@@ -43,27 +42,21 @@ def part(s):
     return s * s * (3.0 - 2.0 * s)
 
 
-@njit(cache=True, error_model="numpy")
-def _edge(x, one, other):
+@njit(error_model="numpy", forceinline=True)
+def _edge(x, one, other, k):
     """Length, mean opening, size of the mean slip, of an edge."""
-    a, b, p, q = one[0], one[1], other[0], other[1]  # p is opposite b
+    a, b, p, q = one[k, 0], one[k, 1], other[k, 0], other[k, 1]  # p is opposite b
     _, _, h2, oa, sa, ob, sb = joints.openings(x[a], x[a + 1], x[b], x[b + 1], x[p], x[p + 1], x[q], x[q + 1])
     h = math.sqrt(h2)
     return h, 0.5 * (oa + ob) / h, abs(0.5 * (sa + sb) / h)
 
 
-@njit(cache=True, error_model="numpy")
-def _triangle(x, one, other, cot):
-    """Area, mean opening, size of the mean slip, of the present mid-surface of a triangle, and into cot (3,) the
-    cotangents of its angles."""
-    a, b, c, p, q, r = (
-        one[0],
-        one[1],
-        one[2],
-        other[0],
-        other[1],
-        other[2],
-    )  # p is opposite a, r opposite b, q opposite c
+@njit(error_model="numpy", forceinline=True)
+def _triangle(x, one, other, k):
+    """Area, mean opening, size of the mean slip, of the present mid-surface of a triangle, and the cotangents of its
+    angles."""
+    a, b, c = one[k, 0], one[k, 1], one[k, 2]
+    p, q, r = other[k, 0], other[k, 1], other[k, 2]  # p is opposite a, r opposite b, q opposite c
     nx, ny, nz, area, d0x, d0y, d0z, d1x, d1y, d1z, d2x, d2y, d2z = joints_space.opened(
         x[a], x[a + 1], x[a + 2], x[b], x[b + 1], x[b + 2], x[c], x[c + 1], x[c + 2], x[p], x[p + 1], x[p + 2],
         x[q], x[q + 1], x[q + 2], x[r], x[r + 1], x[r + 2],
@@ -76,31 +69,36 @@ def _triangle(x, one, other, cot):
     wx, wy, wz = x[c] + x[q] - mx, x[c + 1] + x[q + 1] - my, x[c + 2] + x[q + 2] - mz
     ux, uy, uz, wx, wy, wz = 0.5 * ux, 0.5 * uy, 0.5 * uz, 0.5 * wx, 0.5 * wy, 0.5 * wz
     vx, vy, vz = wx - ux, wy - uy, wz - uz
-    cot[0] = (ux * wx + (uy * wy + uz * wz)) / (2.0 * area)
-    cot[1] = (-ux * vx + (-uy * vy + -uz * vz)) / (2.0 * area)
-    cot[2] = (wx * vx + (wy * vy + wz * vz)) / (2.0 * area)
-    return area, opening, slip
+    cot_a, cot_b = ux * wx + (uy * wy + uz * wz), -ux * vx + (-uy * vy + -uz * vz)
+    cot_c = wx * vx + (wy * vy + wz * vz)
+    return area, opening, slip, cot_a / (2.0 * area), cot_b / (2.0 * area), cot_c / (2.0 * area)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _aperture(laws, row, opening, slip):
+    gain = min(laws[row, DILATE] * slip, laws[row, GAIN])
+    return min(max(laws[row, INITIAL] + opening + gain, laws[row, LEAST]), laws[row, MOST])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _geometry(t, threads, one, other, law, laws, x, viscosity, out):
-    x, n, cot = x.reshape(x.size), len(one), np.empty(3)
-    links = 1 if one.shape[1] == 2 else 3
-    for k in range(n * t // threads, n * (t + 1) // threads):
-        if links == 1:
-            size, opening, slip = _edge(x, one[k], other[k])
-        else:
-            size, opening, slip = _triangle(x, one[k], other[k], cot)
-        row = laws[law[links * k]]
-        gain = min(row[DILATE] * slip, row[GAIN])
-        delta = min(max(row[INITIAL] + opening + gain, row[LEAST]), row[MOST])
-        for m in range(links):
-            c = links * k + m
-            out[c, APERTURE], out[c, WEIGHT] = delta, 1.0
-            if links == 1:
-                out[c, HALF], out[c, CONDUCT] = 0.5 * delta * size, delta * delta * delta / (12.0 * viscosity * size)
-            else:
-                out[c, HALF], out[c, CONDUCT] = delta * size / 6.0, delta * delta * delta / (24.0 * viscosity) * cot[m]
+    x, n = x.reshape(x.size), len(one)
+    first, last = n * t // threads, n * (t + 1) // threads
+    if one.shape[1] == 2:
+        for c in range(first, last):
+            h, opening, slip = _edge(x, one, other, c)
+            delta = _aperture(laws, law[c], opening, slip)
+            out[c, APERTURE], out[c, HALF], out[c, WEIGHT] = delta, 0.5 * delta * h, 1.0
+            out[c, CONDUCT] = delta * delta * delta / (12.0 * viscosity * h)
+        return
+    for k in range(first, last):
+        area, opening, slip, cot_a, cot_b, cot_c = _triangle(x, one, other, k)
+        c = 3 * k
+        delta = _aperture(laws, law[c], opening, slip)
+        for m in range(c, c + 3):
+            out[m, APERTURE], out[m, HALF], out[m, WEIGHT] = delta, delta * area / 6.0, 1.0
+        over = delta * delta * delta / (24.0 * viscosity)
+        out[c, CONDUCT], out[c + 1, CONDUCT], out[c + 2, CONDUCT] = over * cot_a, over * cot_b, over * cot_c
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -322,28 +320,35 @@ def loads(at, to, nodes, g, e, x, state, column, applied):
     that only the other half has at the end, g (k, 4) and e (k, 3) share the pressure out; of other faces they have no
     rows.
     """
-    x, applied, push = x.reshape(x.size), applied.reshape(applied.size), np.zeros(4)
+    x, applied = x.reshape(x.size), applied.reshape(applied.size)
     edges, bilinear = nodes.shape[1] == 2, to.shape[1] == 4
     for m in range(len(at)):
         a, b = at[m, 0], at[m, 1]
         ux, uy = x[b] - x[a], x[b + 1] - x[a + 1]
         p, q = state[nodes[m, 0], column], state[nodes[m, 1], column]
         if edges:
-            nx, ny, nz = uy, -ux, 0.0  # outward, as long as the face
-            push[0], push[1] = (2.0 * p + q) / 6.0, (p + 2.0 * q) / 6.0
-        else:
-            c, r = at[m, 2], state[nodes[m, 2], column]
-            uz, wx, wy, wz = x[b + 2] - x[a + 2], x[c] - x[a], x[c + 1] - x[a + 1], x[c + 2] - x[a + 2]
-            nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx  # 2 A n
-            total = p + (q + r)
-            push[0], push[1], push[2], push[3] = (total + p) / 24.0, (total + q) / 24.0, (total + r) / 24.0, 0.0
+            first, last, i, j = (2.0 * p + q) / 6.0, (p + 2.0 * q) / 6.0, to[m, 0], to[m, 1]
+            applied[i] -= first * uy  # outward, as long as the face
+            applied[i + 1] += first * ux
+            applied[j] -= last * uy
+            applied[j + 1] += last * ux
+            continue
+        c, r = at[m, 2], state[nodes[m, 2], column]
+        uz, wx, wy, wz = x[b + 2] - x[a + 2], x[c] - x[a], x[c + 1] - x[a + 1], x[c + 2] - x[a + 2]
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx  # 2 A n, outward
+        total, back = p + (q + r), 0.0
         if bilinear:
-            back = e[m, 0] * push[0] + e[m, 1] * push[1] + e[m, 2] * push[2]
-            for k in range(4):
-                push[k] -= g[m, k] * back
-        for k in range(to.shape[1]):
-            corner = to[m, k]
-            applied[corner] -= push[k] * nx
-            applied[corner + 1] -= push[k] * ny
-            if not edges:
-                applied[corner + 2] -= push[k] * nz
+            for k in range(3):
+                back += e[m, k] * ((total + state[nodes[m, k], column]) / 24.0)
+        for k in range(3):
+            push, corner = (total + state[nodes[m, k], column]) / 24.0, to[m, k]
+            if bilinear:
+                push -= g[m, k] * back
+            applied[corner] -= push * nx
+            applied[corner + 1] -= push * ny
+            applied[corner + 2] -= push * nz
+        if bilinear:
+            push, corner = g[m, 3] * back, to[m, 3]
+            applied[corner] += push * nx
+            applied[corner + 1] += push * ny
+            applied[corner + 2] += push * nz
