@@ -24,12 +24,17 @@ def test_the_quick_ones_have_some_of_each() -> None:
 
 
 @pytest.mark.parametrize(
-    "of", [pytest.param(of, marks=[] if of in QUICK else [pytest.mark.slow]) for of in ALL], ids=str
+    ("of", "middles"),
+    [
+        *((of, MIDDLES[k % 2 : k % 2 + 1]) for k, of in enumerate(QUICK)),
+        *(pytest.param(of, MIDDLES, marks=pytest.mark.slow) for of in ALL),
+    ],
+    ids=str,
 )
-def test_a_checkpoint_in_the_middle_changes_nothing(of: Combination, tmp_path: Path) -> None:
+def test_a_checkpoint_in_the_middle_changes_nothing(of: Combination, middles: tuple[str, ...], tmp_path: Path) -> None:
     plain, why = run(of, tmp_path / "plain")
     assert not why, f"{of}: {why}\n\n{of.script()}"
-    for middle in MIDDLES:
+    for middle in middles:
         other, why = run(of, tmp_path / middle, middle)
         odd = why or two_ways.difference(plain, other)
         assert not odd, f"{of}, {middle}: {odd}\n\n{of.script(middle)}"

@@ -72,6 +72,7 @@ def test_circles_and_json(curve: Path, tmp_path: Path, capsys: pytest.CaptureFix
     assert (kind((out / "deposit.py").read_text()), kind((out / "biaxial.py").read_text())) == ("zdem", "python")
 
 
+@pytest.mark.slow
 def test_the_same_seed_makes_the_same_files(curve: Path, tmp_path: Path) -> None:
     for name, seed in (("a", 3), ("b", 3), ("c", 4)):
         run(curve, "-n", 80, "--shape", "pentagon", "--deviation", 5, "--seed", seed, "-o", tmp_path / name)

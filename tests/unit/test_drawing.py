@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from hpcdem.post.layers import LAYERS, MOST_LABELS
 from hpcdem.post.plots import frame_figure
 from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.unit.io_synthetic import make_frame
 
 
@@ -58,13 +59,13 @@ STOP
 
 
 @pytest.mark.mpi
-def test_draw_makes_pictures_if_asked(launch: Launcher, tmp_path: Path) -> None:
+def test_draw_makes_pictures_if_asked(resident: Resident, tmp_path: Path) -> None:
     pictures = {}
     for ranks in (1, 2):
         folder = tmp_path / str(ranks)
         folder.mkdir()
         (folder / "a.py").write_text(SCRIPT.format(what="bfill, wall bang cforce"))
-        done = launch(ranks, "--draw", "--no-figure", "a.py", cwd=folder)
+        done = resident(ranks, "--draw", "--no-figure", "a.py", cwd=folder)
         assert done.returncode == 0, done.stdout + done.stderr
         pictures[ranks] = {p.name: p.read_bytes() for p in (folder / "data").glob("draw_*")}
     assert sorted(pictures[1]) == ["draw_0000000100.jpg", "draw_0000000200.jpg"]
