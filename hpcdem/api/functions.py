@@ -17,11 +17,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from hpcdem.api.methods import bound, dressed, tokens
-from hpcdem.api.program import carried_out, place, spelt
+from hpcdem.api.program import carried_out, spelt
 from hpcdem.commands import dem
 from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.core.fields import FIX_BITS
 from hpcdem.core.material import Material
+from hpcdem.core.place import place
 from hpcdem.core.selection import Selection
 from hpcdem.lang.zdem.execute import look_at_units
 from hpcdem.lang.zdem.parser import parse_text

@@ -17,7 +17,8 @@ from dataclasses import dataclass, field
 from inspect import Parameter
 from typing import Any, TypeVar
 
-from hpcdem.api.program import HELP, carried_out, place, spelt
+from hpcdem.api.program import HELP, carried_out, spelt
+from hpcdem.core.place import place
 from hpcdem.lang.pcdc.table import PCDC, SHORT, Command, Model, Option
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g

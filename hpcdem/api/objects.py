@@ -10,11 +10,11 @@ import numpy as np
 
 from hpcdem.api.arguments import arguments, chosen_by, model_arguments
 from hpcdem.api.methods import commands
-from hpcdem.api.program import place
 from hpcdem.api.types import Number, Point, Solved, Where
 from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
 from hpcdem.core.nearest import quoted
+from hpcdem.core.place import place
 from hpcdem.lang.pcdc.bindings import Call, carry_out
 from hpcdem.lang.pcdc.keywords import matching
 from hpcdem.lang.pcdc.kinds import FunctionName

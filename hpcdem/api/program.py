@@ -1,11 +1,9 @@
-"""Where a user's program is, and how its mistakes are told."""
+"""How mistakes of a user's program are told."""
 
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Collection
-from pathlib import Path
 from typing import Any
 
 from hpcdem import session
@@ -18,22 +16,14 @@ from hpcdem.core.errors import (
     WrongValueError,
 )
 from hpcdem.core.nearest import hint
+from hpcdem.core.place import PACKAGE
 
-PACKAGE = str(Path(__file__).resolve().parent.parent)
 HELP = "see help(hpcdem.Simulation)"
 _BOTH = (("color", "colour"), ("colors", "colours"), ("center", "centre"))
 TWINS = {one: other for pair in _BOTH for one, other in (pair, pair[::-1])}
 """Words that are spelt in two ways."""
 _UNKNOWN = re.compile(r"got an unexpected keyword argument '(\w+)'")
 _OWN_NAME = re.compile(r"^\w+(\.\w+)*\(\) ")
-
-
-def place() -> tuple[str, int]:
-    """File and line of the user's program that is being carried out."""
-    frame: Any = sys._getframe(1)
-    while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
-        frame = frame.f_back
-    return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("python", 0)
 
 
 def spelt(options: dict[str, Any], names: Collection[str]) -> dict[str, Any]:

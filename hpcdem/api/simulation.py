@@ -17,7 +17,6 @@ from hpcdem.api.functions import command as _command
 from hpcdem.api.functions import look as _look
 from hpcdem.api.particles import ParticleCommands
 from hpcdem.api.program import carried_out
-from hpcdem.api.program import place as _place
 from hpcdem.commands import dem, fdem
 from hpcdem.core.errors import (
     CommandError,
@@ -29,6 +28,7 @@ from hpcdem.core.errors import (
 )
 from hpcdem.core.fields import FIELDS
 from hpcdem.core.nearest import hint
+from hpcdem.core.place import place as _place
 from hpcdem.io import checkpoint
 from hpcdem.lang.zdem.execute import Interpreter, find, tell_warnings
 from hpcdem.lang.zdem.parser import parse_text

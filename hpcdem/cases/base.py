@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import shlex
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
@@ -21,8 +20,8 @@ from pydantic.fields import FieldInfo
 from hpcdem.core import validation
 from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.core.nearest import hint
+from hpcdem.core.place import place
 
-PACKAGE = str(Path(__file__).resolve().parent.parent)
 DIVIDER = "# ---- {} "
 WIDTH = 100
 """Characters of a comment line."""
@@ -71,7 +70,7 @@ class Case(BaseModel):
         try:
             super().__init__(**given)
         except ValidationError as error:
-            raise ScriptError(*_place(), explained(type(self), error)) from None
+            raise ScriptError(*place(), explained(type(self), error)) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
         try:
@@ -79,7 +78,7 @@ class Case(BaseModel):
         except ValidationError:
             kind = type(self).__name__
             raise ScriptError(
-                *_place(), f"{kind} is frozen: {name} is given when it is made, {kind}({name}={value!r})"
+                *place(), f"{kind} is frozen: {name} is given when it is made, {kind}({name}={value!r})"
             ) from None
 
     # ---- text ------------------------------------------------------------------------------------------------------
@@ -137,7 +136,7 @@ class Case(BaseModel):
     def load(self) -> Any:
         """Load the model that `build` made; the results. Collective."""
         if self._carrier is None:
-            raise ScriptError(*_place(), f"{type(self).__name__}.load: there is no model yet; build() makes it")
+            raise ScriptError(*place(), f"{type(self).__name__}.load: there is no model yet; build() makes it")
         model, loading = self._pieces()
         lines = model.count("\n")  # so messages have the lines of the whole script
         self._carrier.carry_out("\n" * lines + loading)
@@ -162,7 +161,7 @@ class Case(BaseModel):
         try:
             self._carrier = Carrier(f"{self.name}.sc", outdir)
         except CommandError as error:
-            raise ScriptError(*_place(), f"{type(self).__name__}.run: {error}") from None
+            raise ScriptError(*place(), f"{type(self).__name__}.run: {error}") from None
         self._carrier.carry_out(self._pieces()[0])
 
 
@@ -205,9 +204,10 @@ def _divider(title: str) -> str:
     return DIVIDER.format(title).ljust(WIDTH, "-")
 
 
-def _place() -> tuple[str, int]:
-    """File and line of the script or program that is being carried out."""
-    frame: Any = sys._getframe(1)
-    while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
-        frame = frame.f_back
-    return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("python", 0)
+def refuse_thin_ring(inner: float, outer: float, size: float) -> None:
+    """ValueError for a ring between two radii [m] that has no room for some elements of this size [m]."""
+    if inner >= 0.9 * outer:
+        raise ValueError(f"inner is {inner:g}, expected at most 0.9 of outer, {0.9 * outer:g} m")
+    if size > 0.25 * (outer - inner):
+        most = 0.25 * (outer - inner)
+        raise ValueError(f"size is {size:g}, expected at most a quarter of outer - inner, {most:g} m")

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from pydantic import model_validator
 
-from hpcdem.cases.base import quantity
+from hpcdem.cases.base import quantity, refuse_thin_ring
 from hpcdem.cases.water import CHANNELS, ROCK, STEADY, Water
 
 
@@ -43,11 +43,7 @@ class RadialFlow(Water):
 
     @model_validator(mode="after")
     def _fits(self) -> RadialFlow:
-        if self.inner >= 0.9 * self.outer:
-            raise ValueError(f"inner is {self.inner:g}, expected at most 0.9 of outer, {0.9 * self.outer:g} m")
-        if self.size > 0.25 * (self.outer - self.inner):
-            most = 0.25 * (self.outer - self.inner)
-            raise ValueError(f"size is {self.size:g}, expected at most a quarter of outer - inner, {most:g} m")
+        refuse_thin_ring(self.inner, self.outer, self.size)
         if self.inner_pressure == self.outer_pressure:
             raise ValueError("inner_pressure and outer_pressure are equal, expected water that flows")
         return self

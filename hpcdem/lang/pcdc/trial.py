@@ -297,36 +297,38 @@ def _fractures(arguments: Mapping[str, Any]) -> None:
 
 def disc_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
     """The statistics of `geometry create fractures` in three dimensions, as `values.disc_set` takes them."""
-    densities = [name for name in ("p10", "p30", "p32") if name in arguments]
-    if len(densities) != 1:
-        raise CommandError("fractures need one density: p10, p30 or p32")
-    orientation, radius = arguments["orientation"], _given_word(arguments, "radius")
+    orientation = arguments["orientation"]
     return {
+        **_statistics(arguments, "radius", "p10", "p30", "p32"),
         "orientation": (*orientation["value"], orientation.get("towards", 0.0), orientation.get("spread", 0.0)),
-        "radius": (*radius["value"], radius.get("spread", 0.0), radius.get("least", 0.0), radius.get("greatest")),
-        "density": (densities[0], arguments[densities[0]]),
-        "along": arguments.get("scan-direction", (0.0, 0.0, 1.0)), "reached": arguments.get("reached", False),
-    }  # fmt: skip
-
-
-def _given_word(arguments: Mapping[str, Any], name: str) -> Any:
-    if name not in arguments:  # it was not known yet how many dimensions there are
-        raise CommandError(f"fractures in {'three' if name == 'radius' else 'two'} dimensions need a {name}")
-    return arguments[name]
+        "along": arguments.get("scan-direction", (0.0, 0.0, 1.0)),
+    }
 
 
 def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
     """The statistics of `geometry create fractures` as `values.fracture_set` takes them."""
-    densities = [name for name in ("p10", "p20", "p21") if name in arguments]
-    if len(densities) != 1:
-        raise CommandError("fractures need one density: p10, p20 or p21")
-    orientation, length = arguments["orientation"], _given_word(arguments, "length")
+    orientation = arguments["orientation"]
     return {
+        **_statistics(arguments, "length", "p10", "p20", "p21"),
         "orientation": (*orientation["value"], orientation.get("spread", 0.0)),
-        "length": (*length["value"], length.get("spread", 0.0), length.get("least", 0.0), length.get("greatest")),
-        "density": (densities[0], arguments[densities[0]]), "scanline": arguments.get("scan-line", 0.0),
-        "ends_at": arguments.get("ends-at", 0.0), "reached": arguments.get("reached", False),
-    }  # fmt: skip
+        "scanline": arguments.get("scan-line", 0.0),
+        "ends_at": arguments.get("ends-at", 0.0),
+    }
+
+
+def _statistics(arguments: Mapping[str, Any], size: str, *densities: str) -> dict[str, Any]:
+    """Density and size, under the word for it, of fractures of any dimension."""
+    given = [name for name in densities if name in arguments]
+    if len(given) != 1:
+        raise CommandError(f"fractures need one density: {', '.join(densities[:-1])} or {densities[-1]}")
+    if size not in arguments:  # it was not known yet how many dimensions there are
+        raise CommandError(f"fractures in {'three' if size == 'radius' else 'two'} dimensions need a {size}")
+    of = arguments[size]
+    return {
+        size: (*of["value"], of.get("spread", 0.0), of.get("least", 0.0), of.get("greatest")),
+        "density": (given[0], arguments[given[0]]),
+        "reached": arguments.get("reached", False),
+    }
 
 
 _TRIALS: dict[str, Callable[[Mapping[str, Any]], object]] = {

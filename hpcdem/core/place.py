@@ -1,0 +1,17 @@
+"""Where a user's program is."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import FrameType
+
+PACKAGE = str(Path(__file__).resolve().parent.parent)
+
+
+def place() -> tuple[str, int]:
+    """File and line of the user's program that is being carried out."""
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        frame = frame.f_back
+    return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("python", 0)
