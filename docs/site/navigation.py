@@ -17,8 +17,8 @@ NAVIGATION = {
         "docs/files", "docs/fields",
     ],
     "Theory": [
-        "docs/physics", "docs/blocks", "docs/blocks_joints", "docs/blocks_space", "docs/blocks_fluid", "docs/blocks_heat",
-        "docs/blocks_supports", "docs/blocks_coupling",
+        "docs/physics", "docs/blocks", "docs/blocks_joints", "docs/blocks_space", "docs/blocks_fluid",
+        "docs/blocks_heat", "docs/blocks_supports", "docs/blocks_coupling",
     ],
     "Evidence": [
         "docs/gallery", "docs/validation", "docs/benchmarks", "docs/scaling", "docs/reliability", "docs/wishes",
