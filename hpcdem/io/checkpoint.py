@@ -128,7 +128,8 @@ def read(
     ranks says what is wrong with the file.
 
     The rows of a table are shared out in slabs of nearly equal size, in the order of the file. whole: whether all ranks
-    get all rows of the table of this name. No rank reads more than it keeps, and every row is checked by somebody.
+    get all rows of the table of this name (one copy per node of the machine). No rank reads more than it keeps, and
+    every row is checked by somebody.
     """
     state, columns, check = on_first(comm, lambda: _contents(path))
     places = []
@@ -142,8 +143,13 @@ def read(
     tables: Tables = {}
     for full, values in zip(columns, found):
         table, name = full.split("/")
-        tables.setdefault(table, {})[name] = comm.bcast(values) if whole(table) else values
+        tables.setdefault(table, {})[name] = _of_all(comm, values) if whole(table) else values
     return state, tables
+
+
+def _of_all(comm: Comm, values: np.ndarray) -> np.ndarray:
+    """What rank 0 has read, once per node of the machine."""
+    return comm.per_node(lambda: values, once=True)
 
 
 def _verify(path: str | os.PathLike) -> None:

@@ -190,11 +190,12 @@ def cluster_members(node, sizes, begin, member):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def special_nodes(number, n_left, n_own, corner_special, node, begin, local, corner_of, start, one):
+def special_nodes(number, n_left, n_own, corner_special, node, begin, low, local, corner_of, start, one):
     """Nodes of the owned special corners (n_own, 4) bool, each once, in storage order; returns their number.
 
-    local (nn,) i4, all -1, is used and handed back so. corner_of: corner (element * 4 + k) by which the node was found,
-    start: where its members begin in `member`, or -1 for a node of one corner; with arrays of length 0 only counted.
+    local i4, all -1, for the nodes from `low` on, is used and handed back so. corner_of: corner (element * 4 + k) by
+    which the node was found, start: where its members begin in `member`, or -1 for a node of one corner; with arrays of
+    length 0 only counted.
     """
     n = 0
     write = len(corner_of) > 0
@@ -204,9 +205,9 @@ def special_nodes(number, n_left, n_own, corner_special, node, begin, local, cor
             if not corner_special[i, k]:
                 continue
             j = node[e, k]
-            if local[j] >= 0:
+            if local[j - low] >= 0:
                 continue
-            local[j] = n
+            local[j - low] = n
             if write:
                 corner_of[n] = 4 * e + k
                 start[n] = begin[j] if begin[j + 1] > begin[j] else -1
@@ -216,7 +217,7 @@ def special_nodes(number, n_left, n_own, corner_special, node, begin, local, cor
         e = number[n_left + i]
         for k in range(4):
             if corner_special[i, k]:
-                local[node[e, k]] = -1
+                local[node[e, k] - low] = -1
     return n
 
 

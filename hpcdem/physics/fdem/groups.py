@@ -66,20 +66,25 @@ class Groups:
 
     def state(self) -> dict[str, dict[str, list[list[int]]]]:
         """As JSON values: every group as runs [first, last] of numbers."""
-        return {s: {name: _runs(numbers) for name, numbers in of.items()} for s, of in self.sets.items()}
+        return {s: {name: runs(numbers) for name, numbers in of.items()} for s, of in self.sets.items()}
 
     @staticmethod
     def restored(kind: str, state: Mapping[str, Mapping[str, Sequence[Sequence[int]]]]) -> Groups:
         """Inverse of `state`."""
         made = Groups(kind)
         for set_name, of in state.items():
-            for name, runs in of.items():
-                parts = [np.arange(first, last + 1, dtype=np.int64) for first, last in runs]
-                made.sets.setdefault(set_name, {})[name] = np.concatenate([np.empty(0, np.int64), *parts])
+            for name, rows in of.items():
+                made.sets.setdefault(set_name, {})[name] = of_runs(rows)
         return made
 
 
-def _runs(numbers: np.ndarray) -> list[list[int]]:
+def of_runs(rows: Sequence[Sequence[int]]) -> np.ndarray:
+    """Inverse of `runs`."""
+    return np.concatenate([np.empty(0, np.int64), *(np.arange(a, b + 1, dtype=np.int64) for a, b in rows)])
+
+
+def runs(numbers: np.ndarray) -> list[list[int]]:
+    """Ascending numbers as runs [first, last]."""
     if not len(numbers):
         return []
     ends = np.flatnonzero(np.diff(numbers) != 1)

@@ -571,8 +571,10 @@ class Local(JointTables):
         self.special &= real
         self.some_special = bool(self.special.any())
         nothing = np.empty(0, np.int64)
-        scratch = np.full(len(sim.shared_nodes), -1, np.int64)
-        args = sim.number, sim.n_left, sim.n_own, self.special, sim.node, sim.member_begin, scratch
+        mine = node[real]
+        low = int(mine.min(initial=len(sim.shared_nodes)))
+        scratch = np.full(max(int(mine.max(initial=-1)) + 1 - low, 0), -1, np.int32)
+        args = sim.number, sim.n_left, sim.n_own, self.special, sim.node, sim.member_begin, low, scratch
         n = build.special_nodes(*args, nothing, nothing, nothing)
         self.node_lead, self._start, self._one = (np.empty(n, np.int64) for _ in range(3))
         if n:

@@ -297,8 +297,12 @@ class Mesh:
         if self.dim == 2:
             ends = self.edges().points
         else:
-            both = np.concatenate([self.cells[:, [a, b]] for a in range(3) for b in range(a + 1, 4)])
-            ends = np.unique(np.sort(both, axis=1), axis=0)
+            n, pairs = len(self.points), [(a, b) for a in range(3) for b in range(a + 1, 4)]
+            keys = np.empty((len(pairs), len(self.cells)), np.int64)
+            for key, (a, b) in zip(keys, pairs):
+                one, other = self.cells[:, a], self.cells[:, b]
+                key[:] = np.minimum(one, other) * n + np.maximum(one, other)
+            ends = np.column_stack(np.divmod(np.unique(keys), n))
         way = self.points[ends[:, 1]] - self.points[ends[:, 0]]
         return float(np.sqrt((way * way).sum(axis=1)).mean())
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 
+MANY = 1 << 16
+"""Elements that are looked at together."""
 OF_CONTACTOR = [0, 1, 2, 3, 5, 6]
 """Columns of `Surfaces.of_pairs` that a pair has: of T the part of the face, which is the contactor."""
 
@@ -112,7 +114,10 @@ def face_areas(mesh: Mesh, elements: np.ndarray) -> np.ndarray:
 
 def lengths(sim: State) -> np.ndarray:
     """(ne,) [m] median altitude of the elements of each element's body in the mesh."""
-    altitudes = 3.0 * sim.areas[:, None] / face_areas(sim.reference, np.arange(len(sim.areas)))
+    altitudes = np.empty((len(sim.areas), 4))
+    for at in range(0, len(altitudes), MANY):  # corners of all faces at once would be the largest table of all
+        some = np.arange(at, min(at + MANY, len(altitudes)))
+        altitudes[some] = 3.0 * sim.areas[some, None] / face_areas(sim.reference, some)
     body = connectivity.bodies(sim.partner)
     order = np.argsort(body, kind="stable")
     parts = np.split(altitudes[order], np.flatnonzero(np.diff(body[order])) + 1)

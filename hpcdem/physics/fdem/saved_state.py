@@ -17,7 +17,7 @@ from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.block_physics import PHYSICS
-from hpcdem.physics.fdem import tetrahedra, user_functions, user_laws
+from hpcdem.physics.fdem import groups, tetrahedra, user_functions, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.histories import WORDS, Histories
 from hpcdem.physics.fdem.mesh import Mesh
@@ -61,7 +61,7 @@ def state_of(sim: Blocks, extra: Mapping[str, Any]) -> dict[str, Any]:
         "loads": sim.surface_loads.saved_state(),
         "columns": {name: values.shape[1] for name, values in sim.cold.items()},
         "mesh": None if mesh is None else {
-            "groups": {s: {g: rows.tolist() for g, rows in of.items()} for s, of in mesh.groups.items()},
+            "group_runs": {s: {g: groups.runs(rows) for g, rows in of.items()} for s, of in mesh.groups.items()},
             "layers": {name: pairs.tolist() for name, pairs in mesh.layers.items()},
             "cracks": mesh.cracks.tolist(),
             "crack_sets": mesh.crack_sets.tolist(),
@@ -82,10 +82,12 @@ def tables(sim: Blocks) -> dict[str, Table]:
     if len(sim.mesh.macros):
         tables["mesh_hexes"] = _whole({f"p{k}": rows for k, rows in enumerate(sim.mesh.macros.T)}, root)
     for kind, names in ARRAYS.items():
-        tables[kind] = _whole({name: getattr(sim, name).astype(np.int64) for name in names}, root)
+        tables[kind] = _whole({name: getattr(sim, name) for name in names}, root, np.int64)
     if sim.stress0 is not None:
         stress0 = {f"s{k}": sim.stress0[:, k] for k in range(sim.stress0.shape[1])}
-        tables["stress0"] = _whole({**stress0, "row": sim.stress0_row.astype(np.int64)}, root)
+        tables["stress0"] = _whole(
+            {**stress0, "row": sim.stress0_row.astype(np.int64) if root else sim.stress0_row}, root
+        )
     if len(sim.born):
         born_at = sim.birthplace.reshape(len(sim.born), -1)
         tables["born"] = _whole({"number": sim.born, **{f"p{k}": of for k, of in enumerate(born_at.T)}}, root)
@@ -107,10 +109,10 @@ def tables(sim: Blocks) -> dict[str, Table]:
     return tables
 
 
-def _whole(columns: dict[str, np.ndarray], root: bool) -> Table:
+def _whole(columns: dict[str, np.ndarray], root: bool, dtype: Any = None) -> Table:
     """A table that all ranks have, written by rank 0."""
     n = len(next(iter(columns.values())))
-    made = {name: np.ascontiguousarray(values if root else values[:0]) for name, values in columns.items()}
+    made = {name: np.ascontiguousarray(values if root else values[:0], dtype) for name, values in columns.items()}
     return Table(made, offset=0 if root else n, total=n)
 
 
@@ -162,35 +164,10 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
     user_functions.check_restored(state["scene"])
     sim.clear()
     if state["mesh"] is not None:
-        points = np.column_stack([tables["mesh_points"][c] for c in "xyz" if c in tables["mesh_points"]])
-        cells = np.column_stack([tables["mesh_cells"][f"corner_{k}"] for k in range(4)])
-        about = state["mesh"]
-        mesh = Mesh(
-            points,
-            cells,
-            {s: {g: np.array(rows, np.int64) for g, rows in of.items()} for s, of in about["groups"].items()},
-            {name: np.array(rows, np.int64).reshape(-1, points.shape[1]) for name, rows in about["layers"].items()},
-            np.array(about["cracks"], np.int64).reshape(-1, points.shape[1]),
-            np.array(about["crack_sets"], np.int64),
-            np.column_stack([tables["mesh_hexes"][f"p{k}"] for k in range(len(tables["mesh_hexes"]))]).astype(np.int64)
-            if "mesh_hexes" in tables
-            else np.empty(0, np.int64),
-        )
+        mesh = sim.per_node(lambda: _mesh(state["mesh"], tables))
         sim.place_mesh(mesh)
-        for kind, names in ARRAYS.items():
-            for name in names:
-                if name == "corner_row" and "points" in tables:  # of versions that had conditions by points
-                    sim.corner_row[:] = np.append(tables["points"]["point_row"], 0)[mesh.cells.reshape(-1)]
-                    continue
-                if name == "touches" and name not in tables[kind]:  # of versions in which all elements did
-                    continue
-                array = getattr(sim, name)
-                array[:] = tables[kind][name].astype(array.dtype)
-        if "stress0" in tables:
-            of = tables["stress0"]
-            sim.stress0 = np.column_stack([of[f"s{k}"] for k in range(6) if f"s{k}" in of])
-            # In files without this column an initial stress did not follow the moduli: it is that of the present ones.
-            sim.stress0_row[:] = tables["stress0"].get("row", sim.element_row)
+        for name, array in sim.per_node(lambda: _arrays(sim, tables)).items():
+            setattr(sim, name, array)
         if "born" in tables:
             born_at = np.column_stack([tables["born"][f"p{k}"] for k in range(4 * sim.dim)])
             sim.take_births(tables["born"]["number"].astype(np.int64), born_at.reshape(-1, 4, sim.dim))
@@ -211,6 +188,50 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
     if state["closed"]:
         _close_as_it_was(sim, state, places)
     sim.rebuilds = state["rebuilds"]
+
+
+def _mesh(about: dict[str, Any], tables: checkpoint.Tables) -> Mesh:
+    points = np.column_stack([tables["mesh_points"][c] for c in "xyz" if c in tables["mesh_points"]])
+    cells = np.column_stack([tables["mesh_cells"][f"corner_{k}"] for k in range(4)])
+    macros = np.empty(0, np.int64)
+    if "mesh_hexes" in tables:
+        of = tables["mesh_hexes"]
+        macros = np.column_stack([of[f"p{k}"] for k in range(len(of))]).astype(np.int64)
+    if "groups" in about:  # of versions that named each element
+        named = {s: {g: np.array(rows, np.int64) for g, rows in of.items()} for s, of in about["groups"].items()}
+    else:
+        named = {s: {g: groups.of_runs(rows) for g, rows in of.items()} for s, of in about["group_runs"].items()}
+    return Mesh(
+        points,
+        cells,
+        named,
+        {name: np.array(rows, np.int64).reshape(-1, points.shape[1]) for name, rows in about["layers"].items()},
+        np.array(about["cracks"], np.int64).reshape(-1, points.shape[1]),
+        np.array(about["crack_sets"], np.int64),
+        macros,
+    )
+
+
+def _arrays(sim: Blocks, tables: checkpoint.Tables) -> dict[str, np.ndarray]:
+    """Assignments by name."""
+    out: dict[str, np.ndarray] = {}
+    for kind, names in ARRAYS.items():
+        for name in names:
+            if name == "corner_row" and "points" in tables:  # of versions that had conditions by points
+                found = np.append(tables["points"]["point_row"], 0)[sim.the_mesh().cells.reshape(-1)]
+            elif name not in tables[kind] and name == "touches":  # of versions in which all elements did
+                continue
+            else:
+                found = tables[kind][name]
+            before = getattr(sim, name)
+            if before.any() or found.any():  # zeros that nobody has written to take no memory
+                out[name] = found.astype(before.dtype)
+    if "stress0" in tables:
+        of = tables["stress0"]
+        out["stress0"] = np.column_stack([of[f"s{k}"] for k in range(6) if f"s{k}" in of])
+        # In files without this column an initial stress did not follow the moduli: it is that of the present ones.
+        out["stress0_row"] = of.get("row", out.get("element_row", sim.element_row)).astype(sim.stress0_row.dtype)
+    return out
 
 
 def _take_rows(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> dict[str, np.ndarray]:

@@ -53,6 +53,8 @@ SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
 OLDEST = 2000
 """Storage is made again at this age even if nobody moved, so that borders can follow the load."""
+LARGE = 10_000
+"""Elements of a rank whose tables of the last storage are worth giving back to the system."""
 OUTSIDE, MUCH = 1e-6, 1e-3
 """Part of its largest component by which a stress must be beyond the strength to be spoken of: one that was given, one
 that relaxation begins with."""
@@ -345,7 +347,7 @@ class Blocks(Edited):
         if self._state_given:
             self._state_given = False
             notices.warn_of_given_stress(self)
-        if stale:
+        if stale or len(self.number) > LARGE:
             give_back()
 
     def _remember_all(self) -> None:

@@ -62,9 +62,16 @@ def face_corners(_cells: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def pair_faces(cells: np.ndarray, partner: np.ndarray) -> int:
     """Fill partner (4 ne,) i8; returns the lowest face that is used by three or more elements, or -1."""
     partner[:] = -1
-    points = np.sort(face_points(cells, np.arange(len(partner))), axis=1)
-    order = np.lexsort((points[:, 2], points[:, 1], points[:, 0]))  # stable: equal faces ascend
-    same = (points[order[1:]] == points[order[:-1]]).all(axis=1)
+    a, b, c = (cells[:, FACES[:, k]].reshape(-1) for k in range(3))
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    a += b
+    a += c
+    a -= low
+    a -= high  # what is left is the point in the middle
+    order = np.lexsort((high, a, low))  # stable: equal faces ascend
+    same = np.ones(max(len(order) - 1, 0), bool)
+    for column in (low, a, high):
+        same &= np.diff(column[order]) == 0
     bad = order[:-2][same[1:] & same[:-1]]
     first = np.flatnonzero(same)
     partner[order[first]], partner[order[first + 1]] = order[first + 1], order[first]
@@ -94,11 +101,14 @@ def find_edges(faces: Edges, points: np.ndarray, _points: int = 0) -> np.ndarray
     points = np.sort(np.asarray(points, np.int64).reshape(-1, 3), axis=1)
     if not len(points) or not len(faces):
         return np.full(len(points), -1, np.int64)
-    known = np.sort(faces.points, axis=1)
+    wanted = np.zeros(int(faces.points.max()) + 1, bool)
+    wanted[points[points < len(wanted)]] = True
+    some = np.flatnonzero(wanted[faces.points].all(axis=1))  # few, as a rule
+    known = np.sort(faces.points[some], axis=1)
     both = np.concatenate([known, points])
     key = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
     row = np.full(int(key.max()) + 1, -1, np.int64)
-    row[key[: len(known)]] = np.arange(len(known))
+    row[key[: len(known)]] = some
     return row[key[len(known) :]]
 
 

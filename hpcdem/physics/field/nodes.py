@@ -33,18 +33,22 @@ class Nodes:
         """name: of the field; capacity (rows, w): of the corners held here; held (np,): rows of what is prescribed,
         from 1. PhysicsError on all ranks if a node is too wide for one of them. Collective."""
         mesh, own = blocks.the_mesh(), blocks.owned
-        dead = np.repeat(~blocks.alive, 4)
-        node, lead = mesh.corner_clusters(blocks.partner, blocks.open | dead)
-        node[~blocks.alive] = -1
-        node = node.astype(np.int32, copy=False)
+
+        def find() -> tuple[np.ndarray, ...]:
+            node, lead = mesh.corner_clusters(blocks.partner, blocks.open | np.repeat(~blocks.alive, 4))
+            node[~blocks.alive] = -1
+            node = node.astype(np.int32, copy=False)
+            sizes = np.bincount(node[node >= 0], minlength=len(lead))
+            member_begin = np.zeros(len(lead) + 1, np.int32)
+            member = np.empty(int(sizes[sizes > 1].sum()), np.int32)
+            build.cluster_members(node, sizes, member_begin, member)
+            return node, lead, member_begin, member
+
+        node, lead, member_begin, member = blocks.per_node(find)
         self.number, self.leads = node.reshape(-1), lead
-        sizes = np.bincount(node[node >= 0], minlength=len(lead))
-        member_begin = np.zeros(len(lead) + 1, np.int32)
-        member = np.empty(int(sizes[sizes > 1].sum()), np.int32)
-        build.cluster_members(node, sizes, member_begin, member)
         real = node[blocks.number[own]] >= 0
-        nothing, scratch = np.empty(0, np.int64), np.full(len(lead), -1, np.int64)
-        args = blocks.number, blocks.n_left, blocks.n_own, real, node, member_begin, scratch
+        nothing, scratch = np.empty(0, np.int64), np.full(len(lead), -1, np.int32)
+        args = blocks.number, blocks.n_left, blocks.n_own, real, node, member_begin, 0, scratch
         n = build.special_nodes(*args, nothing, nothing, nothing)
         first, start, one = (np.empty(n, np.int64) for _ in range(3))
         build.special_nodes(*args, first, start, one)
