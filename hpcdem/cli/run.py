@@ -20,6 +20,7 @@ from hpcdem.core import chinese
 from hpcdem.core.comm import Comm
 from hpcdem.core.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import launch, run_folder
+from hpcdem.runtime.cgroups import free_memory
 from hpcdem.runtime.run_folder import Job, Retention, claim
 from hpcdem.runtime.stop_requests import AUTOSAVE
 from hpcdem.session import Session
@@ -169,6 +170,8 @@ def run_pcdc(session: Session, options: Options, source: bytes) -> None:
     text = decode(source, name)
     if options.check:
         log.info(check.summary(text, name))
+        if memory := check.memory(text, name, session.comm.size, free_memory(Path("/"))):
+            log.info(f"  {memory}")
         return
     read = check.read(text, name)
     if session.comm.rank == 0:  # which makes the meshes

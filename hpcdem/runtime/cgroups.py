@@ -5,6 +5,7 @@ root: where proc and sys are.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,6 +26,13 @@ def memory(root: Path) -> int | None:
     groups = _groups(root, "memory")
     words = [(read(group / "memory.max") or read(group / "memory.limit_in_bytes")).strip() for group in groups]
     return min((int(word) for word in words if word.isdigit() and int(word) < 1 << 60), default=None)  # 2^63: none
+
+
+def free_memory(root: Path) -> int | None:
+    """What processes of this host can still take, and their control group allows [bytes]; None: nobody knows."""
+    free = re.search(r"^MemAvailable:\s+(\d+)", read(root / "proc/meminfo"), re.MULTILINE)
+    found = [limit for limit in (memory(root), int(free[1]) * 1024 if free else None) if limit is not None]
+    return min(found, default=None)
 
 
 def read(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections import Counter
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from hpcdem.lang.pcdc.kinds import Pending, TableName
 from hpcdem.lang.pcdc.source import Source
 from hpcdem.lang.pcdc.statement import Statement
 from hpcdem.lang.pcdc.trial import HEAT, MODELS, OF_FIELDS
+from hpcdem.physics.fdem import footprint
 from hpcdem.physics.fdem.elements.kind import SIX_NODE_TRIANGLE
 from hpcdem.physics.fdem.tables import TEMPERATURE, Drawn, Over
 
@@ -103,6 +105,53 @@ def summary(text: str, file: str) -> str:
     if missing := missing_packages(script):
         lines.append(f"warning: line {next(iter(missing.values())).line}: {_in_one(list(missing))}")
     return "\n".join(lines)
+
+
+def memory(text: str, file: str, ranks: int, free: float | None) -> str:
+    """A line about the memory that the meshes of a script will take on these ranks of one node, as far as it tells
+    their sizes; "" if it tells none. free [B]: of this machine, None: not known. HpcdemError if the model cannot fit.
+    """
+    count, dim, other = 0, 2, 0
+    for statement in read(text, file).statements:
+        elements = _elements(statement)
+        count, other = count + max(elements, 0), other or statement.line * (elements < 0)
+        cells = statement.arguments.get("cells", statement.arguments.get("n"))
+        dim = len(cells) if elements > 0 and cells is not None else dim
+    if not count:
+        return ""
+    one, mega = footprint.expected(count, dim, ranks), 1e-6
+    said = (
+        f"memory: {count} elements on {ranks} rank{'s' * (ranks > 1)} take about {one.rank * mega:.0f} MB per rank, at "
+        f"most {one.most * mega:.0f} MB, and {one.shared * mega:.0f} MB shared by the ranks of a node: on one node "
+        f"{one.node * mega:.0f} MB at most"
+    )
+    if other:
+        said += f" (without the mesh of line {other}, whose size is not known before it is made)"
+    if free is None:
+        return said
+    if one.node > free:
+        raise HpcdemError(
+            f"{said}. It does not fit: {free * mega:.0f} MB are free here. Fewer elements, or more nodes with "
+            "fewer ranks each"
+        )
+    return f"{said}, of {free * mega:.0f} MB that are free"
+
+
+_MAKES_MESHES = ("mesh create", "mesh import", "mesh equilateral", "mesh patch", "model restore", "element create")
+
+
+def _elements(statement: Statement) -> int:
+    """How many a line makes; -1: nobody knows yet."""
+    name, given = statement.command.name, statement.arguments
+    cells = {"mesh structured": given.get("cells"), "element create brick": given.get("n")}.get(name)
+    if cells is None:
+        return -1 if name.startswith(_MAKES_MESHES) else 0
+    if not isinstance(cells, tuple) or not all(isinstance(one, int) for one in cells):
+        return -1
+    per = {2: 2, 3: given.get("split", 6)}[len(cells)]
+    if given.get("type") in ("quad", "hex") or given.get("triangle") is False:
+        per = {2: 1, 3: 6}[len(cells)]  # six elements store a hexahedron
+    return math.prod(cells) * per if isinstance(per, int) else -1
 
 
 def _loose_names(script: Source) -> list[str]:

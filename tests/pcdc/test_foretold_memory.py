@@ -1,0 +1,38 @@
+"""--check says what memory a model of blocks will take, and refuses one that cannot fit."""
+
+from __future__ import annotations
+
+import pytest
+
+from hpcdem.core.errors import HpcdemError
+from hpcdem.lang.pcdc import check
+from hpcdem.physics.fdem import footprint
+
+BOX = "pcdc model new dim 3\npcdc mesh structured (0,0,0) (1,1,1) cells 100 100 100\n"
+
+
+@pytest.mark.parametrize(("line", "elements"), [
+    ("mesh structured (0,0) (1,1) cells 30 20", 1200),
+    ("mesh structured (0,0) (1,1) cells 30 20 type quad", 600),
+    ("element create brick p0 (0,0) p1 (1,0) p2 (0,1) n 5 4", 40),
+    ("model new dim 3\npcdc mesh structured (0,0,0) (1,1,1) cells 3 2 4 split 5", 120),
+    ("model new dim 3\npcdc mesh structured (0,0,0) (1,1,1) cells 3 2 4 type hex", 144),
+])  # fmt: skip
+def test_elements_are_counted(line: str, elements: int):
+    assert f" {elements} elements on 1 rank take" in check.memory(f"pcdc {line}\n", "a.py", 1, None)
+
+
+def test_a_model_that_cannot_fit_is_refused_with_what_it_takes():
+    one = footprint.expected(6_000_000, 3, 8)
+    said = check.memory(BOX, "a.py", 8, one.node)
+    assert f"{one.rank * 1e-6:.0f} MB per rank" in said and f"{one.shared * 1e-6:.0f} MB shared" in said
+    with pytest.raises(HpcdemError, match=r"does not fit: \d+ MB are free here"):
+        check.memory(BOX, "a.py", 8, 0.99 * one.node)
+
+
+def test_of_meshes_of_unknown_size_nothing_is_foretold():
+    unknown = "pcdc geometry create rectangle (0,0) (1,1) as-layer 'o'\npcdc mesh create from-layer 'o' size 0.1\n"
+    assert check.memory("n = 3\npcdc mesh structured (0,0) (1,1) cells [n] [n]\n", "a.py", 1, 1.0) == ""
+    assert check.memory(unknown, "a.py", 1, 1.0) == ""
+    both = check.memory(f"{unknown}pcdc mesh structured (2,0) (3,1) cells 30 20\n", "a.py", 1, None)
+    assert "without the mesh of line 2" in both
