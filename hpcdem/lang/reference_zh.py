@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from hpcdem.core.chinese import known
-from hpcdem.lang.pages import escaped
+from hpcdem.lang.pages import first_sentence, overview
 from hpcdem.lang.pcdc import reference as pcdc
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.lang.zdem import reference as zdem
@@ -141,13 +141,11 @@ def pcdc_page() -> str:
 
 def _said(context: str, name: str, doc: str) -> str:
     """In Chinese; the first sentence in English where nobody has written it yet."""
-    return known(context, name) or doc.split(". ")[0].rstrip(".") + "."
+    return known(context, name) or first_sentence(doc) + "."
 
 
 def _overview(texts: dict[str, str]) -> str:
-    lines = ["", "## 全部命令", "", "| 命令 | 作用 |", "|---|---|"]
-    lines += [f"| [{name}](#{name.lower().replace(' ', '-')}) | {escaped(text)} |" for name, text in texts.items()]
-    return "\n".join([*lines, ""])
+    return "\n" + overview("全部命令", "| 命令 | 作用 |", texts)
 
 
 def _meant(options: Sequence[Option]) -> list[Option]:

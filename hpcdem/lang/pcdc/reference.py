@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from hpcdem.lang.pages import escaped, wrapped
+from hpcdem.lang.pages import escaped, first_sentence, overview, wrapped
 from hpcdem.lang.pcdc.table import PCDC, RECORDED, Command, Model, Option, Table
 
 _TOP = """\
@@ -75,18 +75,11 @@ centre of an element, a node, both ends of a face or joint.
 
 def page(table: Table = PCDC) -> str:
     """The whole page, in Markdown."""
-    parts = [_TOP, _overview(table)]
+    said = {command.name: first_sentence(command.doc) for command in table.commands}
+    parts = [_TOP, overview("Commands", "| command | what it does |", said)]
     parts += [_command(command) for command in table.commands]
     parts += [_RANGE, _options(table.range_terms), "", *_models(table), _recorded(), _dimensions(table)]
     return "\n".join(parts).rstrip("\n") + "\n"
-
-
-def _overview(table: Table) -> str:
-    rows = ["## Commands", "", "| command | what it does |", "|---|---|"]
-    for command in table.commands:
-        first = command.doc.split(". ")[0].rstrip(".")
-        rows.append(f"| [{command.name}](#{command.name.replace(' ', '-')}) | {escaped(first)} |")
-    return "\n".join([*rows, ""])
 
 
 def _command(command: Command) -> str:

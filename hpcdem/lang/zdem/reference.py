@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from hpcdem.lang.pages import escaped, wrapped
+from hpcdem.lang.pages import escaped, first_sentence, overview, wrapped
 from hpcdem.lang.zdem.table import COLORS, FLAG, SOURCES, ZDEM, Choice, Command, Option, Row, Table
 
 _TOP = """\
@@ -53,18 +53,11 @@ command. Operators are `+ - * /`; no blanks inside, no parentheses. Example: `DE
 
 def page(table: Table = ZDEM) -> str:
     """The whole page, in Markdown."""
-    parts = [_TOP, _overview(table)]
+    said = {command.name: first_sentence(command.doc) for command in table.commands}
+    parts = [_TOP, overview("Commands", "| command | what it does |", said)]
     parts += [_command(command) for command in table.commands]
     parts += [_RANGE, _options(table.range_terms), "", _VARIABLES, _colors()]
     return "\n".join(parts).rstrip("\n") + "\n"
-
-
-def _overview(table: Table) -> str:
-    rows = ["## Commands", "", "| command | what it does |", "|---|---|"]
-    for command in table.commands:
-        first_sentence = command.doc.split(". ")[0].rstrip(".")
-        rows.append(f"| [{command.name}](#{command.name.lower()}) | {escaped(first_sentence)} |")
-    return "\n".join([*rows, ""])
 
 
 def _command(command: Command) -> str:

@@ -100,11 +100,6 @@ def strength_tables(rows: Rows, of: np.ndarray, tables: list[Table], history: np
     )
 
 
-def _by_rows(of_parts: np.ndarray) -> np.ndarray:
-    """(n, parts, 4 or 8) as (n, ...)."""
-    return of_parts.reshape(-1, of_parts.shape[1] * of_parts.shape[2])
-
-
 @dataclass
 class Evaluation:
     """Forces at the present positions, as the next step will see them [N/m].
