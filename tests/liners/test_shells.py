@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from hpcdem.physics.fdem import convergence
+from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.structures import VELOCITY
 from hpcdem.physics.liners import kernels, kernels_space, layout, shells
+from hpcdem.physics.liners.model import Liners
+from tests.blocks.support import model, rectangle
 from tests.liners.sheets import at_rest, done, grid, pressed, ring, sheet, sphere, stiffness
 from tests.liners.support import SHOTCRETE
+from tests.space.support import body, hexes
 
 YOUNG, NU, THICK = SHOTCRETE["young"], SHOTCRETE["poisson_ratio"], SHOTCRETE["thickness"]
 PLATE = YOUNG * THICK**3 / (12.0 * (1.0 - NU**2))
@@ -314,3 +318,58 @@ def test_faces_are_joined_along_edges() -> None:
     assert ends.tolist() == [[0, 2, 3]] and parted == 0
     ends, _, parted = nodes([(0, 2, 3)], [(0, 1, 2)], [(0, 1, 2)], points[:3] + [0.0, 0.0, 0.5])
     assert ends.tolist() == [[3, 4, 5]] and parted == 1  # it has come apart
+
+
+def polar(mesh: Mesh) -> Mesh:
+    """Points of a box from 0 to 1 in x and y: a quarter of a ring from 2 m to 20 m about z."""
+    points = mesh.points.copy()
+    r, angle = 2.0 * 10.0 ** points[:, 0], 0.5 * math.pi * points[:, 1]
+    points[:, 0], points[:, 1] = r * np.cos(angle), r * np.sin(angle)
+    return Mesh.of(points, mesh.cells, macros=mesh.macros)
+
+
+def quarter(mesh: Mesh) -> tuple[Liners, np.ndarray]:
+    """A quarter of a tunnel in elastic rock under 100 kPa and half of it, lined before anything moves, at rest; the
+    middles of its elements."""
+    sim, dim = model(mesh) if mesh.dim == 2 else body(mesh), mesh.dim
+    sim.element_property(None, {"young": 2e9, "poisson_ratio": 0.3})
+    sim.option(dynamic=False, collision=False)
+    x, y = mesh.points[:, 0], mesh.points[:, 1]
+    sim.velocity_condition(np.flatnonzero(np.hypot(x, y) > 19.99), vx=0.0, vy=0.0)
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
+    sim.velocity_condition(np.flatnonzero(x < 1e-9), vx=0.0)
+    if dim == 3:
+        sim.velocity_condition(None, vz=0.0)
+    sim.initial_stress(None, xx=-5e4, yy=-1e5, xy=0.0)
+    edges = mesh.edges()
+    on = (np.hypot(*np.moveaxis(mesh.points[edges.points][:, :, :2], 2, 0)) < 2.0001).all(axis=1)
+    liners = Liners.of(sim)
+    _, elements = liners.create(edges.faces[on & ~edges.inner, 0])
+    liners.assign(elements, {**SHOTCRETE, "thickness": 0.3, "normal_stiffness": 2e11, "shear_stiffness": 2e11})
+    at = liners.nodes["origin"]
+    if dim == 3:
+        liners.condition(np.arange(len(at)), does_z=VELOCITY, does_turn_x=VELOCITY, does_turn_y=VELOCITY)
+    liners.condition(np.flatnonzero(at[:, 1] < 1e-9), does_y=VELOCITY, does_turn=VELOCITY)
+    liners.condition(np.flatnonzero(at[:, 0] < 1e-9), does_x=VELOCITY, does_turn=VELOCITY)
+    assert convergence.solve(sim, ratio=1e-6, cycles=60_000).reason == "ratio"
+    return liners, at[liners.elements["ends"]].mean(axis=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("sides", "close"), [(12, 0.06), (24, 0.02)])
+def test_a_lined_tunnel_is_that_of_the_plane(sides: int, close: float) -> None:
+    """A slice of hexahedra and shells as quads and beams: thrust, its wave and that of the moment."""
+    flat = quarter(polar(rectangle(sides, sides, 1.0, 1.0, kind="quad")))
+    deep = quarter(polar(hexes((sides, sides, 1), (1.0, 1.0, 3.0 / sides))))
+    found = []
+    for liners, middle in (flat, deep):
+        wave = np.cos(2.0 * np.arctan2(middle[:, 1], middle[:, 0]))
+        if liners.blocks.dim == 2:
+            thrust = liners.values("liner-element", "axial_force")
+            ends = [liners.values("liner-element", f"moment_{end}") for end in ("first", "last")]
+            moment = 0.5 * (ends[0] + ends[1])
+        else:
+            both = [[values(liners, f"{name}_{c}") for c in ("xx", "yy")] for name in ("membrane", "bending")]
+            thrust, moment = np.sum(both, axis=1)
+        found.append([thrust.mean(), 2.0 * (thrust * wave).mean(), 2.0 * (moment * wave).mean()])
+    assert found[1] == pytest.approx(found[0], rel=close)
