@@ -104,7 +104,7 @@ def sheared(slip: float, **changed: float) -> np.ndarray:
     moved[sim.where[upper], 0::2] = slip
     sim.x += moved
     flow.find_geometry()
-    return flow._table[:, kernels.APERTURE]
+    return flow.channel_table[:, kernels.APERTURE]
 
 
 def test_slip_opens_by_the_tangent_of_the_angle() -> None:

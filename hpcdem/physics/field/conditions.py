@@ -34,8 +34,6 @@ class Conditions(Assigned, Field):
     """What it is a field of, and the column of elements with its values at their corners."""
     unstressed: ClassVar[str]
     """Column of elements: the mean value at which one is free of the stress that the field brings."""
-    word: ClassVar[str]
-    """What commands call its part of the calculation."""
     several: ClassVar[str] = "values"
     low_to_high: ClassVar[str] = "lower to the higher"
     otherwise: ClassVar[str] = ""

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.core.errors import CommandError
 from hpcdem.core.units import counted, with_prefix
 from hpcdem.physics.fdem import by_temperature, user_laws
 from hpcdem.physics.fdem.moduli import moduli
@@ -394,10 +394,7 @@ class Diffusing(Conditions):
         blocks = self.blocks
         first = self._lowest(blocks.number[blocks.owned][~np.isfinite(blocks.cold[self.quantity]).all(axis=1)])
         if first >= 0:
-            raise PhysicsError(
-                f"step {blocks.clock.step}: the {self.quantity} of element {first} is not finite; the {self.word} time "
-                f"step {self.dt:g} s is probably too large (stable: {self._limit:g} s)"
-            )
+            raise self._blown_up(f"the {self.quantity} of element {first}", self._limit)
 
     # ---- state on disk -------------------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from hpcdem.core.errors import CommandError
+from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.halo.copies import Copies, moved
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem.properties import ELEMENT, Model
@@ -206,6 +206,8 @@ class Field(SurfaceLoad):
     own_clock: ClassVar[bool] = True
     told: ClassVar[str] = ""
     """What messages call it, if not by its name."""
+    word: ClassVar[str]
+    """What commands call its part of the calculation."""
     blocks: Blocks
 
     def _start_clock(self, time: float) -> None:
@@ -253,6 +255,13 @@ class Field(SurfaceLoad):
         """Of what all ranks hold and what is gone."""
         comm = self.blocks.comm
         return exact_sum(np.append(column, gone if comm.rank == 0 else 0.0), comm)
+
+    def _blown_up(self, what: str, stable: float) -> PhysicsError:
+        """What is raised where `what` is not finite; stable: the longest sub-step [s]."""
+        return PhysicsError(
+            f"step {self.blocks.clock.step}: {what} is not finite; the {self.word} time step {self.dt:g} s is probably "
+            f"too large (stable: {stable:g} s)"
+        )
 
     def _lowest(self, numbers: np.ndarray) -> int:
         """Of numbers (n,) of all ranks; -1: there is none."""

@@ -57,7 +57,9 @@ class Slurry(Protocol):
 
 class Channels(Travelling, Said):
     """number (n,): flow nodes owned here, ascending; nodes (n, kernels.NODE): what they hold; held (n + copies,):
-    numbers of the first rows of state (n + copies + more, kernels.STATE)."""
+    numbers of the first rows of state (n + copies + more, kernels.STATE). channels_here (m,): channels of this rank,
+    ascending; sides: where the corners of both their faces begin in x (m, dim); channel_table (l, kernels.CHANNEL): of
+    their links."""
 
     of_nodes: ClassVar[str] = "flow_nodes"
     columns: ClassVar[Mapping[str, tuple[str, int]]] = {
@@ -144,8 +146,8 @@ class Channels(Travelling, Said):
         mine, leads, row = network.nodes[own], leads[own], row[own]
         at = blocks.where[np.column_stack([network.channels, blocks.partner[network.channels]]) // 4]
         beside = ((at >= blocks.owned.start) & (at < blocks.owned.stop)).any(axis=1)
-        self._channels = network.channels[np.isin(network.corners, mine).any(axis=1) | beside]
-        corners = blocks.the_mesh().face_points(self._channels)
+        self.channels_here = network.channels[np.isin(network.corners, mine).any(axis=1) | beside]
+        corners = blocks.the_mesh().face_points(self.channels_here)
         self._forget(~network.there[self.number])
         _, wanted = self._fetch(mine, np.setdiff1d(np.concatenate([corners.reshape(-1), loaded]), mine), more)
         self.held = np.concatenate([mine, wanted])
@@ -159,7 +161,7 @@ class Channels(Travelling, Said):
         self._sums = np.zeros((2, len(self.held)))
         self.note_leaks()
         self._law_table, self._slow = self.laws(), np.empty(len(ends))
-        self._table, self._flowing = (np.empty((len(ends), kernels.CHANNEL)) for _ in range(2))
+        self.channel_table, self._flowing = (np.empty((len(ends), kernels.CHANNEL)) for _ in range(2))
         self.carried = None if self.carried is None else np.empty(0)
         self._leaked_before = np.empty(0)
         self._find_sides()
@@ -169,7 +171,7 @@ class Channels(Travelling, Said):
     def _find_sides(self) -> None:
         """Where both faces of this rank's channels are, and their laws. PhysicsError on all ranks if one of them does
         not hold both. Collective."""
-        blocks, faces = self.blocks, self._channels
+        blocks, faces = self.blocks, self.channels_here
         other = blocks.partner[faces]
         lost = faces[(blocks.where[faces // 4] < 0) | (blocks.where[other // 4] < 0)][:1]
         first = int(blocks.comm.max_into(np.append(lost, -1)[:1])[0])
@@ -179,7 +181,7 @@ class Channels(Travelling, Said):
                 f"{blocks.rebuild_state.side:g} m: its sides have parted too far"
             )
         corners = blocks.the_mesh().face_corners
-        self._sides = self._begins(corners(faces)), self._begins(corners(other))
+        self.sides = self._begins(corners(faces)), self._begins(corners(other))
         self._law = np.repeat((self.row[faces] - 1).astype(np.int64), LINKS[blocks.dim])
 
     def _begins(self, corner: np.ndarray) -> np.ndarray:
@@ -223,15 +225,15 @@ class Channels(Travelling, Said):
             at = np.union1d(at, channels[np.isin(channels, broken)])
         new = at[(self.column("leak_off")[self.row[at]] > 0.0) & np.isinf(self.since[at])]
         self.since[new] = self.time
-        self._since = np.repeat(self.since[self._channels], LINKS[self.blocks.dim])
+        self._since = np.repeat(self.since[self.channels_here], LINKS[self.blocks.dim])
         self._leaks = bool(np.isfinite(self.since).any())
 
     def find_geometry(self) -> None:
         """Apertures and conductances where the blocks are now. Not collective."""
         blocks, kernel = self.blocks, kernels.geometry if self.blocks.threads == 1 else kernels.geometry_threaded
-        kernel(blocks.threads, *self._sides, self._law, self._law_table, blocks.x, self.viscosity, self._table)
+        kernel(blocks.threads, *self.sides, self._law, self._law_table, blocks.x, self.viscosity, self.channel_table)
         if self.slurry is not None:
-            self.slurry.thicken(self._ends, self._table)
+            self.slurry.thicken(self._ends, self.channel_table)
 
     def find_rooms(self) -> None:
         """Room of nodes where the blocks are now. Not collective."""
@@ -239,7 +241,7 @@ class Channels(Travelling, Said):
         self._find_volumes()
 
     def _find_volumes(self) -> None:
-        kernels.volumes(self._begin, self._channel, self._table, self.nodes)
+        kernels.volumes(self._begin, self._channel, self.channel_table, self.nodes)
 
     def _find_state(self, at: np.ndarray | slice) -> None:
         """Pressure and saturation of owned nodes from their fluid."""
@@ -270,10 +272,10 @@ class Channels(Travelling, Said):
 
     def _flowing_table(self) -> np.ndarray:
         """The table of links, where flow is turbulent with the conductances of this moment. Not collective."""
-        slow = self.slowness(self._ends, self._table, self.state, self._slow)
+        slow = self.slowness(self._ends, self.channel_table, self.state, self._slow)
         if slow is None:
-            return self._table
-        np.copyto(self._flowing, self._table)
+            return self.channel_table
+        np.copyto(self._flowing, self.channel_table)
         self._flowing[:, kernels.CONDUCT] *= slow
         return self._flowing
 
@@ -303,7 +305,7 @@ class Channels(Travelling, Said):
 
     def limit(self) -> float:
         """The longest sub-step that is stable, with a factor of two in reserve [s]."""
-        args = self._begin, self._channel, self._ends, self._table, self.nodes, self.state
+        args = self._begin, self._channel, self._ends, self.channel_table, self.nodes, self.state
         least = kernels.longest_step(*args, self.fluid("fluid_bulk"))
         return float(self.blocks.comm.min_into(np.array([least]))[0])
 
@@ -315,24 +317,9 @@ class Channels(Travelling, Said):
         Not collective."""
         return self._ends, self._begin, self._channel, self._side
 
-    @property
-    def sides(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where the corners of both faces of this rank's channels begin in x (m, dim). Not collective."""
-        return self._sides
-
-    @property
-    def channels_here(self) -> np.ndarray:
-        """Numbers of this rank's channels (m,), ascending. Not collective."""
-        return self._channels
-
-    @property
-    def channel_table(self) -> np.ndarray:
-        """Of the links of this rank's channels (m, kernels.CHANNEL). Not to be changed. Not collective."""
-        return self._table
-
     def apertures(self) -> np.ndarray:
         """Of this rank's channels [m]. Not to be changed. Not collective."""
-        return self._table[:: LINKS[self.blocks.dim], kernels.APERTURE]
+        return self.channel_table[:: LINKS[self.blocks.dim], kernels.APERTURE]
 
     def fluxes(self) -> np.ndarray:
         """What flows in this rank's channels (m,) [m2/s] at `_q`: from the first corner on, in space its size: that of
@@ -340,7 +327,7 @@ class Channels(Travelling, Said):
         a triangle is A. Not collective."""
         if LINKS[self.blocks.dim] == 1:
             return self._q
-        x, (one, other) = self.blocks.x.reshape(-1), (of[..., None] + np.arange(3) for of in self._sides)
+        x, (one, other) = self.blocks.x.reshape(-1), (of[..., None] + np.arange(3) for of in self.sides)
         at = 0.5 * (x[one] + x[other[:, TRIANGLE.facing]])
         way = at[:, [2, 0, 1]] - at[:, [1, 2, 0]]
         area = 0.5 * np.linalg.norm(np.cross(way[:, 0], way[:, 1]), axis=1)

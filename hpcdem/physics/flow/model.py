@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.core.errors import CommandError
 from hpcdem.core.units import counted, with_prefix
 from hpcdem.physics.field import assigned
 from hpcdem.physics.field.model import LOOK
@@ -42,6 +42,7 @@ class Flow(Values):
     name: ClassVar[str] = "fluid"
     kernel_kind: ClassVar[str] = "flow"
     told: ClassVar[str] = "flow"
+    word: ClassVar[str] = "hydraulic"
 
     def __init__(self, blocks: Blocks) -> None:
         super().__init__(blocks)
@@ -187,8 +188,8 @@ class Flow(Values):
         if not self.dt > FAR * 2.0 * self.limit():
             return
         n = self.owned
-        rise = np.abs(np.diff(self.state[self._ends, kernels.E], axis=1)[:, 0]) * self._table[:, kernels.WEIGHT]
-        each = np.abs(self._table[:, kernels.CONDUCT]) * (self.fluid("fluid_bulk") + kernels.STEEPEST * rise)
+        rise = np.abs(np.diff(self.state[self._ends, kernels.E], axis=1)[:, 0]) * self.channel_table[:, kernels.WEIGHT]
+        each = np.abs(self.channel_table[:, kernels.CONDUCT]) * (self.fluid("fluid_bulk") + kernels.STEEPEST * rise)
         rate = sum(np.bincount(ends, each, len(self.state))[:n] for ends in self._ends.T)
         does = np.array([one.does for one in self.conditions])[self.condition[self.number]]
         held = np.isin(does, (kernels.PRESSURE, kernels.SURFACE))
@@ -234,7 +235,7 @@ class Flow(Values):
             self.find_shore()
             self.cycles += 1
         if self.cycles % LOOK == 0:
-            self._check()
+            self._check(self.number[~np.isfinite(self.nodes[:, kernels.W])])
 
     def _sub_step(self, condition: np.ndarray) -> None:
         """condition (n,): rows of the conditions of the owned nodes."""
@@ -269,7 +270,7 @@ class Flow(Values):
         room[:2, mine], room[2, mine] = self.nodes[row, : kernels.V + 1].T, self.state[row, kernels.E]
         room = self.blocks.comm.sum_into(room)
         if not np.isfinite(room).all():
-            raise self._blown_up(int(at[~np.isfinite(room).all(axis=0)][0]))
+            self._check(at[~np.isfinite(room).all(axis=0)])
         after, bulk = np.empty(len(at)), self.fluid("fluid_bulk")
         value_at = partial(assigned.now, self.blocks.tables)
         ends = np.cumsum([len(one) for one in points])
@@ -283,18 +284,11 @@ class Flow(Values):
         self.nodes[row, kernels.INFLOW] = came / (self.time - before)
         self._find_state(row)
 
-    def _check(self) -> None:
-        """Stop on all ranks if the flow has blown up."""
-        first = self._lowest(self.number[~np.isfinite(self.nodes[:, kernels.W])])
+    def _check(self, bad: np.ndarray) -> None:
+        """Stop on all ranks if the flow has blown up at one of these nodes (n,)."""
+        first = self._lowest(bad)
         if first >= 0:
-            raise self._blown_up(first)
-
-    def _blown_up(self, node: int) -> PhysicsError:
-        """What is raised where the fluid of a node is not finite. Collective."""
-        return PhysicsError(
-            f"step {self.blocks.clock.step}: the fluid at flow node {node} is not finite; the hydraulic time step "
-            f"{self.dt:g} s is probably too large (stable: {2.0 * self.limit():g} s)"
-        )
+            raise self._blown_up(f"the fluid at flow node {first}", 2.0 * self.limit())
 
     # ---- state on disk -----------------------------------------------------------------------------------------------
 

@@ -67,7 +67,7 @@ class Values(Faces):
             }  # fmt: skip
         else:
             blocks = self.blocks
-            row = blocks.where[self._channels // 4]
+            row = blocks.where[self.channels_here // 4]
             mine = (row >= blocks.owned.start) & (row < blocks.owned.stop)
             ends, aperture = self._corners[mine], self.apertures()[mine]
             self._find_flows(0.0)
@@ -75,7 +75,7 @@ class Values(Faces):
             wanted = [name for name in names if name in _OF_OTHERS]
             others = {name: self._of_others(name, copies=True)[ends].mean(axis=1) for name in wanted}
             made = {
-                "number": self._channels[mine], "aperture": aperture, "flow_rate": flux,
+                "number": self.channels_here[mine], "aperture": aperture, "flow_rate": flux,
                 "pressure": self.state[ends, kernels.P].mean(axis=1),
                 "saturation": self.state[ends, kernels.S].mean(axis=1),
                 "velocity": flux / aperture, **others,
@@ -111,10 +111,10 @@ class Values(Faces):
         blocks, links = self.blocks, LINKS[self.blocks.dim]
         blocks.close_model()
         self._find_flows(0.0)
-        row = blocks.where[self._channels // 4]
+        row = blocks.where[self.channels_here // 4]
         mine = (row >= blocks.owned.start) & (row < blocks.owned.stop)
         found = np.full((len(self.network.channels), links), math.nan)
-        found[np.searchsorted(self.network.channels, self._channels[mine])] = self._q.reshape(-1, links)[mine]
+        found[np.searchsorted(self.network.channels, self.channels_here[mine])] = self._q.reshape(-1, links)[mine]
         return self._on_all_ranks(found.reshape(-1))
 
     def _on_all_ranks(self, values: np.ndarray) -> np.ndarray:
