@@ -121,7 +121,7 @@ def stiffness(slots, own, over, per_h, kind, state, history, x, table, beyond, s
         size, h = _look(x, own[i], over[i], per_h[i], law, past, n, o, s, m)
         out[i] = 0.0
         left[i] = 1.0 if state[slot] == INTACT else -1.0
-        if not slides:
+        if not slides and (left[i] > 0.0 or not softening):
             per = 1.0 / h
             for g in range(POINTS):
                 normal, rub, shear, here, tau = joint_law.intact_slopes(o[g] * per, s[g] * per, law)
