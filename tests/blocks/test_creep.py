@@ -600,7 +600,7 @@ def test_what_crept_yields_afterwards_and_what_yielded_creeps():
             held(sim, np.column_stack([x + (1 + k) * 1e-3 * x * y, y - (1 + k) * 1e-3 * y * y]))
             sim.step()
         assert np.abs(now() - before).max() > 0.05 * np.abs(now()).max(), k
-        s0 = sim.local.quad_s0.reshape(-1, 2, 2, 4)
+        s0 = sim.local.solids.blocks[1].s0.reshape(-1, 2, 2, 4)
         pressure = 0.5 * (s0[..., 0] + s0[..., 1])
         assert np.abs(pressure[:, :, 0] - pressure[:, :, 1]).max() < 1e-9 * np.abs(s0).max(), k
         assert np.abs(s0[:, :, 0] - s0[:, :, 1]).max() > 1e-3 * np.abs(s0).max(), k

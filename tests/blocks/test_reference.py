@@ -7,7 +7,8 @@ import pytest
 
 from hpcdem.physics.fdem import changes, reference
 from hpcdem.physics.fdem.kernels import elements, joint_law, joints
-from hpcdem.physics.fdem.local import ALPHA, Evaluation
+from hpcdem.physics.fdem.local import Evaluation
+from hpcdem.physics.fdem.node_set import ALPHA
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import EVERY_KIND, JOINT, ROCK, jointed, model, rectangle, shaken
 
@@ -143,7 +144,7 @@ def check_kick(sim: Blocks, force: np.ndarray, after: np.ndarray, tied: bool) ->
     alpha = 0.0 if sim.options.dynamic else ALPHA
     v, out = (rows.reshape(len(rows), -1, 2) for rows in (sim.v, after))
     for at in members.values():
-        mass = sum(sim.local.mass[r, k] for r, k in at)
+        mass = sum(sim.local.masses.of_motion[r, k] for r, k in at)
         pulls = np.array([force[r, k] for r, k in at])
         expected = reference.node_velocity(v[at[0]], pulls, mass, alpha, sim.clock.dt)
         scale = np.abs(pulls).max() * sim.clock.dt / mass

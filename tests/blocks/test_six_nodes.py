@@ -159,7 +159,7 @@ def test_the_time_step_is_below_the_limit_and_near_to_it():
     scale = 1.0 / np.sqrt(np.repeat(m, 2))
     omega2 = np.linalg.eigvalsh(k * scale[:, None] * scale)
     assert np.abs(omega2[:3]).max() < 1e-12 * omega2[-1] < omega2[3]  # three movements of a rigid body, no others
-    limit = sim.local.critical_time_step() / sim.safety() * math.sqrt(omega2[-1]) / 2.0
+    limit = sim.local.masses.critical_time_step() / sim.safety() * math.sqrt(omega2[-1]) / 2.0
     assert 0.7 < limit <= 1.0 + 1e-12
 
 

@@ -119,6 +119,24 @@ def test_two_laws_give_the_bits_of_one():
         assert all(np.array_equal(one, other, equal_nan=True) for other in others)
 
 
+def test_stress_found_within_the_loop_over_forces_is_that_found_before_it():
+    """Of triangles and quads, bit by bit, some of them at the limit."""
+    sim = model(shaken(rectangle(3, 2, 0.6, 0.4, kind="mixed"), 0.2))
+    changes.element_model(sim, None, law(sim, "tresca"), {**ROCK, "limit": 2e5, "damp_factor": 0.1})
+    sim.initial_stress(None, xx=-1e5, yy=1e5)
+    sim.close_model()
+    sim.open_model()
+    sim.x[:, :8] += 1e-5 * np.sin(9.0 * sim.x[:, :8])
+    changes.repeat(sim, sim.x)
+    sim.close_model()
+    local = sim.local
+    assert all(local.laws.with_forces) and np.ptp(diagnostics.values(sim, "law_slip")) > 0.0
+    within = sim.evaluate().force
+    local.laws.with_forces = [None, None]
+    local._bind()  # loops that read the stress before
+    assert local.laws.before(0) and local.laws.before(1) and np.array_equal(sim.evaluate().force, within)
+
+
 def test_a_quad_follows_the_law_in_each_of_its_triangles():
     """A bent quad, beside a plain computation: strain of each triangle with the volume of its overlay, the law, the
     mean pressure of the overlay, forces of both overlays by half."""

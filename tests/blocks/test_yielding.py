@@ -162,21 +162,20 @@ def test_the_loop_over_quads_that_yield_is_flow_and_then_forces(large):
         changes.repeat(sim, sim.v)
         found = []
         for parts in (0, 1, 7):  # 0: flow, then forces
-            memory, _, s0, table, history = (part.copy() for part in local.plastic_state())
-            soft = local.strength._replace(history=history)
+            state, of = local.yielding.state(), local.solids.blocks[1]
+            memory, s0, table, history = (part.copy() for part in (state[0], of.s0, *state[2:]))
+            soft = local.yielding.strength._replace(history=history)
             args = list(local._quad_args)
-            args[0], args[6] = max(parts, 1), s0
+            args[0], args[6] = max(parts, 1), of.flat(s0)
             out = [np.zeros((len(sim.number), elements.FORCE)) for _ in range(2)]
             args += [*out, True, 1.0, -9.81, 0.5, 1e-6, 3, np.zeros((7, elements.TALLY), np.int64)]
-            own = sim.n_left, local.quad_initial, local.quad_law
+            own = sim.n_left, of.flat(of.initial), of.law
             if parts:
                 plastic_quads.yielding(*args, *own, soft, memory, table)
             else:
-                of = local.solids[1]
                 flow.flows(
-                    1, of.tables, of.count, of.flowing, of.initial, of.law, soft, not large, 3, memory,
-                    s0.reshape(of.s0.shape), table,
-                )  # fmt: skip
+                    1, of.tables, of.count, of.flowing, of.initial, of.law, soft, not large, 3, memory, s0, table
+                )
                 elements.quads(*args)
             found.append([*out, memory, s0, table, history])
         assert all((a == b).all() for one in found[1:] for a, b in zip(found[0], one))

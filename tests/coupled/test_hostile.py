@@ -68,7 +68,7 @@ def test_the_smaller_time_step_is_chosen(tmp_path):
         sim.close_model()
         both = Coupled(sim, body(rectangle(6, 3, 1.2, 0.6)))
         steps[kn] = both.settle_time_step()
-        alone = both.blocks.local.critical_time_step()
+        alone = both.blocks.local.masses.critical_time_step()
         assert sim.clock.dt == both.blocks.clock.dt == steps[kn] <= alone
         both.advance(1)
     assert steps[1e4] == pytest.approx(alone, rel=1e-3) and steps[1e12] < 0.2 * alone

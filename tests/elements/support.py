@@ -31,7 +31,7 @@ every_kind = pytest.mark.parametrize(
 
 def block(sim: Blocks, kind: Kind) -> ElementBlock:
     """The elements of this kind; the model is closed."""
-    return next(of for of in sim.local.solids if of.kind is kind)
+    return next(of for of in sim.local.solids.blocks if of.kind is kind)
 
 
 def move(sim: Blocks, places: np.ndarray) -> None:

@@ -272,7 +272,7 @@ def test_a_pressure_that_is_linear_on_a_face_pushes_by_its_integrals() -> None:
     sim.close_model()
     at = sim.mesh.points[flow.held]
     flow.state[:, kernels.P] = 1e6 * (1.0 + 2.0 * at[:, 0] - 3.0 * at[:, 1])
-    applied = np.zeros_like(sim.local.applied)
+    applied = np.zeros_like(sim.local.loads.applied)
     flow.add_to(applied)
     force, place = applied.reshape(-1, 4, 4)[:, :, :3], sim.x.reshape(-1, 4, 4)[:, :, :3]
     above = sim.mesh.centroids(sim.number)[:, 2] > 0.1

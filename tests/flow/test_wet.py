@@ -126,7 +126,7 @@ def hollow(cells: int = 5, kind: str = "quad", gravity: bool = False) -> tuple[B
 def forces(sim: Blocks, flow: Flow) -> np.ndarray:
     """Sum of what fluid applies [N/m]."""
     sim.close_model()
-    out = np.zeros_like(sim.local.applied)
+    out = np.zeros_like(sim.local.loads.applied)
     flow.add_to(out)
     return out.reshape(len(out), 4, 2).sum(axis=(0, 1))
 

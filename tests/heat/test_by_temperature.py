@@ -130,7 +130,7 @@ def test_the_time_step_is_that_of_the_stiffest_value() -> None:
     static = [body("mech_iso_elastic", ROCK, warm, left=420.0, right=420.0) for warm in ((), ("young",))]
     for sim in static:
         sim.close_model()
-    assert np.array_equal(static[0].local.mass, static[1].local.mass)
+    assert np.array_equal(static[0].local.masses.of_motion, static[1].local.masses.of_motion)
 
 
 def test_initial_stress_follows_the_modulus_from_where_it_was_said() -> None:

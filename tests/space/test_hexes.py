@@ -98,7 +98,7 @@ def test_forces_are_those_of_the_plain_reference(large, beta):
         for axis in range(3):
             x[place[i] + axis], v[place[i] + axis] = now[:, axis], rng.uniform(-3.0, 3.0, 8)
         force = np.full(sim.x.shape, np.nan)  # neighbours share no rows
-        own.forces(force, sim.v, (1.0, -2.0, -9.0), sim.local.quad_s0)
+        own.forces(force, sim.v, (1.0, -2.0, -9.0), sim.local.solids.blocks[1].s0)
         exact = reference.hexahedron_forces(mesh[i], now, *speeds_and_solid(sim, v, place, i))
         exact += own.h[i, 8:16, None] * (np.array([1.0, -2.0, -9.0]) - 30.0 * v[place[i][:, None] + np.arange(3)])
         found = force.reshape(-1)[place[i][:, None] + np.arange(3)]
@@ -106,7 +106,7 @@ def test_forces_are_those_of_the_plain_reference(large, beta):
         assert np.isfinite(force.reshape(-1, 4)[:, :3]).sum() == 24 * own.count
     several = np.full(sim.x.shape, np.nan)
     sim.threads = 3
-    own.forces(several, sim.v, (1.0, -2.0, -9.0), sim.local.quad_s0)
+    own.forces(several, sim.v, (1.0, -2.0, -9.0), sim.local.solids.blocks[1].s0)
     assert np.array_equal(force, several, equal_nan=True)
 
 

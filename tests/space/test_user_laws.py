@@ -167,11 +167,12 @@ def test_a_hexahedron_shows_the_mean_of_its_tetrahedra_and_has_one_pressure_in_a
     sim.step()
     own = sim.local.hexes
     memory = sim.cold[user_laws.COLUMN][:, 1:]
-    found = own.histories(memory)[0]
+    of = sim.local.solids.blocks[1]
+    found = of.histories(memory, memory.shape[1] // of.kind.in_row)[0]
     assert np.ptp(found[:, 6]) > 1.0 and (found[:, 6] >= 0.0).all()
     assert diagnostics.values(sim, "law_work") == pytest.approx(float(own.shares()[0] @ found[:, 6]), rel=1e-12)
-    pressure = sim.local.quad_s0[0][:, [0, 1, 3]].sum(axis=1).reshape(2, 5)
-    assert np.ptp(pressure, axis=1).max() < 1e-9 * np.abs(sim.local.quad_s0[0]).max()
+    pressure = sim.local.solids.blocks[1].s0[0][:, [0, 1, 3]].sum(axis=1).reshape(2, 5)
+    assert np.ptp(pressure, axis=1).max() < 1e-9 * np.abs(sim.local.solids.blocks[1].s0[0]).max()
 
 
 @BOTH

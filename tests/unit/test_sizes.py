@@ -9,8 +9,6 @@ LINES = 400
 LONGER = {
     "hpcdem.api.simulation.Simulation": "the methods of a program, one beside the other",
     "hpcdem.physics.bolts.model.Bolts": "older than the limit",
-    "hpcdem.physics.fdem.local.Local": "older than the limit: a rank's tables of all kinds of elements",
-    "hpcdem.physics.fdem.local_space.LocalSpace": "older than the limit",
     "hpcdem.physics.liners.model.Liners": "older than the limit",
 }
 """Take a line away when you have split the class."""

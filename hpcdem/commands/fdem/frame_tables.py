@@ -15,6 +15,8 @@ from hpcdem.physics.fdem import diagnostics, sides
 from hpcdem.physics.fdem.conditions import TRACTIONS
 from hpcdem.physics.fdem.groups import FLOW_NODE
 from hpcdem.physics.fdem.kernels import nodes, space
+from hpcdem.physics.fdem.loads import tractions_now
+from hpcdem.physics.fdem.node_set import conditions_now
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.user_functions import Placed
 from hpcdem.physics.field import assigned
@@ -123,7 +125,7 @@ def _node_conditions(blocks: Blocks) -> Columns | None:
         columns["element"] = np.where(lead >= 0, lead // 4, -1)
     points, time, plane = blocks.the_mesh().points[numbers], blocks.time_now(), blocks.dim == 2
     placed = Placed(blocks.acting(), row, points)
-    table = blocks.local.conditions_now(placed, time, time, 1.0)[placed.of]
+    table = conditions_now(blocks, placed, time, time, 1.0)[placed.of]
     does, at, force, constraint = (
         (nodes.DOES_X, nodes.AT_X, nodes.FORCE_X, nodes.CONSTRAINT) if plane
         else (space.DOES, space.AT, space.FORCE, space.CONSTRAINT)
@@ -159,7 +161,7 @@ def _face_conditions(blocks: Blocks) -> Columns | None:
     columns: Columns = {"number": numbers, **dict(zip(CORNERS[mesh.dim], corners.T.copy(), strict=True))}
     middle = mesh.points[mesh.cells[corners // 4, corners % 4]].mean(axis=1)
     placed = Placed(blocks.loads, blocks.load_row[numbers].astype(np.int64), middle)
-    table = blocks.local.loads_now(placed, time)[placed.of]
+    table = tractions_now(blocks, placed, time)[placed.of]
     for name, values in zip(TRACTIONS[blocks.dim], table.T, strict=True):
         word = name if name.startswith("incoming") else "normal_stress" if name == "normal" else f"stress_{name}"
         if name != "dip" or values.any():

@@ -15,7 +15,7 @@ from hpcdem.physics.bolts import kernels, layout
 from hpcdem.physics.bolts.properties import BOLT
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE
-from hpcdem.physics.fdem.local import ALPHA
+from hpcdem.physics.fdem.node_set import ALPHA
 from hpcdem.physics.fdem.structures import MARGIN, REMOVED, Columns, Number, Structure, empty
 
 if TYPE_CHECKING:

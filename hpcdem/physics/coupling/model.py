@@ -350,7 +350,7 @@ class Coupled(SurfaceLoad):
         blocks.close_model()
         self._renew_laws()
         p, local = particles.particles, blocks.local
-        of_discs, of_blocks = diagnostics.critical_dt(particles), local.critical_time_step()
+        of_discs, of_blocks = diagnostics.critical_dt(particles), local.masses.critical_time_step()
         stiffness = np.zeros(1)
         used = np.flatnonzero(particles.used(p["material"], particles.materials))
         table = self._laws.reshape(-1, len(particles.materials), 4)[1 : len(blocks.element_rows), used].reshape(-1, 4)

@@ -133,10 +133,10 @@ class Budget(engine.Budget["Blocks", float]):
             _, strain = local.stresses()
             in_joints = local.stored_in_joints()
             half = np.zeros((sim.n_own, energy.WORK))
-            if local.plastic:
-                half[:, WORK.index("plastic")] = -local.plastic_columns(slice(None))[:, plasticity.WORK]
-            if local.creeps:
-                half[:, WORK.index("creep")] = -local.lost_by_creep()
+            if local.yielding.some:
+                half[:, WORK.index("plastic")] = -local.yielding.columns(slice(None))[:, plasticity.WORK]
+            if local.creeping.some:
+                half[:, WORK.index("creep")] = -local.creeping.lost()
             local.book(sim.v, sim.v, 0.5, 0.0, seen.of_joints, seen.pushed, seen.felt, seen.outside, half)
             stored = dict(zip(STORED, (exact_sum(part, sim.comm) for part in (kinetic, strain, in_joints))))
             return stored, {name: exact_sum(half[:, k], sim.comm) for k, name in enumerate(WORK)}

@@ -228,7 +228,7 @@ def _forces_left_behind(sim: Blocks, dying: np.ndarray) -> tuple[np.ndarray, np.
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     # Common nodes: the forces of the dying corners fall to the lowest corner that stays. Every node is looked at by
     # the owner of that corner.
-    begin, corner_at = local.pulled or (local.node_begin, local.node_corner)
+    begin, corner_at = local.nodes.pulled
     if len(corner_at):
         node = np.repeat(np.arange(len(begin) - 1), np.diff(begin))
         row, k = corner_at // local.force_width, corner_at % local.force_width // local.stride

@@ -103,7 +103,7 @@ def begin(sim: Blocks, end: float) -> None:
     """A creep step begins, which goes to the creep time `end` [s] at most. Collective."""
     clock = sim.creep
     sim.close_model()
-    sim.local.keep_creep()
+    sim.local.creeping.keep()
     left = end - clock.time
     clock.passed = left if left * FULL <= clock.dt else clock.dt
     _warn_of_long_step(sim)
@@ -116,7 +116,7 @@ def finish(sim: Blocks, end: float) -> None:
     if sim.comm.any(bool(local.tally[:, elements.NEW_BROKEN].any())):
         sim._renew_lists()  # joints that broke did so in this creep step
     before = sim.cold["creep"].copy()
-    local.keep_creep()
+    local.creeping.keep()
     whole = end - clock.time <= clock.passed
     done, clock.time = clock.passed, end if whole else clock.time + clock.passed
     clock.passed = 0.0
@@ -134,10 +134,10 @@ def _change(sim: Blocks, before: np.ndarray) -> float:
     found = np.zeros(2)
     n = len(KELVIN_STRAIN[sim.dim])
     stress, kelvin = list(kernels.BEFORE[:n]), list(kernels.IN_KELVIN[:n])
-    for (old, law), (new, _) in zip(local.creep_memory(before), local.creep_memory(after)):
+    for (old, law), (new, _) in zip(local.creeping.memory(before), local.creeping.memory(after)):
         if not len(law):
             continue
-        table = local.creep_table[law]
+        table = local.creeping.table[law]
         way = new[:, stress] - old[:, stress]
         unit = table[:, kernels.PER_KELVIN, None] > 0.0
         rest = np.where(unit, way - 2.0 * table[:, kernels.KELVIN, None] * (new[:, kelvin] - old[:, kelvin]), 0.0)
@@ -156,7 +156,7 @@ def _warn_of_long_step(sim: Blocks) -> None:
     """A line in the log about Kelvin units that a creep step takes beyond their rest."""
     if sim.log is None:
         return
-    table = sim.local.creep_table[np.unique(sim.element_row[sim.creeping()])]
+    table = sim.local.creeping.table[np.unique(sim.element_row[sim.creeping()])]
     longest = 2.0 / float((table[:, kernels.KELVIN] * table[:, kernels.PER_KELVIN]).max(initial=1e-300))
     if sim.creep.passed > longest:
         sim.log.warn_once(

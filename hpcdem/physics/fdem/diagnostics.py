@@ -323,7 +323,7 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
                 columns[f"element_displacement_{along}"] = _mean(way, real, n)
         if "kinetic_energy" in wanted:
             v2 = (_corners(v, real) ** 2).sum(axis=2)
-            columns["kinetic_energy"] = 0.5 * np.where(real, local.mass[own][some] * v2, 0.0).sum(axis=1)
+            columns["kinetic_energy"] = 0.5 * np.where(real, local.masses.of_motion[own][some] * v2, 0.0).sum(axis=1)
     for field in (field for field in DIFFUSING if f"mean_{field}" in wanted):
         if len(mesh.hexes) and field in sim.cold:
             columns[f"mean_{field}"] = by_temperature.means(sim, field)[some]
@@ -339,7 +339,7 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
     if any(name.startswith(("creep", "kelvin_strain")) for name in wanted):
         columns |= _creep_columns(sim, some)
     if of_laws := [name for name in wanted if name.startswith(user_laws.OF_LAW)]:
-        memory = local.law_states()
+        memory = local.laws.states()
         columns |= {name: user_laws.values(sim, name, memory)[some] for name in of_laws}
     for name in wanted & PROPERTIES["element"].keys():
         columns[name] = sim.element_rows.column(PROPERTIES["element"][name])[sim.element_row[number]]
@@ -352,7 +352,7 @@ def _plastic_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndar
     """What elements remember of yielding; zero for those that never had a model that yields. They yield now if they
     did in the last step or do at the present positions."""
     if "plastic" in sim.cold:
-        memory = sim.local.plastic_columns(some)
+        memory = sim.local.yielding.columns(some)
     else:
         memory = np.zeros((sim.n_own, plasticity.MEMORY))[some]
     state = np.zeros(len(memory))
@@ -375,7 +375,7 @@ def _creep_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarra
     components = COMPONENTS[3] if sim.dim == 3 else ("xx", "yy", "xy")
     strains, lost = np.zeros((sim.n_own, 2 * len(components))), np.zeros(sim.n_own)
     if "creep" in sim.cold:
-        strains, lost = sim.local.creep_strains(), sim.local.lost_by_creep()
+        strains, lost = sim.local.creeping.strains(), sim.local.creeping.lost()
     names = [f"{name}_{c}" for name in ("creep_strain", "kelvin_strain") for c in components]
     return {**dict(zip(names, strains[some].T.copy())), "creep_work": lost[some].copy()}
 
@@ -668,8 +668,8 @@ def unbalanced_ratio(sim: Blocks) -> float:
     """Sum of |unbalanced| over sum of |contributing| forces at the nodes, of the present positions; 0 if there are none
     but by rounding, see floors.py. Collective."""
     seen, local, own = sim.evaluate(), sim.local, sim.owned
-    felt, outside = seen.felt[local.my_nodes], seen.outside[local.my_nodes]
-    alone = seen.force[own].reshape(sim.n_own, 4, sim.stride)[local.alone()].reshape(-1)
+    felt, outside = seen.felt[local.nodes.mine], seen.outside[local.nodes.mine]
+    alone = seen.force[own].reshape(sim.n_own, 4, sim.stride)[local.nodes.alone].reshape(-1)
     of_loads = sim.surface_loads.balance()[0]
     unbalanced = np.concatenate([np.abs(felt[:, : sim.dim] + outside).reshape(-1), np.abs(alone), *of_loads])
     total = exact_sum(contributing(sim, seen), sim.comm)
@@ -680,7 +680,7 @@ def contributing(sim: Blocks, seen: Evaluation) -> np.ndarray:
     """Sizes of the components of all forces on this rank's nodes [N/m]: stress, joints, contact and gravity on each
     corner, and what is applied from outside. Not collective."""
     local, own = sim.local, sim.owned
-    felt = seen.felt[local.my_nodes]
+    felt = seen.felt[local.nodes.mine]
     stress = seen.force[own] - seen.of_joints[own]
     parts = [stress, seen.of_joints[own], felt[:, sim.dim :]]
     if len(local.pairs.rows):
@@ -706,13 +706,13 @@ def deep_overlaps(sim: Blocks) -> int:
 def critical_time_step(sim: Blocks) -> float:
     """Stability limit of the model as it is, times the safety factor [s]; infinite in static mode. Collective."""
     sim.close_model()
-    return sim.local.critical_time_step()
+    return sim.local.masses.critical_time_step()
 
 
 def added_mass(sim: Blocks) -> float:
     """Mass that mass scaling has added, over the true mass. Collective."""
     sim.close_model()
-    return sim.local.added_mass() if sim.options.dynamic else 0.0
+    return sim.local.masses.added() if sim.options.dynamic else 0.0
 
 
 # ---- energy ----------------------------------------------------------------------------------------------------

@@ -57,8 +57,8 @@ class Edited(State):
         """A command is about to change a model in motion: elements creep for the time that has passed. Collective."""
         if self.options.dynamic:
             self.close_model()
-            if self.local.creeps:
-                self.local.keep_creep()
+            if self.local.creeping.some:
+                self.local.creeping.keep()
             self.creep.passed = 0.0
 
     def drop_creep_step(self) -> None:

@@ -488,7 +488,7 @@ def at_rest(sim: Blocks, nodes: Nodes, looks: bool = True) -> Iterator[None]:
     """Velocities are zero and nothing dies down; afterwards everything is as it was. looks: whether surfaces touch,
     which is refused."""
     local = sim.local
-    relaxations = local.relaxing_corner
+    relaxations = local.loads.relaxing_corner
     v = sim.v.copy()
     try:
         hold_still(sim)
@@ -499,12 +499,12 @@ def at_rest(sim: Blocks, nodes: Nodes, looks: bool = True) -> Iterator[None]:
         place_corners(sim, nodes.x)
         if sim.local is local:  # else rows have other places now
             sim.v[:] = v
-            local.relaxing_corner = relaxations
+            local.loads.relaxing_corner = relaxations
 
 
 def hold_still(sim: Blocks) -> None:
     sim.v[:] = 0.0
-    sim.local.relaxing_corner = sim.local.relaxing_corner[:0]
+    sim.local.loads.relaxing_corner = sim.local.loads.relaxing_corner[:0]
 
 
 def place_corners(sim: Blocks, x: np.ndarray) -> None:
@@ -555,7 +555,7 @@ def _follow(
 ) -> tuple[np.ndarray, Balanced]:  # fmt: skip
     """Positions of the nodes in equilibrium (nn, dim), by increments: what is out of balance at the beginning grows
     smaller, prescribed movement greater, by equal parts. CommandError if the last ones find no balance."""
-    yields, step, slides = sim.local.yields, sim.clock.step + cycles - 1, bool(sim.slides().any())
+    yields, step, slides = sim.local.yielding.on, sim.clock.step + cycles - 1, bool(sim.slides().any())
     solver.flows = yields or softening or slides
     x, iterations, factors, increments = nodes.x, 0, 0, 0
     unit, done = 1 << FINE if softening else 1 << CUTS if yields or slides else 1, 0
@@ -655,7 +655,7 @@ def commit(
     joint broke: then it is a free face. CommandError if a body came loose, or its surfaces touch."""
     place_corners(sim, x)
     if flows:
-        sim.local.flow(sim.local.plastic_state(), step)
+        sim.local.yielding.flow(step)
     if not softening:
         return False
     sim.local.open_joints()
@@ -670,9 +670,9 @@ def commit(
 def _still_to_flow(sim: Blocks) -> float:
     """Largest change of a stress by the flow of this moment over the largest stress. Collective."""
     local = sim.local
-    _, after, of_quads = local.flowed()
+    after = local.yielding.flowed()[1]
     largest = np.abs(local.stresses(energies=False)[0]).max(initial=0.0)
-    parts = [np.abs(new - old).max(initial=0.0) for new, old in ((after, local.s0), (of_quads, local.quad_s0))]
+    parts = [np.abs(new - old).max(initial=0.0) for new, old in zip(after, [of.s0 for of in local.solids.blocks])]
     change, largest = sim.comm.max_into(np.array([max(parts), largest])).tolist()
     return change / largest if largest > 0.0 else 0.0
 
@@ -683,7 +683,7 @@ def _newton(
 ) -> _Balance:  # fmt: skip
     """Balance of all forces but `missing` (nn, dim) [N/m], from the positions x (nn, dim) and this part of what is
     prescribed on. fresh: an increment begins, with the elastic answer to what is new in it."""
-    left, renew, yields = given if unknowns.given.any() else 0.0, True, sim.local.yields
+    left, renew, yields = given if unknowns.given.any() else 0.0, True, sim.local.yielding.on
     # Which elements on the yield surface will flow on is not known at the beginning: rounding would say. The first way
     # is elastic, and so is one where those with flow lead nowhere. As the stress that cannot be borne goes to many
     # neighbours such a way may well bring more unbalanced forces.
@@ -692,7 +692,7 @@ def _newton(
     rounding = noise = 0.0
     force, ratio, total = unbalanced(sim, nodes, unknowns, x, missing)
     if fresh and yields:
-        with sim.local.without_flow():
+        with sim.local.yielding.off():
             force = unbalanced(sim, nodes, unknowns, x, missing)[0]
     ratios, error = [ratio], ""
     while iterations < MOST and (left > 0.0 or ratio > max(AIM, 0.05 * noise)):
@@ -804,10 +804,10 @@ def unbalanced(
 def _node_forces(sim: Blocks, seen: Evaluation) -> np.ndarray:
     """Sum of the forces on every node (nn, dim) [N/m], on all ranks."""
     local, own = sim.local, sim.owned
-    lead = local.first_corners()
+    lead = local.nodes.first_corners
     row = sim.where[lead // 4]
     mine = (row >= own.start) & (row < own.stop)
-    i, k = np.nonzero(local.alone())
+    i, k = np.nonzero(local.nodes.alone)
     corner = np.concatenate([lead[mine], 4 * sim.number[own][i] + k])
     flat = seen.force[own]
     at = sim.stride * k[:, None] + np.arange(sim.dim)
@@ -850,15 +850,15 @@ def of_joints(sim: Blocks, softening: bool = False) -> tuple[list[Pieces], int]:
 def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
     """Stiffness of the owned elements at the present positions. flows: less what flow takes from it."""
     sim.prepare_kernels(TANGENT[sim.dim])
-    if sim.local.yields:
+    if sim.local.yielding.on:
         sim.prepare_kernels("plastic-tangent")
     local, small = sim.local, not sim.options.large_strain
     found: list[Pieces] = []
-    for of, (c, s0) in zip(local.solids, local.linear()):
+    for of, (c, s0) in zip(local.solids.blocks, local.solids.linear()):
         kind, who, (row, at) = of.kind, of.alone, np.divmod(of.places()[of.alone], sim.x.shape[1])
         made = np.empty((len(who), kind.dim * kind.corners, kind.dim * kind.corners))
         tangent_kernels.elastic(of.tables._replace(c=c), who, of.of_parts(s0, c), small, made)
-        if local.yields and flows:
+        if local.yielding.on and flows:
             _soften(sim, of, made)
         found.append(Pieces(sim.number[of.rows[who]], sim.node[sim.number[row], at // sim.stride], made))
     return found if local.whole is None else [*found, local.whole.pieces()]
@@ -866,7 +866,7 @@ def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
 
 def _soften(sim: Blocks, of: ElementBlock, out: np.ndarray) -> None:
     """Take from the stiffness out (n, m, m) of elements what their flow, from the stress before it, takes from it."""
-    table, small, count = sim.local.yield_table, not sim.options.large_strain, len(of.kind.parts)
+    table, small, count = sim.local.yielding.table, not sim.options.large_strain, len(of.kind.parts)
     can = np.flatnonzero(np.isfinite(table[of.law[of.alone], STRENGTH]).any(axis=1))
     if not len(can):
         return

@@ -37,7 +37,7 @@ def rounding(sim: Blocks) -> float:
     own, dim = sim.owned, sim.dim
     x = np.abs(sim.x[own].reshape(sim.n_own, -1)[:, : 4 * sim.stride if dim == 3 or sim.wide else 6])
     largest = float(sim.comm.max_into(np.array([x.max(initial=0.0)]))[0])
-    each = sim.local.row_sums()[own] * (dim * max(largest, sim.mean_edge))
+    each = sim.local.masses.row_sums()[own] * (dim * max(largest, sim.mean_edge))
     return exact_sum(each.reshape(-1), sim.comm) * float(np.finfo(np.float64).eps)
 
 

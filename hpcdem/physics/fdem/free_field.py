@@ -21,7 +21,9 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import connectivity, user_laws
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.elements import ETA, Q_ETA
+from hpcdem.physics.fdem.loads import tractions_now
 from hpcdem.physics.fdem.moduli import moduli
+from hpcdem.physics.fdem.node_set import conditions_now
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.user_functions import Placed
 
@@ -88,9 +90,9 @@ class FreeField(SurfaceLoad):
         blocks = self.blocks
         seen = blocks.evaluate()
         local, node = blocks.local, blocks.node.reshape(-1)
-        lead = local.first_corners()[local.my_nodes]
+        lead = local.nodes.first_corners[local.nodes.mine]
         felt = np.zeros((int(node.max()) + 1, 2))
-        felt[node[lead]] = seen.felt[local.my_nodes, :2]
+        felt[node[lead]] = seen.felt[local.nodes.mine, :2]
         blocks.comm.sum_into(felt.view(np.int64))  # one rank has each row, the others zero: exact
         face = self.faces["face"][first:, 0] // 4
         corners = 4 * face[:, None] + np.hstack([self.faces["lower"][first:], self.faces["upper"][first:]])
@@ -318,13 +320,13 @@ class FreeField(SurfaceLoad):
         pull = np.column_stack([xy, yy])
         np.add.at(force, self._low, pull)
         np.add.at(force, self._low + 1, -pull)
-        loads = blocks.local.loads_now(self._loads, time)[self._loads.of]
+        loads = tractions_now(blocks, self._loads, time)[self._loads.of]
         incoming = loads[:, [moving.INCOMING_X, moving.INCOMING_Y]]
         z = np.column_stack([self._s, self._p])[self._first_face]
         force[base] -= np.where(self._given, 0.0, z * (v[base] - 2.0 * incoming))
         before = v[base]
         v += dt * force / self._mass[:, None]
-        table = blocks.local.conditions_now(self._conditions, time, time + 0.5 * dt, dt)[self._conditions.of]
+        table = conditions_now(blocks, self._conditions, time, time + 0.5 * dt, dt)[self._conditions.of]
         for axis, (does, at) in enumerate(((moving.DOES_X, moving.AT_X), (moving.DOES_Y, moving.AT_Y))):
             led = np.where(table[:, does] == moving.ACCELERATION, before[:, axis] + table[:, at], table[:, at])
             led = np.where((table[:, does] == moving.FREE) | (table[:, moving.CONSTRAINT] == moving.FIXED), 0.0, led)

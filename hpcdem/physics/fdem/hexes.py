@@ -10,7 +10,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import hexahedra, user_laws
 from hpcdem.physics.fdem.hexahedra import OVERLAYS, PARTS
 from hpcdem.physics.fdem.kernels import hexes, space, tets
-from hpcdem.physics.fdem.local import element_table
+from hpcdem.physics.fdem.moduli import element_table
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
@@ -99,6 +99,11 @@ class Hexes:
         self.h[:n, hexes.H_ETA] = eta
         self.modulus = models[model, space.LAME] + models[model, space.MU2]
 
+    def stiffen(self, ratio: np.ndarray) -> None:
+        """For the time step they are so many times (count,) as stiff."""
+        self.omega2 *= ratio
+        self.modulus *= ratio
+
     def forces(self, force: np.ndarray, v: np.ndarray, gravity: tuple[float, float, float], s0: np.ndarray) -> None:
         """Into the rows (n, 16) [N] of these tetrahedra, with the velocities v (n, 16); s0: see `hexes.forces`."""
         sim, o = self.sim, self.sim.options
@@ -120,11 +125,6 @@ class Hexes:
         small = not self.sim.options.large_strain
         hexes.stresses(which, self.place, self.sim.x, self.parts, self.h, self.remember, s0, small, stress, energy)
         return stress, energy
-
-    def histories(self, memory: np.ndarray) -> np.ndarray:
-        """What each of their tetrahedra remembers (count, 10, n) in rows of owned elements, see elements/kind.py."""
-        rows = memory[self.begin[:, None] + np.arange(PARTS)]
-        return rows.reshape(self.count, hexes.IN_ROW * PARTS, memory.shape[1] // hexes.IN_ROW)[:, : hexes.PARTS]
 
     def shares(self) -> np.ndarray:
         """Part of the volume that each of their tetrahedra has (count, 10)."""

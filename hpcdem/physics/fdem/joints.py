@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -171,6 +171,23 @@ class JointTables:
     def _first_slot(self, owned: np.ndarray) -> np.ndarray:
         """Slots of the first faces of owned elements (0 ..)."""
         return 4 * owned if self.first_slot is None else self.first_slot[owned]
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """Lower faces of all edges between two elements that are there, of all ranks."""
+        return np.flatnonzero(self.sim.joint_exists())
+
+    @cached_property
+    def lower_faces(self) -> np.ndarray:
+        """Lower faces of the owned elements that have a joint model."""
+        sim = self.sim
+        faces = (4 * sim.number[sim.owned][:, None] + np.arange(4)).reshape(-1)
+        return faces[sim.joint_exists()[faces] & (sim.joint_row[faces] > 0)]
+
+    @cached_property
+    def lower_slots(self) -> np.ndarray:
+        """Their slots."""
+        return self.slot_of(self.lower_faces)
 
     def slot_of(self, faces: np.ndarray) -> np.ndarray:
         """Slots of faces of owned elements."""

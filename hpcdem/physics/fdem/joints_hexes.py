@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,10 +10,6 @@ from hpcdem.physics.fdem.joints import Joints
 from hpcdem.physics.fdem.kernels import joints_hexes
 from hpcdem.physics.fdem.kernels.joints import NONE
 from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
-
-if TYPE_CHECKING:
-    from hpcdem.physics.fdem.laws_space import LawsSpace
-
 
 OPPOSITE = np.array([0, 2, 1])
 """Which of the corners p, q, r of the other side are opposite a, b, c."""
@@ -24,7 +20,7 @@ class HexJoints:
     at, weights: see `joints_hexes.forces`; quad (m,) bool: there is one hexahedron on the other side, and the other
     half of the side is a joint too. Others are joints as those of tetrahedra."""
 
-    def __init__(self, local: LawsSpace) -> None:
+    def __init__(self, local: Any) -> None:
         assert local.hexes is not None
         self.local = local
         sim, mesh, hexes = local.sim, local.sim.the_mesh(), local.hexes

@@ -13,11 +13,14 @@ fastest wave. The laws of elements take lambda and 2 G of here and are told by a
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hpcdem.physics.fdem.properties import Rows
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.state import State
 
 
 class Moduli(NamedTuple):
@@ -38,3 +41,10 @@ def moduli(rows: Rows, plane_stress: bool) -> Moduli:
     stiff = 3.0 * bulk + 4.0 * shear
     plane = np.divide(9.0 * bulk * shear, stiff, out=np.zeros_like(bulk), where=stiff > 0.0)
     return Moduli(plane, shear, plane - shear, plane + shear, [0, 1])
+
+
+def element_table(sim: State) -> np.ndarray:
+    """The table of element models (rows, 5) of build.py."""
+    of = moduli(sim.element_rows, sim.options.plane_stress)
+    density, young, damp = map(sim.element_rows.column, ("density", "young", "damp_factor"))
+    return np.column_stack([density, of.lame, 2.0 * of.shear, young, damp])

@@ -65,9 +65,10 @@ def warn_of_flow(sim: Any) -> None:
 def _tell_beyond(sim: Any, least: float, of: np.ndarray, what: str) -> None:
     """How many of these elements (ne,) bool are outside their strength by this part of their stress, and which one
     is farthest; once for one state. Collective."""
-    if not sim.local.yields:
+    if not sim.local.yielding.on:
         return
-    beyond, stress = sim.local.beyond()
+    stress = sim.local.stresses(energies=False, flow=False)[0]
+    beyond = sim.local.yielding.beyond(stress)
     number = sim.number[sim.owned]
     bad = np.flatnonzero((beyond > least * np.abs(stress).max(axis=1)) & of[number])
     worst = bad[np.lexsort((number[bad], -beyond[bad]))[:1]]

@@ -109,18 +109,18 @@ class ForceProbe(Probe):
         points = sides.points(cells, self.numbers)
         place = np.full(len(sim.the_mesh().points), -1, np.int64)
         place[points] = np.arange(len(points))
-        lead = local.first_corners()
+        lead = local.nodes.first_corners
         point = cells[lead // 4, lead % 4]
         wanted = (place >= 0)[cells]
         if sides.are_there(self.numbers):
             some = sides.present(cells, self.numbers, sim.alive)
             chosen = sides.corners(cells, some, len(place)) & np.repeat(sim.alive, 4)
             wanted = sim.with_nodes(chosen, sim.node.reshape(-1)).reshape(cells.shape)
-        self._nodes = np.flatnonzero(local.my_nodes & wanted.reshape(-1)[lead])
+        self._nodes = np.flatnonzero(local.nodes.mine & wanted.reshape(-1)[lead])
         corner, point = lead[self._nodes], point[self._nodes]
         if self.name.startswith("unbalanced"):
             number = sim.number[sim.owned]
-            i, k = np.nonzero(local.alone())
+            i, k = np.nonzero(local.nodes.alone)
             some = wanted[number[i], k]
             self._corners = i[some], k[some]
             corner = np.concatenate([corner, 4 * number[i[some]] + k[some]])

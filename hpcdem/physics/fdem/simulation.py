@@ -340,7 +340,7 @@ class Blocks(Edited):
                 self.prepare_kernels(load.kernel_kind + ("-space" if self.dim == 3 and not load.of_both else ""))
         notices.warn_of_quick_tables(self)
         user_laws.begin(self)
-        user_laws.compile_for_quads(self)
+        user_laws.compile_loops(self)
         stale = self._topology_stale
         super()._close(frozen)
         self.surface_loads.storage_rebuilt()

@@ -35,7 +35,7 @@ checkpoints. What a checkpoint names is never looked for: the script names the f
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -85,8 +85,16 @@ ACROSS = 1e-9
 """Stress across the plane over that in it that is rounding."""
 STEP_OF_STRAIN = 1e-9
 """For the slope of a law at zero strain."""
-_FOR_QUADS: set[tuple[str, int]] = set()
-"""Laws whose loops over quads are compiled in this process, for so many threads."""
+_COMPILED: set[tuple[str, int, str]] = set()
+"""Laws whose loops are compiled in this process, for so many threads and elements of this kind."""
+_SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+_TINY: dict[str, tuple[Any, Any]] = {
+    "triangle": (_SQUARE[:3], [[0, 1, 2, -1]]),
+    "quad": (_SQUARE, [[0, 1, 2, 3]]),
+    "tetrahedron": (np.eye(4, 3), [[3, 0, 1, 2]]),
+    "hexahedron": (np.eye(4, 3), [[3, 0, 1, 2]]),
+}
+"""By kinds of elements, points and cells for which the loops of a law are compiled; those over hexahedra need none."""
 OF_LAW = "law_"
 """How state variables are called as quantities."""
 
@@ -101,7 +109,7 @@ class _Declared(Declared):
 @dataclass(frozen=True)
 class UserLaw(Model):
     """A law of a file. title: FILE:FUNCTION; columns: of the table of properties; loops, evaluate: compiled,
-    see kernels/user_laws.py, in space kernels/user_laws_space.py."""
+    see kernels/user_laws.py."""
 
     title: str = ""
     states: tuple[StateVariable, ...] = ()
@@ -134,9 +142,12 @@ def load(sim: State, path: Path, law: str) -> UserLaw:
     text that rank 0 reads. CommandError with file and line. Collective."""
 
     def take(text: str, path: str, name: str, function: str) -> UserLaw:
-        found = MODELS.get(name) or _made(text, path, name, function)
+        found = MODELS.get(name)
+        if found is None:
+            found = _made(text, path, name, function)
+            _COMPILED.difference_update([one for one in _COMPILED if one[0] == name])
         assert isinstance(found, UserLaw)
-        _compile(found, sim)
+        _compile(found, sim, _kinds(sim, found))
         MODELS[name] = found
         return found
 
@@ -158,23 +169,20 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     from numba.core.errors import NumbaError
 
     kernel = njit(error_model="numpy", nogil=True)(declared.function)
-    kernels: Any
-    if declared.dim == 3:
-        from hpcdem.physics.fdem.kernels import user_laws_space as kernels
-    else:
-        from hpcdem.physics.fdem.kernels import user_laws as kernels
+    from hpcdem.physics.fdem.kernels import user_laws as kernels
 
     wanted = [*STRESS[declared.dim], *(s.name for s in declared.state)]
     columns = [p.name for p in (*USER.properties, *declared.properties) if p.name in names] + [OWN]
     columns += [OWN] * (-len(columns) % 4)
     states = [s.name for s in declared.state]
-    evaluate = kernels.at_strain(kernel, names, states, columns)
-    loops = kernels.loops(kernel, names, states, columns)
+    evaluate = kernels.at_strain(kernel, names, states, columns, declared.dim)
+    loops = kernels.loops(kernel, names, states, columns, declared.dim)
     values, place = made_of(kernel, path), None
     if values is not None:
         place = kept.folder(name, values, repr((names, states, columns, declared.dim)))
         for what, made in {"evaluate": evaluate, **loops._asdict()}.items():
-            kept.keep(made, place, what)
+            if made is not None:
+                kept.keep(made, place, what)
     if place is None or not kept.knows(place, "evaluate"):  # what is kept has passed this
         check_what_returns(kernel, len(names), wanted, path, line)
     try:
@@ -238,22 +246,19 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
     values[BOUND] = bound.reshape(shape) if shape else float(bound[0])
 
 
-def _compile(law: UserLaw, blocks: State, quads: bool = False) -> None:
-    """The loops over triangles, or quads, with arguments of the types that they will have: those of a tiny model of the
-    class and the threads of `blocks`. A law of space has all of its loops at once."""
-    if law.dims == (3,):
-        from hpcdem.physics.fdem.kernels import user_laws_space
-
-        user_laws_space.try_loops(law.loops, len(law.states), blocks.threads)
-        return
+def _compile(law: UserLaw, blocks: State, kinds: Collection[str]) -> None:
+    """The loops over elements of these kinds with arguments of the types that they will have: those of a tiny model of
+    the class and the threads of `blocks`."""
     from hpcdem.physics.fdem.mesh import Mesh  # brings kernels
 
-    sim: Any = type(blocks)(SerialComm(), blocks.threads)
-    corners = [0, 1, 2, 3] if quads else [0, 1, 2, -1]
-    sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][: 4 if quads else 3], [corners]))
-    sim.set_element_model(None, "mech_iso_elastic", {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0})
-    sim.close_model()
-    sim.local.try_law(law)
+    for kind in kinds:
+        sim: Any = type(blocks)(SerialComm(), blocks.threads)
+        sim.take_mesh(Mesh.of(*_TINY[kind]))
+        sim.set_element_model(None, "mech_iso_elastic", {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0})
+        sim.close_model()
+        sim.local.laws.trying(law, kind)
+        sim.local.forces()
+        _COMPILED.add((law.name, blocks.threads, kind))
 
 
 # ---- of a model ------------------------------------------------------------------------------------------------------
@@ -318,19 +323,32 @@ def begin(sim: State) -> None:
     sim.cold[COLUMN] = np.column_stack([now, states.reshape(n, -1)])
 
 
-def compile_for_quads(sim: State) -> None:
-    """The loops over quads of laws that some have, if they are not compiled yet. Collective."""
-    if not sim.wide:
-        return
-    number, quads = numbers(sim), sim.the_mesh().cells[:, 3] >= 0
-    for k, law in enumerate(of_rows(sim.element_rows)):
-        known = law.name, sim.threads
-        if not (quads & sim.alive & (number == 1 + k)).any() or not sim.comm.any(known not in _FOR_QUADS):
+def _kinds(sim: State, law: UserLaw, some: np.ndarray | None = None) -> list[str]:
+    """Kinds of elements that there are, among some of them (ne,) bool; without any the simple one."""
+    simple, several = ("triangle", "quad") if law.dims == (2,) else ("tetrahedron", "hexahedron")
+    if sim.mesh is None or sim.mesh.dim not in law.dims:
+        return [simple]
+    mesh = sim.mesh
+    whole = mesh.cells[:, 3] >= 0 if mesh.dim == 2 else np.zeros(len(mesh.cells), bool)
+    if mesh.dim == 3 and len(mesh.hexes):
+        whole = mesh.macro_of() >= 0
+    whole = whole if some is None else whole[some]
+    return [kind for kind, there in ((simple, not len(whole) or not whole.all()), (several, whole.any())) if there]
+
+
+def compile_loops(sim: State) -> None:
+    """Those over elements of the kinds that have laws, where they are not compiled yet. Collective."""
+    laws = of_rows(sim.element_rows)
+    number = numbers(sim) if laws else np.empty(0, np.int64)
+    for k, law in enumerate(laws):
+        some = sim.alive & (number == 1 + k)
+        kinds = _kinds(sim, law, some) if some.any() else []
+        missing = [kind for kind in kinds if (law.name, sim.threads, kind) not in _COMPILED]
+        if not sim.comm.any(len(missing) > 0):
             continue
-        spent = in_turn(sim.comm, lambda law=law: _compile(law, sim, quads=True))  # type: ignore[misc]
-        _FOR_QUADS.add(known)
+        spent = in_turn(sim.comm, lambda law=law, missing=missing: _compile(law, sim, missing))  # type: ignore[misc]
         if spent and sim.log is not None:
-            sim.log.info(f"law {law.title} is compiled for quads: {spent:.1f} s")
+            sim.log.info(f"law {law.title} is compiled for {' and '.join(kinds)} elements: {spent:.1f} s")
 
 
 def forget(sim: State, mine: np.ndarray) -> None:

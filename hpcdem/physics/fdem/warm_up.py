@@ -69,7 +69,7 @@ def yielding(threads: int = 1) -> None:
         sim = _weak(mesh, threads)
         convergence.advance(sim, 2)
         diagnostics.energies(sim)
-        sim.local.flow(sim.local.plastic_state(), 1)
+        sim.local.yielding.flow(1)
 
 
 def plastic_tangent(threads: int = 1) -> None:
@@ -144,7 +144,7 @@ def _creep(mesh: Mesh, threads: int) -> None:
     sim.option(dynamic=False)
     creep.switch(sim, True, dt=1.0)
     creep.begin(sim, 1.0)
-    sim.local.linear()
+    sim.local.solids.linear()
     sim.step()
     creep.finish(sim, 1.0)
 
@@ -234,7 +234,7 @@ def creeping_hexahedra(threads: int = 1) -> None:
     sim.option(dynamic=False)
     creep.switch(sim, True, dt=1.0)
     creep.begin(sim, 1.0)
-    sim.local.linear()
+    sim.local.solids.linear()
     sim.step()
     creep.finish(sim, 1.0)
 

@@ -13,7 +13,7 @@ from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import LINER_ELEMENT, LINER_NODE
-from hpcdem.physics.fdem.local import ALPHA
+from hpcdem.physics.fdem.node_set import ALPHA
 from hpcdem.physics.fdem.structures import FREE, MARGIN, REMOVED, Columns, Number, Structure, empty
 from hpcdem.physics.liners import kernels
 from hpcdem.physics.liners.beams import Beams

@@ -30,7 +30,7 @@ def pushed(desk: Desk) -> tuple[np.ndarray, np.ndarray]:
     blocks = desk.project.blocks
     blocks.close_model()
     (water,) = (load for load in blocks.surface_loads if load.name == "water")
-    applied = np.zeros_like(blocks.local.applied)
+    applied = np.zeros_like(blocks.local.loads.applied)
     water.add_to(applied)
     dim, rows = blocks.dim, blocks.number[blocks.owned]
     stride = blocks.local.stride

@@ -1,7 +1,8 @@
-"""The elements of one kind that a rank owns, as laws of elements see them."""
+"""The elements of one kind that a rank owns."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,11 +19,20 @@ class ElementBlock:
     without rows in models whose elements are elastic; stored (count, k): owned elements that each is stored as, volume
     (count, k): the part of its volume that each of these has; place, parts: see `Tables`.
 
+    first (count,): the first of the elements that each is stored as; model (count + 3,) i4: row of the model of
+    elements; alone: which are elements of their own, no parts of others.
+
+    stiff: like c, with the largest moduli that the elements can have, by which the time step is found, `stiffer`
+    (count,) times those of their models, None: once; without: elements that have no moduli in c, as a law of the user
+    or a larger element makes their forces.
+
     said, uncrept, initial, like s0: without plastic and creep strain, without creep strain alone, without plastic
-    strain. model (count,): row of the model of elements; creeping (m,): which can creep. law (n, parts): rows of the
-    table of yield surfaces; flowing (m + 3,): which can yield, see `flow.flows`; alone: which are elements of their
-    own, no parts of others.
+    strain. creeping (m,): which can creep. law (n, parts): rows of the table of yield surfaces; flowing (m + 3,): which
+    can yield, see `flow.flows`. over_parts: volume (count,) over that of what each is stored as, None: the same.
     """
+
+    over_parts: Callable[[], np.ndarray] | None = None
+    stiffer: np.ndarray | None = None
 
     def __init__(
         self, sim: State, kind: Kind, rows: np.ndarray, c: np.ndarray, s0: np.ndarray, stored: np.ndarray,
@@ -31,19 +41,76 @@ class ElementBlock:
         self.sim, self.kind, self.rows, self.c, self._tables = sim, kind, rows.astype(np.int32), c, tables
         self.s0 = s0.reshape(-1, len(kind.parts), kind.stresses)
         self.stored, self.volume, self.count = stored, volume, len(stored)
+        self.first = np.ascontiguousarray(stored[:, 0])
+        self.stiff, self.without = c, np.zeros(0, np.int64)
         self.said, self.uncrept, self.initial = (np.zeros((0, *self.s0.shape[1:])) for _ in range(3))
-        self.creeping = self.model = self.flowing = np.zeros(0, np.int64)
+        self.creeping = self.flowing = np.zeros(0, np.int64)
+        self.model = np.zeros(self.count + 3, np.int32)
+        self.model[: self.count] = sim.element_row[sim.number[self.first + sim.n_left]]
         self.law, self.alone = np.zeros((0, len(kind.parts)), np.int32), np.arange(self.count)
-
-    def remember(self) -> None:
-        """Some elements of the model yield or creep."""
-        self.said, self.uncrept, self.initial = (np.zeros_like(self.s0) for _ in range(3))
 
     @property
     def tables(self) -> Tables:
         """For kernels."""
         sim = self.sim
         return self.kind.tables(self.rows, sim.n_left, sim.x.reshape(-1), sim.x.shape[1], self.c, *self._tables)
+
+    # ---- moduli and stress without strain --------------------------------------------------------------------------
+
+    @property
+    def moduli(self) -> np.ndarray:
+        """Columns of moduli in c."""
+        return np.array([self.kind.lame, self.kind.two_mu])
+
+    def set_apart(self) -> None:
+        """`stiff` is no longer c."""
+        if self.stiff is self.c:
+            self.stiff = self.c.copy()
+
+    def stiffen(self, at: np.ndarray, ratio: np.ndarray) -> None:
+        """In `stiff` the elements `at` are so many times as stiff."""
+        self.set_apart()
+        self.stiff[np.ix_(at, self.moduli)] *= ratio[:, None]
+        self.stiffer = np.ones(self.count) if self.stiffer is None else self.stiffer
+        self.stiffer[at] *= ratio
+
+    def take_moduli(self, at: np.ndarray) -> None:
+        """The elements `at` have none any more in c."""
+        self.set_apart()
+        self.without = np.concatenate([self.without, at])
+        self.c[np.ix_(at, self.moduli)] = 0.0
+
+    def follow(self, part: np.ndarray) -> None:
+        """Moduli are so much (n_own,) of the largest ones."""
+        every = np.arange(self.count)
+        self.c[np.ix_(every, self.moduli)] = self.stiff[np.ix_(every, self.moduli)] * part[self.first, None]
+        self.c[np.ix_(self.without, self.moduli)] = 0.0
+
+    def lay(self, initial: np.ndarray, heat: np.ndarray, free: bool) -> None:
+        """Stress without strain is the initial one (n_own, 4 or 6) [Pa] and that of heat (n_own,), none if (0,); free:
+        without that across the plane."""
+        if len(self.s0):
+            flow.lay(self.first, initial, heat, free, self.s0)
+        else:  # one of all parts
+            found = np.zeros((self.count, 1, self.kind.stresses))
+            flow.lay(self.first, initial, heat, free, found)
+            self.c[: self.count, : self.kind.stresses - 2] = found[:, 0, :-2]
+
+    def of_parts(self, s0: np.ndarray, c: np.ndarray) -> np.ndarray:
+        """Stress without strain (n, parts, k) [Pa], also where hexahedra have one each, in their constants c."""
+        kind = self.kind
+        return s0 if len(s0) else np.repeat(c[:, None, : kind.stresses], len(kind.parts), axis=1)
+
+    def flat(self, s0: np.ndarray | None = None) -> np.ndarray:
+        """Stress without strain, a row for each element."""
+        s0 = self.s0 if s0 is None else s0
+        return s0.reshape(len(s0), s0.shape[1] * s0.shape[2])
+
+    # ---- what elements remember, and what owned elements are told ----------------------------------------------------
+
+    def remember(self) -> None:
+        """Some elements of the model yield or creep."""
+        self.said, self.uncrept, self.initial = (np.zeros_like(self.s0) for _ in range(3))
 
     def histories(self, memory: np.ndarray, width: int) -> np.ndarray:
         """What their parts remember (count, parts, width), of the rows of owned elements."""
@@ -57,11 +124,6 @@ class ElementBlock:
         if len(g.place):
             return g.place[: self.count]
         return g.width * g.rows[: self.count, None] + self.kind.stride * np.arange(self.kind.corners)
-
-    def of_parts(self, s0: np.ndarray, c: np.ndarray) -> np.ndarray:
-        """Stress without strain (n, parts, k) [Pa], also where hexahedra have one each, in their constants c."""
-        kind = self.kind
-        return s0 if len(s0) else np.repeat(c[:, None, : kind.stresses], len(kind.parts), axis=1)
 
     def mean(self, values: np.ndarray) -> np.ndarray:
         """Means by volume (count, k) of what their parts have (count, parts, k)."""

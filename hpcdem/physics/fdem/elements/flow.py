@@ -119,6 +119,23 @@ def relieve_all(g, count, base, memory, s0):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def lay(first, initial, heat, free, s0):
+    """Stress without strain (count or more, parts, 4 or more) [Pa] of elements that do not remember: the initial one of
+    the owned elements (n_own, 4 or 6), and of heat (n_own,), stress 11, 22, 33, without rows: none; first (count,):
+    which of these each is; free: without that across the plane."""
+    for i in range(len(first)):
+        r = first[i]
+        for p in range(s0.shape[1]):
+            for k in range(initial.shape[1]):
+                s0[i, p, k] = initial[r, k]
+            if len(heat):
+                s0[i, p, 0], s0[i, p, 1] = s0[i, p, 0] + heat[r], s0[i, p, 1] + heat[r]
+                s0[i, p, 3] += heat[r]
+            if free:
+                s0[i, p, 3] = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def weights(g, count, out):
     """`parts.weight` of the first elements of g, into out (count, parts, 1)."""
     for i in range(count):

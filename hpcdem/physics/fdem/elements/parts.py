@@ -46,6 +46,17 @@ count = _by_kind(lambda kind: _constant(len(kind.parts)))
 """count(g): parts of an element."""
 components = _by_kind(lambda kind: _constant(len(kind.components)))
 """components(g): of stress and strain."""
+overlays = _by_kind(lambda kind: _constant(kind.overlays))
+"""overlays(g): of an element."""
+
+
+def _end(kind: Kind) -> Any:
+    ends = np.array(kind.parts)
+    return njit(error_model="numpy", forceinline=True)(lambda g, p, k: ends[p, k])
+
+
+end = _by_kind(_end)
+"""end(g, p, k): which corner of the element corner k of part p is."""
 
 
 def _corner(kind: Kind) -> Any:
@@ -172,11 +183,9 @@ def memory(g, i, p, of, width):
 
 
 def _strain(kind: Kind) -> Any:
-    ends = np.array(kind.parts)
-
     @njit(error_model="numpy", forceinline=True)
     def plane(g, i, p, small):
-        x, a, b, c = g.x, corner(g, i, ends[p, 0]), corner(g, i, ends[p, 1]), corner(g, i, ends[p, 2])
+        x, a, b, c = g.x, corner(g, i, end(g, p, 0)), corner(g, i, end(g, p, 1)), corner(g, i, end(g, p, 2))
         r11, r12, r21, r22 = inverse(g, i, p)
         _, _, _, _, cs, sn, e11, e22, e12 = _part(
             x[a], x[a + 1], x[b], x[b + 1], x[c], x[c + 1], r11, r12, r21, r22, small
@@ -185,8 +194,8 @@ def _strain(kind: Kind) -> Any:
 
     @njit(error_model="numpy", forceinline=True)
     def space(g, i, p, small):
-        x, a, b = g.x, corner(g, i, ends[p, 0]), corner(g, i, ends[p, 1])
-        c, d = corner(g, i, ends[p, 2]), corner(g, i, ends[p, 3])
+        x, a, b = g.x, corner(g, i, end(g, p, 0)), corner(g, i, end(g, p, 1))
+        c, d = corner(g, i, end(g, p, 2)), corner(g, i, end(g, p, 3))
         c11, c12, c13, c21, c22, c23, c31, c32, c33 = inverse(g, i, p)
         ux, uy, uz = x[b] - x[a], x[b + 1] - x[a + 1], x[b + 2] - x[a + 2]
         wx, wy, wz = x[c] - x[a], x[c + 1] - x[a + 1], x[c + 2] - x[a + 2]
@@ -249,11 +258,11 @@ swell = _by_kind(_swell)
 
 
 def _strains(kind: Kind) -> Any:
-    overlays, each, width, words = kind.overlays, kind.each, len(kind.components), kind.frame
+    several, each, width, words = kind.overlays, kind.each, len(kind.components), kind.frame
 
     @njit(error_model="numpy", forceinline=True)
     def strains(g, i, small, e, frames):
-        for overlay in range(overlays):
+        for overlay in range(several):
             first = each * overlay
             mean = whole = 0.0
             for p in range(first, first + each):
@@ -280,7 +289,7 @@ or 6), and their frames into (parts, 2 or 9)."""
 
 
 def _share(kind: Kind) -> Any:
-    overlays, each, normal = kind.overlays, kind.each, kind.normal
+    several, each, normal = kind.overlays, kind.each, kind.normal
 
     @njit(error_model="numpy", forceinline=True)
     def nothing(g, i, s):
@@ -289,7 +298,7 @@ def _share(kind: Kind) -> Any:
     @njit(error_model="numpy", forceinline=True)
     def share(g, i, s):
         s = s[i]
-        for overlay in range(overlays):
+        for overlay in range(several):
             first = each * overlay
             low = high = trace(g, s, first)
             mean = whole = size = 0.0

@@ -105,11 +105,9 @@ def elastic(e, e11, e22, e12, trace, dt, lanes):
     return p + m * e11, p + m * e22, m * e12, p - lanes[FREED + e] * p
 
 
-def stress_loop(law, keep=None):
+def stress_loop(law):
     """The loop that makes corner forces of strain, viscous parts included: f_l = sigma n s / 2, n s of the face
-    opposite to l. law: a kernel like `elastic`; keep: first of four lanes for the stress without the viscous part."""
-    keeps = keep is not None
-    k11, k22, k12, k33 = (lane((keep or 0) + k) for k in range(4))
+    opposite to l. law: a kernel like `elastic`."""
 
     @njit(nogil=True, error_model="numpy")
     def loop(n, small, beta, dt, lanes):
@@ -126,9 +124,6 @@ def stress_loop(law, keep=None):
             g11, g12, g21, g22 = dux * a + dwx * c, dux * b + dwx * d, duy * a + dwy * c, duy * b + dwy * d
             s11, s22, s12, s33 = law(e, e11, e22, e12, e11 + e22, dt, lanes)
             s11, s22, s12 = lanes[S11 + e] + s11, lanes[S22 + e] + s22, lanes[S12 + e] + s12
-            if keeps:
-                lanes[k11 + e], lanes[k22 + e] = s11, s22
-                lanes[k12 + e], lanes[k33 + e] = s12, lanes[S33 + e] + s33
             d11, d22, eta = cs * g11 + sn * g21, cs * g22 - sn * g12, lanes[VISC + e] + beta * lanes[MU2 + e]
             swell = beta * lanes[LAM + e] * (d11 + d22)
             s11, s22 = s11 + (eta * d11 + swell), s22 + (eta * d22 + swell)
@@ -513,10 +508,9 @@ def elastic_pair(e, a11, a22, a12, b11, b22, b12, mean, one, two, dt, lanes):
     )  # fmt: skip
 
 
-def overlay_loop(overlay, law=elastic_pair, keep=None, looks=False):
+def overlay_loop(overlay, law=elastic_pair, looks=False):
     """The loop that adds the forces of an overlay (0, 1) of quads, the triangles i, j, k and i, k, l. law: a kernel
-    like `elastic_pair`; keep: first of eight lanes for the stress without the viscous part; looks: it also says by how
-    much that is outside.
+    like `elastic_pair`; looks: it also says by how much the stress without the viscous part is outside.
 
     Mixed discretisation: strain per triangle, its volumetric part the mean of the overlay (Marti & Cundall 1982).
     """
@@ -529,8 +523,7 @@ def overlay_loop(overlay, law=elastic_pair, keep=None, looks=False):
     z1, z2 = (Q_S0 + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
     l1, l2 = (Q_YIELD + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
     out = Q_OUTSIDE + lane(overlay)
-    first, keeps = overlay == 0, keep is not None
-    k1, k2 = (lane((keep or 0) + k) for k in (0, 4))
+    first = overlay == 0
 
     @njit(nogil=True, error_model="numpy")
     def loop(n, small, beta, dt, lanes):
@@ -551,11 +544,6 @@ def overlay_loop(overlay, law=elastic_pair, keep=None, looks=False):
             s11, s22, s12 = lanes[z1 + e] + s11, lanes[z1 + _NEXT + e] + s22, lanes[z1 + _B + e] + s12
             t11, t22, t12 = lanes[z2 + e] + t11, lanes[z2 + _NEXT + e] + t22, lanes[z2 + _B + e] + t12
             s33, t33 = lanes[z1 + _B + _NEXT + e] + s33, lanes[z2 + _B + _NEXT + e] + t33
-            if keeps:
-                lanes[k1 + e], lanes[k1 + _NEXT + e] = s11, s22
-                lanes[k1 + _B + e], lanes[k1 + _B + _NEXT + e] = s12, s33
-                lanes[k2 + e], lanes[k2 + _NEXT + e] = t11, t22
-                lanes[k2 + _B + e], lanes[k2 + _B + _NEXT + e] = t12, t33
             if looks:
                 far = laws.outside(
                     s11, s22, s12, s33, lanes[l1 + e], lanes[l1 + _B + e], lanes[l1 + _B + _NEXT + e]

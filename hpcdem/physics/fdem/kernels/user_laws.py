@@ -1,17 +1,20 @@
-"""Loops over elements that have a law of the user: the work on all blocks of elements.py, with this law in the place of
-the elastic one.
+"""Laws of users in elements of any kind.
 
-A law takes numbers and returns numbers, so it is evaluated for lanes (numerics/lanes.py), as the built-in ones are.
-Elements with another model go through the same loop and keep their elastic stress; blocks without any that has the law
-take the loop of elements.py. In a quad the law is that of each of its four triangles, with the volume of the overlay as
-their strains have it (mixed discretisation, Marti & Cundall 1982); the two triangles of an overlay then get the mean of
-their pressures in the plane by area, which is what forces of that volume do work with. All kernels here are made for
-one law; what is compiled is kept apart from the kernels of hpcdem (runtime/kept.py).
+A law takes numbers and returns numbers, so it is evaluated for lanes (numerics/lanes.py), as the built-in ones are. In
+an element of several parts (elements/kind.py) the law is that of each part, with the volume strain of its overlay
+(mixed discretisation, Marti & Cundall 1982); the parts of an overlay then get the mean of their pressures by volume,
+which is what forces of that volume do work with.
+
+`find` does this before the forces of a step: the stress of the law becomes the stress of these elements without strain,
+and in the tables of forces they have no moduli. In the plane the loops over forces (elements.py) do it themselves, with
+the law in place of the elastic one, for one law of each kind of elements: those with another model go through the same
+loop and keep their elastic stress. Both come to the same bits. All kernels here are made for one law; what is compiled
+is kept apart from the kernels of hpcdem (runtime/kept.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,26 +22,36 @@ from numba import njit, prange
 
 from hpcdem.numerics.lane_arguments import arguments, storing
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane
-from hpcdem.physics.fdem.kernels import elements
-from hpcdem.physics.fdem.kernels.elements import BLOCK, LANES, Q_S0, QUAD_BLOCK, QUAD_LANES, S11, S12, S22, S33
+from hpcdem.physics.fdem.elements import parts
+from hpcdem.physics.fdem.elements.kind import QUAD, TRIANGLE, Kind
+from hpcdem.physics.fdem.kernels import elements, tets
+from hpcdem.physics.fdem.kernels.elements import BLOCK, LANES, Q_S0, QUAD_LANES, S11, S12, S22, S33
 
-GIVEN = ("e11", "e22", "e12", "evol", "dt")
-"""Arguments of a law: strain in the frame that turns with the element, its volume strain e11 + e22 (of a quad: of the
-overlay, whose sum e11 + e22 is but for rounding), time step [s], 0 in static runs."""
-INITIAL = ("i11", "i22", "i12", "i33")
+STRAIN = {2: ("e11", "e22", "e12"), 3: ("e11", "e22", "e12", "e33", "e13", "e23")}
+"""Arguments of a law, by dimensions: strain in the frame that turns with the element, in space less that of heat."""
+GIVEN = {dim: (*strain, "evol", "dt") for dim, strain in STRAIN.items()}
+"""Its volume strain besides, e11 + e22, in space e11 + e22 + e33 (of a part: of its overlay, whose sum that is but for
+rounding); time step [s], 0 in static runs."""
+INITIAL = {2: ("i11", "i22", "i12", "i33"), 3: ("i11", "i22", "i12", "i33", "i13", "i23")}
 """Stress at zero strain there [Pa]."""
 OWN = "own"
 """Of the columns of the table of properties: 1 for elements with this law, 0 for others."""
-SHARED = 1e-12
-"""Difference of pressures in a quad, over its stresses, that is put down to rounding."""
+AT_ONCE = 32
+"""Parts of elements of which `find` does the law together."""
 _1, _2, _3, _FOUR = U(1), U(2), U(3), U(4)
+_C, _E, _VOLUME, _I, _S, _REST = 16, 25, 31, 32, 38, 44
+"""First lanes of inverse of the reference matrix, strain, its trace, initial stress, stress of the law; of what each
+law has besides. Before them corners, four words each."""
+_AT_C, _AT_E, _AT_VOLUME = lane(_C), lane(_E), lane(_VOLUME)
+_WORD = tuple(lane(k) for k in range(9))
+_X2, _X3 = lane(4), lane(8)
 
 
 class Obeying(NamedTuple):
-    """What the kernels of a law need: some (blocks,) bool: blocks of triangles with an element that has it; row (count
-    + 3,) i4: of each element, in the flat table of properties, `table`; dt [s]; first_row: storage row of the first
-    owned element; memory (n_own, 1 + parts states): what these remember, from column 1 on, of a quad's four triangles
-    one after the other, `width` columns each."""
+    """What the loops over forces need of a law: some (blocks,) bool: blocks of triangles with an element that has it;
+    row (n + 3,) i4: of each element, in the flat table of properties, `table`; dt [s]; first_row: storage row of the
+    first owned element; memory (n_own, 1 + parts states): what these remember, from column 1 on, `width` columns for
+    each part."""
 
     some: np.ndarray
     row: np.ndarray
@@ -50,98 +63,323 @@ class Obeying(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """The kernels of a law, on one thread and on several: in the place of `elements.triangles` and `elements.quads`,
-    and those that find stress and states only."""
+    """The kernels of a law, on one thread and on several: those that find stress and states, and in the plane those in
+    the place of `elements.triangles` and `elements.quads`."""
 
-    triangles: Any
-    triangles_threaded: Any
-    quads: Any
-    quads_threaded: Any
-    look: Any
-    look_quads: Any
+    find: Any
+    find_threaded: Any
+    triangle: Any = None
+    triangle_threaded: Any = None
+    quad: Any = None
+    quad_threaded: Any = None
+
+    def with_forces(self, kind: Kind, threads: int) -> Any:
+        """In the place of the loop over the forces of elements of a kind of the plane."""
+        return getattr(self, kind.name if threads == 1 else f"{kind.name}_threaded")
 
 
-def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequence[str]) -> Loops:
-    """The loops over elements of a law, a kernel of the arguments `names`; columns: of the table of properties, a
-    multiple of four, one of them `OWN`."""
-    n_states, n_columns = len(states), len(columns)
+class _Law:
+    """A law in lanes: call, a kernel of the arguments `names`, which returns stress and states."""
 
-    def evaluated(first: int, part: int, initial: Sequence[Any]) -> Any:
-        """A kernel (e, values, lanes): stress of the law; states go into their lanes. first: lane of the first column;
-        states of the parts follow; initial: lanes of the initial stress."""
-        begin = first + n_columns + 1 + part * n_states
-        places = dict(zip(INITIAL, initial))
-        places |= {name: lane(first + k) for k, name in enumerate(columns)}
-        places |= {name: lane(begin + k) for k, name in enumerate(states)}
-        given, store = arguments(names, GIVEN, places), storing(n_states, 4, begin)
+    def __init__(
+        self, call: Any, names: Sequence[str], states: Sequence[str], columns: Sequence[str], dim: int
+    ) -> None:
+        self.call, self.names, self.states, self.columns, self.dim = call, names, states, columns, dim
+
+    def at(self, columns: int, states: int, initial: Sequence[Any]) -> Any:
+        """The kernel (e, values, lanes) by which every loop calls the law: stress of the strain `values`, see `GIVEN`;
+        states go into their lanes. columns, states: first lanes of these; initial: lanes of the initial stress."""
+        places: Mapping[str, Any] = {
+            **dict(zip(INITIAL[self.dim], initial)),
+            **{name: lane(columns + k) for k, name in enumerate(self.columns)},
+            **{name: lane(states + k) for k, name in enumerate(self.states)},
+        }
+        law, given = self.call, arguments(self.names, GIVEN[self.dim], places)
+        store = storing(len(self.states), len(INITIAL[self.dim]), states)
 
         @njit(error_model="numpy")
         def evaluate(e, values, lanes):
             found = law(*given(lanes, e, values))
             store(lanes, e, found)
-            return found[0], found[1], found[2], found[3]
+            return found
 
         return evaluate
 
+
+def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequence[str], dim: int) -> Loops:
+    """The loops over elements of a law, a kernel of the arguments `names`; columns: of the table of properties, a
+    multiple of four, one of them `OWN`."""
+    one = _Law(law, names, states, columns, dim)
+    return Loops(*_finding(one)) if dim == 3 else Loops(*_finding(one), *_triangles(one), *_quads(one))
+
+
+# ---- before the forces ---------------------------------------------------------------------------------------------
+
+
+@njit(error_model="numpy")
+def _strain_of_triangles(n, small, lanes):
+    """Strain of parts whose corners and constants are in the lanes, and its trace."""
+    for e in range(U(n)):
+        c, at = _AT_C + e, _AT_E + e
+        _, _, _, _, _, _, e11, e22, e12 = elements._part(
+            lanes[e], lanes[_WORD[1] + e], lanes[_X2 + e], lanes[_X2 + _WORD[1] + e], lanes[_X3 + e],
+            lanes[_X3 + _WORD[1] + e], lanes[c], lanes[c + _WORD[1]], lanes[c + _WORD[2]], lanes[c + _WORD[3]], small,
+        )  # fmt: skip
+        lanes[at], lanes[at + _WORD[1]], lanes[at + _WORD[2]], lanes[_AT_VOLUME + e] = e11, e22, e12, e11 + e22
+
+
+@njit(error_model="numpy")
+def _strain_of_tetrahedra(n, small, lanes):
+    """The same in space."""
+    for e in range(U(n)):
+        c, at = _AT_C + e, _AT_E + e
+        e11, e22, e12, e33, e13, e23, _ = tets.strain(
+            lanes, tets.X + e, lanes[c], lanes[c + _WORD[1]], lanes[c + _WORD[2]], lanes[c + _WORD[3]],
+            lanes[c + _WORD[4]], lanes[c + _WORD[5]], lanes[c + _WORD[6]], lanes[c + _WORD[7]], lanes[c + _WORD[8]],
+            small,
+        )  # fmt: skip
+        lanes[at], lanes[at + _WORD[1]], lanes[at + _WORD[2]], lanes[at + _WORD[3]] = e11, e22, e12, e33
+        lanes[at + _WORD[4]], lanes[at + _WORD[5]], lanes[_AT_VOLUME + e] = e13, e23, e11 + e22 + e33
+
+
+@njit(error_model="numpy")
+def _share_strain(g, i, first, normal, thermal, lanes):
+    """The parts of element i, in the lanes from `first` on, get the mean trace of their overlay, less heat."""
+    n, each = parts.count(g), parts.count(g) // parts.overlays(g)
+    for begin in range(0, n if each > 1 else 0, each):
+        mean = whole = 0.0
+        for p in range(begin, begin + each):
+            volume = parts.volume(g, i, p)
+            mean += volume * lanes[_VOLUME * CAPACITY + first + p]
+            whole += volume
+        mean /= whole
+        for p in range(begin, begin + each):
+            more = (mean - lanes[_VOLUME * CAPACITY + first + p]) / len(normal)
+            for k in normal:
+                lanes[(_E + k) * CAPACITY + first + p] += more
+            lanes[_VOLUME * CAPACITY + first + p] = mean
+    if thermal != 0.0:
+        for p in range(n):
+            for k in normal:
+                lanes[(_E + k) * CAPACITY + first + p] -= thermal
+
+
+def _evaluation(one: _Law) -> Any:
+    """A kernel that finds stress, into lanes from `_S` on, and states of n parts from their strain."""
+    width = len(INITIAL[one.dim])
+    put, two, three, four, five = storing(width, 0, _S), *_WORD[2:6]
+    evaluate = one.at(_REST, _REST + len(one.columns), [lane(_I + k) for k in range(width)])
+
+    @njit(error_model="numpy")
+    def plane(n, dt, lanes):
+        for e in range(U(n)):
+            at = _AT_E + e
+            put(
+                lanes,
+                e,
+                evaluate(e, (lanes[at], lanes[at + _WORD[1]], lanes[at + two], lanes[_AT_VOLUME + e], dt), lanes),
+            )
+
+    @njit(error_model="numpy")
+    def space(n, dt, lanes):
+        for e in range(U(n)):
+            at = _AT_E + e
+            e11, e22, e33 = lanes[at], lanes[at + _WORD[1]], lanes[at + three]
+            rest = lanes[at + four], lanes[at + five], e11 + (e22 + e33), dt
+            put(lanes, e, evaluate(e, (e11, e22, lanes[at + two], e33, *rest), lanes))
+
+    return plane if one.dim == 2 else space
+
+
+def _finding(one: _Law) -> tuple[Any, Any]:
+    """`Loops.find`."""
+    n_states, n_columns, width = len(one.states), len(one.columns), len(INITIAL[one.dim])
+    first_state = _REST + n_columns
+    size = (first_state + n_states) * CAPACITY
+    evaluate = _evaluation(one)
+    strain = _strain_of_triangles if one.dim == 2 else _strain_of_tetrahedra
+    normal, corners, words = ((0, 1), 3, 4) if one.dim == 2 else ((0, 1, 3), 4, 9)
+    axes, inverse = one.dim, storing(words, 0, _C)
+
+    @njit(error_model="numpy")
+    def take(g, i, first, base, own, row, table, memory, per_part, lanes):
+        """Of element i, owned element `own`: all that its parts need, into lanes from place `first` on. (Rows are
+        indexed: views of them are counted, which takes longer.)"""
+        for p in range(parts.count(g)):
+            e = first + p
+            for k in range(corners):
+                at = parts.corner(g, i, parts.end(g, p, k))
+                for axis in range(axes):
+                    lanes[(tets.STRIDE * k + axis) * CAPACITY + e] = g.x[at + axis]
+            inverse(lanes, U(e), parts.inverse(g, i, p))
+            for k in range(n_columns):
+                lanes[(_REST + k) * CAPACITY + e] = table[row * n_columns + k]
+            for k in range(width):
+                lanes[(_I + k) * CAPACITY + e] = base[own, k]
+            j, at = parts.place(g, i, p, per_part)
+            for k in range(n_states):
+                lanes[(first_state + k) * CAPACITY + e] = memory[j, 1 + at + k]
+
+    @njit(error_model="numpy")
+    def put(g, i, first, base, own, memory, per_part, s0, lanes):
+        """Back into their rows."""
+        for p in range(parts.count(g)):
+            e = first + p
+            j, at = parts.place(g, i, p, per_part)
+            for k in range(width):
+                s0[i, p, k] = lanes[(_S + k) * CAPACITY + e]
+            for k in range(n_states):
+                memory[j, 1 + at + k] = lanes[(first_state + k) * CAPACITY + e]
+        parts.share(g, i, s0)
+        for p in range(parts.count(g)):
+            for k in range(width):
+                s0[i, p, k] += base[own, k]
+
     @njit(nogil=True, error_model="numpy")
-    def gather(n, of, first, table, lanes):
-        """Properties of n elements into lanes from `first` on; of: their rows of the table, some more behind them.
-        Where all have the row of the block before they are there already; the lane behind says which that was."""
-        lanes_of, row, filled = U(first) * U(CAPACITY), of[0], U(first + n_columns) * U(CAPACITY)
-        same = True
+    def some(t, threads, who, g, base, thermal, row, table, dt, small, memory, per_part, s0):
+        lanes, n = np.zeros(size), parts.count(g)
+        together, end = AT_ONCE // n, len(who) * (t + 1) // threads
+        for first in range(len(who) * t // threads, end, together):
+            m = min(together, end - first)
+            for k in range(m):
+                i = who[first + k]
+                take(g, i, k * n, base, g.rows[i] - g.first, row[i], table, memory, per_part, lanes)
+            strain(m * n, small, lanes)
+            for k in range(m if n > 1 or len(thermal) else 0):
+                i = who[first + k]
+                _share_strain(g, i, k * n, normal, thermal[g.rows[i] - g.first] if len(thermal) else 0.0, lanes)
+            evaluate(m * n, dt, lanes)
+            for k in range(m):
+                i = who[first + k]
+                put(g, i, k * n, base, g.rows[i] - g.first, memory, per_part, s0, lanes)
+
+    @njit(nogil=True, error_model="numpy")
+    def find(threads, *args):
+        """who (m,): which elements of g, see `kind.Tables`; base (n_own, 4 or 6) [Pa]: initial stress of owned
+        elements; thermal (n_own,): strain of heat, or (0,); row (n,): of the flat table of properties `table`; small:
+        small strains; memory (n_own, 1 + parts states): what owned elements remember, `per_part` columns each part from
+        column 1 on, becomes that after this moment; s0 (n, parts, 4 or 8) [Pa]: becomes the stress."""
+        for t in range(threads):
+            some(t, threads, *args)
+
+    @njit(parallel=True, error_model="numpy")
+    def find_threaded(threads, who, g, base, thermal, row, table, dt, small, memory, per_part, s0):
+        for t in prange(threads):
+            some(t, threads, who, g, base, thermal, row, table, dt, small, memory, per_part, s0)
+
+    return find, find_threaded
+
+
+def at_strain(
+    law: Any, names: Sequence[str], states: Sequence[str], columns: Sequence[str], dim: int
+) -> Callable[..., Any]:
+    """A kernel that evaluates a law at one strain with each row of properties: (table (n, columns), strain (3 or 6,),
+    initial states (states,), out (n, 4 or 6 + states))."""
+    n_states, n_columns, width = len(states), len(columns), len(INITIAL[dim])
+    evaluate, first = _evaluation(_Law(law, names, states, columns, dim)), _REST + n_columns
+    size, normal = (first + n_states) * CAPACITY, (0, 1) if dim == 2 else (0, 1, 3)
+
+    @njit(nogil=True, error_model="numpy")
+    def at_one(table, strain, initial, out):
+        lanes = np.zeros(size)
+        for k in range(len(strain)):
+            lanes[(_E + k) * CAPACITY] = strain[k]
+        for k in normal:
+            lanes[_VOLUME * CAPACITY] += strain[k]
+        for i in range(len(table)):
+            for k in range(n_states):
+                lanes[(first + k) * CAPACITY] = initial[k]
+            for k in range(n_columns):
+                lanes[(_REST + k) * CAPACITY] = table[i, k]
+            evaluate(1, 0.0, lanes)
+            for k in range(width):
+                out[i, k] = lanes[(_S + k) * CAPACITY]
+            for k in range(n_states):
+                out[i, width + k] = lanes[(first + k) * CAPACITY]
+
+    return at_one
+
+
+# ---- within the loops over forces of the plane -----------------------------------------------------------------------
+
+
+def _moving(one: _Law, first: int, kind: Kind) -> tuple[Any, Any]:
+    """Kernels that take properties and states of n elements into lanes from `first` on, and put states back: of the row
+    of each in storage, of[e] in the table of properties."""
+    n_columns, n_states, n_parts = len(one.columns), len(one.states), len(kind.parts)
+    lanes_of, behind, own = lane(first), lane(first + n_columns), lane(first + list(one.columns).index(OWN))
+    first_state = first + n_columns + 1
+
+    @njit(nogil=True, error_model="numpy")
+    def gather(n, of, table, lanes):
+        """Properties of n elements; of: their rows of the table, some more behind them. Where all have the row of the
+        block before they are there already; the lane behind says which that was."""
+        row, same = of[0], True
         for e in range(n):
             same &= of[e] == row
         if same:
-            if lanes[filled] != row + 1.0:
+            if lanes[behind] != row + 1.0:
                 for k in range(U(n_columns)):
                     for e in range(U(BLOCK)):
                         lanes[lanes_of + k * U(CAPACITY) + e] = table[U(row) * U(n_columns) + k]
-            lanes[filled] = row + 1.0
+            lanes[behind] = row + 1.0
             return
-        lanes[filled] = 0.0
+        lanes[behind] = 0.0
         width = U(n_columns)
         for e in range(U(0), U(n), _FOUR):
             r0, r1, r2, r3 = U(of[e]) * width, U(of[e + _1]) * width, U(of[e + _2]) * width, U(of[e + _3]) * width
             for k in range(U(0), width, _FOUR):
                 four_columns(lanes, lanes_of + k * U(CAPACITY) + e, table, (r0 + k, r1 + k, r2 + k, r3 + k))
 
-    # ---- triangles -------------------------------------------------------------------------------------------------
+    @njit(nogil=True, error_model="numpy")
+    def take(n, of, rows, obeying, lanes):
+        gather(n, of, obeying.table, lanes)
+        for p in range(n_parts):
+            for k in range(n_states):
+                at, column = U(first_state + p * n_states + k) * U(CAPACITY), 1 + p * obeying.width + k
+                for e in range(n):
+                    lanes[at + U(e)] = obeying.memory[rows[e] - obeying.first_row, column]
 
-    own = lane(LANES + list(columns).index(OWN))
-    first_state, keep = LANES + n_columns + 1, LANES + n_columns + 1 + n_states
-    of_triangle = evaluated(LANES, 0, (S11, S22, S12, S33))
+    @njit(nogil=True, error_model="numpy")
+    def put(n, rows, obeying, lanes):
+        for p in range(n_parts):
+            for k in range(n_states):
+                at, column = U(first_state + p * n_states + k) * U(CAPACITY), 1 + p * obeying.width + k
+                for e in range(n):
+                    if lanes[own + U(e)] == 1.0:
+                        obeying.memory[rows[e] - obeying.first_row, column] = lanes[at + U(e)]
+
+    return take, put
+
+
+def _triangles(one: _Law) -> tuple[Any, Any]:
+    """The loops in the place of `elements.triangles`."""
+    first_state, own = LANES + len(one.columns) + 1, lane(LANES + list(one.columns).index(OWN))
+    evaluate, (take, put) = one.at(LANES, first_state, (S11, S22, S12, S33)), _moving(one, LANES, TRIANGLE)
 
     @njit(error_model="numpy")
     def chosen(e, e11, e22, e12, trace, dt, lanes):
         """The law for its elements, elasticity for others."""
         s11, s22, s12, s33 = elements.elastic(e, e11, e22, e12, trace, dt, lanes)
-        t11, t22, t12, t33 = of_triangle(e, (e11, e22, e12, trace, dt), lanes)
+        found = evaluate(e, (e11, e22, e12, trace, dt), lanes)
         obeys = lanes[own + e] == 1.0
-        return t11 if obeys else s11, t22 if obeys else s22, t12 if obeys else s12, t33 if obeys else s33
+        return (
+            found[0] if obeys else s11, found[1] if obeys else s22, found[2] if obeys else s12,
+            found[3] if obeys else s33,
+        )  # fmt: skip
 
-    def stress_of_block(loop: Any) -> Any:
-        @njit(nogil=True, error_model="numpy")
-        def stress(b, n, first, rows, small, beta, obeying, lanes):
-            if not obeying.some[b]:
-                elements.elastic_stress(n, small, beta, 0.0, lanes)
-                return
-            memory = obeying.memory
-            gather(n, obeying.row[first:], LANES, obeying.table, lanes)
-            for k in range(n_states):
-                at = U(first_state + k) * U(CAPACITY)
-                for e in range(n):
-                    lanes[at + U(e)] = memory[rows[first + e] - obeying.first_row, 1 + k]
-            loop(n, small, beta, obeying.dt, lanes)
-            for k in range(n_states):
-                at = U(first_state + k) * U(CAPACITY)
-                for e in range(n):
-                    if lanes[own + U(e)] == 1.0:
-                        memory[rows[first + e] - obeying.first_row, 1 + k] = lanes[at + U(e)]
+    loop = elements.stress_loop(chosen)
 
-        return stress
+    @njit(nogil=True, error_model="numpy")
+    def stress(b, n, first, rows, small, beta, obeying, lanes):
+        if not obeying.some[b]:
+            elements.elastic_stress(n, small, beta, 0.0, lanes)
+            return
+        take(n, obeying.row[first:], rows[first:], obeying, lanes)
+        loop(n, small, beta, obeying.dt, lanes)
+        put(n, rows[first:], obeying, lanes)
 
-    blocks = elements.triangle_blocks(stress_of_block(elements.stress_loop(chosen)), n_columns + 1 + n_states)
-    looking = stress_of_block(elements.stress_loop(chosen, keep))
+    blocks = elements.triangle_blocks(stress, len(one.columns) + 1 + len(one.states))
 
     @njit(nogil=True, error_model="numpy")
     def triangles(threads, obeying, *args):
@@ -161,82 +399,57 @@ def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequen
                 some_special, force, of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
             )  # fmt: skip
 
-    @njit(nogil=True, error_model="numpy")
-    def look(obeying, count, rows, wide, x, v, c, base, small, s0):
-        """Stress [Pa] of the elements with this law into their rows of s0 (count + 3, 4); base, as this: initial."""
-        lanes = np.zeros((keep + 4) * CAPACITY)
-        x, v, c, base = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), base.reshape(base.size)
-        for b in range(len(obeying.some)):
-            if obeying.some[b]:
-                first = b * BLOCK
-                n = min(BLOCK, count - first)
-                elements.gather(n, first, rows, wide, x, v, c, base, True, lanes)
-                looking(b, n, first, rows, small, 0.0, obeying, lanes)
-                for e in range(n):
-                    if lanes[own + U(e)] == 1.0:
-                        for k in range(4):
-                            s0[first + e, k] = lanes[U(keep + k) * U(CAPACITY) + U(e)]
+    return triangles, triangles_threaded
 
-    # ---- quads -----------------------------------------------------------------------------------------------------
 
-    own_quad = lane(QUAD_LANES + list(columns).index(OWN))
-    first_of_quad = QUAD_LANES + n_columns + 1
-    keep_quad = first_of_quad + 4 * n_states
-    parts = [evaluated(QUAD_LANES, p, [Q_S0 + lane(4 * p + k) for k in range(4)]) for p in range(4)]
+def _quads(one: _Law) -> tuple[Any, Any]:
+    """The loops in the place of `elements.quads`."""
+    n_columns, n_states = len(one.columns), len(one.states)
+    own, (take, put) = lane(QUAD_LANES + list(one.columns).index(OWN)), _moving(one, QUAD_LANES, QUAD)
+    of_part = [
+        one.at(QUAD_LANES, QUAD_LANES + n_columns + 1 + p * n_states, [Q_S0 + lane(4 * p + k) for k in range(4)])
+        for p in range(4)
+    ]
 
-    def chosen_pair(of_first: Any, of_second: Any) -> Any:
+    def pair(of_first: Any, of_second: Any) -> Any:
         @njit(error_model="numpy")
-        def pair(e, a11, a22, a12, b11, b22, b12, mean, one, two, dt, lanes):
-            """The same of the two triangles of an overlay, which share their pressure in the plane."""
+        def chosen(e, a11, a22, a12, b11, b22, b12, mean, one, two, dt, lanes):
+            """The same of the two triangles of an overlay, which share their pressure in the plane: `parts.share`."""
             s11, s22, s12, s33, t11, t22, t12, t33 = elements.elastic_pair(
                 e, a11, a22, a12, b11, b22, b12, mean, one, two, dt, lanes
             )
-            u11, u22, u12, u33 = of_first(e, (a11, a22, a12, mean, dt), lanes)
-            v11, v22, v12, v33 = of_second(e, (b11, b22, b12, mean, dt), lanes)
-            apart = 0.5 * ((u11 + u22) - (v11 + v22))
-            size = (abs(u11) + abs(u22)) + (abs(v11) + abs(v22))
-            share = (apart if abs(apart) > SHARED * size else 0.0) / (one + two)
-            p, q = -two * share, one * share
-            obeys = lanes[own_quad + e] == 1.0
+            u = of_first(e, (a11, a22, a12, mean, dt), lanes)
+            v = of_second(e, (b11, b22, b12, mean, dt), lanes)
+            first, second = u[0] + u[1], v[0] + v[1]
+            size = abs(u[0]) + abs(u[1]) + abs(v[0]) + abs(v[1])
+            apart = abs(first - second) > 2.0 * parts.SHARED * size
+            shared = (one * first + two * second) / (one + two)
+            p, q = 0.5 * (shared - first if apart else 0.0), 0.5 * (shared - second if apart else 0.0)
+            obeys = lanes[own + e] == 1.0
             return (
-                u11 + p if obeys else s11, u22 + p if obeys else s22, u12 if obeys else s12, u33 if obeys else s33,
-                v11 + q if obeys else t11, v22 + q if obeys else t22, v12 if obeys else t12, v33 if obeys else t33,
+                u[0] + p if obeys else s11, u[1] + p if obeys else s22, u[2] if obeys else s12,
+                u[3] if obeys else s33, v[0] + q if obeys else t11, v[1] + q if obeys else t22,
+                v[2] if obeys else t12, v[3] if obeys else t33,
             )  # fmt: skip
 
-        return pair
+        return chosen
 
-    pairs = chosen_pair(parts[0], parts[1]), chosen_pair(parts[2], parts[3])
+    overlay_0 = elements.overlay_loop(0, pair(of_part[0], of_part[1]))
+    overlay_1 = elements.overlay_loop(1, pair(of_part[2], of_part[3]))
 
-    def stress_of_quads(overlay_0: Any, overlay_1: Any) -> Any:
-        @njit(nogil=True, error_model="numpy")
-        def stress(n, item, row, small, beta, obeying, lanes):
-            memory = obeying.memory
-            gather(n, obeying.row[item[0] :], QUAD_LANES, obeying.table, lanes)
-            for p in range(4):
-                for k in range(n_states):
-                    at, column = U(first_of_quad + p * n_states + k) * U(CAPACITY), 1 + p * obeying.width + k
-                    for e in range(n):
-                        lanes[at + U(e)] = memory[row[e] - obeying.first_row, column]
-            overlay_0(n, small, beta, obeying.dt, lanes)
-            overlay_1(n, small, beta, obeying.dt, lanes)
-            for p in range(4):
-                for k in range(n_states):
-                    at, column = U(first_of_quad + p * n_states + k) * U(CAPACITY), 1 + p * obeying.width + k
-                    for e in range(n):
-                        if lanes[own_quad + U(e)] == 1.0:
-                            memory[row[e] - obeying.first_row, column] = lanes[at + U(e)]
+    @njit(nogil=True, error_model="numpy")
+    def stress(n, item, row, small, beta, obeying, lanes):
+        take(n, obeying.row[item[0] :], row, obeying, lanes)
+        overlay_0(n, small, beta, obeying.dt, lanes)
+        overlay_1(n, small, beta, obeying.dt, lanes)
+        put(n, row, obeying, lanes)
 
-        return stress
-
-    steps = [elements.overlay_loop(overlay, pair) for overlay, pair in enumerate(pairs)]
-    looks = [elements.overlay_loop(overlay, pair, keep_quad + 8 * overlay) for overlay, pair in enumerate(pairs)]
-    blocks_of_quads = elements.quad_blocks(stress_of_quads(*steps), n_columns + 1 + 4 * n_states)
-    looking_at_quads = stress_of_quads(*looks)
+    blocks = elements.quad_blocks(stress, n_columns + 1 + 4 * n_states)
 
     @njit(nogil=True, error_model="numpy")
     def quads(threads, obeying, *args):
         for t in range(threads):
-            blocks_of_quads(obeying, t, threads, *args)
+            blocks(obeying, t, threads, *args)
 
     @njit(parallel=True, error_model="numpy")
     def quads_threaded(
@@ -244,52 +457,9 @@ def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequen
         beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
     ):  # fmt: skip
         for t in prange(threads):
-            blocks_of_quads(
+            blocks(
                 obeying, t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state,
                 history, table, beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
             )  # fmt: skip
 
-    @njit(nogil=True, error_model="numpy")
-    def look_quads(obeying, count, rows, x, v, c, base, small, s0):
-        """The same of quads: s0, base (count, 16)."""
-        lanes = np.zeros((keep_quad + 16) * CAPACITY)
-        item, row = np.empty(QUAD_BLOCK, np.int64), np.empty(QUAD_BLOCK, np.int64)
-        x, v, c, base = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), base.reshape(base.size)
-        for first in range(0, count, QUAD_BLOCK):
-            n = min(QUAD_BLOCK, count - first)
-            whole = (n + 3) // 4 * 4
-            elements.name_quads(first, n, rows, item, row)
-            elements.gather_quads(whole, item, row, x, v, c, base, True, lanes)
-            looking_at_quads(whole, item, row, small, 0.0, obeying, lanes)
-            for e in range(n):
-                if lanes[own_quad + U(e)] == 1.0:
-                    for k in range(16):
-                        s0[first + e, k] = lanes[U(keep_quad + k) * U(CAPACITY) + U(e)]
-
-    return Loops(triangles, triangles_threaded, quads, quads_threaded, look, look_quads)
-
-
-def at_strain(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequence[str]) -> Callable[..., Any]:
-    """A kernel that evaluates a law at one strain with each row of properties: (table (n, columns), strain (3,),
-    initial states (states,), out (n, 4 + states))."""
-    places = {name: lane(len(states) + k) for k, name in enumerate(columns)}
-    places |= {name: lane(k) for k, name in enumerate(states)}
-    places |= dict.fromkeys(INITIAL, lane(len(states) + len(columns)))
-    given = arguments(names, GIVEN, places)
-    n_states, n_columns = len(states), len(columns)
-    size = (n_states + n_columns + 1) * CAPACITY
-
-    @njit(nogil=True, error_model="numpy")
-    def evaluate(table, strain, initial, out):
-        lanes = np.zeros(size)
-        for i in range(len(table)):
-            for k in range(n_states):
-                lanes[k * CAPACITY] = initial[k]
-            for k in range(n_columns):
-                lanes[(n_states + k) * CAPACITY] = table[i, k]
-            values = (strain[0], strain[1], strain[2], strain[0] + strain[1], 0.0)
-            found = law(*given(lanes, U(0), values))
-            for k in range(4 + n_states):
-                out[i, k] = found[k]
-
-    return evaluate
+    return quads, quads_threaded

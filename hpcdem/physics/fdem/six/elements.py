@@ -40,8 +40,8 @@ class SixNodes:
     triangles; from_v, to (n, 6): where the velocity of each node is, and its forces go, of the first corner at it;
     block: themselves; c (n, 23), s0 (n, 3, 4): constants and stress without strain [Pa], see kernels.py."""
 
-    def __init__(self, local: Any) -> None:
-        self.local, self.sim = local, local.sim
+    def __init__(self, local: Any, triangles: ElementBlock) -> None:
+        self.local, self.sim, self.triangles = local, local.sim, triangles
         sim, mesh, own = self.sim, self.sim.reference, self.sim.owned
         sim.prepare_kernels("six-nodes")
         start = sim.where[mesh.macros[:, -1]]
@@ -71,16 +71,16 @@ class SixNodes:
             self.c[:, 4 * p : 4 * p + 4] = np.linalg.inv(j).reshape(-1, 4)
             if p < kernels.GAUSS:
                 self.c[:, kernels.AREA + p] = np.linalg.det(j) / 2.0
-        of_part = self.local.c[self.parts[:, 0]]
+        of_part = self.triangles.c[self.parts[:, 0]]
         self.c[:, kernels.LAMBDA :] = of_part[:, [elements.LAMBDA, elements.TWO_MU, elements.ETA, elements.FREE]]
 
     def _take_over(self) -> None:
         """The parts have no moduli in the table of forces. In that of time steps and of masses of the static mode they
         have those with which triangles would vibrate as fast: omega^2 of a corner is no more than the largest
         eigenvalue of M^-1 K of the element with its share of the masses."""
-        local, o, at = self.local, self.sim.options, self.parts.reshape(-1)
-        local.stiff = local.stiff.copy() if local.stiff is local.c else local.stiff
-        stiff = local.stiff[at]
+        local, of, o, at = self.local, self.triangles, self.sim.options, self.parts.reshape(-1)
+        of.set_apart()
+        stiff = of.stiff[at]
         if o.dynamic and o.mechanical:
             shape = self.c.copy()
             shape[:, kernels.LAMBDA], shape[:, kernels.TWO_MU] = 0.0, self.c[:, kernels.ETA]
@@ -92,12 +92,9 @@ class SixNodes:
             rows = self.rows.reshape(-1).astype(np.int32)
             limits.static_masses(stiff, local.q[:0], rows, local.quad_rows[:0], self.sim.owned.start, none, 0.0, mass)
             ratio = np.repeat(self._fastest(mass / (0.25 * 1.25), self.c), 4)
-        columns = np.array([elements.LAMBDA, elements.TWO_MU])
-        stiff[:, columns] *= ratio[:, None]
-        local.stiff[at] = stiff
-        local.c[at, elements.ETA] = 0.0
-        local.c[np.ix_(at, columns)] = 0.0
-        local.without_moduli = *local.without_moduli, (local.c, at, columns)
+        stiff[:, of.moduli] *= ratio[:, None]
+        of.stiff[at], of.c[at, elements.ETA] = stiff, 0.0
+        of.take_moduli(at)
 
     def _fastest(self, mass: np.ndarray, c: np.ndarray) -> np.ndarray:
         """Largest eigenvalue (n,) of M^-1 K in the mesh, with these masses of corners (rows, 4) and constants."""

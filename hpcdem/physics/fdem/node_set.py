@@ -1,0 +1,187 @@
+"""The nodes at elements of a rank that do not move by themselves: of several corners, with conditions or loads, or of
+elements whose forces are stored (kernels/nodes.py, in space kernels/space.py)."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcdem.physics.fdem import build
+from hpcdem.physics.fdem.kernels import nodes as moving
+from hpcdem.physics.fdem.kernels import space
+from hpcdem.physics.fdem.user_functions import Placed
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.loads import Loads
+    from hpcdem.physics.fdem.node_conditions import NodeCondition
+    from hpcdem.physics.fdem.state import State
+
+ALPHA = 0.8
+"""Local damping of the static mode."""
+COLUMNS = {
+    2: {"x": (moving.AT_X, moving.FORCE_X), "y": (moving.AT_Y, moving.FORCE_Y)},
+    3: {axis: (space.AT + k, space.FORCE + k) for k, axis in enumerate("xyz")},
+}
+"""By dimensions, columns of value and force along an axis in the table of node conditions."""
+
+
+def conditions_now(sim: State, placed: Placed, time: float, middle: float, dt: float) -> np.ndarray:
+    """The table of node conditions, with a row of its own for each node whose condition is a function."""
+    columns = COLUMNS[sim.dim]
+
+    def how(one: NodeCondition, field: str) -> tuple[int, float, float]:
+        kind, _, axis = field.partition("_")
+        at, force = columns[axis]
+        if kind == "force":
+            return force, time, getattr(one, f"part_{axis}")
+        velocity = getattr(one, f"does_{axis}") == moving.VELOCITY
+        return (at, middle, 1.0) if velocity else (at, time, dt)
+
+    return placed.filled(sim.conditions_at(time, middle, dt), how)
+
+
+class NodeSet:
+    """special (n_own, 4) bool: corners of owned elements at these nodes, there are `some`; shared: some have corners of
+    other ranks. width: words of a row of forces; stride: from one corner of a row to the next.
+
+    lead (n,): a corner, element * 4 + k, of each; begin (n + 1,), corner, place, again: see `build.place_nodes`; mass
+    (n,); kick: dt / mass; condition, share: rows of the table of conditions and the part of its force, where other
+    ranks' elements are at the node; outside (n, dim), felt (n, 2 dim): forces from outside, and all."""
+
+    kick: np.ndarray
+    _table: np.ndarray | None
+    _kernel: Any = staticmethod(moving.move)
+    _kernel_threaded: Any = staticmethod(moving.move_threaded)
+
+    def __init__(self, sim: State, special: np.ndarray, width: int, stride: int) -> None:
+        self.sim, self.special, self.width, self.stride = sim, special, width, stride
+        mesh, own = sim.the_mesh(), sim.owned
+        number = sim.number[own]
+        node = sim.node[number]
+        real = node >= 0
+        special[real] |= sim.shared_nodes[node[real]] | (sim.corner_row.reshape(-1, 4)[number][real] > 0)
+        special &= real
+        self.some = bool(special.any())
+        nothing = np.empty(0, np.int64)
+        mine = node[real]
+        low = int(mine.min(initial=len(sim.shared_nodes)))
+        scratch = np.full(max(int(mine.max(initial=-1)) + 1 - low, 0), -1, np.int32)
+        args = sim.number, sim.n_left, sim.n_own, special, sim.node, sim.member_begin, low, scratch
+        n = build.special_nodes(*args, nothing, nothing, nothing)
+        self.lead, self._start, self._one = (np.empty(n, np.int64) for _ in range(3))
+        if n:
+            build.special_nodes(*args, self.lead, self._start, self._one)
+        m = int(self._one.sum())
+        self.begin, self.mass = np.zeros(n + 1, np.int64), np.empty(n)
+        self.corner, self.place, self.again = (np.empty(m, np.int64) for _ in range(3))
+        lead = mesh.cells[self.lead // 4, self.lead % 4]
+        row, part = sim.rows_of_nodes(self.lead, sim.node)
+        self.functions = Placed(sim.acting(), row, mesh.points[lead])
+        self.condition = self.functions.of
+        self.share = np.where(np.isnan(part), self._one / np.maximum(sim.point_corners[lead], 1), part)
+        self.outside, self.felt = np.zeros((n, sim.dim)), np.zeros((n, 2 * sim.dim))
+
+    def find_corners(self, mass: np.ndarray) -> int:
+        """Where their corners are, and their masses by those of corners (rows, 4). A corner whose element is not held
+        by this rank, or -1. Collective."""
+        sim, own = self.sim, self.sim.owned
+        lost = self._weigh(mass)
+        rows = self.corner // self.width
+        self.shared = sim.comm.any(bool(((rows < own.start) | (rows >= own.stop)).any()))
+        return lost
+
+    def _weigh(self, mass: np.ndarray) -> int:
+        sim = self.sim
+        return int(
+            build.place_nodes(
+                self.lead, self._start, self._one, sim.member, sim.where, sim.the_mesh().cells, sim.v.shape[1],
+                self.width, self.stride, mass, self.begin, self.corner, self.place, self.again, self.mass,
+            )
+        )  # fmt: skip
+
+    def set_masses(self, mass: np.ndarray, dt: float) -> None:
+        """Their masses, by those of corners (rows, 4), and the time step [s]."""
+        sim = self.sim
+        self._weigh(mass)
+        self.kick = dt / self.mass
+        self._table = None if sim.conditions_vary() else sim.conditions_at(0.0, 0.0, dt)
+
+    @property
+    def pulled(self) -> tuple[np.ndarray, np.ndarray]:
+        """`begin` and `corner` of the corners that have forces."""
+        return self.begin, self.corner
+
+    def _where(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where their corners are, as the kernel takes it besides."""
+        return self.place, self.again
+
+    def move(self, force: np.ndarray, loads: Loads) -> None:
+        """New velocities from the forces on their corners, those of elements and loads. Collective."""
+        if not (self.some or self.shared):
+            return
+        sim, clock = self.sim, self.sim.clock
+        loads.find()
+        if self.shared:
+            sim.halo.fill(force)
+            if loads.some:
+                sim.halo.fill(loads.applied)
+        table = self._table
+        if table is None:
+            now, half = sim.time_now(), 0.5 * clock.dt if sim.options.dynamic else 0.0
+            table = conditions_now(sim, self.functions, now, now + half, clock.dt)
+        kernel = self._kernel if sim.threads == 1 else self._kernel_threaded
+        kernel(
+            sim.threads, self.begin, self.corner, *self._where(), self.kick, self.condition, self.share, table,
+            loads.some, force, loads.applied, sim.v, 0.0 if sim.options.dynamic else ALPHA, self.outside, self.felt,
+        )  # fmt: skip
+
+    # ---- who they are ----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def first_corners(self) -> np.ndarray:
+        """Lowest corner (element * 4 + k) of each. Not to be changed."""
+        out = self.lead.copy()
+        several = self._start >= 0
+        out[several] = self.sim.member[self._start[several]]
+        return out
+
+    @cached_property
+    def mine(self) -> np.ndarray:
+        """Those whose lowest corner is on an element of this rank, bool."""
+        row, own = self.sim.where[self.first_corners // 4], self.sim.owned
+        return (row >= own.start) & (row < own.stop)
+
+    @cached_property
+    def alone(self) -> np.ndarray:
+        """(n_own, 4) bool: corners of owned elements that move by themselves. Not to be changed."""
+        return ~self.special & (self.sim.the_mesh().cells[self.sim.number[self.sim.owned]] >= 0)
+
+
+class NodeSetSpace(NodeSet):
+    """Only the corners of nodes are kept. Of hexahedra only one corner at each of their points has forces."""
+
+    _kernel = staticmethod(space.move)
+    _kernel_threaded = staticmethod(space.move_threaded)
+    _pulled: tuple[np.ndarray, np.ndarray] | None = None
+
+    def pull(self, true_mass: np.ndarray) -> None:
+        """Only corners with masses (rows, 4) have forces."""
+        some = true_mass.reshape(-1)[self.corner // self.stride] > 0.0
+        before = np.concatenate([[0], np.cumsum(some)])
+        self._pulled = before[self.begin], self.corner[some]
+
+    @property
+    def pulled(self) -> tuple[np.ndarray, np.ndarray]:
+        return super().pulled if self._pulled is None else self._pulled
+
+    def _where(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.pulled
+
+    def _weigh(self, mass: np.ndarray) -> int:
+        self.corner, self.place, self.again = (np.empty(len(self.corner), np.int64) for _ in range(3))
+        lost = super()._weigh(mass)
+        self.corner = self.corner.astype(np.int32)
+        self.place = self.again = np.empty(0, np.int64)
+        return lost
