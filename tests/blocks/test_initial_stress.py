@@ -185,8 +185,8 @@ def test_it_is_saved_with_the_moduli_it_belongs_to(tmp_path):
 def test_a_file_without_the_column_is_read(tmp_path, monkeypatch):
     """The table of initial stresses as versions before wrote it: the stress stays, and follows what comes."""
     usual = saved_state._whole
-    monkeypatch.setattr(saved_state, "_whole", lambda columns, root: usual(
-        {name: values for name, values in columns.items() if name != "row"}, root))  # fmt: skip
+    monkeypatch.setattr(saved_state, "_whole", lambda columns, root, *kind: usual(
+        {name: values for name, values in columns.items() if name != "row"}, root, *kind))  # fmt: skip
     sim = held("cross")
     sim.initial_stress(None, **STRESS)
     saved_state.save(sim, tmp_path / "old.sav")

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import bisect
 import math
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 
 from hpcdem.core.cells import keys
 from hpcdem.core.comm import Comm
+from hpcdem.core.deprecated import renamed
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import CLUMP, FIELDS, FX, TORQUE, WIDTH
 from hpcdem.core.memory import aligned, take_rows
@@ -319,15 +319,7 @@ class Simulation(Model):
         self.particles.cold[:, FX : TORQUE + 1] = self.lists.owned_forces()
         self._open_lists()
 
-    def open(self) -> None:
-        """Deprecated name of `open_model`."""
-        warnings.warn("open of a Simulation is called open_model", DeprecationWarning, stacklevel=2)
-        self.open_model()
-
-    def close(self, least_skin: float = 0.0) -> None:
-        """Deprecated name of `close_model`."""
-        warnings.warn("close of a Simulation is called close_model", DeprecationWarning, stacklevel=2)
-        self.close_model(least_skin)
+    open, close = renamed("open", "open_model"), renamed("close", "close_model")
 
     def _open_lists(self) -> None:
         p = self.particles

@@ -1,8 +1,7 @@
-"""Models and properties of elements, faces and joints, tables and random fields that they follow, initial stress."""
+"""Models and properties of elements, faces and joints, tables and random fields that they follow."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -13,7 +12,6 @@ from hpcdem.core.errors import CommandError
 from hpcdem.core.memory import sparse_zeros
 from hpcdem.numerics.random_field import RandomField
 from hpcdem.physics.fdem import properties
-from hpcdem.physics.fdem.moduli import moduli
 from hpcdem.physics.fdem.node_conditions import Number
 from hpcdem.physics.fdem.properties import (
     BARTON_BANDIS,
@@ -371,81 +369,6 @@ class Assignments(Settings):
         """(n, 2), in space (n, 3) [m] in the mesh: centres of elements, middles of faces and joints. Hexahedra and
         their sides are one object."""
         return self._mesh().centroids(of) if on == ELEMENT else self._mesh().side_middles(of)
-
-    def initial_stress(
-        self,
-        elements: Numbers,
-        xx: float = 0.0,
-        yy: float = 0.0,
-        xy: float = 0.0,
-        zz: float | None = None,
-        gradient: Mapping[str, tuple[float, ...]] | None = None,
-        xz: float = 0.0,
-        yz: float = 0.0,
-    ) -> None:
-        """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y, in space in z)
-        at the centroid as it lies in the mesh, of six-node triangles at their Gauss points. It is the stress of a
-        strain by the moduli of this moment, and changes with them, see `initial_stresses`. In the plane zz, if nothing
-        is said of it, is that of plane strain, Poisson's ratio times xx + yy, and in space and in plane stress 0."""
-        at = self.numbers_of_elements(elements)
-        mesh, values = self._mesh(), self.per_node(lambda: self._initial(at, xx, yy, xy, zz, gradient, xz, yz))
-        self.before_change()
-
-        def put() -> tuple[np.ndarray, np.ndarray]:
-            stress0 = np.zeros((len(mesh.cells), len(COMPONENTS[mesh.dim]))) if self.stress0 is None else self.stress0
-            stress0[at] = values
-            self.stress0_row[at] = self.element_row[at]
-            return stress0, self.stress0_row
-
-        self.stress0, self.stress0_row = self.per_node(put)
-        self._note_moduli(at)
-        self.changed()
-
-    def _initial(
-        self, at: np.ndarray, xx: float, yy: float, xy: float, zz: float | None,
-        gradient: Mapping[str, tuple[float, ...]] | None, xz: float, yz: float,
-    ) -> np.ndarray:  # fmt: skip
-        """What `initial_stress` says of elements (n,), (n, 4) or (n, 6) [Pa]."""
-        mesh = self._mesh()
-        names = COMPONENTS[mesh.dim]
-        if mesh.dim == 2 and (xz != 0.0 or yz != 0.0):
-            raise CommandError("in two dimensions there is no stress xz and yz")
-        given = {"xx": xx, "yy": yy, "xy": xy, "zz": 0.0 if zz is None else zz, "xz": xz, "yz": yz}
-        values = np.tile(finite("initial stress", [given[name] for name in names]), (len(at), 1))
-        for name, slope in (gradient or {}).items():
-            if name not in names:
-                raise CommandError(f"a stress gradient is one of {', '.join(names)}, got {name}")
-            values[:, names.index(name)] += mesh.stress_points(at) @ self._vector(f"gradient of {name}", slope)
-        if self.options.plane_stress and (values[:, ACROSS] != 0.0).any():
-            raise CommandError(
-                f"an initial stress zz of {values[values[:, ACROSS] != 0.0, ACROSS][0]:g} Pa cannot be in plane "
-                "stress, where the stress across the plane is 0: leave stress-zz out, or say model plane-strain"
-            )
-        if mesh.dim == 2 and zz is None and "zz" not in (gradient or {}):
-            values[:, ACROSS] = math.nan  # until there are moduli
-        return values
-
-    def initial_stresses(self, elements: np.ndarray) -> np.ndarray:
-        """Stress [Pa] (n, 4), in space (n, 6), of elements (n,) at zero strain, by their present moduli.
-
-        What was said fixes a strain: mean stress over 3 K and deviator over 2 G with the moduli of that moment. So the
-        mean follows the bulk modulus and the deviator the shear modulus. (In plane stress both are of the plane, and
-        the bulk modulus K_2, see moduli.py.)"""
-        assert self.stress0 is not None
-        out = self.stress0[elements]
-        said, now = self.stress0_row[elements], self.element_row[elements]
-        ratio = np.ones((len(out), 2))
-        of = moduli(self.element_rows, self.options.plane_stress)
-        for c, modulus in enumerate((of.bulk, of.shear)):
-            other = (said > 0) & (modulus[said] != modulus[now])
-            ratio[other, c] = modulus[now[other]] / modulus[said[other]]
-        other = (ratio != 1.0).any(axis=1)  # the rest keeps every bit
-        normal = of.normal
-        mean = out[other][:, normal].mean(axis=1, keepdims=True)
-        scaled = ratio[other, 1:] * (out[other] - np.where(np.isin(np.arange(out.shape[1]), normal), mean, 0.0))
-        scaled[:, normal] += ratio[other, :1] * mean
-        out[other] = scaled
-        return out
 
     def random_field(self, name: str, field: RandomField) -> None:
         """Make or replace a random field; properties that were drawn from one of this name stay."""

@@ -12,7 +12,8 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.core.memory import sparse_zeros
 from hpcdem.physics.fdem import node_conditions, sides, user_functions
-from hpcdem.physics.fdem.assignments import COMPONENTS, Assignments
+from hpcdem.physics.fdem.assignments import COMPONENTS
+from hpcdem.physics.fdem.initial_stress import InitialStress
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.node_conditions import Contradiction, NodeCondition, Number
@@ -57,7 +58,7 @@ class Relaxation:
     in_steps: bool
 
 
-class Conditions(Assignments):
+class Conditions(InitialStress):
     """What nodes and faces are made to do. Methods that assign raise CommandError, alike on all ranks, and change
     nothing then."""
 
@@ -383,17 +384,11 @@ class Conditions(Assignments):
         self.before_change()
 
         def say() -> tuple[list[Traction], np.ndarray]:
-            self._change_rows(self.loads, self.load_row, at, changes)
+            _change_rows(self.loads, self.load_row, at, changes)
             return self.loads, self.load_row
 
         self.loads, self.load_row = self.per_node(say)
         self.changed(stiffness=quiet is not None)  # dashpots limit the time step
-
-    @staticmethod
-    def _change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
-        old = column[at]
-        for row in np.unique(old).tolist():
-            column[at[old == row]] = _row_of(rows, replace(rows[row], **changes))
 
     def remove_conditions(self, nodes: Numbers = None, kinds: Sequence[str] = node_conditions.KINDS) -> None:
         """Take back velocities and accelerations, forces, constraints of nodes (these kinds); None: of all, those too
@@ -463,6 +458,12 @@ class Conditions(Assignments):
         """(4 ne,) bool: faces with dashpots."""
         quiet = np.array([one.quiet for one in self.loads])
         return self._of_rows(quiet, self.load_row, lambda: np.ones(1, bool))
+
+
+def _change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
+    old = column[at]
+    for row in np.unique(old).tolist():
+        column[at[old == row]] = _row_of(rows, replace(rows[row], **changes))
 
 
 def _row_of(rows: list, wanted: Any) -> int:

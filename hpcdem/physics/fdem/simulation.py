@@ -446,21 +446,25 @@ class Blocks(Edited):
         self.opened_apart = 0
 
     def _nodes_of_corners(self) -> tuple[np.ndarray, ...]:
-        mesh = self.the_mesh()
-        node, lead = self._clusters()
-        sizes = np.bincount(node[node >= 0], minlength=len(lead))
-        shared, node = sizes > 1, node.astype(np.int32, copy=False)
-        begin = np.zeros(len(lead) + 1, np.int32)
-        member = np.empty(int(sizes[shared].sum()), np.int32)
-        if len(member):  # else zeros that nobody has written to: nothing of them is in the memory
-            build.cluster_members(node, sizes, begin, member)
-        cells = mesh.cells[self.alive]
-        at_points = np.bincount(cells[cells >= 0], minlength=len(mesh.points))
-        # A rank has pages of its own of `where` only around the elements that it holds.
-        return node, shared, begin, member, at_points, np.full(len(mesh.cells), -1, np.int64)
+        return _nodes_of_corners(self.the_mesh(), self.alive, *self._clusters())
 
     def _costs(self) -> np.ndarray:
         """Relative cost of the owned elements: broken zones cost more."""
         cost = np.ones(len(self.number))
         cost += 0.5 * np.minimum(self.histories.counts(), 12)
         return cost
+
+
+def _nodes_of_corners(mesh: Mesh, alive: np.ndarray, node: np.ndarray, lead: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Of corners their node, of nodes whether they have several corners, and which (`build.cluster_members`); elements
+    at each point; and an empty table for the places of elements."""
+    sizes = np.bincount(node[node >= 0], minlength=len(lead))
+    shared, node = sizes > 1, node.astype(np.int32, copy=False)
+    begin = np.zeros(len(lead) + 1, np.int32)
+    member = np.empty(int(sizes[shared].sum()), np.int32)
+    if len(member):  # else zeros that nobody has written to: nothing of them is in the memory
+        build.cluster_members(node, sizes, begin, member)
+    cells = mesh.cells[alive]
+    at_points = np.bincount(cells[cells >= 0], minlength=len(mesh.points))
+    # A rank has pages of its own of the table only around the elements that it holds.
+    return node, shared, begin, member, at_points, np.full(len(mesh.cells), -1, np.int64)

@@ -5,15 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from hpcdem.physics.fdem.groups import LINER_ELEMENT
 from hpcdem.physics.fdem.structures import Columns
-
-if TYPE_CHECKING:
-    from hpcdem.physics.liners.model import Liners
 
 
 @dataclass(frozen=True)
@@ -39,8 +36,8 @@ class Elements(ABC):
     parted_at: ClassVar[str]
     """What of the mesh is between two elements that are joined."""
 
-    def __init__(self, liners: Liners) -> None:
-        self.liners = liners
+    def __init__(self, liners: Any) -> None:
+        self.liners = liners  # physics.liners.model.Liners, which imports this
 
     @abstractmethod
     def lay(self, faces: np.ndarray, points: np.ndarray, at: np.ndarray) -> Laid:

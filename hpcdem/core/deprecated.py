@@ -1,0 +1,18 @@
+"""Names of before, which act and warn."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+
+def renamed(old: str, new: str) -> Callable[..., Any]:
+    """A method `old` that calls the method `new` and warns."""
+
+    def method(self: Any, *args: Any, **options: Any) -> Any:
+        warnings.warn(f"{old} of {type(self).__name__} is deprecated: use {new}", DeprecationWarning, stacklevel=2)
+        return getattr(self, new)(*args, **options)
+
+    method.__name__, method.__doc__ = old, f"Deprecated name of `{new}`."
+    return method
