@@ -15,14 +15,11 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
-
-if TYPE_CHECKING:
-    from hpcdem.halo.comm import MpiComm
 
 SMALL = 1 << 16
 """Bytes of an array that is not worth a file: it travels with the rest."""
@@ -32,11 +29,12 @@ PREFIX = "hpcdem-shared-"
 
 
 class Nodes:
-    """The ranks of this node of the machine (host) and, on the first of them, the first ones of all nodes (leads).
+    """The ranks of this node of the machine (host) and, on the first of them, the first ones of all nodes (leads, else
+    None): both halo.comm.MpiComm, which imports this.
 
     folders: where files may be, in this order; notice: what a user should know of, said once by `warn`."""
 
-    def __init__(self, host: MpiComm, leads: MpiComm | None, folders: tuple[str, ...] = ()) -> None:
+    def __init__(self, host: Any, leads: Any, folders: tuple[str, ...] = ()) -> None:
         self.host, self.leads = host, leads
         self.folders = folders or ("/dev/shm", tempfile.gettempdir())
         self.warn: Callable[[str], None] | None = None
@@ -162,14 +160,14 @@ def _map(path: Path, size: int) -> mmap.mmap:
         os.close(file)
 
 
-def _broadcast(comm: MpiComm, block: np.ndarray) -> np.ndarray:
+def _broadcast(comm: Any, block: np.ndarray) -> np.ndarray:
     """The bytes of its first rank, on all ranks of a communicator: into the block where it is not that of the first."""
     for at in range(0, len(block), PIECE):
         comm.wait(comm.mpi.Ibcast(block[at : at + PIECE], 0))
     return block
 
 
-def _sent(leads: MpiComm, head: bytes, large: list[Any]) -> tuple[bytes, list[Any]]:
+def _sent(leads: Any, head: bytes, large: list[Any]) -> tuple[bytes, list[Any]]:
     """What the first rank of all has."""
     head, sizes = leads.bcast((head, [len(one) for one in large]))
     return head, [_broadcast(leads, one) for one in large or [np.empty(size, np.uint8) for size in sizes]]

@@ -23,7 +23,6 @@ from hpcdem.physics.fdem.properties import BARTON_BANDIS, COHESIVE, COULOMB_JOIN
 from hpcdem.physics.fdem.tetrahedra import FACES, STRIDE
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.joints_hexes import HexJoints
     from hpcdem.physics.fdem.state import State
 
 LAWS = {COULOMB_JOINT.name: joint_law.COULOMB, BARTON_BANDIS.name: joint_law.BARTON_BANDIS}
@@ -90,7 +89,7 @@ class JointTables:
     head: np.ndarray
     follow: np.ndarray
     tally: np.ndarray
-    sides: HexJoints | None = None
+    sides: Any = None
 
     # ---- made at a rebuild ---------------------------------------------------------------------------------------
 

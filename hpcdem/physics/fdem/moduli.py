@@ -13,14 +13,11 @@ fastest wave. The laws of elements take lambda and 2 G of here and are told by a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hpcdem.physics.fdem.properties import Rows
-
-if TYPE_CHECKING:
-    from hpcdem.physics.fdem.state import State
 
 
 class Moduli(NamedTuple):
@@ -43,7 +40,7 @@ def moduli(rows: Rows, plane_stress: bool) -> Moduli:
     return Moduli(plane, shear, plane - shear, plane + shear, [0, 1])
 
 
-def element_table(sim: State) -> np.ndarray:
+def element_table(sim: Any) -> np.ndarray:
     """The table of element models (rows, 5) of build.py."""
     of = moduli(sim.element_rows, sim.options.plane_stress)
     density, young, damp = map(sim.element_rows.column, ("density", "young", "damp_factor"))
