@@ -384,7 +384,7 @@ class Conditions(InitialStress):
         self.before_change()
 
         def say() -> tuple[list[Traction], np.ndarray]:
-            _change_rows(self.loads, self.load_row, at, changes)
+            change_rows(self.loads, self.load_row, at, changes)
             return self.loads, self.load_row
 
         self.loads, self.load_row = self.per_node(say)
@@ -460,7 +460,8 @@ class Conditions(InitialStress):
         return self._of_rows(quiet, self.load_row, lambda: np.ones(1, bool))
 
 
-def _change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
+def change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
+    """Give objects `at` rows with these changes, which are added where there is none."""
     old = column[at]
     for row in np.unique(old).tolist():
         column[at[old == row]] = _row_of(rows, replace(rows[row], **changes))

@@ -16,6 +16,7 @@ from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import by_temperature, hexahedra
+from hpcdem.physics.fdem.conditions import change_rows
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.field import assigned
 from hpcdem.physics.field.assigned import Number
@@ -199,7 +200,7 @@ class Conditions(Assigned, Field):
                         "nor has its element"
                     )
         with self.changing():
-            self.blocks._change_rows(exposed.conditions, exposed.row, at, changes)
+            change_rows(exposed.conditions, exposed.row, at, changes)
 
     def remove_face_conditions(self, faces: np.ndarray | None) -> None:
         """Nothing passes through faces (None: all)."""
