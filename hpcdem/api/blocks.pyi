@@ -35,7 +35,7 @@ class Geometry(Words):
         as_layer : name of the layer; a layer may hold several shapes.
         """
     def polygon(self, points: Sequence[Point], as_layer: str) -> None:
-        """A closed line; in three dimensions the flat surface within.
+        """A closed line; in three dimensions the plane surface inside it.
 
         Parameters
         ----------
@@ -148,12 +148,12 @@ class Geometry(Words):
         as_layer : name of the layer; a layer may hold several shapes.
         """
     def extrude(self, layer: str, along: Point, as_layer: str) -> None:
-        """In three dimensions: the bodies that the polygons of a layer become, drawn along a way.
+        """In three dimensions: bodies made by extruding the polygons of a layer along a vector.
 
         Parameters
         ----------
         layer : of polygons.
-        along : the way [m].
+        along : the vector of extrusion [m].
         as_layer : name of the layer; a layer may hold several shapes.
         """
     def revolve(
@@ -164,7 +164,7 @@ class Geometry(Words):
         about: Point | None = None,
         angle: float | None = None,
     ) -> None:
-        """In three dimensions: the bodies that the polygons of a layer become, turned about an axis in their plane.
+        """In three dimensions: bodies made by revolving the polygons of a layer about an axis in their plane.
 
         Parameters
         ----------
@@ -218,12 +218,13 @@ class Geometry(Words):
         length : distribution of the length, and its value: the length, the mean, the mean, the exponent [m] (in the
             plane).
         length_spread : lognormal: standard deviation [m].
-        length_least : no shorter ones [m] (default: 0).
-        length_greatest : no longer ones [m] (default: none).
-        radius : the same of the radius of discs [m] (in three dimensions).
+        length_least : lower bound [m] (default: 0).
+        length_greatest : upper bound [m] (default: none).
+        radius : distribution of the radius of discs, and its value: the radius, the mean, the mean, the exponent [m]
+            (in three dimensions).
         radius_spread : lognormal: standard deviation [m].
-        radius_least : no shorter ones [m] (default: 0).
-        radius_greatest : no longer ones [m] (default: none).
+        radius_least : lower bound [m] (default: 0).
+        radius_greatest : upper bound [m] (default: none).
         p10 : density: fractures per length of a scan line [1/m].
         p20 : density: fractures per area [1/m2] (in the plane).
         p21 : density: length of fractures per area [1/m] (in the plane).
@@ -231,11 +232,12 @@ class Geometry(Words):
         p32 : density: area of fractures per volume [1/m] (in three dimensions).
         scan_line : direction of the line of p10 [degrees] (in the plane; default: 0).
         scan_direction : direction of the line of p10 (in three dimensions; default: (0,0,1)).
-        reached : p20 or p21, p30 or p32 is met as nearly as whole ones can, not in the mean.
-        ends_at : share of the crossings with earlier fractures at which one ends (in the plane; default: 0).
-        hole : none inside of this layer (in the plane).
-        shortest : shorter pieces at the rim are left out [m] (in the plane; default: 0).
-        seed : another seed, another network.
+        reached : meets p20, p21, p30 or p32 as closely as a whole number of fractures can, not on average.
+        ends_at : share of the intersections with earlier fractures at which a fracture ends (in the plane; default:
+            0).
+        hole : no fractures inside this layer (in the plane).
+        shortest : shorter pieces at the boundary are omitted [m] (in the plane; default: 0).
+        seed : seed of the random numbers: each seed gives another network.
         """
     def import_file(self, file: File, as_layer: str, dxf_layer: str | None = None, scale: float | None = None) -> None:
         """Lines of a DXF file; in three dimensions the solids of a STEP or BREP file, or what the triangles of an STL
@@ -246,7 +248,7 @@ class Geometry(Words):
         file : name of the file.
         as_layer : name of the layer; a layer may hold several shapes.
         dxf_layer : only this layer of the file (default: all).
-        scale : metres in a unit of the file [m] (default: as STEP and DXF files say, else 1).
+        scale : metres in a unit of the file [m] (default: the unit given in STEP and DXF files, else 1).
         """
     def transform(
         self,
@@ -265,13 +267,13 @@ class Geometry(Words):
         layer : name of the layer.
         scale : done first.
         rotate : then, counter-clockwise; in three dimensions right-handed about an axis [degrees].
-        axis : about which it is turned (in three dimensions; default: (0,0,1)).
+        axis : centre of rotation (in three dimensions; default: (0,0,1)).
         about : centre of both [m] (default: the origin).
         move : last [m].
         """
     def scale(self, factors: Point, layer: Sequence[str] | None = None) -> None:
-        """Multiplies the coordinates of layers, of all without layer; a negative factor mirrors. What is round takes
-        one size of factor only.
+        """Multiplies the coordinates of layers, of all without layer; a negative factor mirrors. Round shapes need
+        factors of equal size.
 
         Parameters
         ----------
@@ -279,7 +281,7 @@ class Geometry(Words):
         layer : names of layers (default: all).
         """
     def translate(self, way: Point, layer: Sequence[str] | None = None) -> None:
-        """Moves layers, all without layer.
+        """Moves layers; without layer all of them.
 
         Parameters
         ----------
@@ -330,18 +332,18 @@ class Mesh(Words):
         size : length of edges [m].
         type : triangles or quads (in the plane; default: tri).
         refine_layer : smaller elements near this layer; each is (refine_layer, size, distance); size: length of
-            edges there [m]; distance: over which the size grows to that of the rest [m] (default: ten times the
-            size).
-        hole : what is inside of this layer stays empty.
-        region : what is inside of this layer is a group of its own; each is (region, group); group: its name
-            (default: the name of the layer).
+            edges there [m]; distance: distance over which the size grows to that of the rest [m] (default: ten times
+            the size).
+        hole : the inside of this layer stays empty.
+        region : the elements inside this layer become a group; each is (region, group); group: its name (default:
+            the name of the layer).
         embed : lines that become edges of the mesh; in three dimensions surfaces, which become faces.
-        crack : lines that become edges with a crack from the beginning; in three dimensions surfaces.
-        bodies : each body of the layer is a group of its own: by its name in its file, else by the layer and its
-            number (in three dimensions).
-        irregular : triangles in no pattern: rows of equilateral ones lead cracks (in the plane).
-        smooth : inner points lie in the middle of their neighbours, so that joints on all edges share a uniform
-            stress evenly; for triangles (in the plane).
+        crack : lines that become edges with an initial crack; in three dimensions surfaces.
+        bodies : each body of the layer becomes a group, named as in its file, else by the layer and its number (in
+            three dimensions).
+        irregular : triangles without a pattern, since cracks follow rows of equilateral triangles (in the plane).
+        smooth : moves inner points to the centre of their neighbours, so that joints on all edges carry a uniform
+            stress equally; for triangles (in the plane).
         group : the group that the new elements are in.
         set : the set of the group.
         """
@@ -369,8 +371,7 @@ class Mesh(Words):
         diagonal : of the triangles; alternating, or both of each rectangle (in the plane; default: alternate).
         split : tetrahedra of each box: 5, mirrored from box to box, 6 about a diagonal, or 12 about a point in the
             middle (in three dimensions; default: 6).
-        ratio : along x and y (and z): each rectangle or box is so many times as large as the one before (default: 1
-            1).
+        ratio : along x and y (and z): ratio of the size of each rectangle or box to the one before (default: 1 1).
         group : the group that the new elements are in.
         set : the set of the group.
         """
@@ -397,7 +398,7 @@ class Mesh(Words):
         p2 : of the second [m].
         p3 : of the third [m] (in three dimensions).
         n : elements along each edge.
-        ratio : along each edge an element is so many times as large as the one before (default: 1 1).
+        ratio : along each edge: ratio of the size of an element to the one before (default: 1 1).
         triangle : triangles, or tetrahedra; False: quads, or hexahedra (default: True).
         group : the group that the new elements are in.
         set : the set of the group.
@@ -411,21 +412,21 @@ class Mesh(Words):
         group: str | None = None,
         set: str | None = None,
     ) -> None:
-        """In the plane: triangles in the inside of closed lines, by Gmsh, with a mesh size for each piece. Other pieces
-        become edges and points of the mesh, as far as they lie inside.
+        """In the plane: triangles inside closed lines, by Gmsh, with a mesh size for each piece. Other pieces inside
+        become edges and points of the mesh.
 
         Parameters
         ----------
         layer : layers of geometry; each is (layer, mesh_size, is_boundary); mesh_size: length of edges there [m]
-            (default: the largest of the others); is_boundary: it bounds the mesh: what is outside is cut off
-            (default: the first piece does).
+            (default: the largest of the others); is_boundary: it bounds the mesh: the outside is removed (default:
+            the first piece does).
         circle : a circle; each is (center, radius, mesh_size, is_boundary); center: its centre [m]; radius: its
             radius [m]; mesh_size: length of edges there [m] (default: the largest of the others); is_boundary: it
-            bounds the mesh: what is outside is cut off (default: the first piece does).
+            bounds the mesh: the outside is removed (default: the first piece does).
         arc : an arc, counter-clockwise; each is (center, start_point, end_point, mesh_size, is_boundary); center:
             its centre [m]; start_point: where it begins [m]; end_point: where it ends [m]; mesh_size: length of
-            edges there [m] (default: the largest of the others); is_boundary: it bounds the mesh: what is outside is
-            cut off (default: the first piece does).
+            edges there [m] (default: the largest of the others); is_boundary: it bounds the mesh: the outside is
+            removed (default: the first piece does).
         group : the group that the new elements are in.
         set : the set of the group.
         """
@@ -440,8 +441,7 @@ class Mesh(Words):
         group: str | None = None,
         set: str | None = None,
     ) -> None:
-        """In the plane: triangles in the inside of closed lines, by Gmsh, that follow other lines and points as far as
-        these lie inside.
+        """In the plane: triangles inside closed lines, by Gmsh, that follow other lines and points inside.
 
         Parameters
         ----------
@@ -453,7 +453,7 @@ class Mesh(Words):
         point : points of the mesh; each is (array, layer, mesh_size); array: points; or a list of vectors [m];
             layer: layers of geometry; mesh_size: length of edges there [m] (default: the largest of the others).
         global_mesh_size : of pieces without one, and away from them [m] (default: the largest of the pieces).
-        tolerance : points nearer than this are one [m] (default: 1e-4).
+        tolerance : points nearer than this are merged [m] (default: 1e-4).
         group : the group that the new elements are in.
         set : the set of the group.
         """
@@ -466,7 +466,7 @@ class Mesh(Words):
         group: str | None = None,
         set: str | None = None,
     ) -> None:
-        """In the plane: triangles in the inside of a closed line, by Gmsh, with others in it that are holes, or filled.
+        """In the plane: triangles inside a closed line, by Gmsh, with inner lines that are holes or filled.
 
         Parameters
         ----------
@@ -534,18 +534,18 @@ class Mesh(Words):
         Parameters
         ----------
         file : name of the file.
-        group : a group that all elements are put into, besides those of the file.
+        group : a group for all elements, in addition to those of the file.
         set : the set of the group.
-        merge : points nearer than this are one [m] (default: 0).
+        merge : points nearer than this are merged [m] (default: 0).
         scale : metres in a unit of the file [m] (default: 1).
         """
     def intersect(self, layer: str, follow: bool = False) -> None:
-        """Joints on a layer become cracks: the edges of the mesh that lie on it.
+        """Turns the joints on a layer into cracks: the edges of the mesh that lie on it.
 
         Parameters
         ----------
         layer : its lines are edges of the mesh, its surfaces faces.
-        follow : they are not: the edges that follow them best are taken, the faces between elements on either side.
+        follow : they are not: uses the edges that follow them best, or the faces between elements on either side.
         """
     def glue(
         self,
@@ -555,13 +555,12 @@ class Mesh(Words):
         set: str | None = None,
         where: Where | None = None,
     ) -> None:
-        """Bodies that were meshed separately hang together where their faces lie on each other: these become joints, as
-        inside of a body. Elements are cut where points of others lie on their sides. With a range only faces of its
-        elements are glued, to any others.
+        """Connects separately meshed bodies where their faces coincide; the faces become joints like those inside a
+        body. Elements are cut at hanging nodes. With a range only faces of its elements are glued, to any others.
 
         Parameters
         ----------
-        tolerance : points nearer than this are one [m] (default: a thousandth of the shortest edge).
+        tolerance : points nearer than this are merged [m] (default: a thousandth of the shortest edge).
         between : only faces between the elements of these two groups.
         set : the set of the group.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
@@ -573,8 +572,9 @@ class Mesh(Words):
         *,
         where: Where | None = None,
     ) -> None:
-        """In the plane: quads are halved until they are short enough, before the first model or condition is assigned.
-        Neighbours follow, so that no side has more than one point on it; quads with such a point become triangles.
+        """In the plane: halves quads until they are short enough, before the first model or condition is assigned.
+        Neighbours are divided too, so that no side has more than one hanging node; quads with a hanging node become
+        triangles.
 
         Parameters
         ----------
@@ -583,47 +583,47 @@ class Mesh(Words):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def delete(self, *, where: Where | None = None) -> None:
-        """Elements are gone. Before the first model or condition is assigned the mesh is without them, and numbers of
-        others close up; later they are taken out, as by `elements.null`.
+        """Deletes elements. Before the first model or condition is assigned, they leave the mesh and the others are
+        renumbered; later they are excavated, as by `elements.null`.
 
         Parameters
         ----------
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def add_nodes(self, points: Sequence[Point]) -> None:
-        """More nodes, for elements that are added next, before the first model or condition is assigned. Their numbers
-        follow those of the mesh.
+        """Adds nodes for elements that follow, before the first model or condition is assigned. Their numbers follow
+        those of the mesh.
 
         Parameters
         ----------
         points : the nodes [m].
         """
     def add_element(self, *corners: int) -> None:
-        """One more element, by the numbers of its nodes.
+        """Adds an element by the numbers of its nodes.
 
         Parameters
         ----------
         corners : three or four, in three dimensions four.
         """
     def scale(self, factors: Point) -> None:
-        """Coordinates of all points of the mesh are multiplied, before the first model or condition is assigned.
+        """Multiplies the coordinates of all points of the mesh, before the first model or condition is assigned.
 
         Parameters
         ----------
         factors : along the axes, above 0.
         """
     def translate(self, way: Point) -> None:
-        """All points of the mesh are moved, before the first model or condition is assigned.
+        """Moves all points of the mesh, before the first model or condition is assigned.
 
         Parameters
         ----------
         way : where to [m].
         """
     def quadratic(self) -> None:
-        """In the plane: each triangle of the mesh becomes a six-node triangle, in which displacements are quadratic: a
-        beam bends with one of them through its height. It is stored as four elements, which go together; joints,
-        contact and loads act on the halves of its sides. Elastic. The mesh has triangles only; comes before the
-        first model or condition.
+        """In the plane: turns each triangle of the mesh into an elastic six-node triangle with quadratic displacements:
+        one over the height of a beam is enough for bending. It is stored as four connected elements; joints, contact
+        and loads act on the halves of its sides. The mesh must have triangles only; must precede the first model or
+        condition.
         """
     def quality(self) -> None:
         """Say in the log how good the mesh is: angles, sizes."""
@@ -679,14 +679,14 @@ class Elements(Stressed):
         """
     @overload
     def model(self, name: Literal["null"], *, relax: float | None = None, where: Where | None = None) -> None:
-        """The elements are taken out: excavated. Faces beside them become free. Another model in a range that names
-        them brings them back, as new material where the void is then, free of stress; they hang together with what
-        lies around them, without joints, until face-joint c-model gives them some.
+        """Removes (excavates) elements; adjacent faces become free. Assigning another model to them reinstates them as
+        new, stress-free material at the present position of the void, connected to its neighbours without joints
+        until face-joint c-model assigns some.
 
         Parameters
         ----------
-        relax : what they did to the others dies down over this time (static runs: so many steps) [s] (default: at
-            once).
+        relax : the forces of the removed elements decrease to 0 over this time (static runs: number of steps) [s]
+            (default: at once).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     @overload
@@ -708,7 +708,7 @@ class Elements(Stressed):
         damp_b: Value | None = None,
         where: Where | None = None,
     ) -> None:
-        """Elastic up to the strength of Mohr and Coulomb, or in tension, then plastic, for large rotations.
+        """Elastic up to the Mohr–Coulomb or tensile strength, then plastic, for large rotations.
 
         Parameters
         ----------
@@ -747,11 +747,11 @@ class Elements(Stressed):
         parameter: Sequence[tuple[str, Value]] = (),
         where: Where | None = None,
     ) -> None:
-        """A law in a Python file of the user, see docs/user_laws.md.
+        """A user law in a Python file, see docs/user_laws.md.
 
         Parameters
         ----------
-        law : 'file.py:law': the file, beside the script, and the name of the law in it; plain text.
+        law : 'file.py:law': the file, in the folder of the script, and the name of the law in it; plain text.
         density : density [kg/m3].
         young : Young's modulus E [Pa].
         poisson_ratio : Poisson's ratio.
@@ -788,8 +788,8 @@ class Elements(Stressed):
         friction: Value | None = None,
         where: Where | None = None,
     ) -> None:
-        """Elastic in its volume, creeping in its shape after Burgers while model creep is on, for large rotations.
-        Strain of the Kelvin unit goes with a stress that was there before.
+        """Burgers creep: elastic in volume, creeping in shear while model creep is on, for large rotations. An initial
+        strain of the Kelvin unit belongs to an initial stress.
 
         Parameters
         ----------
@@ -832,10 +832,10 @@ class Elements(Stressed):
         conductivity_dip: Value | None = None,
         where: Where | None = None,
     ) -> None:
-        """Heat conduction and thermal expansion. It acts beside the mechanical model of the elements, all of which need
-        it where one has it. Heat crosses joints until they break, and from then on passes from surface to surface
-        where they touch, with a transfer coefficient. At the temperatures of this moment elements are free of
-        thermal stress. Temperatures are those of any scale of degrees.
+        """Heat conduction and thermal expansion, in addition to the mechanical model. If one element has this model,
+        all elements need it. Heat is conducted across intact joints; broken joints transfer heat where their
+        surfaces are in contact, with a transfer coefficient. Elements are free of thermal stress at the present
+        temperatures. Temperatures may be in °C or K.
 
         Parameters
         ----------
@@ -886,9 +886,9 @@ class Elements(Stressed):
         where: Where | None = None,
     ) -> None:
         """Fluid in joints: each is a channel between its two nodes, broken or not, of the aperture aperature-initial
-        plus its mean opening, within the limits. It acts beside the mechanical model of the joint. Given again,
-        fluid that has no room any more is gone, and new room is dry. In space channels are the triangles of the
-        joints.
+        plus its mean opening, within the limits. It acts in addition to the mechanical model of the joint. If the
+        model is assigned again, excess fluid is removed, and new volume is dry. In space channels are the triangles
+        of the joints.
 
         Parameters
         ----------
@@ -958,9 +958,9 @@ class Elements(Stressed):
         proppant_stokes: bool | None = None,
         where: Where | None = None,
     ) -> None:
-        """Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, make it heavier
-        and more viscous, settle, and bridge where it is narrow. A node that is filled to the limit is a pack: no
-        grains pass it, fluid does, and the walls lean on it.
+        """Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, increase its
+        density and viscosity, settle, and bridge where the channel is narrow. A node that is filled to the limit is
+        a pack: fluid passes it, grains do not, and it carries the load of the walls.
 
         Parameters
         ----------
@@ -1019,8 +1019,8 @@ class Elements(Stressed):
         second_order: bool | None = None,
         where: Where | None = None,
     ) -> None:
-        """Heat in the fluid of joints with a hydraulic model, all of which need it where one has it, beside heat in the
-        elements. Fluid that has none yet has the temperature of the rock beside it. What comes in has the
+        """Heat in the fluid of joints with a hydraulic model, in addition to heat in the elements. If one channel has
+        this model, all channels need it. Fluid starts at the temperature of the adjacent rock; inflow has the
         temperature of its node.
 
         Parameters
@@ -1049,9 +1049,9 @@ class Elements(Stressed):
         pore_index: Value | None = None,
         where: Where | None = None,
     ) -> None:
-        """Diffusion of moisture, mass of water over dry mass, beside the mechanical model of the elements, all of which
-        need it where one has it. It crosses joints until they break. At the values of this moment elements are free
-        of the stress that it brings.
+        """Diffusion of moisture, mass of water over dry mass, in addition to the mechanical model. If one element has
+        this model, all elements need it. It crosses joints until they break. Elements are free of the stress that it
+        causes at the present values.
 
         Parameters
         ----------
@@ -1179,58 +1179,57 @@ class Elements(Stressed):
 
         Parameters
         ----------
-        law : 'file.py:law': the file, beside the script, and the name of the law in it; plain text.
+        law : 'file.py:law': the file, in the folder of the script, and the name of the law in it; plain text.
         """
     def null(self, *, relax: float | None = None, where: Where | None = None) -> None:
-        """The elements are taken out: excavated. Faces beside them become free. Another model in a range that names
-        them brings them back, as new material where the void is then, free of stress; they hang together with what
-        lies around them, without joints, until `joints.model` gives them some.
+        """Removes (excavates) elements; adjacent faces become free. Assigning another model to them reinstates them as
+        new, stress-free material at the present position of the void, connected to its neighbours without joints
+        until `joints.model` assigns some.
 
         Parameters
         ----------
-        relax : what they did to the others dies down over this time (static runs: so many steps) [s] (default: at
-            once).
+        relax : the forces of the removed elements decrease to 0 over this time (static runs: number of steps) [s]
+            (default: at once).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def hide(self, hidden: bool = True, *, where: Where | None = None) -> None:
-        """Elements are hidden from pictures and, where use-hidden is not said, from ranges; False: seen again. They go
-        on being computed.
+        """Hides elements from pictures and, without use-hidden, from ranges; False: shows them. They are still
+        computed.
 
         Parameters
         ----------
-        hidden : whether they are.
+        hidden : whether they are hidden.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def collision(self, on: bool, *, where: Where | None = None) -> None:
-        """Whether contact of these elements is looked for; False: others pass through them.
+        """Contact detection for these elements; False: others pass through them.
 
         Parameters
         ----------
-        on : whether they touch others.
+        on : whether contact is detected.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def water(self, surface: str, density: float, *, where: Where | None = None) -> None:
-        """Water stands before the surface of the model: its pressure, the depth below a water line times density and
-        gravity, pushes on all free faces of these elements that lie below the line, on parts of faces too, wherever
-        they move. Where the line, which goes from left to right, does not reach there is no water. Said again: it
-        takes the place of what was.
+        """Water pressure on the surface of the model: depth below a water line times density and gravity, on all free
+        faces of these elements below the line, also on parts of faces, as they move. The line runs from left to
+        right; beyond its ends is no water. The last command replaces earlier ones.
 
         Parameters
         ----------
         surface : layer of the water line, in three dimensions of planes and polygons.
-        density : of the water; 0: there is none any more [kg/m3].
+        density : of the water; 0: removes the water [kg/m3].
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def reset_state(self, *, where: Where | None = None) -> None:
-        """The plastic state of elements is forgotten. Elastic elements have none: the log says that nothing was
-        changed. Stresses stay; plastic strain is counted from here on.
+        """Resets the plastic state of elements; plastic strain starts at 0 again. Stresses stay. Elastic elements have
+        no such state, and the log reports that nothing changed.
 
         Parameters
         ----------
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def reset_kelvin_strain(self, *, where: Where | None = None) -> None:
-        """The Kelvin units of elements that creep are without strain from here on. Stresses and displacements stay.
+        """Sets the strain of the Kelvin units of creeping elements to 0. Stresses and displacements stay.
 
         Parameters
         ----------
@@ -1262,7 +1261,7 @@ class Faces(Fluxed):
         damping_ratio: Value | None = None,
         where: Where | None = None,
     ) -> None:
-        """Contact of surfaces: potential of the overlap, Coulomb friction. Of two surfaces the smaller value counts.
+        """Contact of surfaces: potential of the overlap, Coulomb friction. The smaller value of two surfaces applies.
 
         Parameters
         ----------
@@ -1330,8 +1329,8 @@ class Faces(Fluxed):
         incoming_z: Number | None = None,
         where: Where | None = None,
     ) -> None:
-        """Traction on surfaces: stress times the present normal. Tension is positive. Where it is not 0 it is the
-        total: water before the face does not push besides.
+        """Traction on surfaces: stress times the present normal. Tension is positive. Where it is not 0, it is the
+        total traction: water pressure on the face is not added.
 
         Parameters
         ----------
@@ -1343,11 +1342,11 @@ class Faces(Fluxed):
         yz : stress yz [Pa] (in three dimensions).
         normal : stress along the normal, which turns with the surface; negative is pressure [Pa].
         dip : shear stress along the surface, counter-clockwise about the body [Pa] (in the plane).
-        quiet : dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress given beside it
+        quiet : dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress given with it
             enters as a wave of half its size.
         incoming_x : velocity along x of a plane wave that comes in through quiet faces [m/s].
-        incoming_y : the same along y [m/s].
-        incoming_z : the same along z [m/s] (in three dimensions).
+        incoming_y : velocity along y of that wave [m/s].
+        incoming_z : velocity along z of that wave [m/s] (in three dimensions).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def heat(
@@ -1358,8 +1357,8 @@ class Faces(Fluxed):
         environment_temperature: Number | None = None,
         where: Where | None = None,
     ) -> None:
-        """Heat through surfaces, which are adiabatic without it; faces that are inside begin with it when they are
-        free. Times of tables are those of heat.
+        """Heat through surfaces, which are adiabatic without it; inner faces follow it once they are free. Times of
+        tables are those of heat.
 
         Parameters
         ----------
@@ -1369,10 +1368,10 @@ class Faces(Fluxed):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def free_field(self, *, where: Where | None = None) -> None:
-        """Vertical sides beyond which the ground goes True: a column with the elements of the side and the base of the
-        model there, velocity or quiet faces, moves beside each, and the side has its stress and dashpots that see
-        the difference of both motions. The nodes of the side are held by the forces that they have now, so the
-        conditions of the static stage can go.
+        """Free-field boundary on vertical sides: a column with the elements of the side and the base motion of the
+        model (velocity or quiet faces) moves next to each side, which gets its stress and dashpots on the difference
+        of both motions. The present forces keep the nodes of the side in equilibrium, so remove the conditions of
+        the static stage.
 
         Parameters
         ----------
@@ -1411,8 +1410,8 @@ class Joints(Objects):
         np: int | None = None,
         where: Where | None = None,
     ) -> None:
-        """Cohesive joints between elements: they hold up to their strength, soften, break, and are contacts from then
-        on.
+        """Cohesive joints between elements: intact up to their strength, then they soften and break, and are contacts
+        afterwards.
 
         Parameters
         ----------
@@ -1442,9 +1441,9 @@ class Joints(Objects):
         dilation_limit: Value | None = None,
         where: Where | None = None,
     ) -> None:
-        """Joints that were there before, as springs: sigma = normal-stiffness opening, tau = shear-stiffness slip, at
-        most cohesion - sigma tan friction. They slide, open and close and never break. A point that opens against
-        its tensile strength loses that and its cohesion.
+        """Pre-existing joints, as springs: sigma = normal-stiffness opening, tau = shear-stiffness slip, at most
+        cohesion - sigma tan friction. They slide, open and close and never break. A point that opens beyond its
+        tensile strength loses that strength and its cohesion.
 
         Parameters
         ----------
@@ -1472,11 +1471,10 @@ class Joints(Objects):
         dilation_part: Value | None = None,
         where: Where | None = None,
     ) -> None:
-        """Rough joints that were there before: closure v under the pressure normal-stiffness v / (1 - v /
-        closure-maximum), from the pressure jcs on along the tangent; shear strength by the angle residual-friction +
-        m jrc log10(jcs / pressure), at most 70 degrees, m: roughness that is mobilised or worn, by the path over
-        joint-size / 500 (jrc / joint-size)^0.33; dilation by dilation-part of the part with m. They slide, open and
-        close and never break.
+        """Pre-existing rough joints: closure v under the pressure normal-stiffness v / (1 - v / closure-maximum), from
+        the pressure jcs on along the tangent; shear strength by the angle residual-friction + m jrc log10(jcs /
+        pressure), at most 70 degrees, m: roughness that is mobilised or worn, by the path over joint-size / 500 (jrc
+        / joint-size)^0.33; dilation by dilation-part of the part with m. They slide, open and close and never break.
 
         Parameters
         ----------
@@ -1519,9 +1517,9 @@ class Joints(Objects):
         where: Where | None = None,
     ) -> None:
         """Fluid in joints: each is a channel between its two nodes, broken or not, of the aperture aperature-initial
-        plus its mean opening, within the limits. It acts beside the mechanical model of the joint. Given again,
-        fluid that has no room any more is gone, and new room is dry. In space channels are the triangles of the
-        joints.
+        plus its mean opening, within the limits. It acts in addition to the mechanical model of the joint. If the
+        model is assigned again, excess fluid is removed, and new volume is dry. In space channels are the triangles
+        of the joints.
 
         Parameters
         ----------
@@ -1591,9 +1589,9 @@ class Joints(Objects):
         proppant_stokes: bool | None = None,
         where: Where | None = None,
     ) -> None:
-        """Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, make it heavier
-        and more viscous, settle, and bridge where it is narrow. A node that is filled to the limit is a pack: no
-        grains pass it, fluid does, and the walls lean on it.
+        """Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, increase its
+        density and viscosity, settle, and bridge where the channel is narrow. A node that is filled to the limit is
+        a pack: fluid passes it, grains do not, and it carries the load of the walls.
 
         Parameters
         ----------
@@ -1652,8 +1650,8 @@ class Joints(Objects):
         second_order: bool | None = None,
         where: Where | None = None,
     ) -> None:
-        """Heat in the fluid of joints with a hydraulic model, all of which need it where one has it, beside heat in the
-        elements. Fluid that has none yet has the temperature of the rock beside it. What comes in has the
+        """Heat in the fluid of joints with a hydraulic model, in addition to heat in the elements. If one channel has
+        this model, all channels need it. Fluid starts at the temperature of the adjacent rock; inflow has the
         temperature of its node.
 
         Parameters
@@ -1805,8 +1803,8 @@ class Joints(Objects):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def reset_state(self, *, where: Where | None = None) -> None:
-        """Damage of joints that are not broken is forgotten. Those that slide forget that they are torn, not what has
-        slid.
+        """Resets the damage of joints that are not broken. Sliding joints regain their tensile strength and cohesion
+        but keep their slip.
 
         Parameters
         ----------
@@ -1870,9 +1868,8 @@ class Nodes(Moved):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def damp(self, local: float, *, where: Where | None = None) -> None:
-        """Local damping of nodes: what drives one is less by this part of its size against its motion, in dynamic runs
-        (without it there is none) and in static ones (0.8). The stable time step is shorter by the root of 1 +
-        damping.
+        """Local damping of nodes: a force against the motion, of this part of the size of the unbalanced force.
+        Default: 0 in dynamic runs, 0.8 in static runs. It divides the stable time step by the root of 1 + damping.
 
         Parameters
         ----------
@@ -1888,16 +1885,16 @@ class Nodes(Moved):
         where: Where | None = None,
     ) -> None:
         """Fluid at nodes, one of the three at each; times of tables are those of flow. With a range, pressure and
-        flow_surface wet the free faces whose nodes all lie in it: water stands before them and pushes on them,
-        whether channels end there or not. Without a range they apply to the fluid in joints only.
+        flow_surface load the free faces whose nodes all lie in it with water pressure, with or without channels
+        there. Without a range they apply to the fluid in joints only.
 
         Parameters
         ----------
         pressure : pressure, not negative [Pa].
-        flow_surface : level of water that stands at the nodes, against gravity, or a point of its surface:
+        flow_surface : water level at the nodes, measured against gravity, or a point of the water surface:
             hydrostatic pressure below it; above it water can leave (seepage) [m].
-        flow_rate : volume that comes in at each node; negative: is taken out, as far as there is fluid; in space
-            m3/s [m2/s].
+        flow_rate : inflow volume at each node; negative: outflow, limited to the available fluid; in space m3/s
+            [m2/s].
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def proppant(
@@ -1907,15 +1904,15 @@ class Nodes(Moved):
         proppant_volumetric_flow_rate: Number | None = None,
         where: Where | None = None,
     ) -> None:
-        """Proppant that comes in at flow nodes, of wells too, one of these; times of tables are those of flow. A node
-        that is packed takes none.
+        """Proppant inflow at flow nodes, also of wells; give one of the two. Times of tables are those of flow; a
+        packed node accepts none.
 
         Parameters
         ----------
         proppant_volumetric_concentration : concentration of the slurry that conditions and wells bring: volume of
             grains over that of the slurry.
-        proppant_volumetric_flow_rate : volume of grains that comes in at each node, in the slurry that is there; in
-            space m3/s [m2/s].
+        proppant_volumetric_flow_rate : volume of grains that enters each node, added to its slurry; in space m3/s
+            [m2/s].
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def temperature(self, temperature: Number, *, where: Where | None = None) -> None:
@@ -1927,7 +1924,7 @@ class Nodes(Moved):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def fluid_temperature(self, temperature: Number, *, where: Where | None = None) -> None:
-        """Temperature of the fluid at flow nodes, as of what is injected there; times of tables are those of heat.
+        """Temperature of the fluid at flow nodes, for example of injected fluid; times of tables are those of heat.
 
         Parameters
         ----------
@@ -1958,14 +1955,14 @@ class Nodes(Moved):
 
         Parameters
         ----------
-        temperature : temperature, of the fluid at them too; before, it is 0. Elements around the nodes are free of
-            thermal stress then [K].
+        temperature : temperature, also of the fluid at the nodes; initially 0. Elements around the nodes are free of
+            thermal stress at this temperature [K].
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def reset_velocity(self) -> None:
-        """All velocities become zero."""
+        """Sets all velocities to 0."""
     def reset_displacement(self) -> None:
-        """Displacements are counted from here."""
+        """Sets all displacements to 0."""
 
 class Bolts(Objects):
     """Rock bolts: `sim.bolts["axial-force"]` is that of their elements, see `Objects`."""
@@ -1993,19 +1990,19 @@ class Bolts(Objects):
         group: str | None = None,
         set: str | None = None,
     ) -> None:
-        """Installs a rock bolt along these points, as things are now: at any stage of a run. It is divided at the edges
-        of elements, or as said. Nodes go with the rock across the bar, and are tied to it along the bar by grout,
-        under the plate altogether; where the rock is taken out they are free. Bolts have no weight and no stiffness
-        in bending.
+        """Installs a rock bolt along these points at their present positions, at any stage of a run. It is divided at
+        the edges of elements, or as given. Nodes follow the rock across the bar and are coupled along it by grout;
+        under the plate in all directions. Where the rock is removed they are free. Bolts have no weight and no
+        stiffness in bending.
 
         Parameters
         ----------
         points : the points, from the head on; or a list of vectors [m].
         segments : elements of each straight part.
         length : of an element, at most [m] (default: to the edges of the elements of the mesh).
-        grout : from where to where along the bolt there is grout; without the rest is free [m] (default: all of it).
-        plate : the first node is tied to the rock: a face plate.
-        group : the group that its elements and nodes are put into (default: none).
+        grout : start and end of the grout along the bolt; the rest is free [m] (default: all of it).
+        plate : fixes the first node to the rock by a face plate.
+        group : the group of its elements and nodes (default: none).
         set : the set of the group.
         """
     def between(
@@ -2018,15 +2015,15 @@ class Bolts(Objects):
         set: str | None = None,
         where: Where | None = None,
     ) -> None:
-        """Installs a rock bolt from a point to another, as `bolts.create`, in the parts of the way that lie in the
-        rock: each is a bolt. With a range only in these elements.
+        """Installs rock bolts between two points, as `bolts.create`: each part of the line inside the rock becomes a
+        bolt. With a range only in these elements.
 
         Parameters
         ----------
         first : head [m].
         second : end [m].
         mesh_size : length of its elements, at most [m] (default: 0.2).
-        group : the group that its elements and nodes are put into (default: none).
+        group : the group of its elements and nodes (default: none).
         set : the set of the group.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -2051,13 +2048,12 @@ class Bolts(Objects):
         damp_factor: float | None = None,
         where: Where | None = None,
     ) -> None:
-        """Bars with one force along them, elastic and perfectly plastic, in grout that slips at its strength. Forces
-        and stiffness are those of one bolt; the model divides them by the spacing. The strength of the grout per
-        length is the smaller of pi (diameter + 2 grout-thickness) (cohesion-rock-grout - sigma tan
-        friction-rock-grout) and pi diameter (cohesion-grout-bolt - sigma tan friction-grout-bolt), sigma: stress
-        across the bar in the rock if it is pressure, in space the mean in all directions across. Given again, the
-        force in the bar stays, but for the difference of the pretension. In space each bolt is there by itself:
-        spacing is 1.
+        """Bars with an axial force only, elastic and perfectly plastic, in grout that slips at its strength. Forces and
+        stiffness are those of one bolt; the model divides them by the spacing. The strength of the grout per length
+        is the smaller of pi (diameter + 2 grout-thickness) (cohesion-rock-grout - sigma tan friction-rock-grout) and
+        pi diameter (cohesion-grout-bolt - sigma tan friction-grout-bolt), sigma: stress across the bar in the rock
+        if it is pressure, in space the mean in all directions across. If the model is assigned again, the force in
+        the bar changes only by the difference of the pretension. In space each bolt is a single bolt: spacing is 1.
 
         Parameters
         ----------
@@ -2082,8 +2078,8 @@ class Bolts(Objects):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def delete(self, *, where: Where | None = None) -> None:
-        """Takes elements of bolts out at once, with their part of the grout. Their numbers go with them, those of the
-        others stay; without RANGE all of them.
+        """Removes elements of bolts with their part of the grout at once; without RANGE all of them. The numbers of the
+        others stay.
 
         Parameters
         ----------
@@ -2116,8 +2112,8 @@ class BoltNodes(Conditioned):
         az: Number | None = None,
         where: Where | None = None,
     ) -> None:
-        """Velocity or acceleration of nodes of bolts. Components that are not given stay free: along the bar by its
-        forces, across it with the rock.
+        """Velocity or acceleration of nodes of bolts. Other components stay free: along the bar nodes follow its
+        forces, across it the rock.
 
         Parameters
         ----------
@@ -2137,7 +2133,7 @@ class BoltNodes(Conditioned):
         fz: Number | None = None,
         where: Where | None = None,
     ) -> None:
-        """Force on each node of one bolt; across the bar the rock takes it.
+        """Force on each node of one bolt; the rock carries the component across the bar.
 
         Parameters
         ----------
@@ -2161,14 +2157,14 @@ class FlowNodes(GroupedElsewhere):
         concentration: float | None = None,
         where: Where | None = None,
     ) -> None:
-        """Fluid that the flow nodes (nodes at which a channel ends) among these nodes hold now; before, channels are
-        dry.
+        """Sets the present fluid of the flow nodes (nodes at which a channel ends) among these nodes; channels are
+        initially dry.
 
         Parameters
         ----------
         pressure : filled, at this pressure [Pa].
-        saturation : part of the room that is filled.
-        concentration : of proppant in the fluid that is there.
+        saturation : filled part of the volume.
+        concentration : of proppant in the present fluid.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def initial_temperature(self, temperature: float, *, where: Where | None = None) -> None:
@@ -2190,8 +2186,9 @@ class Channels(GroupedElsewhere):
 class Wells(Named):
     """Wells: `sim.wells["injection"]` is what one has now: pressure [Pa], rate [m2/s], injected [m2], stage."""
     def create(self, name: str, *, where: Where | None = None) -> None:
-        """Flow nodes of a range are a well: one room, whose pressure is that at its highest node. Stages say what it
-        does; without one it is shut in. Its water pushes on free faces whose nodes all lie in the range.
+        """Makes a well of the flow nodes of a range: one connected volume, whose pressure is that at its highest node.
+        Stages control it; without a stage it is shut in. Its water loads the free faces whose nodes all lie in the
+        range.
 
         Parameters
         ----------
@@ -2208,17 +2205,17 @@ class Wells(Named):
         time: float | None = None,
         limit: float | None = None,
     ) -> None:
-        """One more stage of a well, after those that it has; one without time that has begun ends now. After the last
-        the well is shut in. Times of tables are those of flow.
+        """Appends a stage to a well; a stage without time that has begun ends now. After the last stage the well is
+        shut in. Times of tables are those of flow.
 
         Parameters
         ----------
         name : name.
-        rate : volume that is pumped in; negative: drawn, as far as there is fluid; in space m3/s [m2/s].
-        pressure : pressure that is held [Pa].
-        shut_in : nothing comes in or out.
-        time : time of flow that it takes [s] (default: no end).
-        limit : with rate: pressure above which less is pumped in [Pa] (default: none).
+        rate : injected volume; negative: produced, limited to the available fluid; in space m3/s [m2/s].
+        pressure : prescribed pressure [Pa].
+        shut_in : no flow in or out.
+        time : duration, in time of flow [s] (default: no end).
+        limit : with rate: pressure above which the rate is reduced [Pa] (default: none).
         """
 
 class Liners(Objects):
@@ -2237,14 +2234,14 @@ class Liners(Objects):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def create(self, *, group: str | None = None, set: str | None = None, where: Where | None = None) -> None:
-        """Puts a liner on the free faces that the range chooses, as things are now: at any stage of a run, without
-        force in it. A face has one beam, in space a triangle; where faces or liners meet at a point, in space along
-        an edge, of the mesh they are joined, also around a closed opening. Liners have weight, and no contact of
-        their own: what pushes them is the rock of their faces.
+        """Installs a stress-free liner on the selected free faces at their present positions, at any stage of a run. A
+        face gets one beam, in space one triangle; liners that share a point, in space an edge, of the mesh are
+        connected, also around a closed opening. Liners have weight but no contact: the rock of their faces loads
+        them.
 
         Parameters
         ----------
-        group : the group that its elements and nodes are put into (default: none).
+        group : the group of its elements and nodes (default: none).
         set : the set of the group.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -2268,13 +2265,13 @@ class Liners(Objects):
         bond_friction: float | None = None,
         where: Where | None = None,
     ) -> None:
-        """In the plane beams in plane strain, of a metre of its thickness, elastic and perfectly plastic. Either a
-        shell of a thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0. The axial
-        force is held between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N + Nc) / (Nt
-        + Nc)^2: what a rectangle bears that is plastic all over. In space flat shells of a thickness, whose forces
-        and moments are held so in their principal directions. The bond to the rock is elastic, slips at
-        bond-cohesion + pressure tan(bond-friction), and parts for good above bond-tensile-strength. Given again,
-        what elements carry stays.
+        """In the plane beams in plane strain, per metre of thickness, elastic and perfectly plastic. Either a shell
+        with a thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0. The axial force
+        stays between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N + Nc) / (Nt +
+        Nc)^2: the limit of a fully plastic rectangular section. In space flat shells with a thickness, whose forces
+        and moments have these limits in their principal directions. The bond to the rock is elastic, slips at
+        bond-cohesion + pressure tan(bond-friction), and parts for good above bond-tensile-strength. If the model is
+        assigned again, the forces in elements stay.
 
         Parameters
         ----------
@@ -2297,8 +2294,7 @@ class Liners(Objects):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def delete(self, *, where: Where | None = None) -> None:
-        """Takes elements of liners out at once. Their numbers go with them, those of the others stay; without RANGE all
-        of them.
+        """Removes elements of liners at once; without RANGE all of them. The numbers of the others stay.
 
         Parameters
         ----------
@@ -2357,7 +2353,7 @@ class LinerNodes(Objects):
         moment_z: Number | None = None,
         where: Where | None = None,
     ) -> None:
-        """Force and moment on each node of a liner, in the plane of a metre of thickness.
+        """Force and moment on each node of a liner, in the plane per metre of thickness.
 
         Parameters
         ----------
@@ -2381,7 +2377,7 @@ class LinerNodes(Objects):
 class Tables(Tabled):
     """Functions of time for conditions, or of a coordinate for properties; linear from point to point."""
     def delete(self, name: str) -> None:
-        """Forgets a table.
+        """Deletes a table.
 
         Parameters
         ----------
@@ -2403,9 +2399,9 @@ class Fields(Random):
         least: float | None = None,
         greatest: float | None = None,
     ) -> None:
-        """A random field: properties that differ from element to element, face to face, joint to joint. Where several
-        properties take the same field they are drawn together; another seed is another, independent field. What was
-        drawn stays, whatever becomes of the field.
+        """Creates a random field: properties that differ between elements, faces or joints. Properties that use one
+        field are fully correlated; another seed gives an independent field. Assigned values stay when the field is
+        changed or deleted.
 
         Parameters
         ----------
@@ -2413,15 +2409,15 @@ class Fields(Random):
         weibull : scale (63 % of the values are below it) and shape.
         normal : mean and standard deviation.
         lognormal : mean and standard deviation of the values themselves.
-        seed : another seed, another field.
-        correlation : over this length neighbours are alike: the field is one of places, the same in any mesh [m]
-            (default: each object by itself).
+        seed : seed of the random numbers: each seed gives another field.
+        correlation : correlation length; the field depends on positions, not on the mesh [m] (default: objects are
+            independent).
         covariance : exp(-r/L), or exp(-(r/L)2), which is smooth (default: exponential).
-        least : the distribution is cut below (default: none).
-        greatest : the distribution is cut above (default: none).
+        least : lower bound of the distribution (default: none).
+        greatest : upper bound of the distribution (default: none).
         """
     def delete(self, name: str) -> None:
-        """Forgets a random field; what was drawn from it stays.
+        """Deletes a random field; assigned values stay.
 
         Parameters
         ----------
@@ -2489,8 +2485,8 @@ class Charts(Words):
         scale_x : factor (default: 1).
         scale_y : factor (default: 1).
         values : points (x,y).
-        profile : of the fluid as it is now, along the line that the joints of the range make, over the distance [m]
-            from its left end (in the plane).
+        profile : present values of the fluid along the line of the joints of the range, over the distance [m] from
+            its left end (in the plane).
         label : in the legend.
         style : how it is drawn (default: line).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
@@ -2510,16 +2506,16 @@ class Charts(Words):
         ----------
         name : name.
         file : name of the figure: .png, .pdf or .svg.
-        cracks : beside it the model as it is now, with its cracks by the way they broke.
-        plastic : beside it the model as it is now, with contours of plastic shear strain.
-        fluid : beside it the model as it is now, its channels coloured by that.
-        temperature : beside it the model as it is now, with contours of temperature, and cracks.
+        cracks : adds the present model, with its cracks by mode.
+        plastic : adds the present model with contours of plastic shear strain.
+        fluid : adds the present model with channels coloured by this value.
+        temperature : adds the present model with contours of temperature, and cracks.
         """
 
 class Output(Words):
     """Frames for ParaView."""
     def vtk(self, file: File, every: int | None = None, *, off: bool = False) -> None:
-        """Frames for ParaView: now, and every so many steps.
+        """Writes frames for ParaView: now, and with every at an interval of steps.
 
         Parameters
         ----------
@@ -2551,34 +2547,33 @@ class Output(Words):
         title: str | None = None,
         where: Where | None = None,
     ) -> None:
-        """A picture of the model as it is now, `<name>_<step>.png`, of any field that frames have.
+        """Draws the present model, `<name>_<step>.png`, with any field of frames.
 
         Parameters
         ----------
-        file : first part of the name, in the folder of the results; .pdf, .svg or .png at its end says what is
-            drawn.
-        view : what is shown, as a file *.mv says, of hpcdem view or hpcdem draw (default: everything).
-        field : what colours objects; hpcdem draw --list names the fields of a frame.
-        object : of which objects the field and the options below are (default: the first that have the field).
-        limits : values of the first and the last colour (default: those that 1 % of what is shown is below or
-            above).
-        full : in the place of limits: the least and the greatest value of what is shown.
-        log : colours by the logarithm.
+        file : first part of the name, in the folder of the results; the ending .pdf, .svg or .png selects the
+            format.
+        view : view file *.mv of hpcdem view or hpcdem draw (default: everything).
+        field : field of the colours; hpcdem draw --list lists the fields of a frame.
+        object : objects to which the field and the options below apply (default: the first that have the field).
+        limits : values of the first and the last colour (default: the 1 % and 99 % quantiles of the shown values).
+        full : instead of limits: minimum and maximum of the shown values.
+        log : logarithmic colours.
         colours : of the field (default: viridis).
         opacity : from 0 to 1 (default: 1).
         edges : outlines of elements.
         size : factor on widths of lines (default: 1).
         vectors : arrows: displacement or velocity.
         arrows : factor on their length (default: 1).
-        filter : only objects for which this holds, as 'stress_yy < -1e6 and x > 2'.
+        filter : only objects that satisfy this condition, for example 'stress_yy < -1e6 and x > 2'.
         deformed : factor on displacements (default: 1).
         camera : lower left and upper right corner of the picture, in space along it and up it [m] (default: the
             model).
-        eye : from where a body is seen: along an axis, from the right, the front and above (iso), or from a
-            direction (in three dimensions; default: 'iso').
-        section : a plane that cuts it: 'x=1.5' takes the part towards the eye away, 'x<1.5' and 'x>1.5' say what
-            stays, 'px,py,pz,nx,ny,nz' gives a point and the normal into what is taken away (in three dimensions;
-            default: whole).
+        eye : position of the viewer: along an axis, from the right, the front and above (iso), or in a direction (in
+            three dimensions; default: 'iso').
+        section : a cutting plane: 'x=1.5' removes the part towards the eye, 'x<1.5' and 'x>1.5' keep one side,
+            'px,py,pz,nx,ny,nz' gives a point and the normal into the removed part (in three dimensions; default:
+            whole).
         title : over the picture; {step} and {time} are filled in.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -2641,24 +2636,22 @@ class BlockCommands(Clocks):
         ----------
         dynamic : true motion in time; False: static, towards equilibrium (default: True).
         collision : contact of surfaces (default: True).
-        overlap : of bodies that overlap before the first step: refuse it, with the places; let a static stage move
-            them apart; or start as they are (default: refuse).
-        deep_overlap : of bodies that come to overlap by more than a tenth of an altitude of an element: say where,
-            or end the run there (default: warn).
-        potential : what contact presses with: the distance to the nearest side of an element over the usual altitude
-            in its body, or four times the smallest of its barycentric coordinates (in three dimensions; default:
-            distance).
-        mechanical : motion of blocks; False: they stand still while fluid or heat flows (default: True).
-        large_strain : rotations of elements are taken into account (default: True).
+        overlap : bodies that overlap before the first step: reject them, with their positions; separate them in a
+            static stage; or start with the overlap (default: refuse).
+        deep_overlap : bodies that overlap by more than a tenth of an altitude of an element during the run: report
+            where, or end the run (default: warn).
+        potential : potential of contact: distance to the nearest face of an element over the typical altitude in its
+            body, or four times the smallest barycentric coordinate (in three dimensions; default: distance).
+        mechanical : motion of blocks; False: blocks are fixed while fluid or heat flows (default: True).
+        large_strain : rotations of elements are included (default: True).
         energy : keep the energy budget from here on, in dynamic runs: `energies`, histories of the model, a table at
             the end.
-        hydraulic : flow of fluid in joints that have a hydraulic model; False: pressures stay as they are and go on
-            pushing, so that blocks come to rest at them (default: True).
-        one_way : fluid follows the blocks, but does not push on them.
-        thermal : heat flows in elements that have a thermal model; False: temperatures, and the stress that they
-            bring, stay as they are (default: True).
-        proppant : grains move in the fluid of channels that carry them; False: they stay where they are (default:
-            True).
+        hydraulic : flow in joints with a hydraulic model; False: pressures are frozen and keep loading the blocks
+            (default: True).
+        one_way : fluid follows the blocks but does not load them.
+        thermal : heat flow in elements with a thermal model; False: temperatures and thermal stress are frozen
+            (default: True).
+        proppant : motion of grains in channels that carry proppant; False: grains are fixed (default: True).
         """
     def time_step(
         self,
@@ -2672,17 +2665,18 @@ class BlockCommands(Clocks):
         thermal: float | None = None,
     ) -> None:
         """The time step of dynamic runs. In static runs a step is one unit of time. Without this command it is
-        estimated at the first step and after each change of the model. Of value, mass_scaling and auto on the one
-        said last holds and ends the others.
+        estimated at the first step and after each change of the model. The last of value, mass_scaling and auto on
+        applies and replaces the others.
 
         Parameters
         ----------
-        value : the time step itself; 0: estimated again; a table over the time is looked at every 100 steps [s].
+        value : the time step; 0: estimated again; a table over time is evaluated every 100 steps [s].
         auto : True: estimated again every 100 steps; False: at the first step and after changes of the model only; a
             value stays.
         update_frequency : with auto: steps after which it is estimated again (default: 100).
-        safety : part of the stability limit that is taken, by estimates and mass_scaling (default: 0.8).
-        mass_scaling : nodes get as much mass as this time step needs; 0: none, and the step is estimated again [s].
+        safety : part of the stability limit that estimates and mass_scaling use (default: 0.8).
+        mass_scaling : mass is added to nodes as this time step requires; 0: none, and the step is estimated again
+            [s].
         hydraulic : sub-step of flow, which then has a clock of its own; 0: those of a cycle take the time of the
             steps of the blocks, or without motion half of what is stable [s] (default: 0).
         thermal : sub-step of heat, which then has a clock of its own; 0: those of a cycle take the time of the steps
@@ -2718,26 +2712,26 @@ class BlockCommands(Clocks):
         Parameters
         ----------
         field : its name.
-        flows : False: values, and the stress that they bring, stay as they are (default: True).
+        flows : False: values and the stress that they cause are frozen (default: True).
         time_step : sub-step of the field, which then has a clock of its own; 0: those of a cycle take the time of
             the steps of the blocks, or without motion 0.9 of what is stable [s] (default: 0).
         sub_steps : in a cycle; 0: as many as are stable (default: 0).
-        current_time : what its clock shows now [s].
+        current_time : present time of its clock [s].
         """
     def run_time(self, time: float) -> None:
-        """The time that `solve` takes at most from now on, from its beginning or from the start-time of model reset;
-        without another aim each `solve` goes on for it. In static runs without creep no time passes.
+        """Maximum simulated time of each following `solve`, counted from its start or from the start-time of model
+        reset; without another criterion `solve` runs for this time. No time passes in static runs without creep.
 
         Parameters
         ----------
-        time : 0: no end any more [s].
+        time : 0: no limit [s].
         """
     def solve_check(self, steps: int) -> None:
-        """Steps between two looks at the ratio in `solve`.
+        """Steps between two checks of the ratio in `solve`.
 
         Parameters
         ----------
-        steps : in static runs 50, in dynamic ones 100 without this command.
+        steps : default: 50 in static runs, 100 in dynamic runs.
         """
     def rayleigh(
         self,
@@ -2746,14 +2740,14 @@ class BlockCommands(Clocks):
         frequency: float | None = None,
         part: Literal["both", "mass", "stiffness"] | None = None,
     ) -> None:
-        """Rayleigh damping of elements in dynamic runs, beside that of their damp-factor: alpha times the mass, beta
+        """Rayleigh damping of elements in dynamic runs, in addition to their damp-factor: alpha times the mass, beta
         times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + pi beta f.
 
         Parameters
         ----------
-        ratio : part of the critical damping at the frequency; 0: none any more.
-        frequency : where the ratio is this; with both parts it is least there [Hz].
-        part : both, or one of them alone (default: both).
+        ratio : part of the critical damping at the frequency; 0: no Rayleigh damping.
+        frequency : frequency at which this ratio applies; with both parts the ratio is least there [Hz].
+        part : both parts, or one of them (default: both).
         """
     def creep(
         self,
@@ -2764,31 +2758,31 @@ class BlockCommands(Clocks):
         least: float | None = None,
         greatest: float | None = None,
     ) -> None:
-        """Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time passes with the time of
-        the model. In static runs `solve` time makes it pass, in creep steps, each of which ends in balance; `every`
-        of histories and frames then counts creep steps.
+        """Switches creep of elements of mech-burgers on or off. In dynamic runs creep time passes with the time of the
+        model. In static runs `solve` time advances it in creep steps, each of which ends in equilibrium; `every` of
+        histories and frames then counts creep steps.
 
         Parameters
         ----------
         on : whether they creep.
         dt : creep step of static runs; with change the first one [s].
-        change : the creep step follows this change of stress: the largest of the deviators of elements and of their
-            Kelvin dashpots in a creep step, over the largest deviator of all; from one to the next it halves or
-            doubles at most (default: dt stays).
+        change : the creep step is adapted to this change of stress: the largest change of the deviators of elements
+            and of their Kelvin dashpots in a creep step, over the largest deviator; the step at most halves or
+            doubles each time (default: dt stays).
         least : with change: shortest creep step [s] (default: dt / 100).
         greatest : with change: longest creep step [s] (default: 100 dt).
         """
     def plane_stress(self) -> None:
-        """In the plane: the model is a plate of a metre of thickness whose two faces bear nothing: the stress across
-        the plane is 0, in elements that are elastic, yield or creep, and with heat. It comes before element initial
-        and before the first step. A law of the user must give 0 for that stress itself.
+        """In the plane: plane stress: a plate of unit thickness with stress-free faces; the stress across the plane is
+        0 in elastic, yielding and creeping elements, also with heat. Must precede element initial and the first
+        step. A user law must return 0 for the out-of-plane stress.
         """
     def plane_strain(self) -> None:
-        """In the plane: nothing moves across the plane. Models of the plane are in plane strain unless `plane_stress`
-        says otherwise; it takes that back.
+        """In the plane: plane strain: no strain across the plane. This is the default of models in two dimensions; the
+        command revokes `plane_stress`.
         """
     def tell_devices(self) -> None:
-        """Says in the log what the run computes with: ranks, threads, cores."""
+        """Reports the ranks, threads and cores of the run in the log."""
     def step(self, n: int) -> None:
         """So many steps of the blocks, and of the particles that are coupled to them.
 
@@ -2815,39 +2809,40 @@ class BlockCommands(Clocks):
         solver: Literal["auto", "direct", "petsc"] | None = None,
         steps: int | None = None,
     ) -> None:
-        """Steps until the first of ratio, cycles, time and run_time is reached. Without any of them it is ratio 1e-5 or
-        10 000 cycles; a warning says if it was the cycles. With elastic: straight to static equilibrium by Newton's
-        method, for blocks that are elastic or yield, whose joints stay before their peak and whose surfaces do not
-        touch. A run towards a ratio that gets nowhere (window, limit) ends the script with exit code 3 and names the
-        body that slides away; `solved['reason']` says how a run ended.
+        """Steps until the first of ratio, cycles, time and run_time is reached. Without any of them: ratio 1e-5 or 10
+        000 cycles, with a warning if the cycles end it. With elastic: static equilibrium by Newton's method, for
+        elastic or yielding blocks whose joints are not past their peak and whose surfaces are not in contact. A run
+        that does not converge to its ratio (window, limit) ends the script with exit code 3 and names the body that
+        slides away; `solved['reason']` is the reason why a run ended.
 
         Parameters
         ----------
         ratio : unbalanced over all forces of the nodes; with elastic: 1e-8, and as far below as rounding allows.
         cycles : steps; with elastic: units of time (1) for which prescribed velocities act.
-        time : time that passes; in static runs creep time, each creep step to its ratio (1e-5), or with elastic at
-            once [s].
+        time : simulated time; in static runs creep time, with each creep step solved to its ratio (1e-5), or
+            directly with elastic [s].
         run_time : as `run_time`, for this command alone [s].
-        window : towards a ratio: it has failed when the least ratio has not fallen by a tenth in so many steps, nor
-            in as many as the progress so far took; 0: never (default: static runs: ten times as many as a wave takes
-            there and back, at least 20 000; dynamic ones, and beside cycles or time: 0).
-        limit : towards a ratio: it has failed after so many steps; 0: never (default: static runs 1 000 000, dynamic
-            ones 10 000 000; beside time: 0).
-        on_failure : stop: with exit code 3; continue: with a warning, the script looks at solved (default: stop).
-        elastic : at once, without steps.
-        hydraulic : flow by implicit steps, backward Euler, for so much time or until it is steady; in static runs
+        window : with a ratio: the run fails if the least ratio has not decreased by a tenth in this number of steps,
+            nor in as many steps as the progress so far took; 0: never (default: static runs: ten times the steps in
+            which a wave crosses the model and returns, at least 20 000; dynamic runs, and with cycles or time: 0).
+        limit : with a ratio: the run fails after this number of steps; 0: never (default: static runs 1 000 000,
+            dynamic runs 10 000 000; with time: 0).
+        on_failure : stop: with exit code 3; continue: with a warning, the script can check solved (default: stop).
+        elastic : directly, without steps.
+        hydraulic : flow by implicit steps, backward Euler, for a time or until it is steady; in static runs blocks
+            are in equilibrium at the end of each step, and joints may pass their peak and break; with mechanical
+            off, flow alone.
+        thermal : heat by implicit steps, backward Euler, for a time or directly to its steady state; in static runs
             blocks are in equilibrium at the end of each step, and joints may pass their peak and break; with
-            mechanical off, flow alone.
-        thermal : heat by implicit steps, backward Euler, for so much time or to its steady state at once; in static
-            runs blocks are in equilibrium at the end of each step, and joints may pass their peak and break; with
             mechanical off, heat alone.
-        dt : with hydraulic or thermal: longest time step; those of flow are shorter where joints break or no balance
-            is found [s] (default: a hundredth of the time).
-        auto : with hydraulic and time: by explicit steps, as without the word hydraulic, where an estimate says that
-            these cost less, or where implicit ones are refused; the log has both estimates.
-        steady : with hydraulic or thermal: until as much flows out as in; no time passes.
-        solver : with elastic, hydraulic or thermal: SciPy on one rank, the same bits on any number of ranks; PETSc
-            on all; auto: PETSc, if it is there, from 400 000 unknowns on, in space from 20 000 (default: auto).
-        steps : with elastic: what is new in the loads is brought on in so many equal increments, in each of which
-            elements flow once; one that finds no balance is halved (default: 1).
+        dt : with hydraulic or thermal: longest time step; steps of flow are shorter when joints break or a step does
+            not converge [s] (default: a hundredth of the time).
+        auto : with hydraulic and time: uses explicit steps, as without the word hydraulic, if their estimated cost
+            is lower or implicit steps are not possible; the log reports both estimates.
+        steady : with hydraulic or thermal: until outflow equals inflow; no time passes.
+        solver : with elastic, hydraulic or thermal: SciPy on one rank, identical results on any number of ranks;
+            PETSc on all ranks; auto: PETSc, if available, from 400 000 unknowns, in space from 20 000 (default:
+            auto).
+        steps : with elastic: number of equal load increments, in each of which elements yield once; an increment
+            that does not converge is halved (default: 1).
         """

@@ -186,7 +186,7 @@ assert abs(budget.stored_energy(sim) / (2e6 * 0.01**3 / 3.0) - 1.0) < 1e-9
         [
             (
                 "lang/zdem/table.py",
-                '    Command("FREE", "Takes FIX back.", options=_DEGREES, ranged=True, '
+                '    Command("FREE", "Revokes FIX.", options=_DEGREES, ranged=True, '
                 'example=("FREE x RANGE group base",)),',
                 '    Command("HALT", "Velocities become zero.", ranged=True, example=("HALT RANGE group base",),\n'
                 '            does="properties.halt"),',
@@ -209,10 +209,10 @@ assert sim.particles["vx"][np.argsort(sim.particles["gid"])].tolist() == [2.0, 0
         [
             (
                 "lang/pcdc/table.py",
-                '    Command("mod{el} g{ravity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),',
+                '    Command("mod{el} g{ravity}", "Sets gravity from now on.", ("pcdc model gravity (0,-9.81)",),',
                 '=    Command("mod{el} moon", "Gravity of the moon.", '
                 '("pcdc model moon",), does="settings.moon"),\n'
-                '    Command("mod{el} g{ravity}", "Gravity from now on.", '
+                '    Command("mod{el} g{ravity}", "Sets gravity from now on.", '
                 '("pcdc model gravity (0,-9.81)",),',
             ),
             (

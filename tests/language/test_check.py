@@ -311,7 +311,7 @@ def test_output_files_are_listed():
 
 def test_files_that_could_not_be_written_are_told(tmp_path):
     report = examined("START", "SAV results/a.sav", file=str(tmp_path / "s.py"))
-    assert any("line 2: SAV: there is no folder" in note for note in report.notes)
+    assert any("line 2: SAV: folder" in note for note in report.notes)
 
 
 def test_what_would_be_refused():

@@ -283,7 +283,7 @@ def test_what_is_not_carried_out_is_refused_before_anything_runs():
     recorder = Recorder()
     with pytest.raises(ScriptError) as caught:
         carry_out(script, recorder, Sim())
-    assert str(caught.value) == "a.py:4: hpcdem does not carry out DRAW yet"
+    assert str(caught.value) == "a.py:4: hpcdem does not support DRAW yet"
     assert recorder.calls == []
 
 

@@ -30,7 +30,7 @@ def test_a_parameter_is_the_number_wherever_its_name_stands():
 @pytest.mark.parametrize(
     ("text", "line", "what"),
     [
-        ("h = 3\nSTART\nSET dt 1", 1, "nothing uses the parameter h"),
+        ("h = 3\nSTART\nSET dt 1", 1, "parameter h is never used"),
         ("h = 3\nh = 4\nSTART\nSET dt {h}", 2, "the parameter h is set a second time, after line 1"),
         ("top = 3\nSTART\nSET dt {top}", 1, "'top' is an extent of the model"),
         ("h = much\nSTART", 1, "'h'"),

@@ -164,7 +164,7 @@ def test_words_of_public_scripts(play, tmp_path):
     assert sim.drawing == (100, ("bfill", "bondc", "wall"))
     assert "script.py:4: SET: 'GRAVTIY' is taken for gravity, which begins like it" in log
     assert "script.py:7: PROP: 'damping' is taken for damp" in log
-    assert "PAUSE: a run waits for nobody" in log and "LOG: the log goes to standard output" in log
+    assert "PAUSE: runs are not interactive" in log and "LOG: the log goes to standard output" in log
     assert log.count("warning:") <= 3
     script = parse_text("START\nSET DT 1 gravtiy (0 1)\nCYC 1\n", "a.py")
     assert "note: line 2: SET: 'gravtiy' is taken for gravity" in check.summary(script)

@@ -256,7 +256,7 @@ def test_a_window_without_particles_is_refused(play, tmp_path):
 
 def test_exp_does_not_replace_the_file_that_was_loaded(play, tmp_path):
     (tmp_path / "xyr.dat").write_text("1 2 1\n5 2 1\n")
-    with pytest.raises(ScriptError, match=r"xyr\.dat would be written over the file that line 1 reads"):
+    with pytest.raises(ScriptError, match=r"xyr\.dat would overwrite the file that line 1 reads"):
         play("DEL RANGE x 4 9", "EXP xyr.dat", begin="LOAD xyr.dat")
     assert (tmp_path / "xyr.dat").read_text() == "1 2 1\n5 2 1\n"
     play("DEL RANGE x 4 9", "EXP left.dat", begin="LOAD xyr.dat")

@@ -37,7 +37,7 @@ def test_nothing_is_written_over_what_is_read(bench, monkeypatch, text, name):
     kept = (folder / name).read_bytes()
     bench.project.to_read("mesh.csv")
     bench.project.to_read("before.sav")
-    with pytest.raises(ScriptError, match=r"would be written over .*; give it another name") as caught:
+    with pytest.raises(ScriptError, match=r"would overwrite .*; choose another name") as caught:
         bench(text.replace("{folder}", str(folder)))
     assert (folder / name).read_bytes() == kept and caught.value.line == text.count("\n")
 
@@ -59,9 +59,9 @@ def test_what_is_exported_is_a_result(bench):
     ("text", "message"),
     [("LOAD b.dat\nSAV a.py\n", "a.py is the script itself, and would be overwritten"),
      ("LOAD b.dat\nEXP ./a.py\n", "./a.py is the script itself, and would be overwritten"),
-     ("LOAD b.dat\nEXP b.dat\n", "b.dat would be written over the file that line 1 reads"),
-     ("RES c.sav\nCYC 10\nSAV c.sav\n", "c.sav would be written over the file that line 1 reads"),
-     ("LOAD b.dat\nEXP link.py\n", "link.py would be written over the script that runs"),
+     ("LOAD b.dat\nEXP b.dat\n", "b.dat would overwrite the file that line 1 reads"),
+     ("RES c.sav\nCYC 10\nSAV c.sav\n", "c.sav would overwrite the file that line 1 reads"),
+     ("LOAD b.dat\nEXP link.py\n", "link.py would overwrite the script that runs"),
      ("RES d.sav\nSAV e.sav\nSAV e.sav\n", None), ("RES d.sav\nSAV e.sav\n", None)],
 )  # fmt: skip
 def test_zdem_scripts(tmp_path, text, message):

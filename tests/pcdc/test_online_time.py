@@ -241,7 +241,7 @@ def test_what_has_no_effect_is_said_once(tmp_path):
 
 def test_code_is_refused_with_what_to_do(bench):
     for line, why in (
-        ("boundary-model create s-b-c name 'a' code 'x'", "no code of C# is run.*function in Python"),
+        ("boundary-model create s-b-c name 'a' code 'x'", "C# code is not supported.*Python function"),
         ("b-m create stress-b-c n 'a' v k 'b' t 'c'", "function 'file.py:name'"),
         ("model collision ecda off", "ecda off: faces of a joint that is whole are no contacts"),
     ):

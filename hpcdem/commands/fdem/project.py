@@ -319,7 +319,7 @@ class Project:
         """A file that is about to be written. CommandError if it is the script, or one that was read."""
         real = os.path.realpath(path)
         if real in self.inputs:
-            raise CommandError(f"{path} would be written over {self.inputs[real]}; give it another name")
+            raise CommandError(f"{path} would overwrite {self.inputs[real]}; choose another name")
         self.made.add(real)
         return path
 

@@ -286,23 +286,25 @@ ISO_ELASTIC = Model(
     _ELASTIC, one_of=_PAIRS, of=properties.MECH_ISO_ELASTIC, dims=BOTH, does="assignments.element_model",
 )  # fmt: skip
 NULL = Model(
-    "null", "", "The elements are taken out: excavated. Faces beside them become free. Another model in a range that "
-    "names them brings them back, as new material where the void is then, free of stress; they hang together with what "
-    "lies around them, without joints, until face-joint c-model gives them some.",
-    (Option("relax", (POSITIVE,), "what they did to the others dies down over this time (static runs: so many steps)",
+    "null", "", "Removes (excavates) elements; adjacent faces become free. Assigning another model to them reinstates "
+    "them as new, stress-free material at the present position of the void, connected to its neighbours without joints "
+    "until face-joint c-model assigns some.",
+    (Option("relax", (POSITIVE,), "the forces of the removed elements decrease to 0 over this time (static runs: "
+                                  "number of steps)",
             "s", "at once"),), dims=BOTH, does="assignments.null",
 )  # fmt: skip
 MOHR_COULOMB = Model(
     "mech{anical}-m{ohr}-c{oulomb}", "2",
-    "Elastic up to the strength of Mohr and Coulomb, or in tension, then plastic, for large rotations.",
+    "Elastic up to the Mohr–Coulomb or tensile strength, then plastic, for large rotations.",
     declared(
         properties.MECH_MOHR_COULOMB, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "fri{ction}",
         "coh{esion}", "ten{sile}", "di{lation}", "d{amp}-f{actor}", "pen{alty}", "d{amp}-b",
     ),
     one_of=_PAIRS, of=properties.MECH_MOHR_COULOMB, dims=BOTH, does="assignments.element_model",
 )  # fmt: skip
-_FUNCTION = Option("function", (FILE,), "'file.py:function', beside the script; plain text", required=True)
-_LAW = Option("law", (FILE,), "'file.py:law': the file, beside the script, and the name of the law in it; plain text",
+_FUNCTION = Option("function", (FILE,), "'file.py:function', in the folder of the script; plain text", required=True)
+_LAW = Option("law", (FILE,), "'file.py:law': the file, in the folder of the script, and the name of the law in it; "
+                              "plain text",
               required=True)  # fmt: skip
 _PARAMETER = Option(
     "par{ameter}",
@@ -311,15 +313,15 @@ _PARAMETER = Option(
     repeated=True,
 )
 USER = Model(
-    "user", "", "A law in a Python file of the user, see docs/user_laws.md.",
+    "user", "", "A user law in a Python file, see docs/user_laws.md.",
     (*declared(properties.USER, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "d{amp}-f{actor}",
                "fri{ction}", "pen{alty}"), _PARAMETER),
     one_of=_PAIRS, of=properties.USER, leading=(_LAW,), dims=BOTH, does="assignments.user_model",
 )  # fmt: skip
 BURGERS = Model(
     "mech{anical}-bur{gers}", "3",
-    "Elastic in its volume, creeping in its shape after Burgers while model creep is on, for large rotations. Strain "
-    "of the Kelvin unit goes with a stress that was there before.",
+    "Burgers creep: elastic in volume, creeping in shear while model creep is on, for large rotations. An initial "
+    "strain of the Kelvin unit belongs to an initial stress.",
     declared(
         properties.MECH_BURGERS, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "b{ulk}", "k{elvin}-s{hear}",
         "k{elvin}-v{iscosity}", "m{axwell}-s{hear}", "m{axwell}-v{iscosity}", "k{elvin}-s{train}-xx",
@@ -335,18 +337,18 @@ _COEFFICIENTS = {
 }  # fmt: skip
 ISO_HEAT = Model(
     "therm{al}-iso-h{eat}", "12",
-    "Heat conduction and thermal expansion. It acts beside the mechanical model of the elements, all of which need it "
-    "where one has it. Heat crosses joints until they break, and from then on passes from surface to surface where "
-    "they touch, with a transfer coefficient. At the temperatures of this moment elements are free of thermal stress. "
-    "Temperatures are those of any scale of degrees.",
+    "Heat conduction and thermal expansion, in addition to the mechanical model. If one element has this model, all "
+    "elements need it. Heat is conducted across intact joints; broken joints transfer heat where their surfaces are in "
+    "contact, with a transfer coefficient. Elements are free of thermal stress at the present temperatures. "
+    "Temperatures may be in °C or K.",
     declared(HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "e{xpansion}-c{oeficient}",
              "conductivity-a{cross}", "conductivity-ang{le}", also=_COEFFICIENTS),
     of=HEAT_PROPERTIES, dims=BOTH, does="heat.model",
 )  # fmt: skip
 FIELD_MODELS = {
-    one.name: Model(one.word, "", f"Diffusion of {one.doc}, beside the mechanical model of the elements, all of which "
-                    "need it where one has it. It crosses joints until they break. At the values of this moment "
-                    "elements are free of the stress that it brings.", declared(one.model), of=one.model, dims=BOTH,
+    one.name: Model(one.word, "", f"Diffusion of {one.doc}, in addition to the mechanical model. If one element has "
+                    "this model, all elements need it. It crosses joints until they break. Elements are free of the "
+                    "stress that it causes at the present values.", declared(one.model), of=one.model, dims=BOTH,
             does="fields.model", of_field=one.name)
     for one in kinds().values()
 }  # fmt: skip
@@ -359,10 +361,10 @@ FIELDS_AT_NODES = {
 }  # fmt: skip
 FIELDS_AT_FACES = {
     one.name: Model(
-        one.on_faces, "", f"The flow of {one.name} through surfaces, which let nothing through without it. Times of "
+        one.on_faces, "", f"The flow of {one.name} through surfaces; without it surfaces are impermeable. Times of "
         "tables are those of the field.",
         (Option("flux", (TABLED,), "what comes in", one.flux),
-         Option("transfer", (NOT_NEGATIVE,), "what goes to the environment, over the difference to it", one.transfer,
+         Option("transfer", (NOT_NEGATIVE,), "flow to the environment over the difference to it", one.transfer,
                 "that of the elements"),
          Option("environment", (TABLED,), "value of the environment", one.unit)), any_of=True, dims=BOTH,
                  does="fields.face_condition", of_field=one.name, by_time=True)
@@ -391,17 +393,17 @@ FORCE = Model(
 )  # fmt: skip
 MOVE = Model(
     "mech{anical}-m{ove}-b{oundary}-c{onstraint}", "7",
-    "Freedom of nodes. A constraint holds beside those that a node has already, and beside prescribed velocities: two "
-    "directions hold it, a direction and a velocity say how fast it goes along. What contradicts is refused.",
+    "Constrains nodes. Constraints accumulate and combine with prescribed velocities: two directions fix a node; one "
+    "direction and a velocity define its motion along the line. Contradictions are rejected.",
     (Option("t{ype}", (FREEDOM, OPTIONAL_VECTOR),
-            "0 free (takes constraints back), 1 held, 2 moves along the vector only, 3 (in three dimensions) across it "
-            "only (type 0 and 1 take a vector and do not use it)", required=True),), dims=BOTH,
+            "0 free (removes constraints), 1 fixed, 2 moves along the vector only, 3 (in three dimensions) across it "
+            "only (types 0 and 1 accept a vector and ignore it)", required=True),), dims=BOTH,
     also=("mech{anical}-m{ove}-c{onstrain}",), does="assignments.move",
 )  # fmt: skip
 STRESS = Model(
     "m{echanical}-s{tress}-b{oundary}-c{ondition}", "6",
-    "Traction on surfaces: stress times the present normal. Tension is positive. Where it is not 0 it is the total: "
-    "water before the face does not push besides.",
+    "Traction on surfaces: stress times the present normal. Tension is positive. Where it is not 0, it is the total "
+    "traction: water pressure on the face is not added.",
     (Option("s{tress}-x{x}", (TABLED,), "stress xx", "Pa", also=("x{x}",)),
      Option("s{tress}-y{y}", (TABLED,), "stress yy", "Pa", also=("y{y}",)),
      Option("s{tress}-z{z}", (TABLED,), "stress zz", "Pa", dims=SPACE, also=("z{z}",)),
@@ -411,38 +413,39 @@ STRESS = Model(
             "pressure", "Pa", also=("n{ormal}",)),
      Option("d{ip}", (TABLED,), "shear stress along the surface, counter-clockwise about the body", "Pa", dims=PLANE),
      Option("q{uiet}", (BOOL,), "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress "
-            "given beside it enters as a wave of half its size"),
+            "given with it enters as a wave of half its size"),
      Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s"),
-     Option("inc{oming}-y", (TABLED,), "the same along y", "m/s"),
-     Option("inc{oming}-z", (TABLED,), "the same along z", "m/s", dims=SPACE)),
+     Option("inc{oming}-y", (TABLED,), "velocity along y of that wave", "m/s"),
+     Option("inc{oming}-z", (TABLED,), "velocity along z of that wave", "m/s", dims=SPACE)),
     any_of=True, dims=BOTH, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",), does="assignments.stress",
 )  # fmt: skip
 ABSORB = Model(
     "mech{anical}-abs{orb}-b{oundary}-c{ondition}", "", "Surfaces through which waves leave, as m-s-b-c quiet on.",
     (Option("n{ormal}", (TABLED,), "stress along the normal, which enters as a wave of half its size", "Pa"),
-     Option("d{ip}", (TABLED,), "the same along the surface, counter-clockwise about the body", "Pa", dims=PLANE)),
+     Option("d{ip}", (TABLED,), "stress along the surface, counter-clockwise about the body, which enters as a wave of "
+                                "half its size", "Pa", dims=PLANE)),
     dims=BOTH, does="assignments.stress", fixed=(("quiet", True),),
 )  # fmt: skip
 FLOW_CONDITION = Model(
     "hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11",
     "Fluid at nodes, one of the three at each; times of tables are those of flow. With a range, pressure and "
-    "flow-surface wet the free faces whose nodes all lie in it: water stands before them and pushes on them, whether "
-    "channels end there or not. Without a range they apply to the fluid in joints only.",
+    "flow-surface load the free faces whose nodes all lie in it with water pressure, with or without channels there. "
+    "Without a range they apply to the fluid in joints only.",
     (Option("p{ressure}", (TABLED,), "pressure, not negative", "Pa"),
-     Option("f{low}-s{urface}", (LEVEL,), "level of water that stands at the nodes, against gravity, or a point of "
-            "its surface: hydrostatic pressure below it; above it water can leave (seepage)", "m",
+     Option("f{low}-s{urface}", (LEVEL,), "water level at the nodes, measured against gravity, or a point of the water "
+            "surface: hydrostatic pressure below it; above it water can leave (seepage)", "m",
             also=("f{luid}-s{urface}",)),
-     Option("f{low}-r{ate}", (TABLED,), "volume that comes in at each node; negative: is taken out, as far as there is "
+     Option("f{low}-r{ate}", (TABLED,), "inflow volume at each node; negative: outflow, limited to the available "
             "fluid; in space m3/s", "m2/s")),
     any_of=True, dims=BOTH,
     also=("hydr{aulic}-c{onstant}-f{low}-b{oundary}", "hydra{ulic}-c{onstant}-f{luid}-b{oundary}"),
     does="flow.condition",
 )  # fmt: skip
 FREE_FIELD = Model(
-    "free-f{ield}", "", "Vertical sides beyond which the ground goes on: a column with the elements of the side and "
-    "the base of the model there, velocity or quiet faces, moves beside each, and the side has its stress and dashpots "
-    "that see the difference of both motions. The nodes of the side are held by the forces that they have now, so the "
-    "conditions of the static stage can go.", (), does="assignments.free_field",
+    "free-f{ield}", "", "Free-field boundary on vertical sides: a column with the elements of the side and the base "
+    "motion of the model (velocity or quiet faces) moves next to each side, which gets its stress and dashpots on the "
+    "difference of both motions. The present forces keep the nodes of the side in equilibrium, so remove the "
+    "conditions of the static stage.", (), does="assignments.free_field",
 )  # fmt: skip
 TEMPERATURE = Model(
     "therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes; times of tables are those of heat.",
@@ -450,24 +453,24 @@ TEMPERATURE = Model(
     also=("therm{al}-n{ode}-b{oundary}-c{ondition}",), does="heat.condition", by_time=True,
 )  # fmt: skip
 FLUID_TEMPERATURE = Model(
-    "therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of the fluid at flow nodes, as of what is injected "
-    "there; times of tables are those of heat.",
+    "therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of the fluid at flow nodes, for example of injected "
+    "fluid; times of tables are those of heat.",
     (Option("t{emperature}", (TABLED,), "temperature", "K", required=True, also=("t{mperature}",)),), dims=BOTH,
     also=("therm{al}-c{avity}-b{oundary}-c{ondition}",), does="heat.fluid_condition", by_time=True,
 )  # fmt: skip
 PROPPANT_CONDITION = Model(
-    "hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that comes in at flow nodes, of wells too, one of these; "
-    "times of tables are those of flow. A node that is packed takes none.",
+    "hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant inflow at flow nodes, also of wells; give one of the two. "
+    "Times of tables are those of flow; a packed node accepts none.",
     (Option("p{roppant}-v{olumetric}-c{oncentration}", (TABLED,), "concentration of the slurry that conditions and "
             "wells bring: volume of grains over that of the slurry", "1"),
-     Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (TABLED,), "volume of grains that comes in at each node, in the "
-            "slurry that is there; in space m3/s", "m2/s")),
+     Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (TABLED,), "volume of grains that enters each node, added to its "
+            "slurry; in space m3/s", "m2/s")),
     any_of=True, dims=BOTH, does="flow.proppant_condition", by_time=True,
 )  # fmt: skip
 CONST_HEAT = Model(
     "therm{al}-c{onst}-h{eat}", "16",
-    "Heat through surfaces, which are adiabatic without it; faces that are inside begin with it when they are free. "
-    "Times of tables are those of heat.",
+    "Heat through surfaces, which are adiabatic without it; inner faces follow it once they are free. Times of tables "
+    "are those of heat.",
     (Option("h{eat}-f{lux}", (TABLED,), "heat that comes in", "W/m2"),
      Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer to the environment", "W/(m2 K)",
             "that of the elements",
@@ -480,17 +483,18 @@ CONST_HEAT = Model(
 
 CONTACT = Model(
     "c{ontact}-m{ohr}-c{oulomb}", "8",
-    "Contact of surfaces: potential of the overlap, Coulomb friction. Of two surfaces the smaller value counts.",
+    "Contact of surfaces: potential of the overlap, Coulomb friction. The smaller value of two surfaces applies.",
     declared(properties.CONTACT_MOHR_COULOMB, "f{riction}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}", "d{amping}-t",
              "d{amping}-b", "d{amping}-r{atio}", also={"penalty-normal": ("n{ormal}-s{tiffness}",),
                                                        "penalty-shear": ("s{hear}-s{tiffness}",)})
-    + (Option("c{ohesion}", (NOT_NEGATIVE,), "surfaces that touch have none", "Pa", "0", refused="surfaces that touch "
-              "have friction and no cohesion; joints have it until they break: face-joint c-model c-i-c-i cohesion"),),
+    + (Option("c{ohesion}", (NOT_NEGATIVE,), "contacts have none", "Pa", "0", refused="contacts have "
+              "friction but no cohesion; joints have cohesion until they break: face-joint c-model c-i-c-i cohesion"),),
     of=properties.CONTACT_MOHR_COULOMB, dims=BOTH, does="assignments.face_model",
 )  # fmt: skip
 COHESIVE = Model(
     "c{lassic}-i{ntrinsic}-c{ohesive}-i{nterface}", "9",
-    "Cohesive joints between elements: they hold up to their strength, soften, break, and are contacts from then on.",
+    "Cohesive joints between elements: intact up to their strength, then they soften and break, and are contacts "
+    "afterwards.",
     (*declared(properties.COHESIVE, "f{riction}", "c{ohesion}", "t{ensile}-s{trength}", "gf1", "gf2",
                "p{enalty}-o{verlay}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}",
                also={"penalty-overlay": ("p{enalty}-o{verlap}",)}),
@@ -499,20 +503,19 @@ COHESIVE = Model(
 )  # fmt: skip
 COULOMB_JOINT = Model(
     "j{oint}-m{ohr}-c{oulomb}", "",
-    "Joints that were there before, as springs: sigma = normal-stiffness opening, tau = shear-stiffness slip, at most "
-    "cohesion - sigma tan friction. They slide, open and close and never break. A point that opens against its tensile "
-    "strength loses that and its cohesion.",
+    "Pre-existing joints, as springs: sigma = normal-stiffness opening, tau = shear-stiffness slip, at most cohesion - "
+    "sigma tan friction. They slide, open and close and never break. A point that opens beyond its tensile strength "
+    "loses that strength and its cohesion.",
     declared(properties.COULOMB_JOINT, "n{ormal}-s{tiffness}", "s{hear}-s{tiffness}", "f{riction}", "c{ohesion}",
              "t{ensile}-s{trength}", "dil{ation}", "dil{ation}-l{imit}"),
     of=properties.COULOMB_JOINT, dims=BOTH, does="assignments.joint_model",
 )  # fmt: skip
 BARTON_BANDIS = Model(
     "j{oint}-b{arton}-b{andis}", "",
-    "Rough joints that were there before: closure v under the pressure normal-stiffness v / (1 - v / closure-maximum), "
-    "from the pressure jcs on along the tangent; shear strength by the angle residual-friction + m jrc "
-    "log10(jcs / pressure), at most 70 degrees, m: roughness that is mobilised or worn, by the path over "
-    "joint-size / 500 (jrc / joint-size)^0.33; dilation by dilation-part of the part with m. They slide, open and "
-    "close and never break.",
+    "Pre-existing rough joints: closure v under the pressure normal-stiffness v / (1 - v / closure-maximum), from the "
+    "pressure jcs on along the tangent; shear strength by the angle residual-friction + m jrc log10(jcs / pressure), "
+    "at most 70 degrees, m: roughness that is mobilised or worn, by the path over joint-size / 500 (jrc / "
+    "joint-size)^0.33; dilation by dilation-part of the part with m. They slide, open and close and never break.",
     declared(properties.BARTON_BANDIS, "n{ormal}-s{tiffness}", "s{hear}-s{tiffness}", "c{losure}-m{aximum}",
              "r{esidual}-f{riction}", "jrc", "jcs", "j{oint}-s{ize}", "dil{ation}-p{art}"),
     of=properties.BARTON_BANDIS, dims=BOTH, does="assignments.joint_model",
@@ -533,14 +536,15 @@ _POROUS = tuple(
 POROUS = Model(
     "hydr{aulic}-p{orous}-m{edium}", "10",
     "Fluid in joints: each is a channel between its two nodes, broken or not, of the aperture aperature-initial plus "
-    "its mean opening, within the limits. It acts beside the mechanical model of the joint. Given again, fluid that "
-    "has no room any more is gone, and new room is dry. In space channels are the triangles of the joints.",
+    "its mean opening, within the limits. It acts in addition to the mechanical model of the joint. If the model is "
+    "assigned again, excess fluid is removed, and new volume is dry. In space channels are the triangles of the "
+    "joints.",
     _POROUS, of=POROUS_PROPERTIES, dims=BOTH, does="flow.model", ranged=JOINT,
 )  # fmt: skip
 FLUID_HEAT = Model(
     "t{hermal}-f{luid}", "13",
-    "Heat in the fluid of joints with a hydraulic model, all of which need it where one has it, beside heat in the "
-    "elements. Fluid that has none yet has the temperature of the rock beside it. What comes in has the temperature of "
+    "Heat in the fluid of joints with a hydraulic model, in addition to heat in the elements. If one channel has this "
+    "model, all channels need it. Fluid starts at the temperature of the adjacent rock; inflow has the temperature of "
     "its node.",
     tuple(replace(o, values=(BOOL,), unit="", default="off") if o.name == "second-order" else o for o in declared(
         FLUID_HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "sec{ond}-o{rder}",
@@ -566,9 +570,9 @@ GRAINS = Model(
 )
 PROPPANT = Model(
     "hydr{aulic}-p{orous}-p{roppant}-m{edium}", "17",
-    "Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, make it heavier and "
-    "more viscous, settle, and bridge where it is narrow. A node that is filled to the limit is a pack: no grains pass "
-    "it, fluid does, and the walls lean on it.",
+    "Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, increase its "
+    "density and viscosity, settle, and bridge where the channel is narrow. A node that is filled to the limit is a "
+    "pack: fluid passes it, grains do not, and it carries the load of the walls.",
     (*_POROUS, *_GRAINS), of=MEDIUM_PROPERTIES, dims=BOTH, does="flow.with_proppant", ranged=JOINT,
 )  # fmt: skip
 
@@ -576,12 +580,12 @@ PROPPANT = Model(
 
 BOLT = Model(
     "mech{anical}-e{lastic}-p{lastic}", "19",
-    "Bars with one force along them, elastic and perfectly plastic, in grout that slips at its strength. Forces and "
+    "Bars with an axial force only, elastic and perfectly plastic, in grout that slips at its strength. Forces and "
     "stiffness are those of one bolt; the model divides them by the spacing. The strength of the grout per length is "
     "the smaller of pi (diameter + 2 grout-thickness) (cohesion-rock-grout - sigma tan friction-rock-grout) and pi "
     "diameter (cohesion-grout-bolt - sigma tan friction-grout-bolt), sigma: stress across the bar in the rock if it is "
-    "pressure, in space the mean in all directions across. Given again, the force in the bar stays, but for the "
-    "difference of the pretension. In space each bolt is there by itself: spacing is 1.",
+    "pressure, in space the mean in all directions across. If the model is assigned again, the force in the bar "
+    "changes only by the difference of the pretension. In space each bolt is a single bolt: spacing is 1.",
     declared(
         BOLT_PROPERTIES, "den{sity}", "y{oung}", "d{iameter}", "t{ensile}-y{ield}-f{orce}",
         "c{ompressive}-y{ield}-f{orce}", "t{ension}-f{ailure}-s{train}", "s{hear}-s{tiffness}-r{ock}-b{olt}",
@@ -591,13 +595,13 @@ BOLT = Model(
     of=BOLT_PROPERTIES, dims=BOTH, does="supports.assign",
 )  # fmt: skip
 BOLT_VELOCITY = Model(
-    "b{olt}-n{ode}-c{onstrain}", "20", "Velocity or acceleration of nodes of bolts. Components that are not given stay "
-    "free: along the bar by its forces, across it with the rock.", VELOCITY.options, any_of=True, dims=BOTH,
+    "b{olt}-n{ode}-c{onstrain}", "20", "Velocity or acceleration of nodes of bolts. Other components stay free: along "
+    "the bar nodes follow its forces, across it the rock.", VELOCITY.options, any_of=True, dims=BOTH,
     also=("s{upport}-n{ode}-c{onstrain}",), does="bolts.velocity",
 )  # fmt: skip
 BOLT_FORCE = Model(
-    "b{olt}-n{ode}-f{orce}-b{oundary}-c{ondition}", "21", "Force on each node of one bolt; across the bar the rock "
-    "takes it.", FORCE.options, any_of=True, dims=BOTH,
+    "b{olt}-n{ode}-f{orce}-b{oundary}-c{ondition}", "21", "Force on each node of one bolt; the rock carries the "
+    "component across the bar.", FORCE.options, any_of=True, dims=BOTH,
     also=("b{olt}-n{ode}-f{orce}-b{oundary}-c{onditio}", "s{upport}-n{ode}-f{orce}-b{oundary}-c{onditio}"),
     does="bolts.force",
 )  # fmt: skip
@@ -606,12 +610,13 @@ BOLT_FORCE = Model(
 
 LINER = Model(
     "beam", "",
-    "In the plane beams in plane strain, of a metre of its thickness, elastic and perfectly plastic. Either a shell of "
-    "a thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0. The axial force is held "
-    "between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N + Nc) / (Nt + Nc)^2: what a "
-    "rectangle bears that is plastic all over. In space flat shells of a thickness, whose forces and moments are held "
-    "so in their principal directions. The bond to the rock is elastic, slips at bond-cohesion + pressure "
-    "tan(bond-friction), and parts for good above bond-tensile-strength. Given again, what elements carry stays.",
+    "In the plane beams in plane strain, per metre of thickness, elastic and perfectly plastic. Either a shell with a "
+    "thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0. The axial force stays "
+    "between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N + Nc) / (Nt + Nc)^2: the "
+    "limit of a fully plastic rectangular section. In space flat shells with a thickness, whose forces and moments "
+    "have these limits in their principal directions. The bond to the rock is elastic, slips at bond-cohesion + "
+    "pressure tan(bond-friction), and parts for good above bond-tensile-strength. If the model is assigned again, the "
+    "forces in elements stay.",
     declared(
         LINER_PROPERTIES, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "th{ickness}", "area", "inertia",
         "t{ensile}-s{trength}", "c{ompressive}-s{trength}", "pl{astic}-m{oment}", "n{ormal}-s{tiffness}",
@@ -629,8 +634,8 @@ LINER_VELOCITY = Model(
     any_of=True, dims=BOTH, does="liners.velocity",
 )  # fmt: skip
 LINER_FORCE = Model(
-    "l{iner}-n{ode}-f{orce}-b{oundary}-c{ondition}", "", "Force and moment on each node of a liner, in the plane "
-    "of a metre of thickness.",
+    "l{iner}-n{ode}-f{orce}-b{oundary}-c{ondition}", "", "Force and moment on each node of a liner, in the plane per "
+    "metre of thickness.",
     (Option("f{orce}-x", (TABLED,), "force along x", "N/m"), Option("f{orce}-y", (TABLED,), "force along y", "N/m"),
      Option("f{orce}-z", (TABLED,), "force along z", "N", dims=SPACE),
      Option("m{oment}", (TABLED,), "moment, counter-clockwise", "N m/m", dims=PLANE),
@@ -650,7 +655,7 @@ RANGE_TERMS = (
     Option("z", (FLOAT, OPTIONAL_FLOAT), "z from ... to ..., or at one number, in the mesh", "m", dims=SPACE),
     Option("a{rea}", (NOT_NEGATIVE, NOT_NEGATIVE), "elements with an area, in space faces, from ... to ...", "m2",
            only=("element", "element-face")),
-    Option("not", (), "the term that follows does not hold"),
+    Option("not", (), "negates the next term"),
     Option("in-c{ircle}", (OPTIONAL_VECTOR, OPTIONAL_FLOAT), "all its points lie in the circle, in space the sphere, "
            "about a centre and of a radius; elements: their centre; in the mesh", "m",
            more=(Option("c{enter}", (VECTOR,), "the centre", "m"), Option("rad{ius}", (POSITIVE,), "the radius", "m"))),
@@ -669,8 +674,8 @@ RANGE_TERMS = (
            only=("element", *_FACES), dims=PLANE,
            more=(Option("ray-dir{ection}", (VECTOR,), "of the ray", "", "(1,0)"),
                  Option("count", (ZERO_OR_MORE,), "crossings", "1", "1"))),
-    Option("pres{ent}", (), "x, y and geometry (of elements) look at where things are at this moment"),
-    Option("use-hidden", (BOOL,), "elements that are hidden, and what belongs to them, are chosen too", default="off"),
+    Option("pres{ent}", (), "x, y and geometry (of elements) use present positions"),
+    Option("use-hidden", (BOOL,), "also selects hidden elements and their nodes, faces and joints", default="off"),
     Option("boundary", (), "lies on a surface of the model", only=("element-face", "node")),
     Option("face-of", (STRING,), "faces, joints or nodes of the elements of the group; joints: both elements are in "
            "it; nodes: where elements may part, on their side", more=(SET,), only=_FACES),
@@ -707,8 +712,8 @@ def _removed(*conditions: Model) -> tuple[Option, ...]:
 
 def _group_command(kind: str, notation: str, also: str = "") -> Command:
     return Command(
-        f"{notation} g{{roup}}", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the "
-        "one it was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
+        f"{notation} g{{roup}}", f"Assigns {kind}s to a group; each is in at most one group of a set, and leaves its "
+        "previous group.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
         (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind, dims=BOTH,
         also=(f"{also} g{{roup}}",) if also else (), does="assignments.group",
     )  # fmt: skip
@@ -716,7 +721,7 @@ def _group_command(kind: str, notation: str, also: str = "") -> Command:
 
 def _list_command(kind: str, notation: str) -> Command:
     return Command(
-        f"{notation} l{{ist}} sum{{mary}}", f"Says in the log how many {kind}s there are, by model and group.",
+        f"{notation} l{{ist}} sum{{mary}}", f"Reports the number of {kind}s by model and group in the log.",
         (f"pcdc {kind} list summary range x 0 5",), ranged=kind, dims=BOTH, also=(f"{notation} l{{ist}}",),
         does="summary.listed",
     )  # fmt: skip
@@ -755,74 +760,74 @@ _STEPS = (
 )  # fmt: skip
 _CLOCKS = (
     Option("s{tart}-t{ime}", (FLOAT,), "time from which model run-time counts", "s"),
-    Option("c{urrent}-t{ime}", (FLOAT,), "what the clock shows now", "s"),
+    Option("c{urrent}-t{ime}", (FLOAT,), "present time of the clock", "s"),
     Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "time step", "s"),
 )  # fmt: skip
 _WINDOW = "hpcdem view shows a run while it steps, at its own pace"
 
 _MODEL = (
-    Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
+    Command("mod{el} new", "Starts a new model; only Python variables are kept.",
             ("pcdc model new", "pcdc model new dim 3"),
-            options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three not everything is there, see "
+            options=(Option("dim", (DIMENSIONS,), "dimensions of space; some commands are not available in three, see "
                             "the end of the reference", "", "2"),), manual=True, dims=BOTH, does="settings.new"),
-    Command("mod{el} sav{e}", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables "
-            "and functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
-            (_leading("file", FILE, "name of the file, beside the script"),), manual=True, dims=BOTH,
+    Command("mod{el} sav{e}", "Writes the complete state to a file: mesh, models, motion, cracks, histories, and "
+            "Python variables and functions whose names begin with m_.", ("pcdc model save 'test.sav'",),
+            (_leading("file", FILE, "name of the file, in the folder of the script"),), manual=True, dims=BOTH,
             does="checkpoints.save"),
-    Command("mod{el} rest{ore}", "The state of a file, and its m_ variables and functions.",
+    Command("mod{el} rest{ore}", "Loads the state of a file with its m_ variables and functions.",
             ("pcdc model restore 'test.sav'",), (_leading("file", FILE, "name of the file"),), manual=True, dims=BOTH,
             does="restore"),
-    Command("mod{el} g{ravity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),
+    Command("mod{el} g{ravity}", "Sets gravity from now on.", ("pcdc model gravity (0,-9.81)",),
             (_leading("gravity", VECTOR, "acceleration", "m/s2"),), dims=BOTH, does="settings.gravity"),
-    Command("mod{el} units", "The units of all values that follow: those that are unlikely in them are warned of, once "
-            "per property and with the factor that looks missing; histories and charts are labelled with them. No "
-            "value is changed.", ("pcdc model units SI", "pcdc model units mm-MPa-s"),
+    Command("mod{el} units", "Declares the units of all following values. Unlikely values give a warning, once per "
+            "property, with the factor that may be missing; histories and charts show the units. No value is "
+            "changed.", ("pcdc model units SI", "pcdc model units mm-MPa-s"),
             (_leading("system", choice(*UNITS), ", ".join(UNITS.values())),), dims=BOTH, does="settings.units"),
     Command("mod{el} opt{ion}", "Switches of the calculation.",
             ("pcdc model option dynamic off", "pcdc model option collision on"),
             options=(
                 Option("dyn{amic}", (BOOL,), "true motion in time; off: static, towards equilibrium", default="on"),
                 Option("col{lision}", (OPTIONAL_BOOL,), "contact of surfaces", default="on"),
-                Option("ecda", (BOOL,), "on: joints that are whole are no contacts besides; nothing else is there, so "
-                       "off is refused", default="on"),
+                Option("ecda", (BOOL,), "on: intact joints are not contacts; off is not available and is "
+                       "rejected", default="on"),
                 Option("cr{eep}", (BOOL,), "as model creep", default="off"),
-                Option("over{lap}", (choice("refuse", "relax", "keep"),), "of bodies that overlap before the first "
-                       "step: refuse it, with the places; let a static stage move them apart; or start as they are",
+                Option("over{lap}", (choice("refuse", "relax", "keep"),), "bodies that overlap before the first step: "
+                       "reject them, with their positions; separate them in a static stage; or start with the overlap",
                        default="refuse"),
-                Option("deep-o{verlap}", (choice("warn", "stop"),), "of bodies that come to overlap by more than a "
-                       "tenth of an altitude of an element: say where, or end the run there", default="warn"),
-                Option("pot{ential}", (choice("distance", "munjiza"),), "what contact presses with: the distance to "
-                       "the nearest side of an element over the usual altitude in its body, or four times the smallest "
-                       "of its barycentric coordinates", default="distance", dims=SPACE),
-                Option("mech{anical}", (BOOL,), "motion of blocks; off: they stand still while fluid or heat flows",
+                Option("deep-o{verlap}", (choice("warn", "stop"),), "bodies that overlap by more than a tenth of an "
+                       "altitude of an element during the run: report where, or end the run", default="warn"),
+                Option("pot{ential}", (choice("distance", "munjiza"),), "potential of contact: distance to the nearest "
+                       "face of an element over the typical altitude in its body, or four times the smallest "
+                       "barycentric coordinate", default="distance", dims=SPACE),
+                Option("mech{anical}", (BOOL,), "motion of blocks; off: blocks are fixed while fluid or heat flows",
                        default="on"),
-                Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
+                Option("large-s{train}", (BOOL,), "rotations of elements are included", default="on"),
                 Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
                        "histories of the model, a table at the end", default="off"),
-                Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model; off: pressures "
-                       "stay as they are and go on pushing, so that blocks come to rest at them", default="on"),
-                Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off"),
-                Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
-                       "the stress that they bring, stay as they are", default="on"),
-                Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
-                       "where they are", default="on", also=("p{roppant}-t{ransport}",))),
+                Option("hyd{raulic}", (BOOL,), "flow in joints with a hydraulic model; off: pressures are frozen and "
+                       "keep loading the blocks", default="on"),
+                Option("one-way", (BOOL,), "fluid follows the blocks but does not load them", default="off"),
+                Option("therm{al}", (BOOL,), "heat flow in elements with a thermal model; off: temperatures and "
+                       "thermal stress are frozen", default="on"),
+                Option("prop{pant}", (BOOL,), "motion of grains in channels that carry proppant; off: grains are "
+                       "fixed", default="on", also=("p{roppant}-t{ransport}",))),
             needs_option=True, manual=True, dims=BOTH, also=("mod{el}",), does="option"),
     Command("mod{el} t{ime}-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. "
-            "Without this command it is estimated at the first step and after each change of the model. Of value, "
-            "mass-scaling and auto on the one said last holds and ends the others.",
+            "Without this command it is estimated at the first step and after each change of the model. The last of "
+            "value, mass-scaling and auto on applies and replaces the others.",
             ("pcdc model time-step auto off", "pcdc model time-step 1e-7", "pcdc model time-step value 0",
              "pcdc model time-step table 'dt'", "pcdc model time-step auto update-frequency 20"),
             (_leading("value", TABLED_STEP, "as the word value", "s", False),),
             (
-                Option("value", (TABLED_STEP,), "the time step itself; 0: estimated again; a table over the time is "
-                       "looked at every 100 steps", "s"),
+                Option("value", (TABLED_STEP,), "the time step; 0: estimated again; a table over time is evaluated "
+                       "every 100 steps", "s"),
                 Option("auto", (OPTIONAL_BOOL,), "on: estimated again every 100 steps; off: at the first step and "
                        "after changes of the model only; a value stays", default="off"),
                 Option("u{pdate}-f{requency}", (COUNT,), "with auto: steps after which it is estimated again",
                        default="100"),
-                Option("safe{ty}", (PART,), "part of the stability limit that is taken, by estimates and mass-scaling",
+                Option("safe{ty}", (PART,), "part of the stability limit that estimates and mass-scaling use",
                        "1", "0.8"),
-                Option("mass-s{caling}", (NOT_NEGATIVE,), "nodes get as much mass as this time step needs; 0: none, "
+                Option("mass-s{caling}", (NOT_NEGATIVE,), "mass is added to nodes as this time step requires; 0: none, "
                        "and the step is estimated again", "s"),
                 Option("hyd{raulic}", (NOT_NEGATIVE,), "sub-step of flow, which then has a clock of its own; 0: those "
                        "of a cycle take the time of the steps of the blocks, or without motion half of what is stable",
@@ -831,14 +836,14 @@ _MODEL = (
                        "a cycle take the time of the steps of the blocks, or without motion 0.9 of what is stable", "s",
                        "0")),
             needs_option=True, manual=True, dims=BOTH, does="settings.time_step"),
-    Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
+    Command("mod{el} step", "Executes a number of steps.", ("pcdc model step 1000",),
             (_leading("steps", ZERO_OR_MORE, "number of steps"),), dims=BOTH, does="steps.step"),
     Command("mod{el} sol{ve}", "Steps until the first of ratio, cycles, time and run-time is reached. Without any of "
-            "them it is ratio 1e-5 or 10 000 cycles; a warning says if it was the cycles. With elastic: "
-            "straight to static equilibrium by Newton's method, for blocks that are elastic or yield, whose joints "
-            "stay before their peak and whose surfaces do not touch. A run towards a ratio that gets nowhere (window, "
-            "limit) ends the script with exit code 3 and names the body that slides away; `pcdc.solved['reason']` says "
-            "how a run ended.",
+            "them: ratio 1e-5 or 10 000 cycles, with a warning if the cycles end it. With elastic: static equilibrium "
+            "by Newton's method, for elastic or yielding blocks whose joints are not past their peak and whose "
+            "surfaces are not in contact. A run that does not converge to its ratio (window, limit) ends the script "
+            "with exit code 3 and names the body that slides away; `pcdc.solved['reason']` is the reason why a run "
+            "ended.",
             ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic time 1e6",
              "pcdc model solve elastic steps 10", "pcdc model solve hydraulic time 5 dt 0.01",
              "pcdc model solve hydraulic steady", "pcdc model solve hydraulic auto time 3600",
@@ -848,73 +853,74 @@ _MODEL = (
                             "as far below as rounding allows", "1"),
                      Option("c{ycles}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
                             "velocities act"),
-                     Option("t{ime}", (POSITIVE,), "time that passes; in static runs creep time, each creep step to "
-                            "its ratio (1e-5), or with elastic at once", "s"),
+                     Option("t{ime}", (POSITIVE,), "simulated time; in static runs creep time, with each creep step "
+                            "solved to its ratio (1e-5), or directly with elastic", "s"),
                      Option("r{un}-t{ime}", (POSITIVE,), "as model run-time, for this command alone", "s"),
-                     Option("win{dow}", (ZERO_OR_MORE,), "towards a ratio: it has failed when the least ratio has not "
-                            "fallen by a tenth in so many steps, nor in as many as the progress so far took; 0: "
-                            "never", default="static runs: ten times as many as a wave takes there and back, at least "
-                            "20 000; dynamic ones, and beside cycles or time: 0"),
-                     Option("lim{it}", (ZERO_OR_MORE,), "towards a ratio: it has failed after so many steps; 0: never",
-                            default="static runs 1 000 000, dynamic ones 10 000 000; beside time: 0"),
+                     Option("win{dow}", (ZERO_OR_MORE,), "with a ratio: the run fails if the least ratio has not "
+                            "decreased by a tenth in this number of steps, nor in as many steps as the progress so far "
+                            "took; 0: never", default="static runs: ten times the steps in which a wave crosses the "
+                            "model and returns, at least 20 000; dynamic runs, and with cycles or time: 0"),
+                     Option("lim{it}", (ZERO_OR_MORE,), "with a ratio: the run fails after this number of steps; 0: "
+                                                        "never",
+                            default="static runs 1 000 000, dynamic runs 10 000 000; with time: 0"),
                      Option("on-f{ailure}", (choice("stop", "continue"),), "stop: with exit code 3; continue: with a "
-                            "warning, the script looks at pcdc.solved", default="stop"),
-                     Option("ela{stic}", (), "at once, without steps"),
-                     Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it "
-                            "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
-                            "may pass their peak and break; with mechanical off, flow alone"),
-                     Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
-                            "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
-                            "and joints may pass their peak and break; with mechanical off, heat alone"),
-                     Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
-                            "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
-                     Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
-                            "where an estimate says that these cost less, or where implicit ones are refused; the log "
-                            "has both estimates"),
-                     Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
-                            "passes"),
-                     Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
-                            "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if "
-                            "it is there, from 400 000 unknowns on, in space from 20 000", default="auto"),
-                     Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
-                            "equal increments, in each of which elements flow once; one that finds no balance is "
+                            "warning, the script can check pcdc.solved", default="stop"),
+                     Option("ela{stic}", (), "directly, without steps"),
+                     Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for a time or until it is "
+                            "steady; in static runs blocks are in equilibrium at the end of each step, and joints may "
+                            "pass their peak and break; with mechanical off, flow alone"),
+                     Option("therm{al}", (), "heat by implicit steps, backward Euler, for a time or directly to its "
+                            "steady state; in static runs blocks are in equilibrium at the end of each step, and "
+                            "joints may pass their peak and break; with mechanical off, heat alone"),
+                     Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; steps of flow are "
+                            "shorter when joints break or a step does not converge", "s", "a hundredth of the time"),
+                     Option("auto", (), "with hydraulic and time: uses explicit steps, as without the word hydraulic, "
+                            "if their estimated cost is lower or implicit steps are not possible; the log reports both "
+                            "estimates"),
+                     Option("stea{dy}", (), "with hydraulic or thermal: until outflow equals inflow; no time passes"),
+                     Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: SciPy "
+                            "on one rank, identical results on any number of ranks; PETSc on all ranks; auto: PETSc, "
+                            "if available, from 400 000 unknowns, in space from 20 000", default="auto"),
+                     Option("ste{ps}", (COUNT,), "with elastic: number of equal load increments, in each of which "
+                            "elements yield once; an increment that does not converge is "
                             "halved", "", "1")), dims=BOTH, does="solve"),
-    Command("mod{el} r{un}-t{ime}", "The time that model solve takes at most from now on, from its beginning or from "
-            "the start-time of model reset; without another aim each model solve goes on for it. In static runs "
-            "without creep no time passes.", ("pcdc model run-time 0.1", "pcdc model run-time 0"),
-            (_leading("time", NOT_NEGATIVE, "0: no end any more", "s"),), dims=BOTH, does="clocks.run_time"),
-    Command("mod{el} s{olve}-c{heck}", "Steps between two looks at the ratio in model solve.",
-            ("pcdc model solve-check 10",), (_leading("steps", COUNT, "in static runs 50, in dynamic ones 100 without "
-                                                      "this command"),), dims=BOTH, does="clocks.solve_check"),
+    Command("mod{el} r{un}-t{ime}", "Maximum simulated time of each following model solve, counted from its start or "
+            "from the start-time of model reset; without another criterion model solve runs for this time. No time "
+            "passes in static runs without creep.", ("pcdc model run-time 0.1", "pcdc model run-time 0"),
+            (_leading("time", NOT_NEGATIVE, "0: no limit", "s"),), dims=BOTH, does="clocks.run_time"),
+    Command("mod{el} s{olve}-c{heck}", "Steps between two checks of the ratio in model solve.",
+            ("pcdc model solve-check 10",), (_leading("steps", COUNT, "default: 50 in static runs, 100 in dynamic "
+                                                      "runs"),), dims=BOTH, does="clocks.solve_check"),
     Command("mod{el} c{ycle}-o{ption}", "Time step and number of steps of each part in a cycle of a coupled "
             "calculation: those of the blocks as model time-step value and model sub-step mechanical, those of fluid "
             "and heat as model time-step and model sub-step with these words. Proppant moves with the fluid, in its "
             "steps.", ("pcdc model cycle-option mechanical cycle-number 20 hydraulic time-step 0.5 cycle-number 4",),
             options=tuple(Option(word, (), f"of {what}", more=_STEPS) for word, what in _PARTS),
             needs_option=True, dims=BOTH, does="clocks.cycle_option"),
-    Command("mod{el} reset", "Sets the clocks of the parts. Tables of conditions, stages of wells and leak-off go by "
+    Command("mod{el} reset", "Sets the clocks of the parts. Tables of conditions, stages of wells and leak-off use "
             "them.", ("pcdc model reset mechanical current-time 0", "pcdc model reset hydraulic current-time 0 "
                       "time-step 0.5"),
             options=tuple(Option(word, (), f"of {what}", more=_CLOCKS) for word, what in _PARTS),
             needs_option=True, dims=BOTH, does="clocks.reset"),
-    Command("mod{el} query", "Says in the log what time a part has come to, and its time step.",
+    Command("mod{el} query", "Reports the present time and the time step of a part in the log.",
             ("pcdc model query mechanical time",),
             options=tuple(Option(word, (), f"of {what}", more=(Option("t{ime}", (), "its clock", required=True),))
                           for word, what in _PARTS),
             needs_option=True, dims=BOTH, does="clocks.query"),
-    Command("mod{el} pl{ane}-strain", "Nothing moves across the plane. Models of the plane are in plane strain unless "
-            "model plane-stress says otherwise; it takes that back.", ("pcdc model plane-strain",),
+    Command("mod{el} pl{ane}-strain", "Plane strain: no strain across the plane. This is the default of models in two "
+            "dimensions; the command revokes model plane-stress.", ("pcdc model plane-strain",),
             does="settings.option", fixed=(("plane_stress", False),)),
-    Command("mod{el} pl{ane}-stress", "The model is a plate of a metre of thickness whose two faces bear nothing: the "
-            "stress across the plane is 0, in elements that are elastic, yield or creep, and with heat. It comes "
-            "before element initial and before the first step. A law of the user must give 0 for that stress itself.",
+    Command("mod{el} pl{ane}-stress", "Plane stress: a plate of unit thickness with stress-free faces; the stress "
+            "across the plane is 0 in elastic, yielding and creeping elements, also with heat. Must precede element "
+            "initial and the first step. A user law must return 0 for the out-of-plane stress.",
             ("pcdc model plane-stress",), does="settings.option", fixed=(("plane_stress", True),)),
     Command("mod{el} p{lot}-f{requency}", "Steps between two pictures of the window.", ("pcdc model p-f 10",),
             (_leading("steps", COUNT, "steps"),), dims=BOTH, idle=_WINDOW),
-    Command("mod{el} r{ender}-i{nterval}", "The same.", ("pcdc model render-interval 10",),
+    Command("mod{el} r{ender}-i{nterval}", "Interval between two pictures of the window.",
+            ("pcdc model render-interval 10",),
             (_leading("steps", COUNT, "steps"),), dims=BOTH, idle=_WINDOW),
-    Command("mod{el} r{ender}-a{uto}", "The same by itself.", ("pcdc model render-auto",),
-            (_leading("on", BOOL, "whether it is", required=False),), dims=BOTH, idle=_WINDOW),
+    Command("mod{el} r{ender}-a{uto}", "Draws the window automatically.", ("pcdc model render-auto",),
+            (_leading("on", BOOL, "whether it is drawn", required=False),), dims=BOTH, idle=_WINDOW),
     Command("mod{el} c{ollision}-d{etect}", "How contacts are searched.", ("pcdc model collision-detect bvh",),
             options=tuple(Option(word, (), doc) for word, doc in (
                 ("bvh", "by a tree of boxes"), ("sap", "along an axis"), ("unif{orm}", "by cells"),
@@ -938,33 +944,35 @@ _MODEL = (
     Command("mod{el} fi{eld}", "The clock of a field that diffuses in elements, as of moisture.",
             ("pcdc model field moisture time-step 3600", "pcdc model field moisture flows off"),
             (_leading("field", choice(*kinds()), "its name"),),
-            options=(Option("fl{ows}", (BOOL,), "off: values, and the stress that they bring, stay as they are",
+            options=(Option("fl{ows}", (BOOL,), "off: values and the stress that they cause are frozen",
                             default="on"),
                      Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "sub-step of the field, which then has a clock of its "
                             "own; 0: those of a cycle take the time of the steps of the blocks, or without motion 0.9 "
                             "of what is stable", "s", "0"),
                      Option("s{ub}-s{teps}", (ZERO_OR_MORE,), "in a cycle; 0: as many as are stable", default="0"),
-                     Option("c{urrent}-t{ime}", (FLOAT,), "what its clock shows now", "s")),
+                     Option("c{urrent}-t{ime}", (FLOAT,), "present time of its clock", "s")),
             needs_option=True, dims=BOTH, does="fields.clock"),
-    Command("mod{el} ray{leigh}", "Rayleigh damping of elements in dynamic runs, beside that of their damp-factor: "
-            "alpha times the mass, beta times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + "
-            "pi beta f.",
+    Command("mod{el} ray{leigh}", "Rayleigh damping of elements in dynamic runs, in addition to their damp-factor: "
+            "alpha times the mass, beta times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + pi "
+            "beta f.",
             ("pcdc model rayleigh 0.05 frequency 12", "pcdc model rayleigh 0.02 frequency 5 part stiffness",
              "pcdc model rayleigh 0"),
-            (_leading("ratio", NOT_NEGATIVE, "part of the critical damping at the frequency; 0: none any more", "1"),),
-            (Option("freq{uency}", (POSITIVE,), "where the ratio is this; with both parts it is least there", "Hz"),
-             Option("part", (choice("both", "mass", "stiffness"),), "both, or one of them alone", default="both")),
+            (_leading("ratio", NOT_NEGATIVE, "part of the critical damping at the frequency; 0: no Rayleigh "
+                                             "damping", "1"),),
+            (Option("freq{uency}", (POSITIVE,), "frequency at which this ratio applies; with both parts the ratio is "
+                                                "least there", "Hz"),
+             Option("part", (choice("both", "mass", "stiffness"),), "both parts, or one of them", default="both")),
                     dims=BOTH, does="settings.rayleigh"),
-    Command("mod{el} creep", "Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time "
-            "passes with the time of the model. In static runs model solve time makes it pass, in creep steps, each of "
-            "which ends in balance; `every` of histories and frames then counts creep steps.",
+    Command("mod{el} creep", "Switches creep of elements of mech-burgers on or off. In dynamic runs creep time passes "
+            "with the time of the model. In static runs model solve time advances it in creep steps, each of which "
+            "ends in equilibrium; `every` of histories and frames then counts creep steps.",
             ("pcdc model creep on dt 3600", "pcdc model creep on dt 100 change 0.05 greatest 86400",
              "pcdc model creep off"),
             (_leading("on", BOOL, "whether they creep"),),
             (Option("dt", (POSITIVE,), "creep step of static runs; with change the first one", "s"),
-             Option("cha{nge}", (PART,), "the creep step follows this change of stress: the largest of the deviators "
-                    "of elements and of their Kelvin dashpots in a creep step, over the largest deviator of all; from "
-                    "one to the next it halves or doubles at most", "1", "dt stays"),
+             Option("cha{nge}", (PART,), "the creep step is adapted to this change of stress: the largest change of "
+                    "the deviators of elements and of their Kelvin dashpots in a creep step, over the largest "
+                    "deviator; the step at most halves or doubles each time", "1", "dt stays"),
              Option("least", (POSITIVE,), "with change: shortest creep step", "s", "dt / 100"),
              Option("great{est}", (POSITIVE,), "with change: longest creep step", "s", "100 dt")), dims=BOTH,
             does="settings.creep"),
@@ -972,8 +980,8 @@ _MODEL = (
 
 _LENGTHS = (
     Option("spr{ead}", (NOT_NEGATIVE,), "lognormal: standard deviation", "m"),
-    Option("least", (NOT_NEGATIVE,), "no shorter ones", "m", "0"),
-    Option("great{est}", (POSITIVE,), "no longer ones", "m", "none"),
+    Option("least", (NOT_NEGATIVE,), "lower bound", "m", "0"),
+    Option("great{est}", (POSITIVE,), "upper bound", "m", "none"),
 )
 
 _GEOMETRY = (
@@ -981,7 +989,7 @@ _GEOMETRY = (
             ("pcdc geometry create polyline ([i],0) (0,[i]) as-layer ['line'+ str(i)]",),
             (_leading("points", VECTORS, "the points; or a list of vectors", "m"),), (_LAYER,), manual=True,
             does="shape"),
-    Command("geom{etry} c{reate} polyg{on}", "A closed line; in three dimensions the flat surface within.",
+    Command("geom{etry} c{reate} polyg{on}", "A closed line; in three dimensions the plane surface inside it.",
             ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'block'",),
             (_leading("points", PLACES, "the corners", "m"),), (_LAYER,), dims=BOTH,
             also=("geom{etry} c{reate} p{olyline}-c{lose}",), does="shape"),
@@ -1023,7 +1031,8 @@ _GEOMETRY = (
                        "distribution of the length, and its value: the length, the mean, the mean, the exponent", "m",
                        required=True, more=_LENGTHS, dims=PLANE),
                 Option("rad{ius}", (choice("fixed", "exponential", "lognormal", "power"), FLOAT),
-                       "the same of the radius of discs", "m", required=True, more=_LENGTHS, dims=SPACE),
+                       "distribution of the radius of discs, and its value: the radius, the mean, the mean, the "
+                       "exponent", "m", required=True, more=_LENGTHS, dims=SPACE),
                 Option("p10", (POSITIVE,), "density: fractures per length of a scan line", "1/m"),
                 Option("p20", (POSITIVE,), "density: fractures per area", "1/m2", dims=PLANE),
                 Option("p21", (POSITIVE,), "density: length of fractures per area", "1/m", dims=PLANE),
@@ -1031,13 +1040,16 @@ _GEOMETRY = (
                 Option("p32", (POSITIVE,), "density: area of fractures per volume", "1/m", dims=SPACE),
                 Option("scan-l{ine}", (FLOAT,), "direction of the line of p10", "degrees", "0", dims=PLANE),
                 Option("scan-dir{ection}", (VECTOR,), "direction of the line of p10", "", "(0,0,1)", dims=SPACE),
-                Option("reached", (), "p20 or p21, p30 or p32 is met as nearly as whole ones can, not in the mean"),
-                Option("ends-at", (NOT_NEGATIVE,), "share of the crossings with earlier fractures at which one ends",
+                Option("reached", (), "meets p20, p21, p30 or p32 as closely as a whole number of fractures can, not "
+                                      "on average"),
+                Option("ends-at", (NOT_NEGATIVE,), "share of the intersections with earlier fractures at which a "
+                                                   "fracture ends",
                        "1", "0", dims=PLANE),
                 Option("ins{ide}", (STRING,), "the layer that bounds them", required=True),
-                Option("hole", (STRING,), "none inside of this layer", repeated=True, dims=PLANE),
-                Option("shortest", (NOT_NEGATIVE,), "shorter pieces at the rim are left out", "m", "0", dims=PLANE),
-                Option("seed", (ZERO_OR_MORE,), "another seed, another network", required=True), _LAYER), dims=BOTH,
+                Option("hole", (STRING,), "no fractures inside this layer", repeated=True, dims=PLANE),
+                Option("shortest", (NOT_NEGATIVE,), "shorter pieces at the boundary are omitted", "m", "0", dims=PLANE),
+                Option("seed", (ZERO_OR_MORE,), "seed of the random numbers: each seed gives another "
+                                                "network", required=True), _LAYER), dims=BOTH,
             does="fractures"),
     Command("geom{etry} c{reate} box", "A box along the axes.",
             ("pcdc geometry create box (0,0,0) (10,5,4) as-layer 'rock'",),
@@ -1063,13 +1075,13 @@ _GEOMETRY = (
             ("pcdc geometry create plane (0,0,1) (0,0.2,1) as-layer 'fault'",),
             (_leading("point", VECTOR, "a point of it", "m"), _leading("normal", VECTOR, "normal of any length")),
             (_LAYER,), dims=SPACE, does="shape"),
-    Command("geom{etry} c{reate} ext{rude}", "The bodies that the polygons of a layer become, drawn along a way.",
+    Command("geom{etry} c{reate} ext{rude}", "Bodies made by extruding the polygons of a layer along a vector.",
             ("pcdc geometry create extrude layer 'profile' along (0,10,0) as-layer 'slope'",),
             options=(Option("layer", (STRING,), "of polygons", required=True),
-                     Option("along", (VECTOR,), "the way", "m", required=True), _LAYER), dims=SPACE,
+                     Option("along", (VECTOR,), "the vector of extrusion", "m", required=True), _LAYER), dims=SPACE,
             does="geometry.extrude"),
-    Command("geom{etry} c{reate} rev{olve}", "The bodies that the polygons of a layer become, turned about an axis in "
-            "their plane.", ("pcdc geometry create revolve layer 'profile' axis (0,0,1) as-layer 'ring'",),
+    Command("geom{etry} c{reate} rev{olve}", "Bodies made by revolving the polygons of a layer about an axis in their "
+            "plane.", ("pcdc geometry create revolve layer 'profile' axis (0,0,1) as-layer 'ring'",),
             options=(Option("layer", (STRING,), "of polygons", required=True),
                      Option("axis", (VECTOR,), "direction of the axis", required=True),
                      Option("about", (VECTOR,), "a point of it", "m", "(0,0,0)"),
@@ -1080,7 +1092,8 @@ _GEOMETRY = (
             ("pcdc geometry import 'slope.dxf' as-layer 'slope'",),
             (_leading("file", FILE, "name of the file"),),
             (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all"),
-             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "as STEP and DXF files say, else 1")),
+             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "the unit given in STEP and DXF files, "
+                                                                               "else 1")),
             dims=BOTH, does="geometry.import_file"),
     Command("geom{etry} transf{orm}", "Moves, turns or scales a layer.",
             ("pcdc geometry transform 'hole' rotate 30 about (0,0) move (1,0)",),
@@ -1088,14 +1101,14 @@ _GEOMETRY = (
             (Option("scale", (POSITIVE,), "done first"),
              Option("rot{ate}", (FLOAT,), "then, counter-clockwise; in three dimensions right-handed about an axis",
                     "degrees"),
-             Option("axis", (VECTOR,), "about which it is turned", "", "(0,0,1)", dims=SPACE),
+             Option("axis", (VECTOR,), "centre of rotation", "", "(0,0,1)", dims=SPACE),
              Option("about", (VECTOR,), "centre of both", "m", "the origin"), Option("move", (VECTOR,), "last", "m")),
             needs_option=True, dims=BOTH, does="geometry.transform"),
     Command("geom{etry} s{cale}", "Multiplies the coordinates of layers, of all without layer; a negative factor "
-            "mirrors. What is round takes one size of factor only.",
+            "mirrors. Round shapes need factors of equal size.",
             ("pcdc geometry scale (2,1) layer 'hole' 'slope'",),
             (_leading("factors", VECTOR, "along the axes, not 0"),), (_SOME_LAYERS,), dims=BOTH, does="geometry.scale"),
-    Command("geom{etry} t{ranslate}", "Moves layers, all without layer.",
+    Command("geom{etry} t{ranslate}", "Moves layers; without layer all of them.",
             ("pcdc geometry translate (10,0) layer 'hole' 'slope'",),
             (_leading("way", VECTOR, "where to", "m"),), (_SOME_LAYERS,), dims=BOTH, does="geometry.translate"),
     Command("geom{etry} exp{ort}", "Writes layers to a DXF file, in metres, each as a layer of its name.",
@@ -1117,21 +1130,23 @@ _MESH = (
                 Option("ref{ine}-l{ayer}", (STRING,), "smaller elements near this layer",
                        repeated=True,
                        more=(Option("size", (POSITIVE,), "length of edges there", "m", required=True),
-                             Option("dist{ance}", (POSITIVE,), "over which the size grows to that of the rest", "m",
+                             Option("dist{ance}", (POSITIVE,), "distance over which the size grows to that of the "
+                                                               "rest", "m",
                                     "ten times the size"))),
-                Option("hole", (STRING,), "what is inside of this layer stays empty", repeated=True),
-                Option("reg{ion}", (STRING,), "what is inside of this layer is a group of its own", repeated=True,
+                Option("hole", (STRING,), "the inside of this layer stays empty", repeated=True),
+                Option("reg{ion}", (STRING,), "the elements inside this layer become a group", repeated=True,
                        more=(Option("group", (STRING,), "its name", default="the name of the layer"),)),
                 Option("emb{ed}", (STRING,), "lines that become edges of the mesh; in three dimensions surfaces, which "
                        "become faces", repeated=True),
-                Option("crack", (STRING,), "lines that become edges with a crack from the beginning; in three "
-                       "dimensions surfaces", repeated=True),
-                Option("bodies", (), "each body of the layer is a group of its own: by its name in its file, else by "
-                       "the layer and its number", dims=SPACE),
+                Option("crack", (STRING,), "lines that become edges with an initial crack; in three dimensions "
+                       "surfaces", repeated=True),
+                Option("bodies", (), "each body of the layer becomes a group, named as in its file, else by the layer "
+                       "and its number", dims=SPACE),
                 Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri", dims=PLANE),
-                Option("irr{egular}", (), "triangles in no pattern: rows of equilateral ones lead cracks", dims=PLANE),
-                Option("smooth", (), "inner points lie in the middle of their neighbours, so that joints on all "
-                       "edges share a uniform stress evenly; for triangles", dims=PLANE), _GROUP), dims=BOTH,
+                Option("irr{egular}", (), "triangles without a pattern, since cracks follow rows of equilateral "
+                                          "triangles", dims=PLANE),
+                Option("smooth", (), "moves inner points to the centre of their neighbours, so that joints on all "
+                       "edges carry a uniform stress equally; for triangles", dims=PLANE), _GROUP), dims=BOTH,
             does="meshes.create"),
     Command("mesh str{uctured}", "A regular mesh of a rectangle.",
             ("pcdc mesh structured (0,0) (10,5) cells 40 20 type tri diagonal both group 'base'",
@@ -1144,59 +1159,59 @@ _MESH = (
                     "tetrahedra or hexahedra", default="tri, tet"),
              Option("diag{onal}", (choice("right", "left", "alternate", "both"),), "of the triangles; alternating, or "
                     "both of each rectangle", default="alternate", dims=PLANE),
-             Option("ratio", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along x and y (and z): each rectangle or box is so "
-                    "many times as large as the one before", "1", "1 1"), _GROUP), dims=BOTH,
+             Option("ratio", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along x and y (and z): ratio of the size of each "
+                    "rectangle or box to the one before", "1", "1 1"), _GROUP), dims=BOTH,
             does="meshes.grid"),
     Command("mesh equi{lateral}", "Nearly equilateral triangles in a rectangle.",
             ("pcdc mesh equilateral (0,0) (10,5) size 0.25 group 'base'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
             (Option("size", (POSITIVE,), "length of edges", "m", required=True), _GROUP), does="meshes.equilateral"),
-    Command("mod{el} add node", "More nodes, for elements that are added next, before the first model or condition is "
-            "assigned. Their numbers follow those of the mesh.", ("pcdc model add node (0,0) (1,0) (0,1)",),
+    Command("mod{el} add node", "Adds nodes for elements that follow, before the first model or condition is assigned. "
+            "Their numbers follow those of the mesh.", ("pcdc model add node (0,0) (1,0) (0,1)",),
             (_leading("points", PLACES, "the nodes", "m"),), dims=BOTH, does="meshes.add_nodes"),
-    Command("mod{el} add element", "One more element, by the numbers of its nodes.", ("pcdc model add element 0 1 2",),
+    Command("mod{el} add element", "Adds an element by the numbers of its nodes.", ("pcdc model add element 0 1 2",),
             (Option("corners", (ZERO_OR_MORE, ZERO_OR_MORE, ZERO_OR_MORE, LAST_ID), "three or four, in three "
                     "dimensions four", required=True),), dims=BOTH, does="meshes.add_element"),
-    Command("mod{el} scale", "Coordinates of all points of the mesh are multiplied, before the first model or "
+    Command("mod{el} scale", "Multiplies the coordinates of all points of the mesh, before the first model or "
             "condition is assigned.", ("pcdc model scale (1,2)",),
             (_leading("factors", VECTOR, "along the axes, above 0"),),
             dims=BOTH, does="meshes.scale"),
-    Command("mod{el} tran{slate}", "All points of the mesh are moved, before the first model or condition is "
+    Command("mod{el} tran{slate}", "Moves all points of the mesh, before the first model or condition is "
             "assigned.", ("pcdc model translate (10,0)",), (_leading("way", VECTOR, "where to", "m"),), dims=BOTH,
             does="meshes.translate"),
     Command("mesh imp{ort}", "A mesh of another program, for example .msh or .inp; its physical groups and sets of "
             "elements, nodes and faces become groups.",
             ("pcdc mesh import 'rock.msh'",), (_leading("file", FILE, "name of the file"),),
-            (Option("group", (STRING,), "a group that all elements are put into, besides those of the file",
+            (Option("group", (STRING,), "a group for all elements, in addition to those of the file",
                     more=(SET,)),
-             Option("merge", (NOT_NEGATIVE,), "points nearer than this are one", "m", "0"),
+             Option("merge", (NOT_NEGATIVE,), "points nearer than this are merged", "m", "0"),
              Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1")), dims=BOTH,
             also=("mod{el} imp{ort} gmsh", "mod{el} imp{ort} abaqus"), does="meshes.import_file"),
-    Command("mesh int{ersect}", "Joints on a layer become cracks: the edges of the mesh that lie on it.",
+    Command("mesh int{ersect}", "Turns the joints on a layer into cracks: the edges of the mesh that lie on it.",
             ("pcdc mesh intersect layer 'fault'",),
             options=(Option("layer", (STRING,), "its lines are edges of the mesh, its surfaces faces", required=True),
-                     Option("follow", (), "they are not: the edges that follow them best are taken, the faces between "
+                     Option("follow", (), "they are not: uses the edges that follow them best, or the faces between "
                             "elements on either side")), dims=BOTH, does="meshes.intersect"),
-    Command("mesh glue", "Bodies that were meshed separately hang together where their faces lie on each other: these "
-            "become joints, as inside of a body. Elements are cut where points of others lie on their sides. With a "
-            "range only faces of its elements are glued, to any others.",
+    Command("mesh glue", "Connects separately meshed bodies where their faces coincide; the faces become joints like "
+            "those inside a body. Elements are cut at hanging nodes. With a range only faces of its elements are "
+            "glued, to any others.",
             ("pcdc mesh glue", "pcdc mesh glue tolerance 1e-4 between 'lining' 'rock' set 'domain'"),
-            options=(Option("tol{erance}", (POSITIVE,), "points nearer than this are one", "m",
+            options=(Option("tol{erance}", (POSITIVE,), "points nearer than this are merged", "m",
                             "a thousandth of the shortest edge"),
                      Option("betw{een}", (STRING, STRING), "only faces between the elements of these two groups",
                             more=(SET,))), ranged="element", dims=BOTH, also=("e{lement} glue",), does="meshes.glue"),
-    Command("mesh quad{ratic}", "Each triangle of the mesh becomes a six-node triangle, in which displacements are "
-            "quadratic: a beam bends with one of them through its height. It is stored as four elements, which go "
-            "together; joints, contact and loads act on the halves of its sides. Elastic. The mesh has triangles only; "
-            "comes before the first model or condition.", ("pcdc mesh quadratic",), does="meshes.six_nodes"),
-    Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",), dims=BOTH,
+    Command("mesh quad{ratic}", "Turns each triangle of the mesh into an elastic six-node triangle with quadratic "
+            "displacements: one over the height of a beam is enough for bending. It is stored as four connected "
+            "elements; joints, contact and loads act on the halves of its sides. The mesh must have triangles only; "
+            "must precede the first model or condition.", ("pcdc mesh quadratic",), does="meshes.six_nodes"),
+    Command("mesh qual{ity}", "Reports the quality of the mesh: angles, sizes.", ("pcdc mesh quality",), dims=BOTH,
             does="meshes.tell_quality"),
 )  # fmt: skip
 
 # ---- meshes in the words of the online commands -------------------------------------------------------------------
 
 _SIZE = Option("m{esh}-s{ize}", (POSITIVE,), "length of edges there", "m", "the largest of the others")
-_BOUNDARY = Option("is-b{oundary}", (), "it bounds the mesh: what is outside is cut off", "", "the first piece does")
+_BOUNDARY = Option("is-b{oundary}", (), "it bounds the mesh: the outside is removed", "", "the first piece does")
 _ARRAY = Option("a{rray}", (VECTORS,), "points; or a list of vectors", "m")
 _LAYERS = Option("l{ayer}", (STRINGS,), "layers of geometry")
 _ELEMENT_CREATE = (
@@ -1209,12 +1224,12 @@ _ELEMENT_CREATE = (
                      Option("p2", (VECTOR,), "of the second", "m", required=True),
                      Option("p3", (VECTOR,), "of the third", "m", required=True, dims=SPACE),
                      Option("n", (COUNT, COUNT, THIRD_COUNT), "elements along each edge", required=True),
-                     Option("r{atio}", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along each edge an element is so many "
-                            "times as large as the one before", "1", "1 1"),
+                     Option("r{atio}", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along each edge: ratio of the size of an "
+                            "element to the one before", "1", "1 1"),
                      Option("tri{angle}", (BOOL,), "triangles, or tetrahedra; off: quads, or hexahedra", default="on",
                             also=("tet{ra}",)), _GROUP), dims=BOTH, does="meshes.brick"),
-    Command("e{lement} create geo{metry}", "Triangles in the inside of closed lines, by Gmsh, with a mesh size for "
-            "each piece. Other pieces become edges and points of the mesh, as far as they lie inside.",
+    Command("e{lement} create geo{metry}", "Triangles inside closed lines, by Gmsh, with a mesh size for each piece. "
+            "Other pieces inside become edges and points of the mesh.",
             ("pcdc element create geometry layer 'out' m-s 1.5 is-boundary layer 'fault' m-s 0.5 circle center (4,3) "
              "radius 1 m-s 0.25",),
             options=(
@@ -1227,8 +1242,8 @@ _ELEMENT_CREATE = (
                              Option("s{tart}-p{oint}", (VECTOR,), "where it begins", "m", required=True),
                              Option("e{nd}-p{oint}", (VECTOR,), "where it ends", "m", required=True), _SIZE,
                              _BOUNDARY)), _GROUP), needs_option=True, does="patch"),
-    Command("e{lement} create geo{metry}-p{atch}", "Triangles in the inside of closed lines, by Gmsh, that follow "
-            "other lines and points as far as these lie inside.",
+    Command("e{lement} create geo{metry}-p{atch}", "Triangles inside closed lines, by Gmsh, that follow other lines "
+            "and points inside.",
             ("pcdc element create geometry-patch b-c-p array (0,0) (9,0) (9,6) (0,6) m-s 1 c-polyline layer 'fault' "
              "m-s 0.4 c-point array (2,2) m-s 0.2 g-m-s 1.5",),
             options=(
@@ -1239,10 +1254,10 @@ _ELEMENT_CREATE = (
                 Option("c{onstrain}-p{oint}", (), "points of the mesh", repeated=True, more=(_ARRAY, _LAYERS, _SIZE)),
                 Option("g{lobal}-m{esh}-s{ize}", (POSITIVE,), "of pieces without one, and away from them", "m",
                        "the largest of the pieces"),
-                Option("t{olerance}", (NOT_NEGATIVE,), "points nearer than this are one", "m", "1e-4"), _GROUP),
+                Option("t{olerance}", (NOT_NEGATIVE,), "points nearer than this are merged", "m", "1e-4"), _GROUP),
             does="patch"),
-    Command("e{lement} create geo{metry}-b{oundary}", "Triangles in the inside of a closed line, by Gmsh, with others "
-            "in it that are holes, or filled.",
+    Command("e{lement} create geo{metry}-b{oundary}", "Triangles inside a closed line, by Gmsh, with inner lines that "
+            "are holes or filled.",
             ("pcdc element create geometry-boundary boundary (0,0) (9,0) (9,6) (0,6) m-s 1 inner-boundary (3,2) (5,2) "
              "(4,4) m-s 0.4 inner-boundary (6,2) (8,2) (7,3) m-s 0.5 filled on",),
             options=(
@@ -1261,39 +1276,38 @@ _ELEMENT_CREATE = (
 
 _OBJECTS = (
     _group_command("element", "e{lement}"),
-    Command("e{lement} delete", "Elements are gone. Before the first model or condition is assigned the mesh is "
-            "without them, and numbers of others close up; later they are taken out, as by element c-model null.",
+    Command("e{lement} delete", "Deletes elements. Before the first model or condition is assigned, they leave the "
+            "mesh and the others are renumbered; later they are excavated, as by element c-model null.",
             ("pcdc element delete range x 2 4 y 0 1",), ranged="element", dims=BOTH, does="meshes.delete"),
-    Command("e{lement} from", "Elements of another program.", ("pcdc element from",), dims=BOTH,
+    Command("e{lement} from", "A mesh of another program.", ("pcdc element from",), dims=BOTH,
             refused="a mesh of another program is read by mesh import 'file' (model import gmsh or abaqus)"),
-    Command("e{lement} dens{ify}", "Quads are halved until they are short enough, before the first model or condition "
-            "is assigned. Neighbours follow, so that no side has more than one point on it; quads with such a point "
-            "become triangles.",
+    Command("e{lement} dens{ify}", "Halves quads until they are short enough, before the first model or condition is "
+            "assigned. Neighbours are divided too, so that no side has more than one hanging node; quads with a "
+            "hanging node become triangles.",
             ("pcdc element densify pattern 1 1 maximum-length 0.5 0.5 range x 2 4 y 0 1",),
             options=(Option("p{attern}", (CHOSEN, CHOSEN), "1: halved along x, along y; 0: not", "", "1 1"),
                      Option("m{aximum}-l{ength}", (POSITIVE, SECOND_POSITIVE), "of sides along x and y; one number for "
                             "both", "m", required=True)), ranged="element", does="meshes.densify"),
-    Command("e{lement} hide", "Elements are hidden from pictures and, where use-hidden is not said, from ranges; off: "
-            "seen again. They go on being computed.",
+    Command("e{lement} hide", "Hides elements from pictures and, without use-hidden, from ranges; off: shows them. "
+            "They are still computed.",
             ("pcdc element hide range group 'cover'", "pcdc element hide off"),
-            (_leading("hidden", BOOL, "whether they are", required=False),), ranged="element", dims=BOTH,
+            (_leading("hidden", BOOL, "whether they are hidden", required=False),), ranged="element", dims=BOTH,
             does="settings.hide"),
     _list_command("element", "e{lement}"),
-    Command("e{lement} col{lision}", "Whether contact of these elements is looked for; off: others pass through them.",
+    Command("e{lement} col{lision}", "Contact detection for these elements; off: others pass through them.",
             ("pcdc element collision off range group 'cover'",),
-            (_leading("on", BOOL, "whether they touch others"),), ranged="element", dims=BOTH,
+            (_leading("on", BOOL, "whether contact is detected"),), ranged="element", dims=BOTH,
             does="settings.collision"),
-    Command("e{lement} w{ater}", "Water stands before the surface of the model: its pressure, the depth below a water "
-            "line times density and gravity, pushes on all free faces of these elements that lie below the line, on "
-            "parts of faces too, wherever they move. Where the line, which goes from left to right, does not reach "
-            "there is no water. Said again: it takes the place of what was.",
+    Command("e{lement} w{ater}", "Water pressure on the surface of the model: depth below a water line times density "
+            "and gravity, on all free faces of these elements below the line, also on parts of faces, as they move. "
+            "The line runs from left to right; beyond its ends is no water. The last command replaces earlier ones.",
             ("pcdc element water surface 'lake' density 1000", "pcdc element water surface 'lake' density 0"),
             options=(Option("s{urface}", (STRING,), "layer of the water line, in three dimensions of planes and "
                             "polygons", required=True),
-                     Option("d{ensity}", (NOT_NEGATIVE,), "of the water; 0: there is none any more", "kg/m3",
+                     Option("d{ensity}", (NOT_NEGATIVE,), "of the water; 0: removes the water", "kg/m3",
                             required=True)), ranged="element", dims=BOTH, does="assignments.water"),
-    Command("e{lement} c-m{odel}", "The constitutive model of elements, with its properties. Models of fluid "
-            "are those of the joints around the elements.",
+    Command("e{lement} c-m{odel}", "Assigns a constitutive model and its properties to elements. Fluid models apply to "
+            "the joints around the elements.",
             ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25",
              "pcdc element c-model null range group 'excav_1' set 'domain'",
              "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
@@ -1307,32 +1321,34 @@ _OBJECTS = (
                     *FIELD_MODELS.values()),
             ranged="element", manual=True,
             dims=BOTH),
-    Command("e{lement} law", "Reads, checks and compiles a law of a Python file without giving it to elements: for a "
-            "script that begins with model restore. A checkpoint does not name files that are executed.",
+    Command("e{lement} law", "Reads, checks and compiles a law of a Python file without assigning it to elements, for "
+            "a script that begins with model restore. A checkpoint does not name files to execute.",
             ("pcdc element law 'clay.py:clay'",), (_LAW,), dims=BOTH, does="assignments.load_law"),
     Command("e{lement} prop{erty}", "Changes properties; the others stay.",
             ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
              "pcdc element property conductivity 3.5 range group 'salt'",
              "pcdc element property young table 'E_of_depth' over y density field 'density'"),
             options=_OF_SOLIDS, ranged="element", needs_option=True, dims=BOTH, does="heat.element_property"),
-    Command("e{lement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
-            "not given are zero; in the plane stress-zz is then that of plane strain, Poisson's ratio times xx + yy, "
-            "in plane stress 0. It is that of a strain, by the moduli of this moment: where these are lowered later, "
-            "it goes down with them. A stress beyond the strength of the element is reported in the log.",
+    Command("e{lement} init{ial}", "Initial stress, tension positive. Omitted components are 0, except stress-zz in "
+            "the plane: Poisson's ratio times xx + yy in plane strain, 0 in plane stress. It is stored as a strain by "
+            "the present moduli and is rescaled if these change later. A stress beyond the strength of the element is "
+            "reported in the log.",
             ("pcdc element initial stress-xx -5e6 stress-yy -10e6",
              "pcdc element initial stress-yy 0 gradient (0,25e3)"),
             options=tuple(
                 Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa", also=(f"s{{stress}}-{c}",),
-                       more=(Option("g{radient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
+                       more=(Option("g{radient}", (VECTOR,), "gradient, which is multiplied by the position and "
+                                                             "added", "Pa/m"),))
                 for c in ("xx", "yy", "xy", "zz")) + tuple(
                 Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa", dims=SPACE, also=(f"s{{stress}}-{c}",),
-                       more=(Option("g{radient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
+                       more=(Option("g{radient}", (VECTOR,), "gradient, which is multiplied by the position and "
+                                                             "added", "Pa/m"),))
                 for c in ("xz", "yz")), ranged="element", needs_option=True, dims=BOTH, does="initial_stress"),
-    Command("e{lement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
-            "log says that nothing was changed. Stresses stay; plastic strain is counted from here on.",
+    Command("e{lement} res{et} state", "Resets the plastic state of elements; plastic strain starts at 0 again. "
+            "Stresses stay. Elastic elements have no such state, and the log reports that nothing changed.",
             ("pcdc element reset state",), ranged="element", manual=True, dims=BOTH, does="settings.reset_elements"),
-    Command("e{lement} res{et} k{elvin}-s{train}", "The Kelvin units of elements that creep are without strain from "
-            "here on. Stresses and displacements stay.", ("pcdc element reset kelvin-strain",), ranged="element",
+    Command("e{lement} res{et} k{elvin}-s{train}", "Sets the strain of the Kelvin units of creeping elements to 0. "
+            "Stresses and displacements stay.", ("pcdc element reset kelvin-strain",), ranged="element",
             dims=BOTH, does="settings.reset_kelvin_strain"),
     _group_command("element-face", "e{lement}-f{ace}"),
     _list_command("element-face", "e{lement}-f{ace}"),
@@ -1349,14 +1365,14 @@ _OBJECTS = (
              "pcdc element-face boundary therm-c-h transfer-coeficient 25 environment-temperature 10 range boundary"),
             models=(STRESS, ABSORB, FREE_FIELD, CONST_HEAT, *FIELDS_AT_FACES.values()), ranged="element-face",
             dims=BOTH, also=("e{lement}-f{ace} b{oundary} a{pply}", "e{lement}-f{ace} a{pply}")),
-    Command("e{lement}-f{ace} b{oundary} r{emove}", "Takes boundary conditions of surfaces back.",
+    Command("e{lement}-f{ace} b{oundary} r{emove}", "Removes boundary conditions of surfaces.",
             ("pcdc element-face boundary remove range geometry 'hole'",
              "pcdc element-face boundary remove therm-c-h range geometry 'hole'"),
             options=_removed(STRESS, CONST_HEAT, *FIELDS_AT_FACES.values()), ranged="element-face", dims=BOTH,
             also=("e{lement}-f{ace} r{emove}",), does="free_faces"),
     _group_command("face-joint", "f{ace}-j{oint}"),
     _list_command("face-joint", "f{ace}-j{oint}"),
-    Command("f{ace}-j{oint} c-m{odel}", "The model of the joints between elements. Joints without one hold for ever.",
+    Command("f{ace}-j{oint} c-m{odel}", "The model of the joints between elements. Joints without a model never break.",
             ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",
              "pcdc face-joint c-model hydr-p-m property fluid-density 1000 fluid-bulk 2.2e9 viscosity 1e-6 "
              "aperature-initial 1e-5 aperature-minumum 1e-6 aperature-maximum 1e-3"),
@@ -1368,8 +1384,8 @@ _OBJECTS = (
              "pcdc face-joint property aperature-initial field 'aperture' shear-dilation 5 range geometry 'fault'"),
             options=(*_OF_JOINTS, *_properties(POROUS), *_properties(FLUID_HEAT), *_properties(GRAINS)),
             ranged="face-joint", needs_option=True, dims=BOTH, does="flow.joint_property"),
-    Command("f{ace}-j{oint} res{et} state", "Damage of joints that are not broken is forgotten. Those "
-            "that slide forget that they are torn, not what has slid.",
+    Command("f{ace}-j{oint} res{et} state", "Resets the damage of joints that are not broken. Sliding joints regain "
+            "their tensile strength and cohesion but keep their slip.",
             ("pcdc face-joint reset state",), ranged="face-joint", dims=BOTH, does="settings.reset_joints"),
     _group_command("node", "n{ode}"),
     Command("n{ode} bou{ndary}", "A boundary condition of nodes.",
@@ -1382,187 +1398,188 @@ _OBJECTS = (
             models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE,
                     *FIELDS_AT_NODES.values()),
             ranged="node", dims=BOTH, also=("n{ode} bou{ndary} a{pply}", "n{ode} a{pply}")),
-    Command("n{ode} mech{anical}-d{amp}", "Local damping of nodes: what drives one is less by this part of its size "
-            "against its motion, in dynamic runs (without it there is none) and in static ones (0.8). The stable time "
-            "step is shorter by the root of 1 + damping.",
+    Command("n{ode} mech{anical}-d{amp}", "Local damping of nodes: a force against the motion, of this part of the "
+            "size of the unbalanced force. Default: 0 in dynamic runs, 0.8 in static runs. It divides the stable time "
+            "step by the root of 1 + damping.",
             ("pcdc node mechanical-damp local 0.3 range y 0 2",),
             options=(Option("l{ocal}", (limited(0.0, 1.0, True),), "part, from 0 to 1", "1", required=True),),
             ranged="node", dims=BOTH, does="assignments.damp"),
-    Command("n{ode} func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
-            "giving it to a condition: for a script that begins with model restore.",
+    Command("n{ode} func{tion}", "Reads, checks and compiles a function of position and time in a Python file without "
+            "assigning it to a condition, for a script that begins with model restore.",
             ("pcdc node function 'pump.py:wave'",), (_FUNCTION,), dims=BOTH, does="assignments.load_function"),
-    Command("n{ode} bou{ndary} r{emove}", "Takes boundary conditions of nodes back.",
+    Command("n{ode} bou{ndary} r{emove}", "Removes boundary conditions of nodes.",
             ("pcdc node boundary remove range group 'platen' set 'bc'",
              "pcdc node boundary remove mech-vel-b-c range group 'platen' set 'bc'"),
             options=_removed(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE,
                              *FIELDS_AT_NODES.values()),
             ranged="node", dims=BOTH, also=("n{ode} rem{ove}",), does="free_nodes"),
-    Command("n{ode} init{ial}", "The velocity or temperature of nodes now.",
+    Command("n{ode} init{ial}", "Sets the present velocity or temperature of nodes.",
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
                      *(Option(f"vel{{ocity}}-{axis}", (FLOAT,), f"velocity along {axis}; the other components stay",
                               "m/s", dims=SPACE if axis == "z" else BOTH) for axis in "xyz"),
                      *(Option(f"f{{orce}}-{axis}", (FLOAT,), f"force along {axis} on each node from now on, as the "
                               "force condition", "N", dims=SPACE if axis == "z" else BOTH) for axis in "xyz"),
-                     Option("temp{erature}", (FLOAT,), "temperature, of the fluid at them too; before, it is 0. "
-                            "Elements around the nodes are free of thermal stress then", "K"),
-                     *(Option(one.name, (FLOAT,), f"{one.doc}; before, it is 0. Elements around the nodes are free of "
-                              "the stress that it brings then", one.unit) for one in kinds().values())), ranged="node",
+                     Option("temp{erature}", (FLOAT,), "temperature, also of the fluid at the nodes; initially 0. "
+                            "Elements around the nodes are free of thermal stress at this temperature", "K"),
+                     *(Option(one.name, (FLOAT,), f"{one.doc}; initially 0. Elements around the nodes are then free of "
+                              "its stress", one.unit) for one in kinds().values())), ranged="node",
             needs_option=True, dims=BOTH, does="initial_nodes"),
-    Command("n{ode} therm{al}-init{ialize}", "The temperature of nodes now, as node initial temperature.",
+    Command("n{ode} therm{al}-init{ialize}", "Sets the present temperature of nodes, as node initial temperature.",
             ("pcdc node thermal-initialize temperature 15 range x 0 1",),
-            options=(Option("t{emperature}", (FLOAT,), "temperature, of the fluid at them too", "K", required=True),),
+            options=(Option("t{emperature}", (FLOAT,), "temperature, also of the fluid at the "
+                                                       "nodes", "K", required=True),),
             ranged="node", dims=BOTH, does="heat.initial"),
-    Command("n{ode} hydr{aulic}-init{ialize}", "Fluid that flow nodes hold now, and its temperature.",
+    Command("n{ode} hydr{aulic}-init{ialize}", "Sets the present fluid of flow nodes and its temperature.",
             ("pcdc node hydraulic-initialize flow-node-saturation 0.5",),
-            options=(Option("f{low}-n{ode}-s{aturation}", (limited(0.0, 1.0, True),), "part of the room that is "
-                            "filled", "1", also=("f{luid}-c{avity}-s{aturation}",)),
+            options=(Option("f{low}-n{ode}-s{aturation}", (limited(0.0, 1.0, True),), "filled part of the "
+                            "volume", "1", also=("f{luid}-c{avity}-s{aturation}",)),
                      Option("f{low}-n{ode}-t{emperature}", (FLOAT,), "of the fluid alone", "K",
                             also=("f{luid}-c{avity}-t{emperature}",))),
             ranged="node", needs_option=True, dims=BOTH, does="initial_fluid"),
-    Command("n{ode} hist{ory}", "A history of the temperature of a node, of several their mean.",
+    Command("n{ode} hist{ory}", "A history of the temperature of a node, or of the mean of several nodes.",
             ("pcdc node history 'gauge' thermal temperature range id 3",), (_NAME,),
             options=(Option("therm{al}", (), "of heat", required=True,
                             more=(Option("temp{erature}", (), "temperature", required=True),)), _EVERY),
             ranged="node", dims=BOTH, does="node_history"),
-    Command("n{ode} re{set} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True,
+    Command("n{ode} re{set} vel{ocity}", "Sets all velocities to 0.", ("pcdc node reset velocity",), manual=True,
     dims=BOTH, does="settings.reset_velocity"),
-    Command("n{ode} re{set} dis{placement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
+    Command("n{ode} re{set} dis{placement}", "Sets all displacements to 0.", ("pcdc node reset displacement",),
             manual=True, dims=BOTH, does="settings.reset_displacement"),
-    Command("flow-n{ode} init{ial}", "Fluid that the flow nodes (nodes at which a channel ends) among these nodes hold "
-            "now; before, channels are dry.", ("pcdc flow-node initial saturation 1",
+    Command("flow-n{ode} init{ial}", "Sets the present fluid of the flow nodes (nodes at which a channel ends) among "
+            "these nodes; channels are initially dry.", ("pcdc flow-node initial saturation 1",
                                                "pcdc flow-node initial pressure 1e6 range x 0 1"),
             options=(Option("p{ressure}", (NOT_NEGATIVE,), "filled, at this pressure", "Pa"),
-                     Option("sat{uration}", (limited(0.0, 1.0, True),), "part of the room that is filled", "1"),
-                     Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the fluid that is there", "1")),
+                     Option("sat{uration}", (limited(0.0, 1.0, True),), "filled part of the volume", "1"),
+                     Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the present fluid", "1")),
             ranged="node", needs_option=True, dims=BOTH, does="flow.initial"),
-    Command("well cr{eate}", "Flow nodes of a range are a well: one room, whose pressure is that at its highest node. "
-            "Stages say what it does; without one it is shut in. Its water pushes on free faces whose nodes all lie in "
-            "the range.",
+    Command("well cr{eate}", "Makes a well of the flow nodes of a range: one connected volume, whose pressure is that "
+            "at its highest node. Stages control it; without a stage it is shut in. Its water loads the free faces "
+            "whose nodes all lie in the range.",
             ("pcdc well create 'injection' range geometry 'hole'",), (_NAME,), ranged="node", dims=BOTH,
             does="flow.well"),
-    Command("well st{age}", "One more stage of a well, after those that it has; one without time that has begun ends "
-            "now. After the last the well is shut in. Times of tables are those of flow.",
+    Command("well st{age}", "Appends a stage to a well; a stage without time that has begun ends now. After the last "
+            "stage the well is shut in. Times of tables are those of flow.",
             ("pcdc well stage 'injection' rate 1e-4 time 60 limit 8e6", "pcdc well stage 'injection' shut-in time 600",
              "pcdc well stage 'injection' pressure table 'bottom-hole'"),
             (_NAME,),
-            options=(Option("ra{te}", (TABLED,), "volume that is pumped in; negative: drawn, as far as there is fluid; "
+            options=(Option("ra{te}", (TABLED,), "injected volume; negative: produced, limited to the available fluid; "
                             "in space m3/s", "m2/s"),
-                     Option("pr{essure}", (TABLED,), "pressure that is held", "Pa"),
-                     Option("sh{ut}-in", (), "nothing comes in or out"),
-                     Option("time", (POSITIVE,), "time of flow that it takes", "s", "no end"),
-                     Option("lim{it}", (NOT_NEGATIVE,), "with rate: pressure above which less is pumped in", "Pa",
+                     Option("pr{essure}", (TABLED,), "prescribed pressure", "Pa"),
+                     Option("sh{ut}-in", (), "no flow in or out"),
+                     Option("time", (POSITIVE,), "duration, in time of flow", "s", "no end"),
+                     Option("lim{it}", (NOT_NEGATIVE,), "with rate: pressure above which the rate is reduced", "Pa",
                             "none")), dims=BOTH, does="stage"),
-    Command("bolt cr{eate} p{olyline}", "Installs a rock bolt along these points, as things are now: at any stage of "
-            "a run. It is divided at the edges of elements, or as said. Nodes go with the rock across the bar, and are "
-            "tied to it along the bar by grout, under the plate altogether; where the rock is taken out they are free. "
-            "Bolts have no weight and no stiffness in bending.",
+    Command("bolt cr{eate} p{olyline}", "Installs a rock bolt along these points at their present positions, at any "
+            "stage of a run. It is divided at the edges of elements, or as given. Nodes follow the rock across the bar "
+            "and are coupled along it by grout; under the plate in all directions. Where the rock is removed they are "
+            "free. Bolts have no weight and no stiffness in bending.",
             ("pcdc bolt create polyline (0,2) (0,5) length 0.1 grout 0.5 3 plate group 'roof'",
              "pcdc bolt create polyline [points]"),
             (_leading("points", PLACES, "the points, from the head on; or a list of vectors", "m"),),
             (Option("seg{ments}", (COUNT,), "elements of each straight part"),
              Option("len{gth}", (POSITIVE,), "of an element, at most", "m", "to the edges of the elements of the mesh"),
-             Option("grout", (NOT_NEGATIVE, POSITIVE), "from where to where along the bolt there is grout; without "
-                    "the rest is free", "m", "all of it"),
-             Option("plate", (), "the first node is tied to the rock: a face plate"),
-             Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
+             Option("grout", (NOT_NEGATIVE, POSITIVE), "start and end of the grout along the bolt; the rest is "
+                    "free", "m", "all of it"),
+             Option("plate", (), "fixes the first node to the rock by a face plate"),
+             Option("group", (STRING,), "the group of its elements and nodes", "", "none",
                     more=(SET,))), dims=BOTH, does="bolts.create"),
-    Command("bolt c-m{odel}", "The properties of elements of bolts, which act from then on.",
+    Command("bolt c-m{odel}", "Assigns properties to elements of bolts, from now on.",
             ("pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 tensile-yield-force 250e3 "
              "shear-stiffness-rock-bolt 1e9 grout-thickness 0.0125 cohesion-rock-grout 1.5e6 cohesion-grout-bolt 2e6 "
              "spacing 1.5 pretension-force 50e3 range group 'roof'",),
             models=(BOLT,), ranged="bolt-element", dims=BOTH,
             also=("b{olt}-e{lement} c-m{odel}", "s{upport}-e{lement} c-m{odel}")),
-    Command("b{olt}-e{lement} c{reate}", "Installs a rock bolt from a point to another, as bolt create polyline, in "
-            "the parts of the way that lie in the rock: each is a bolt. With a range only in these elements.",
+    Command("b{olt}-e{lement} c{reate}", "Installs rock bolts between two points, as bolt create polyline: each part "
+            "of the line inside the rock becomes a bolt. With a range only in these elements.",
             ("pcdc bolt-element create (0,2) (0,5) mesh-size 0.25",),
             (_leading("first", VECTOR, "head", "m"), _leading("second", VECTOR, "end", "m")),
             (Option("m{esh}-s{ize}", (POSITIVE,), "length of its elements, at most", "m", "0.2"),
-             Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
+             Option("group", (STRING,), "the group of its elements and nodes", "", "none",
                     more=(SET,))), ranged="element", dims=BOTH, also=("s{upport}-e{lement} c{reate}",),
             does="bolts.between"),
     _group_command("bolt-element", "b{olt}-e{lement}", "s{upport}-e{lement}"),
     _group_command("bolt-node", "b{olt}-n{ode}", "s{upport}-n{ode}"),
-    Command("b{olt}-n{ode} bou{ndary}", "What is prescribed at nodes of bolts.",
+    Command("b{olt}-n{ode} bou{ndary}", "Prescribes conditions at nodes of bolts.",
             ("pcdc bolt-node boundary b-n-c velocity-y -1e-3 range id 0",
              "pcdc bolt-node boundary b-n-f-b-c force-y -50e3 range group 'heads'"),
             models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH,
             also=("b{olt}-n{ode} bou{ndary} a{pply}", "b{olt}-n{ode} a{pply}",
                   "s{upport}-n{ode} bou{ndary}", "s{upport}-n{ode} bou{ndary} a{pply}", "s{upport}-n{ode} a{pply}")),
-    Command("b{olt}-n{ode} bou{ndary} r{emove}", "Takes it back.",
+    Command("b{olt}-n{ode} bou{ndary} r{emove}", "Removes these conditions.",
             ("pcdc bolt-node boundary remove range group 'heads'",
              "pcdc bolt-node boundary remove b-n-f-b-c range group 'heads'"),
             options=_removed(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH,
             also=("b{olt}-n{ode} r{emove}", "s{upport}-n{ode} bou{ndary} r{emove}", "s{upport}-n{ode} r{emove}"),
             does="free_bolt_nodes"),
-    Command("bolt del{ete}", "Takes elements of bolts out at once, with their part of the grout. Their numbers go with "
-            "them, those of the others stay; without RANGE all of them.",
+    Command("bolt del{ete}", "Removes elements of bolts with their part of the grout at once; without RANGE all of "
+            "them. The numbers of the others stay.",
             ("pcdc bolt delete range group 'roof'",), ranged="bolt-element", dims=BOTH, does="supports.delete"),
     Command("liner cr{eate}",
-            "Puts a liner on the free faces that the range chooses, as things are now: at any stage of a run, "
-            "without force in it. A face has one beam, in space a triangle; where faces or liners meet at a point, in "
-            "space along an edge, of the mesh they are joined, also around a closed opening. Liners have weight, and "
-            "no contact of their own: what pushes "
-            "them is the rock of their faces.",
+            "Installs a stress-free liner on the selected free faces at their present positions, at any stage of a "
+            "run. A face gets one beam, in space one triangle; liners that share a point, in space an edge, of the "
+            "mesh are connected, also around a closed opening. Liners have weight but no contact: the rock of their "
+            "faces loads them.",
             ("pcdc liner create group 'shotcrete' range geometry 'tunnel'", "pcdc liner create range boundary y 2 3"),
-            options=(Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
+            options=(Option("group", (STRING,), "the group of its elements and nodes", "", "none",
                             more=(SET,)),), ranged="element-face", dims=BOTH, does="liners.create"),
-    Command("liner c-m{odel}", "The properties of elements of liners, which act from then on.",
+    Command("liner c-m{odel}", "Assigns properties to elements of liners, from now on.",
             ("pcdc liner c-model beam property density 2400 young 20e9 poisson-ratio 0.2 thickness 0.2 "
              "tensile-strength 2e6 compressive-strength 25e6 normal-stiffness 1e10 shear-stiffness 1e10 "
              "bond-tensile-strength 0.5e6 bond-cohesion 1e6 bond-friction 35 range group 'shotcrete'",),
             models=(LINER,), ranged="liner-element", dims=BOTH),
-    Command("liner del{ete}", "Takes elements of liners out at once. Their numbers go with them, those of the others "
-            "stay; without RANGE all of them.", ("pcdc liner delete range group 'shotcrete'",), ranged="liner-element",
+    Command("liner del{ete}", "Removes elements of liners at once; without RANGE all of them. The numbers of the "
+            "others stay.", ("pcdc liner delete range group 'shotcrete'",), ranged="liner-element",
             dims=BOTH, does="supports.delete"),
     _group_command("liner-element", "liner-e{lement}"),
     _group_command("liner-node", "liner-n{ode}"),
-    Command("liner-n{ode} bou{ndary}", "What is prescribed at nodes of liners.",
+    Command("liner-n{ode} bou{ndary}", "Prescribes conditions at nodes of liners.",
             ("pcdc liner-node boundary l-n-c velocity-x 0 velocity-y 0 spin 0 range group 'footing'",
              "pcdc liner-node boundary l-n-f-b-c force-y -50e3 moment 1e3 range id 3"),
             models=(LINER_VELOCITY, LINER_FORCE), ranged="liner-node", dims=BOTH),
-    Command("liner-n{ode} bou{ndary} rem{ove}", "Takes it back.",
+    Command("liner-n{ode} bou{ndary} rem{ove}", "Removes these conditions.",
             ("pcdc liner-node boundary remove range group 'footing'",), ranged="liner-node", dims=BOTH,
             does="supports.remove_conditions"),
 )  # fmt: skip
 
 _RECORDS = (
-    Command("tab{le} cr{eate}", "A function of time, or for properties of x or y; linear from point to point, constant "
-            "before and after.",
+    Command("tab{le} cr{eate}", "Creates a function of time, or, for properties, of x or y; linear between points, "
+            "constant before and after.",
             ("pcdc table create 'blast' values (0,0) (5e-5,-60e6) (2e-4,0)",
              "pcdc table create 'blast' values [points]",
              "pcdc table create 'E_of_depth' values (-500,60e9) (0,20e9)",
              "pcdc table create 'c_of_strain' values (0,2e6) (0.01,2e5)"),
             (_NAME,), (Option("val{ues}", (VECTORS,), "(time or coordinate, value), the first ascending", "s or m",
                               required=True),), dims=BOTH, does="assignments.table"),
-    Command("tab{le}", "The same in pairs of numbers. With relative-time the table begins when a condition takes it: "
-            "its times count from that moment.",
+    Command("tab{le}", "Creates a table from pairs of numbers. With relative-time its times count from the moment when "
+            "a condition starts to use it.",
             ("pcdc table 'ramp' data 0 0, 0.1 2e6, 1 2e6", "pcdc table 'ramp' data 0 0 0.1 2e6 type relative-time"),
             (_NAME,), (Option("d{ata}", (PAIRS,), "time and value, in turn", "s"),
                        Option("t{ype}", (), "what its times count from",
-                              more=(Option("r{elative}-t{ime}", (), "the moment at which a condition takes it"),
+                              more=(Option("r{elative}-t{ime}", (), "the moment when a condition starts to use it"),
                                     Option("a{bsolute}-t{ime}", (), "the beginning of the model")))),
             needs_option=True, dims=BOTH, does="table"),
-    Command("tab{le} del{ete}", "Forgets a table.", ("pcdc table delete 'blast'",), (_NAME,), dims=BOTH,
+    Command("tab{le} del{ete}", "Deletes a table.", ("pcdc table delete 'blast'",), (_NAME,), dims=BOTH,
             does="assignments.remove_table"),
-    Command("field cr{eate}", "A random field: properties that differ from element to element, face to face, joint to "
-            "joint. Where several properties take the same field they are drawn together; another seed is another, "
-            "independent field. What was drawn stays, whatever becomes of the field.",
+    Command("field cr{eate}", "Creates a random field: properties that differ between elements, faces or joints. "
+            "Properties that use one field are fully correlated; another seed gives an independent field. Assigned "
+            "values stay when the field is changed or deleted.",
             ("pcdc field create 'strength' weibull 5e6 4 seed 7",
              "pcdc field create 'E' lognormal 40e9 8e9 seed 3 correlation 0.02 least 10e9"),
             (_NAME,),
             (Option("wei{bull}", (POSITIVE, POSITIVE), "scale (63 % of the values are below it) and shape"),
              Option("norm{al}", (FLOAT, NOT_NEGATIVE), "mean and standard deviation"),
              Option("logn{ormal}", (POSITIVE, NOT_NEGATIVE), "mean and standard deviation of the values themselves"),
-             Option("seed", (ZERO_OR_MORE,), "another seed, another field", required=True),
-             Option("corr{elation}", (POSITIVE,), "over this length neighbours are alike: the field is one of places, "
-                    "the same in any mesh", "m", "each object by itself",
+             Option("seed", (ZERO_OR_MORE,), "seed of the random numbers: each seed gives another "
+                                             "field", required=True),
+             Option("corr{elation}", (POSITIVE,), "correlation length; the field depends on positions, not on the "
+                    "mesh", "m", "objects are independent",
                     more=(Option("cov{ariance}", (choice("exponential", "gaussian"),), "exp(-r/L), or exp(-(r/L)2), "
                                  "which is smooth", "", "exponential"),)),
-             Option("least", (FLOAT,), "the distribution is cut below", "", "none"),
-             Option("great{est}", (FLOAT,), "the distribution is cut above", "", "none")), dims=BOTH,
+             Option("least", (FLOAT,), "lower bound of the distribution", "", "none"),
+             Option("great{est}", (FLOAT,), "upper bound of the distribution", "", "none")), dims=BOTH,
             does="random_field"),
-    Command("field del{ete}", "Forgets a random field; what was drawn from it stays.",
+    Command("field del{ete}", "Deletes a random field; assigned values stay.",
             ("pcdc field delete 'strength'",), (_NAME,), dims=BOTH, does="assignments.remove_field"),
     Command("his{tory} cr{eate}", "Records a number during the run: of one object, of those of a range or, without "
             "one, of all (sum, mean, minimum or maximum), or of the model.",
@@ -1571,11 +1588,11 @@ _RECORDS = (
              "pcdc history create 'worst' element value stress-yy minimum every 10",
              "pcdc history create 'cracks' model value broken-joints every 100",
              "pcdc history create 'pump' well value pressure well 'injection' every 10"),
-            (_NAME, _leading("object", choice(*RECORDED), "what it is a number of")),
+            (_NAME, _leading("object", choice(*RECORDED), "kind of the object")),
             (Option("id", (ZERO_OR_MORE,), "the object of this number"),
              Option("near{est}", (VECTOR,), "the object nearest to this point", "m"),
-             Option("val{ue}", (_RECORDED,), "what is recorded, see below", required=True), _EVERY,
-             Option("var{iable}", (STRING,), "with law-state: which state variable of laws of the user"),
+             Option("val{ue}", (_RECORDED,), "the recorded value, see below", required=True), _EVERY,
+             Option("var{iable}", (STRING,), "with law-state: the state variable of user laws"),
              Option("well", (STRING,), "with object well: its name"),
              *(Option(how, (), "of the objects of range, or of all")
                for how in ("sum", "mean", "min{imum}", "max{imum}"))),
@@ -1599,8 +1616,8 @@ _RECORDS = (
              Option("prof{ile}",
                     (choice("pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature",
                             "concentration"),),
-                    "of the fluid as it is now, along the line that the joints of the range make, over the distance "
-                    "[m] from its left end", dims=PLANE),
+                    "present values of the fluid along the line of the joints of the range, over the distance [m] from "
+                    "its left end", dims=PLANE),
              Option("lab{el}", (STRING,), "in the legend"),
              Option("style", (choice("line", "points"),), "how it is drawn", default="line")), ranged="face-joint",
                     dims=BOTH, does="charts.add"),
@@ -1608,57 +1625,58 @@ _RECORDS = (
             ("pcdc chart export 'ucs' 'ucs.png'", "pcdc chart export 'ucs' 'ucs.png' cracks",
             "pcdc chart export 'slope' 'slope.png' plastic", "pcdc chart export 'crack' 'crack.png' fluid aperture"),
             (_NAME, _leading("file", FILE, "name of the figure: .png, .pdf or .svg")),
-            (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),
-             Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain"),
-             Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks"),
+            (Option("crack{s}", (), "adds the present model, with its cracks by mode"),
+             Option("plas{tic}", (), "adds the present model with contours of plastic shear strain"),
+             Option("temp{erature}", (), "adds the present model with contours of temperature, and cracks"),
              Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity", "concentration"),),
-                    "beside it the model as it is now, its channels coloured by that")), dims=BOTH,
+                    "adds the present model with channels coloured by this value")), dims=BOTH,
             does="charts.export"),
-    Command("output vtk", "Frames for ParaView: now, and every so many steps.",
+    Command("output vtk", "Writes frames for ParaView: now, and with every at an interval of steps.",
             ("pcdc output vtk 'blast' every 1000", "pcdc output vtk 'last'"),
             (_leading("file", FILE, "first part of the names of the files, in the folder of the results"),),
             (Option("ev{ery}", (COUNT,), "steps between two frames", "", "once, now"),
              Option("off", (), "no more frames of this name")), dims=BOTH, also=("mod{el} exp{ort} vtk",),
             does="frames.vtk"),
-    Command("output image", "A picture of the model as it is now, `<name>_<step>.png`, of any field that frames have.",
+    Command("output image", "Draws the present model, `<name>_<step>.png`, with any field of frames.",
             ("pcdc output image 'stress' field 'stress-yy' limits -2e6 0 colours blue-red",
              "pcdc output image 'roof.pdf' object elements field 'displacement' deformed 100 range group 'roof'",
              "pcdc output image 'flow' view 'flow.mv' title 'step {step}'"),
-            (_leading("file", FILE, "first part of the name, in the folder of the results; .pdf, .svg or .png at its "
-                                    "end says what is drawn"),),
-            (Option("view", (FILE,), "what is shown, as a file *.mv says, of hpcdem view or hpcdem draw", "",
+            (_leading("file", FILE, "first part of the name, in the folder of the results; the ending .pdf, .svg or "
+                                    ".png selects the format"),),
+            (Option("view", (FILE,), "view file *.mv of hpcdem view or hpcdem draw", "",
                     "everything"),
-             Option("field", (STRING,), "what colours objects; hpcdem draw --list names the fields of a frame"),
-             Option("object", (choice(*OBJECTS),), "of which objects the field and the options below are", "",
+             Option("field", (STRING,), "field of the colours; hpcdem draw --list lists the fields of a frame"),
+             Option("object", (choice(*OBJECTS),), "objects to which the field and the options below apply", "",
                     "the first that have the field"),
              Option("limits", (FLOAT, FLOAT), "values of the first and the last colour", "",
-                    "those that 1 % of what is shown is below or above"),
-             Option("full", (), "in the place of limits: the least and the greatest value of what is shown"),
-             Option("log", (), "colours by the logarithm"),
+                    "the 1 % and 99 % quantiles of the shown values"),
+             Option("full", (), "instead of limits: minimum and maximum of the shown values"),
+             Option("log", (), "logarithmic colours"),
              Option("colours", (choice(*COLOURS),), "of the field", default="viridis"),
              Option("opacity", (FLOAT,), "from 0 to 1", default="1"), Option("edges", (), "outlines of elements"),
              Option("size", (POSITIVE,), "factor on widths of lines", default="1"),
              Option("vectors", (STRING,), "arrows: displacement or velocity"),
              Option("arrows", (POSITIVE,), "factor on their length", default="1"),
-             Option("filter", (STRING,), "only objects for which this holds, as 'stress_yy < -1e6 and x > 2'"),
+             Option("filter", (STRING,), "only objects that satisfy this condition, for example 'stress_yy < -1e6 and "
+                                         "x > 2'"),
              Option("deformed", (FLOAT,), "factor on displacements", default="1"),
              Option("camera", (CORNER, CORNER), "lower left and upper right corner of the picture, in space along it "
                     "and up it", "m", "the model"),
-             Option("eye", (EYE,), "from where a body is seen: along an axis, from the right, the front and above "
-                    "(iso), or from a direction", "", "'iso'", dims=SPACE),
-             Option("section", (SECTION,), "a plane that cuts it: 'x=1.5' takes the part towards the eye away, 'x<1.5' "
-                    "and 'x>1.5' say what stays, 'px,py,pz,nx,ny,nz' gives a point and the normal into what is taken "
-                    "away", "", "whole", dims=SPACE),
+             Option("eye", (EYE,), "position of the viewer: along an axis, from the right, the front and above (iso), "
+                    "or in a direction", "", "'iso'", dims=SPACE),
+             Option("section", (SECTION,), "a cutting plane: 'x=1.5' removes the part towards the eye, 'x<1.5' and "
+                    "'x>1.5' keep one side, 'px,py,pz,nx,ny,nz' gives a point and the normal into the removed "
+                    "part", "", "whole", dims=SPACE),
              Option("title", (STRING,), "over the picture; {step} and {time} are filled in")), ranged="any", dims=BOTH,
             does="pictures.image"),
 )  # fmt: skip
 
 _ONLINE = (
-    Command("dev{ice} l{ist}", "Says in the log what the run computes with: ranks, threads, cores.",
+    Command("dev{ice} l{ist}", "Reports the ranks, threads and cores of the run in the log.",
             ("pcdc device list",), dims=BOTH, does="clocks.devices"),
     Command("dev{ice} s{witch}-t{o}", "Another device.", ("pcdc device switch-to 'GPU 0'",),
             (_leading("name", STRING, "its name"),), dims=BOTH,
-            idle="a run computes with the ranks and threads that it was started with (mpirun -n, -j)"),
+            idle="a run uses the ranks and threads given at its start (mpirun -n, -j)"),
     Command("v{iew}", "What a window shows.", ("pcdc view 'stress' target element name 'stress-yy'",), (_NAME,),
             options=(Option("t{arget}", (), "of what", more=tuple(
                 Option(word, (), doc, more=(Option("n{ame}", (STRING,), "the field"),)) for word, doc in (
@@ -1667,10 +1685,10 @@ _ONLINE = (
                      Option("u{pdate}", (), "draws it again")),
             needs_option=True, dims=BOTH,
             idle="hpcdem view shows any field of a run while it steps; output image draws one into a file"),
-    Command("b{oundary}-m{odel}", "Conditions in code of C#.", ("pcdc boundary-model create s-b-c name 'a' code 'b'",),
-            dims=BOTH, refused="no code of C# is run. A stress or velocity that depends on place and time is a "
-            "function in Python: element-face boundary m-s-b-c stress-normal function 'file.py:name', "
-            "node boundary mech-vel-b-c velocity-x function 'file.py:name'"),
+    Command("b{oundary}-m{odel}", "Conditions in C# code.", ("pcdc boundary-model create s-b-c name 'a' code 'b'",),
+            dims=BOTH, refused="C# code is not supported. Write a stress or velocity that depends on position and time "
+            "as a Python function: element-face boundary m-s-b-c stress-normal function 'file.py:name', node boundary "
+            "mech-vel-b-c velocity-x function 'file.py:name'"),
 )  # fmt: skip
 
 INSTEAD = {

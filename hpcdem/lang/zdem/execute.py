@@ -27,7 +27,7 @@ def refuse_unexecuted(statements: Sequence[Statement]) -> None:
             raise ScriptError(
                 statement.file,
                 statement.line,
-                f"hpcdem does not carry out {', '.join(statement.unexecuted)} yet",
+                f"hpcdem does not support {', '.join(statement.unexecuted)} yet",
             )
 
 
@@ -60,9 +60,9 @@ def refuse_lost_files(script: Script, outdir: Path | None = None) -> None:
             raise statement.error(f"{statement.get('file')} is a folder, expected a file name")
         if os.path.realpath(path) in read:
             what = read[os.path.realpath(path)]
-            raise statement.error(f"{statement.get('file')} would be written over {what}; give it another name")
+            raise statement.error(f"{statement.get('file')} would overwrite {what}; choose another name")
         if not path.parent.is_dir() and os.path.normpath(path.parent) not in map(os.path.normpath, results):
-            raise statement.error(f"there is no folder {path.parent} to write {path.name} into")
+            raise statement.error(f"folder {path.parent} for {path.name} not found; create it first")
 
 
 def _files_read(script: Script) -> dict[str, str]:
@@ -89,15 +89,14 @@ def refuse_escapes(script: Script, folder: Path) -> None:
     for statement in script.statements:
         if statement.get("law"):
             raise statement.error(
-                "a law of the user is executed, and this script was taken from a checkpoint; to run it, give the "
-                "script itself: hpcdem SCRIPT --resume"
+                "user laws are never executed from a checkpoint; give the script: hpcdem SCRIPT --resume"
             )
         for word in ("file", "outdir"):
             name = statement.get(word)
             if name and not any((script.directory / name).resolve().is_relative_to(root) for root in allowed):
                 raise statement.error(
-                    f"{name} is outside of {script.directory}, and this script was taken from a checkpoint; to run it, "
-                    "give the script itself: hpcdem SCRIPT --resume"
+                    f"{name} is outside {script.directory}; a script from a checkpoint cannot access it. Give the "
+                    "script: hpcdem SCRIPT --resume"
                 )
 
 
@@ -157,7 +156,7 @@ class Interpreter:
         if not 0 <= index < len(self.script.statements):
             raise UsageError(
                 f"the checkpoint was written at statement {index + 1} of its script, {self.script.file} has only "
-                f"{len(self.script.statements)}; it is not the same script"
+                f"{len(self.script.statements)}; it is a different script"
             )
         statement = self.script.statements[index]
         sim.position, sim.line = index, statement.line
@@ -209,7 +208,7 @@ def check_same_beginning(script: Script, saved_text: str, position: int) -> None
             continue
         raise UsageError(
             f"{script.file}:{statement.line}: '{statement.text}' was '{before.text}' when the checkpoint was written; "
-            "lines that were carried out already must not be changed"
+            "executed lines must not be changed"
         )
 
 
@@ -333,7 +332,7 @@ _CONVERTERS: dict[str, Callable[[_Call], None]] = {
     "IMPLE": _imple,
     "HIST": lambda call: dem.history.hist(call.sim, **call.given("id", "interval"), what=recorded(call.statement)),
     "DRAW": _draw,
-    "LOG": lambda call: _say(call, "the log goes to standard output; nothing to switch"),
-    "PAUSE": lambda call: _say(call, "a run waits for nobody, it goes on"),
+    "LOG": lambda call: _say(call, "the log goes to standard output: the command has no effect"),
+    "PAUSE": lambda call: _say(call, "runs are not interactive, so it has no effect"),
 }
 """Commands whose row names no function."""

@@ -43,7 +43,7 @@ class Parameters:
         if self.table.command(name) is not None or lexer.number(value) is None:
             return False
         if name in VARIABLES:
-            raise ScriptError(self.file, line.number, f"'{name}' is an extent of the model, no name for a parameter")
+            raise ScriptError(self.file, line.number, f"'{name}' is an extent of the model and cannot name a parameter")
         if name in self.known:
             first = self.known[name].token.line
             raise ScriptError(self.file, line.number, f"the parameter {name} is set a second time, after line {first}")
@@ -68,5 +68,5 @@ class Parameters:
             if name not in self.used:
                 raise ScriptError(
                     self.file, parameter.token.line,
-                    f"nothing uses the parameter {name}; write {{{name}}} where its number shall stand",
+                    f"parameter {name} is never used; write {{{name}}} in place of the number",
                 )  # fmt: skip

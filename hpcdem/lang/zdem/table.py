@@ -305,7 +305,7 @@ class Table:
 
     commands: tuple[Command, ...]
     range_terms: tuple[Option, ...]
-    range_row: Row = field(default_factory=lambda: Row("RANGE", "limits a command to the particles chosen"))
+    range_row: Row = field(default_factory=lambda: Row("RANGE", "limits a command to the selected particles"))
 
     def command(self, word: str) -> Command | None:
         """The command a (lower-case) word stands for."""
@@ -346,10 +346,10 @@ _PROPERTIES = (
                kind=Number("<float>", one.range, low=one.low, high=one.high, above=one.above))
         for name, one in PROPERTIES.items()
     ),
-    Option("hertz", "the particles take the Hertz-Mindlin contact; a later kn or ks without it takes that back"),
-    Option("law", "pairs of these particles follow a law in a Python file of the user (docs/user_laws.md); linear: a "
-           "built-in one again", kind=LAW, source="X"),
-    Option("between", "this law is that of pairs of discs that have these two laws, instead of a law of particles",
+    Option("hertz", "assigns the Hertz-Mindlin contact to the particles; a later kn or ks without it revokes it"),
+    Option("law", "pairs of these particles follow a user law in a Python file (docs/user_laws.md); linear: a built-in "
+           "law again", kind=LAW, source="X"),
+    Option("between", "assigns this law to pairs of discs with these two laws, not to particles",
            kind=OF_LAWS, source="X"),
     Option("parameter", "properties that this law declares", kind=VALUES, source="X"),
     Option("xv", "velocity in x", kind=FLOAT, unit="m/s"),
@@ -361,13 +361,13 @@ _PROPERTIES = (
     Option("gbmod", "model 1 bond: shear modulus", also=("gbmmod",), kind=NOT_NEGATIVE, unit="Pa"),
     Option("tstrength", "model 1 bond: tensile strength", kind=NOT_NEGATIVE, unit="Pa"),
     Option("sstrength", "model 1 bond: cohesion", kind=NOT_NEGATIVE, unit="Pa"),
-    Option("rubber", "marks the bonds as those of a membrane: kept and written, without any effect on the motion",
+    Option("rubber", "marks the bonds as those of a membrane: stored and written, without effect on the motion",
            source="P"),
-    Option("conserving", "the bonds have one shear stiffness, touching or open, so that opening and closing make no "
+    Option("conserving", "the bonds keep one shear stiffness, closed or open, so that opening and closing create no "
            "energy (docs/physics.md, Bonds)", source="X"),
     Option("n_bond", "model 2 bond: tensile strength", kind=NOT_NEGATIVE, unit="N"),
     Option("s_bond", "model 2 bond: shear strength", kind=NOT_NEGATIVE, unit="N"),
-    Option("tolerate", "largest gap that is bonded, up to 10 of the largest radius; the word alone keeps the default",
+    Option("tolerate", "largest bonded gap, up to 10 times the largest radius; the word alone keeps the default",
            kind=TOLERANCE, unit="m",
            default="1e-6"),
     Option("rext", "factor on the radii in the search for bonds, see cratio of GLINE", kind=POSITIVE, default="1"),
@@ -375,8 +375,8 @@ _PROPERTIES = (
 
 _PROP_DOC = (
     "Sets properties, velocities, colour and group of particles. With a bond key (ebmod gbmod tstrength sstrength, or "
-    "n_bond s_bond) it also bonds all pairs of chosen particles with distance <= (Ra + Rb) rext + tolerate, at once; "
-    "pairs bonded already get the new values. Without a bond key tolerate and rext have no effect."
+    "n_bond s_bond) it also bonds all pairs of selected particles with distance <= (Ra + Rb) rext + tolerate "
+    "immediately; existing bonds get the new values. Without a bond key tolerate and rext have no effect."
 )
 
 _DEGREES = (
@@ -391,32 +391,32 @@ def _interval(name: str, doc: str, source: str = "R") -> Option:
 
 
 _SETTINGS = (
-    Option("dt", "time step; of DT and frac the one given last counts", kind=POSITIVE, unit="s"),
+    Option("dt", "time step; the last of DT and frac applies", kind=POSITIVE, unit="s"),
     Option("gravity", "gravity in x and y", kind=POINT, unit="m/s2", default="0 0"),
     Option(
         "disk",
-        "volume that makes the mass: on pi r^2, off (or 0) 4/3 pi r^3, hex 2 sqrt(3) r^2",
+        "volume for the mass: on pi r^2, off (or 0) 4/3 pi r^3, hex 2 sqrt(3) r^2",
         kind=Choice("on|off|hex", "on, off (or 0), or hex",
                     (("on", "on"), ("off", "off"), ("hex", "hex"), ("0", "off"), ("1", "on"))),
         default="on",
     ),
     Option("frac", "time step over sqrt(smallest mass / largest pair stiffness)", kind=POSITIVE, source="S"),
     Option("damp", "lattice-solid damping, force -v times this", kind=LSM, unit="N s/m", default="lsm 0", source="S"),
-    Option("restitution", "share of the speed at which discs that are not bonded part again, from each other and from "
-           "walls; 1: nothing is lost", kind=RATIO, default="1", source="X"),
-    _interval("stepbar", "a line of progress every so many steps"),
-    *(_interval(name, f"{one.what} every so many steps", one.sources[0]) for name, one in OUTPUTS.items()),
-    _interval("energy", "a row of energy.csv every so many steps, and the energy budget at the end", source="X"),
+    Option("restitution", "coefficient of restitution of unbonded discs, with each other and with walls; 1: no "
+           "loss", kind=RATIO, default="1", source="X"),
+    _interval("stepbar", "steps between two lines of progress"),
+    *(_interval(name, f"{one.what} at this interval of steps", one.sources[0]) for name, one in OUTPUTS.items()),
+    _interval("energy", "steps between two rows of energy.csv, with the energy budget at the end", source="X"),
     Option("thickness", "of the model, in the force of PROP xp, yp and the stresses of HIST", kind=POSITIVE, unit="m",
            default="1", source="X"),
-    Option("seed", "start of the random numbers of GEN", kind=INDEX, default="5", source="X"),
+    Option("seed", "seed of the random numbers of GEN", kind=INDEX, default="5", source="X"),
     Option("wallside", "sides of walls that act: left of P1->P2 (ZDEM up to 2.0) or both",
            kind=Choice("left|both", "left or both", (("left", "left"), ("both", "both"))), default="both", source="X"),
-    Option("gentry", "attempts of GEN per particle asked for; not set: GEN gives up after 1000 failures in a row",
+    Option("gentry", "attempts of GEN per requested particle; not set: GEN stops after 1000 consecutive failures",
            kind=POSITIVE, source="X"),
     Option("outdir", "folder of the results", kind=FILE, default="data", source="X"),
-    Option("units", "units of all that follows: values that are unlikely in them are warned of, histories and curves "
-           "are labelled with them; no value is changed",
+    Option("units", "declares the units of all following values: unlikely values give a warning, histories and curves "
+           "show the units; no value is changed",
            kind=Choice("|".join(UNITS.values()), ", ".join(UNITS.values()), tuple((name, name) for name in UNITS)),
            source="X"),
 )  # fmt: skip
@@ -427,16 +427,16 @@ COMMANDS = (
             does="particles.start"),
     Command(
         "RESTORE",
-        "Goes on from a restart file of hpcdem, looked for beside the script, then in ./data below it.",
+        "Resumes from a checkpoint of hpcdem, searched for in the script's folder, then in its ./data.",
         leading=(Option("file", "restart file", kind=FILE, required=True),),
         example=("RES 0000046000.sav",),
         does="checkpoints.restore",
     ),
     Command(
         "LOAD",
-        "Begins a new calculation with the particles of a text file of columns x y r [group], or with all that a frame "
-        "all_<step>.dat of ZDEM or hpcdem holds: particles with velocities and properties, walls, bonds, step, time "
-        "step and gravity. Bounds that leave nobody are an error.",
+        "Begins a new calculation with the particles of a text file of columns x y r [group], or with the complete "
+        "contents of a frame all_<step>.dat of ZDEM or hpcdem: particles with velocities and properties, walls, bonds, "
+        "step, time step and gravity. Bounds that select no particle are an error.",
         leading=(Option("file", "file of particles", kind=FILE, required=True),),
         options=(
             Option("scale", "factor on x, y and r", kind=POSITIVE, default="1"),
@@ -447,7 +447,7 @@ COMMANDS = (
                  "LOAD all_0000046000.dat"),
         does="particles.load",
     ),
-    Command("STOP", "Ends the run; what follows it is not read.", source="S", example=("STOP",), does="cycles.stop"),
+    Command("STOP", "Ends the run; ignores all following lines.", source="S", example=("STOP",), does="cycles.stop"),
     # ---- walls
     Command(
         "BOX",
@@ -467,9 +467,9 @@ COMMANDS = (
     ),
     Command(
         "WALL",
-        "With nodes: makes a wall, or replaces the one of this id. Without: changes the properties given. Both sides "
-        "act, with the same properties, unless SET wallside left was given before; stiffnesses are for linear contacts "
-        "only.",
+        "With nodes: creates a wall, or replaces the wall of this id. Without nodes: changes the given properties. "
+        "Both sides act, with the same properties, unless SET wallside left was given before; stiffnesses are for "
+        "linear contacts only.",
         options=(
             _id("number of the wall"),
             Option("nodes", "end points P1 and P2", kind=SEGMENT, unit="m"),
@@ -477,8 +477,8 @@ COMMANDS = (
             _KS,
             _FRIC,
             _COLOR,
-            Option("xv", "velocity in x, until it is changed", kind=FLOAT, unit="m/s", default="0"),
-            Option("yv", "velocity in y, until it is changed", kind=FLOAT, unit="m/s", default="0"),
+            Option("xv", "velocity in x", kind=FLOAT, unit="m/s", default="0"),
+            Option("yv", "velocity in y", kind=FLOAT, unit="m/s", default="0"),
         ),
         example=("WALL ID 1, NODES ( 10.0 , 10000.0 ) ( 10.0 , 10.0 ), kn=0e10 ks=0e10 fric 0.0 COLOR blue",
                  "WALL id 1 xv 2.0"),
@@ -487,7 +487,7 @@ COMMANDS = (
     # ---- particles
     Command(
         "BALL",
-        "Makes one particle.",
+        "Creates one particle.",
         options=(
             _id("number of the particle"),
             Option("x", "centre", kind=FLOAT, unit="m", required=True),
@@ -501,13 +501,13 @@ COMMANDS = (
     ),
     Command(
         "GEN",
-        "Fills a rectangle with particles. num: at random without overlap, until so many are placed or no more fit in "
-        "(1000 failures in a row, or as SET gentry says). grid: on a square lattice with a spacing of twice the "
-        "largest radius. The sides of the rectangle may be expressions. A rectangle too narrow for a particle is an "
-        "error, a full one is not: the log says how many were placed.",
+        "Fills a rectangle with particles. num: at random without overlap, until this number is placed or no more fit "
+        "in (1000 consecutive failures, or SET gentry). grid: on a square lattice with a spacing of twice the largest "
+        "radius. The sides of the rectangle may be expressions. A rectangle too narrow for a particle is an error; if "
+        "not all particles fit, the log reports the number placed.",
         longest="generate",
         options=(
-            Option("num", "particles asked for", kind=ASKED),
+            Option("num", "requested number of particles", kind=ASKED),
             Option("grid", "one particle on every node of a lattice", source="S"),
             Option("idmin", "first id of a lattice", kind=INDEX, default="next free id", source="S"),
             _RADII,
@@ -524,12 +524,12 @@ COMMANDS = (
     ),
     Command(
         "GLINE",
-        "Makes a row of equal particles from p1 towards p2, centres 2 rad cratio apart, the first at p1.",
+        "Creates a row of equal particles from p1 towards p2, with a spacing of 2 rad cratio, the first at p1.",
         options=(
             Option("p1", "first centre", kind=POINT, unit="m", required=True),
             Option("p2", "end of the row", kind=POINT, unit="m", required=True),
             _RAD,
-            Option("cratio", "distance of neighbours over the sum of their radii", kind=RATIO, default="1"),
+            Option("cratio", "distance between neighbours over the sum of their radii", kind=RATIO, default="1"),
             _KN,
             _KS,
             _FRIC,
@@ -541,17 +541,18 @@ COMMANDS = (
     ),
     Command(
         "CLUMP",
-        "Rigid bodies made of discs. With file: adds those of a clump file (docs/files.md), looked for as by LOAD; the "
-        "file is scaled, turned about its origin and moved by (x y); mass and inertia are density times area and polar "
-        "second moment of area in the file. Without: the chosen particles become one clump, with the sums of their "
-        "areas and moments. RANGE chooses clumps as a whole, by their centre; DEL, PROP, FIX act on them so, PROP xv "
-        "yv spin on their centre, and BOX deletes those whose centre leaves it. They need SET disk on.",
+        "Creates rigid bodies made of discs. With file: adds the clumps of a file (docs/files.md), searched for as by "
+        "LOAD; the file is scaled, rotated about its origin and moved by (x y); mass and inertia are density times "
+        "area and polar second moment of area in the file. Without file: the selected particles become one clump, with "
+        "the sums of their areas and moments. RANGE selects complete clumps by their centre, also in DEL, PROP and "
+        "FIX; PROP xv yv spin act on the centre, and BOX deletes clumps whose centre leaves it. Clumps need SET disk "
+        "on.",
         source="X",
         options=(
             Option("file", "clump file", kind=FILE, source="X"),
-            Option("x", "the origin of the file comes to this place", kind=FLOAT, unit="m", default="0", source="X"),
-            Option("y", "the origin of the file comes to this place", kind=FLOAT, unit="m", default="0", source="X"),
-            Option("angle", "turns the file, anticlockwise", kind=FLOAT, unit="rad", default="0", source="X"),
+            Option("x", "new position of the origin of the file", kind=FLOAT, unit="m", default="0", source="X"),
+            Option("y", "new position of the origin of the file", kind=FLOAT, unit="m", default="0", source="X"),
+            Option("angle", "rotation of the file, anticlockwise", kind=FLOAT, unit="rad", default="0", source="X"),
             Option("scale", "factor on all lengths of the file", kind=POSITIVE, default="1", source="X"),
             replace(_COLOR, default="lg; joined particles keep theirs", source="X"),
             replace(_GROUP, default="***; joined particles keep theirs", source="X"),
@@ -572,7 +573,7 @@ COMMANDS = (
     ),
     Command(
         "EXP",
-        "Writes x y r of particles to a text file that LOAD reads. Its folder must be there before the run begins.",
+        "Writes x y r of particles to a text file that LOAD reads. Its folder must exist before the run begins.",
         longest="export",
         leading=(Option("file", "file of particles", kind=FILE, required=True),),
         options=(Option("group", "the group as a fourth column"),),
@@ -594,24 +595,24 @@ COMMANDS = (
             "PROP law glue.py:glue between sticky.py:sticky|linear parameter pull 50.0",
         ),
     ),
-    Command("INIT", "The same as PROP.", options=_PROPERTIES, ranged=True, same_as="PROP",
+    Command("INIT", "Another name of PROP.", options=_PROPERTIES, ranged=True, same_as="PROP",
             example=("INI xv 2.0 RANGE group base",)),
     Command(
         "BOND",
-        "Breaks the bonds that have both ends among the chosen particles.",
-        leading=(Option("break", "the only thing BOND does", required=True),),
+        "Breaks the bonds between selected particles.",
+        leading=(Option("break", "the only action of BOND", required=True),),
         ranged=True,
         example=("BOND break RANGE y 1.0 10.0",),
         does="bonds.break_bonds",
     ),
     Command(
         "FIX",
-        "The chosen particles keep their velocity in these degrees of freedom, whatever force acts.",
+        "Prescribes the present velocity of the selected particles in these degrees of freedom, independent of forces.",
         options=_DEGREES,
         ranged=True,
         example=("FIX y spin RANGE group base",),
     ),
-    Command("FREE", "Takes FIX back.", options=_DEGREES, ranged=True, example=("FREE x RANGE group base",)),
+    Command("FREE", "Revokes FIX.", options=_DEGREES, ranged=True, example=("FREE x RANGE group base",)),
     # ---- settings
     Command(
         "SET",
@@ -623,7 +624,7 @@ COMMANDS = (
     # ---- running
     Command(
         "CYC",
-        "Calculates so many steps. A frame all_<step>_ini is written first.",
+        "Executes a number of steps. Writes a frame all_<step>_ini first.",
         longest="cycle",
         leading=(Option("steps", "steps", kind=INDEX, required=True),),
         example=("CYC 5000",),
@@ -631,22 +632,22 @@ COMMANDS = (
     ),
     Command(
         "IMPLE",
-        "Calculates until a wall has moved the distance at its velocity: nint(distance / (|velocity| dt)) steps. "
-        "A frame all_<step>_ini is written first and one at the end; the intervals of SET rest meanwhile.",
+        "Executes steps until a wall has moved the distance at its velocity: nint(distance / (|velocity| dt)) steps. "
+        "Writes a frame all_<step>_ini first and one at the end; the intervals of SET are inactive meanwhile.",
         also=("implie",),
-        leading=(Option("wall", "the only thing that can be moved", required=True),),
+        leading=(Option("wall", "the only object that can be moved", required=True),),
         options=(
             _id("number of the wall"),
             Option("xmove", "distance in x", kind=DISTANCE, unit="m"),
             Option("ymove", "distance in y", kind=DISTANCE, unit="m", source="X"),
-            *(Option(name, f"{one.what} each time the wall has moved so far", kind=NOT_NEGATIVE, unit="m",
+            *(Option(name, f"{one.what} at this interval of wall displacement", kind=NOT_NEGATIVE, unit="m",
                      default="off", source=one.sources[1]) for name, one in OUTPUTS.items()),
         ),
         example=("IMPLE wall id 1 xmove 10000.0 save 2000.0 print 1000.0 ps 1000.0 vtk 1000.0",),
     ),
     Command(
         "SAV",
-        "Writes a restart file of this name, beside the script. Its folder must be there before the run begins.",
+        "Writes a checkpoint of this name in the folder of the script. Its folder must exist before the run begins.",
         longest="save",
         source="S",
         leading=(Option("file", "restart file", kind=FILE, required=True, source="S"),),
@@ -656,8 +657,8 @@ COMMANDS = (
     # ---- histories and pictures
     Command(
         "HIST",
-        "Records a number every so many steps in data/hist_id_<id>.dat (step, value: the layout of ZDEM's readers) and "
-        "data/hist_<id>.csv (with the time). Stresses and strains are positive in compression and shortening.",
+        "Records a number at an interval of steps in data/hist_id_<id>.dat (step, value: the layout of ZDEM's readers) "
+        "and data/hist_<id>.csv (with the time). Stresses and strains are positive in compression and shortening.",
         source="S",
         longest="history",
         options=(
@@ -668,7 +669,7 @@ COMMANDS = (
             Option("energy", "record the kinetic and elastic energy", source="X"),
             Option("time", "record the time", source="X"),
             Option("unbalanced", "record the unbalanced force over the mean contact force", source="X"),
-            Option("contacts", "record the number of contacts that touch", source="X"),
+            Option("contacts", "record the number of closed contacts", source="X"),
             Option("bonds", "record the number of bonds", source="X"),
             Option("gstress", "record the axial stress [Pa] on an end wall made of the particles of a group: force of "
                    "all others on it, over its width and SET thickness; the axis is across the row", kind=OF_GROUP,
@@ -692,10 +693,10 @@ COMMANDS = (
     ),
     Command(
         "PLOT",
-        "Writes one history against another at the end of the run, and draws it: hist_<y>_vs_<x>.txt and .png.",
+        "Writes and draws one history over another at the end of the run: hist_<y>_vs_<x>.txt and .png.",
         source="S",
         leading=(
-            Option("hist", "histories are all that can be plotted; the word may be left out", source="S"),
+            Option("hist", "only histories can be plotted; the word is optional", source="S"),
             Option("x", "history on the x axis", kind=INDEX, required=True, source="S"),
             Option("y", "history on the y axis", kind=INDEX, required=True, source="S"),
         ),
@@ -704,8 +705,8 @@ COMMANDS = (
     ),
     Command(
         "DRAW",
-        "Pictures in mid-run, draw_<step>.jpg, if the run was started with --draw; otherwise only noted in the log. A "
-        "word with - before it switches off.",
+        "Draws pictures during the run, draw_<step>.jpg, if the run was started with --draw; otherwise the log "
+        "mentions them. A word with - before it switches an item off.",
         source="S",
         options=(
             Option("interval", "steps between two drawings", kind=COUNT, unit="steps", source="S"),
@@ -720,13 +721,13 @@ COMMANDS = (
     ),
     Command(
         "LOG",
-        "Accepted, without effect: the log goes to standard output and is kept where that is redirected to.",
+        "Accepted, without effect: the log goes to standard output; redirect it to keep it.",
         source="P",
         leading=(Option("state", "", kind=Choice("on|off", "on or off", (("on", "on"), ("off", "off"))), required=True,
                         source="P"),),
         example=("LOG on",),
     ),
-    Command("PAUSE", "Accepted, without effect: a run waits for nobody.", source="P", example=("PAUSE",)),
+    Command("PAUSE", "Accepted, without effect: runs are not interactive.", source="P", example=("PAUSE",)),
 )  # fmt: skip
 
 RANGE_TERMS = (

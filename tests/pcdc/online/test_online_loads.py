@@ -163,7 +163,7 @@ pcdc model step 60
 HOSTILE = [
     (
         "element-face c-model c-m-c property friction 30 cohesion 1e5",
-        "surfaces that touch have friction and no cohesion",
+        "contacts have friction but no cohesion",
     ),
     ("node mechanical-damp local 1.5", "from 0 to 1"),
     ("node mechanical-damp", "lacks l{ocal}"),
