@@ -47,7 +47,7 @@ def _known(context: click.Context, argument: click.Parameter, value: str | None)
     from hpcdem.cases import CASES
 
     if value is not None:
-        raise click.UsageError(f"there is no case '{value}'; there is {', '.join(CASES)}")
+        raise click.UsageError(f"unknown case '{value}'; known: {', '.join(CASES)}")
     return value
 
 
@@ -79,7 +79,7 @@ def command(kind: type[Case]) -> click.Command:
         options.append(click.Option([f"--{word}", name], metavar="X", help=f"{doc} [{shown}{measured}]."))
     options += [
         click.Option(["-o", "--output"], type=PATH, metavar="FILE", help=f"The script; - prints it [{kind.name}.sc]."),
-        click.Option(["--force"], is_flag=True, help="Replace the file if it is there."),
+        click.Option(["--force"], is_flag=True, help="Replace an existing file."),
     ]
     return click.Command(kind.name, context_settings=HELP, params=options, help=f"{kind.title}: write its script.")
 
@@ -101,9 +101,9 @@ def work(kind: type[Case], comm: Comm, log: Log, options: dict[str, Any]) -> Non
             click.echo(case.script(), nl=False)
             return
         if path.exists() and not options["force"]:
-            raise UsageError(f"{path} is there already; --force replaces it, -o names another file")
+            raise UsageError(f"{path} exists: use --force to replace it, or -o for another name")
         if not path.parent.is_dir():
-            raise UsageError(f"cannot write {path}: there is no folder {path.parent}")
+            raise UsageError(f"cannot write {path}: folder {path.parent} not found")
         with atomic_path(path) as temporary:
             Path(temporary).write_text(case.script(), encoding="utf-8")
         click.echo(f"{path}: {case.title}; run it with hpcdem {path}")

@@ -28,7 +28,7 @@ class Talk(Protocol):
 
 
 @click.command(context_settings=HELP)
-@click.option("--zdem", is_flag=True, help="ZDEM commands in place of PCDC commands and Python.")
+@click.option("--zdem", is_flag=True, help="ZDEM commands instead of PCDC commands and Python.")
 @click.option("-j", "threads", type=click.IntRange(1), metavar="N", help="Threads [what srun -c gives, else 1].")
 @click.option("--outdir", type=PATH, metavar="DIR", help="Results [data in this folder].")
 @click.option("--pipe", is_flag=True, hidden=True)
@@ -49,7 +49,7 @@ def start(words: list[str]) -> NoReturn:
         from hpcdem.runtime.stop_requests import StopRequests
 
         if comm.size > 1:
-            raise UsageError(f"hpcdem console is for one rank, these are {comm.size}; a script runs on many")
+            raise UsageError(f"hpcdem console supports one rank, started on {comm.size}: use a script for more")
         log = Log(comm.rank)
         log.folds = False
         for warning in warnings:
@@ -124,7 +124,7 @@ def _zdem(session: Session, piped: bool) -> None:
 
 def serve(talk: Talk, begin: Any, requests: IO[str], answers: IO[str]) -> None:
     """For a program at the other end of a pipe (page/console.py): each line of requests is {"text": ..., "name": ...}.
-    What is said is text; lines that begin with MARK tell that it is ready, and how a request ended."""
+    Output is text; lines that begin with MARK report readiness and how a request ended."""
 
     def mark(**content: Any) -> None:
         answers.write(f"\n{MARK}{json.dumps(content)}\n")

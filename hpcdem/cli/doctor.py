@@ -28,8 +28,8 @@ STYLES = {"OK": "green", "WARNING": "yellow", "PROBLEM": "bold red"}
     "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
 )
 def doctor(**options: Any) -> None:
-    """Look for what would keep a run from working, make it slow or put it at risk: packages, MPI and its launcher,
-    cores and memory, file systems, the kernel cache, Slurm, limits of the shell. Says what to type against it.
+    """Report what would make a run fail, slow it down or put it at risk, and the commands that fix it: packages, MPI
+    and its launcher, cores and memory, file systems, the kernel cache, Slurm, limits of the shell.
 
     Also under mpiexec or srun, as the run would be started: then it looks at all ranks and hosts. Exit codes: 0 no
     problem, 1 a problem (warnings are none).

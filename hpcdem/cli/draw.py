@@ -33,14 +33,14 @@ LOOKS = {
 
 @click.command(context_settings=HELP, no_args_is_help=True)
 @click.argument("paths", type=PATH, nargs=-1, required=True, metavar="FRAME|DIR...")
-@click.option("--view", "view_file", type=PATH, metavar="FILE", help="What is shown, as a view *.mv says; the options "
-              "below change it [everything].")  # fmt: skip
-@click.option("--field", metavar="NAME", help="Colour objects by this field; --list tells which there are.")
-@click.option("--object", "on", metavar="WORD", help="Of which objects --field and the options below are: elements, "
+@click.option("--view", "view_file", type=PATH, metavar="FILE", help="View *.mv that defines what is shown; the "
+              "options below change it [everything].")  # fmt: skip
+@click.option("--field", metavar="NAME", help="Colour objects by this field; --list shows the fields.")
+@click.option("--object", "on", metavar="WORD", help="Objects to which --field and the options below apply: elements, "
               "particles, joints, ... [the first that have the field].")  # fmt: skip
 @click.option("--range", "limits", type=Numbers(2, "full"), metavar="A,B|full", help="Values of the first and the last "
-              "colour; full: the least and the greatest [those that 1 % is below or above].")  # fmt: skip
-@click.option("--log", is_flag=True, default=None, help="Colours by the logarithm.")
+              "colour; full: minimum and maximum [the 1 % and 99 % quantiles].")  # fmt: skip
+@click.option("--log", is_flag=True, default=None, help="Logarithmic colour scale.")
 @click.option(
     "--colours", metavar="NAME", help="viridis, cividis, yellow-brown, blue-red, ... (docs/view.md) [viridis]."
 )
@@ -50,32 +50,35 @@ LOOKS = {
 @click.option("--size", type=FINITE, metavar="N", help="Factor on radii of particles and widths of lines [1].")
 @click.option("--vectors", metavar="NAME", help="Arrows of this field: displacement, velocity, force.")
 @click.option("--arrows", type=FINITE, metavar="N", help="Factor on the length of arrows [1].")
-@click.option("--filter", metavar="TEXT", help="Only objects for which this holds: 'stress_yy < -1e6 and x > 2'.")
-@click.option("--hide", multiple=True, metavar="WORD", help="Leave these objects out; may stand several times.")
+@click.option(
+    "--filter", metavar="TEXT", help="Only objects that satisfy this condition: 'stress_yy < -1e6 and x > 2'."
+)
+@click.option("--hide", multiple=True, metavar="WORD", help="Hide these objects; repeatable.")
 @click.option("--show", multiple=True, metavar="WORD", help="Show these objects (contacts and bonds are hidden).")
 @click.option("--deformed", type=FINITE, metavar="N", help="Factor on displacements of blocks [1].")
 @click.option("--camera", type=Numbers(4), metavar="L,R,B,T", help="Left, right, bottom, top of the picture, m; in "
-              "space along the picture and up it [all].")  # fmt: skip
-@click.option("--eye", metavar="WORD|X,Y,Z", help="In space: seen from +x, -x, +y, -y, +z, -z, iso (right, front, "
-              "above), or from this direction [iso].")  # fmt: skip
-@click.option("--section", metavar="PLANE", help="In space: cut by x=1.5 (the part towards the eye is taken away), "
-              "x<1.5, x>1.5 (what stays), or PX,PY,PZ,NX,NY,NZ (a point, the normal into what goes).")  # fmt: skip
-@click.option("--title", metavar="TEXT", help="Over the picture; {step} and {time} are filled in.")
+              "three dimensions in the plane of the picture [all].")  # fmt: skip
+@click.option("--eye", metavar="WORD|X,Y,Z", help="In three dimensions: view from +x, -x, +y, -y, +z, -z, iso (right, "
+              "front, above), or from this direction [iso].")  # fmt: skip
+@click.option("--section", metavar="PLANE", help="In three dimensions: section at x=1.5 (the part towards the viewer "
+              "is removed), x<1.5 or x>1.5 (the part that remains), or PX,PY,PZ,NX,NY,NZ (a point and the normal into "
+              "the removed part).")  # fmt: skip
+@click.option("--title", metavar="TEXT", help="Title above the picture; {step} and {time} are replaced.")
 @click.option("--no-axes", is_flag=True, help="Without axes.")
-@click.option("--no-legend", is_flag=True, help="Without legend and bars of colours.")
-@click.option("--step", type=click.IntRange(0), metavar="N", help="Of a folder: only the frame of this step.")
-@click.option("--name", metavar="NAME", help="Of a folder: frames of blocks NAME_<step>.vtkhdf.")
+@click.option("--no-legend", is_flag=True, help="Omit legend and colour bars.")
+@click.option("--step", type=click.IntRange(0), metavar="N", help="For a folder: only the frame of this step.")
+@click.option("--name", metavar="NAME", help="For a folder: frames of blocks NAME_<step>.vtkhdf.")
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="The picture, or a film *.gif or *.mp4 "
               "[beside each frame].")  # fmt: skip
-@click.option("--format", "formats", type=Formats(FORMATS), metavar="LIST", help="Some of png, jpg, tiff, pdf, svg "
-              "[png].")  # fmt: skip
+@click.option("--format", "formats", type=Formats(FORMATS), metavar="LIST", help="One or more of png, jpg, tiff, pdf, "
+              "svg [png].")  # fmt: skip
 @number("dpi", 300.0, "Dots per inch [300].", POSITIVE)
 @number("page", 17.0, "Width of the picture, cm [17].", POSITIVE)
 @number("font", 9.0, "Size of letters, points [9].", POSITIVE)
 @number("fps", None, "Frames per second of a film [10].", POSITIVE)
-@number("max_workers", None, "Processes that draw at a time [one per core].", POSITIVE)
-@click.option("--save-view", type=PATH, metavar="FILE", help="Write what is shown as a view *.mv.")
-@click.option("--list", "only_list", is_flag=True, help="Draw nothing: say which objects and fields there are.")
+@number("max_workers", None, "Number of drawing processes [one per core].", POSITIVE)
+@click.option("--save-view", type=PATH, metavar="FILE", help="Write the view as *.mv.")
+@click.option("--list", "only_list", is_flag=True, help="List the available objects and fields; draw nothing.")
 def draw(**options: Any) -> None:
     """Draw frames of particles or of blocks: PNG, JPG, TIFF, and true vectors in PDF and SVG.
 
@@ -115,7 +118,7 @@ def _film(pictures: list[Path], film: Path, fps: float) -> None:
 
 
 def frames_of(options: dict[str, Any], log: Log) -> list[Path]:
-    """The files to be drawn. Raises HpcdemError where there is none."""
+    """The files to be drawn. Raises HpcdemError if none exists."""
     from hpcdem.core.errors import HpcdemError, UsageError
     from hpcdem.io.frames import left_out, list_frames, list_mesh_frames
 
@@ -123,10 +126,10 @@ def frames_of(options: dict[str, Any], log: Log) -> list[Path]:
     for path in options["paths"]:
         if not path.is_dir():
             if not path.exists():
-                raise HpcdemError(f"there is no folder or file {path}")
+                raise HpcdemError(f"folder or file not found: {path}")
             for name in ("step", "name"):
                 if options[name] is not None:
-                    raise UsageError(f"--{name} chooses frames of a folder; {path} is a file")
+                    raise UsageError(f"--{name} selects frames of a folder, but {path} is a file")
             found.append(path)
             continue
         files = [] if options["name"] else list_frames(path)
@@ -151,11 +154,13 @@ def plan(options: dict[str, Any], log: Log, scratch: Path | None = None) -> list
 
     files, output = frames_of(options, log), options["output"]
     if options["fps"] is not None and scratch is None:
-        raise UsageError("--fps goes with a film: -o FILE.gif or FILE.mp4")
+        raise UsageError("--fps requires a film: -o FILE.gif or FILE.mp4")
     if output is not None and options["formats"]:
-        raise UsageError("--format goes without --output, whose name says what is drawn")
+        raise UsageError("--format cannot be used with --output, whose name determines the format")
     if output is not None and scratch is None and len(files) > 1:
-        raise UsageError(f"{len(files)} frames do not go into one picture: --step chooses one, or -o FILE.gif a film")
+        raise UsageError(
+            f"{len(files)} frames do not fit into one picture: select one with --step, or make a film with -o FILE.gif"
+        )
     first = read_moment(files[-1])
     view = view_of(options, first)
     seen, view = common(files, view)

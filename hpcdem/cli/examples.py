@@ -21,9 +21,7 @@ PLACES = (Path(__file__).resolve().parents[2] / "examples", Path(sys.prefix) / "
 """Of a source tree, and of a package that was installed."""
 
 
-@click.command(
-    context_settings=HELP, epilog="Then: hpcdem NAME.py. Each example says in its first lines what it shows."
-)
+@click.command(context_settings=HELP, epilog="Then: hpcdem NAME.py. The first lines of each example describe it.")
 @click.argument("name", required=False)
 @click.option("--into", type=PATH, default=Path(), metavar="DIR", help="Folder to copy the example to [this one].")
 def examples(**options: Any) -> None:
@@ -81,12 +79,12 @@ def copied(name: str, into: Path) -> list[Path]:
     known = scripts()
     path = known.get(Path(name).stem)
     if path is None:
-        raise UsageError(f"{name}: no such example{hint(name, known) or '.'} There are {', '.join(known)}")
+        raise UsageError(f"{name}: unknown example{hint(name, known) or '.'} Known: {', '.join(known)}")
     text = path.read_text(encoding="utf-8")
     others = [other for other in folder().iterdir() if other.is_file() and other.suffix not in SUFFIXES]
     files = [path, *(other for other in sorted(others) if other.name in text)]
     for target in (into / file.name for file in files):
         if target.exists():
-            raise UsageError(f"{target} exists already; it is not overwritten. Choose a folder with --into DIR")
+            raise UsageError(f"{target} exists and is not overwritten: choose another folder with --into DIR")
     into.mkdir(parents=True, exist_ok=True)
     return [Path(shutil.copy(file, into / file.name)) for file in files]

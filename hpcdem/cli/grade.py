@@ -27,8 +27,7 @@ MM = 1e-3
 
 @click.command(
     context_settings=HELP, no_args_is_help=True,
-    epilog="FILE holds a size in mm and the per cent of mass finer than it per line. What the words mean: "
-    "docs/specimens.md.",
+    epilog="Each line of FILE gives a size in mm and the percentage of mass finer than it. Terms: docs/specimens.md.",
 )  # fmt: skip
 @click.argument("file", type=PATH, metavar="[FILE]", required=False)
 @click.option("--shape", type=click.Choice(SHAPES), default="circle", help="Shape of the grains [circle].")
@@ -38,16 +37,17 @@ MM = 1e-3
 @click.option("--void-ratio", type=FINITE, default=0.5, metavar="E", help="Voids over grains, by area [0.5].")
 @click.option("--l-over-d", type=FINITE, default=1.5, metavar="R", help="ellipse: long over short axis [1.5].")
 @click.option("--size-rule", type=click.Choice(("major", "minor", "area")), default="major",
-              help="ellipse: what its size is: an axis, or the diameter of a circle of its area [major].")  # fmt: skip
-@click.option("--deviation", type=FINITE, default=0.0, metavar="DEG", help="Polygons: how far vertices may be off, in "
-              "degrees [0].")  # fmt: skip
+              help="ellipse: definition of its size: an axis, or the diameter of a circle of equal area "
+                  "[major].")  # fmt: skip
+@click.option("--deviation", type=FINITE, default=0.0, metavar="DEG", help="Polygons: largest deviation of vertices, "
+              "in degrees [0].")  # fmt: skip
 @click.option("--roundness", type=FINITE, default=0.0, metavar="R", help="Polygons: 0 straight edges, 1 a circle [0].")
-@click.option("--mass-exponent", type=click.Choice(("2", "3")), default="2", help="Mass of a grain goes with its size "
-              "squared, or cubed for the numbers of a sieve curve of real grains [2].")  # fmt: skip
+@click.option("--mass-exponent", type=click.Choice(("2", "3")), default="2", help="Exponent of size in the mass of a "
+              "grain: 2, or 3 for the grain numbers of a real sieve curve [2].")  # fmt: skip
 @click.option("--placement", type=click.Choice(("dense", "cells")), default="dense", help="dense: in the box at the "
               "void ratio; cells: loose, one grain per cell of a column [dense].")  # fmt: skip
 @click.option("--cell", type=FINITE, default=2.0, metavar="F", help="cells: cell over largest grain [2].")
-@click.option("--seed", type=int, default=0, metavar="N", help="Seed of the random numbers [0].")
+@click.option("--seed", type=int, default=0, metavar="N", help="Random seed [0].")
 @click.option("-o", "--out", type=PATH, metavar="DIR", help="Folder for the files [specimen].")
 @click.option("--layout", type=click.Choice(("sample", "full", "plain")), help="PPDEM file: arcs; with a column of "
               "roundness; circles without the leading 1 [sample; with --read the one that fits].")  # fmt: skip
@@ -56,18 +56,18 @@ MM = 1e-3
 @click.option("--gap", type=FINITE, default=0.03, metavar="G", help="Largest gap between outlines and the discs of "
               "clumps, over the size [0.03].")  # fmt: skip
 @click.option("--format", "formats", type=Formats(FORMATS, none=True), default="png", metavar="LIST",
-              help="Figures: png, jpg, pdf, svg, with commas between them, or none [png].")  # fmt: skip
-@click.option("--falling", is_flag=True, help="Grading curve with sizes that fall to the right.")
+              help="Figures: png, jpg, pdf, svg, separated by commas, or none [png].")  # fmt: skip
+@click.option("--falling", is_flag=True, help="Plot the grading curve with sizes decreasing to the right.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
-@click.option("--read", "read", type=PATH, metavar="FILE.dat", help="Look into a PPDEM file instead; FILE, if given, "
-              "is the grading to compare it with.")  # fmt: skip
+@click.option("--read", "read", type=PATH, metavar="FILE.dat", help="Inspect a PPDEM file instead; FILE, if given, is "
+              "the grading for comparison.")  # fmt: skip
 def grade(**options: Any) -> None:
-    """Make a specimen that has the grading curve in FILE: grains of one shape, in their places.
+    """Make a specimen with the grading curve in FILE: grains of one shape, in their positions.
 
     \b
     specimen.dat            the outlines, for PPDEM
     specimen.xyr, .clumps   circles for LOAD, other shapes as clumps of discs for CLUMP
-    deposit.py, biaxial.py  scripts that go on with them
+    deposit.py, biaxial.py  scripts that use them
     grading.csv, specimen.json, figures of grading, packing and sizes
     """
 
@@ -103,10 +103,10 @@ def make(options: dict[str, Any]) -> None:
     from hpcdem.specimens import Outputs, Style
 
     if options["file"] is None:
-        raise UsageError("a file with the grading is missing: hpcdem grade FILE ...")
+        raise UsageError("the grading file is missing: hpcdem grade FILE ...")
     style = Style(_layout(options), _factor(options), options["gap"], tuple(options["formats"]), options["falling"])
     if style.layout == "plain" and options["shape"] != "circle":
-        raise UsageError("--layout plain is for circles only")
+        raise UsageError("--layout plain supports circles only")
     wanted = request(options, read_grading(options["file"]))
     began = time.perf_counter()
     outputs = Outputs(make_specimen(wanted), style)
@@ -149,14 +149,16 @@ def show(made: Specimen, facts: dict[str, Any]) -> None:
         f"{made.request.placement}: {room['width']:.4g} x {room['height']:.4g} mm, void ratio {voids['reached']:.4g}"
     )
     if made.request.placement == "dense":
-        placed += f"; {facts['added']} found room, {facts['moved']} were made room for in {facts['sweeps']} rounds"
+        placed += f"; {facts['added']} placed freely, {facts['moved']} separated in {facts['sweeps']} rounds"
         if made.density.raised > 1.0:
-            placed += f"; the box had to be {100.0 * (made.density.raised - 1.0):.2g} % higher"
+            placed += f"; the box was made {100.0 * (made.density.raised - 1.0):.2g} % higher"
     click.echo(placed)
     click.echo(_numbers(facts["Cu"], facts["Cc"]))
     missing = [f"{r.size:g} mm" for r in made.rows if not r.count and math.isfinite(r.needed)]
     if missing:
-        click.echo(f"no grain of {', '.join(missing)}: the last column says from which number on there is one")
+        click.echo(
+            f"no grain of {', '.join(missing)}: the last column gives the number of grains that would include one"
+        )
     if "clumps" in facts:
         c = facts["clumps"]
         click.echo(

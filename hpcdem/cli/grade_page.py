@@ -26,8 +26,8 @@ grade = click.Command(
         click.Option(
             ["--serve"],
             is_flag=True,
-            help="Show it on a page in the browser, where sliders change it, and "
-            "which saves the files; FILE is where the table begins. To this machine only.",
+            help="Open a page in the browser with sliders for the options, which also saves the files; FILE is the "
+            "initial table. For this machine only.",
         ),
         click.Option(["--port"], type=click.IntRange(0, 65535), metavar="N", help="--serve: port [a free one]."),
         click.Option(["--no-browser"], is_flag=True, help="--serve: only print the address."),
@@ -46,7 +46,7 @@ def start(words: list[str]) -> NoReturn:
         if not options["serve"]:
             for name in ("port", "no_browser"):
                 if options[name]:
-                    raise UsageError(f"--{name.replace('_', '-')} goes with --serve")
+                    raise UsageError(f"--{name.replace('_', '-')} requires --serve")
     if not options["serve"]:
         run_program(grade, "hpcdem grade", words, on_paper.work)
     with messages_only():
@@ -59,7 +59,7 @@ def serve(options: dict[str, Any]) -> None:
     """Serve the page until Ctrl-C. Raises HpcdemError."""
     for name in NOT_SERVED:
         if options[name]:
-            raise UsageError(f"--{name.removeprefix('as_')} does not go with --serve")
+            raise UsageError(f"--{name.removeprefix('as_')} cannot be used with --serve")
     launch.prepare_environment(1)
 
     from hpcdem.page.lifetime import serve as serve_page

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 @click.command(
     context_settings=HELP, no_args_is_help=True,
-    epilog="Every byte of a checkpoint is compared with its checksum. Exit code 1 if a file is damaged or unknown.",
+    epilog="Checkpoints are checked completely against their checksums. Exit code 1 if a file is damaged or unknown.",
 )  # fmt: skip
 @click.argument("paths", type=PATH, nargs=-1, required=True, metavar="FILE|DIR...")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object per line and path.")
-@click.option("--all", "every", is_flag=True, help="Of a folder: look into all its files, not only the last ones.")
+@click.option("--all", "every", is_flag=True, help="For a folder: inspect all files, not only the newest ones.")
 def info(**options: Any) -> None:
     """What is in a checkpoint (.sav), a frame (.vtkhdf, .dat) or the output folder of a run."""
 
@@ -68,7 +68,7 @@ def _placed(facts: dict[str, Any]) -> dict[str, Any]:
 
 def show(path: Path, facts: dict[str, Any]) -> None:
     """A line with the verdict, and one per fact."""
-    click.echo(f"{path}: {facts['kind']}, {'whole' if facts['whole'] else 'NOT WHOLE: ' + facts['why']}")
+    click.echo(f"{path}: {facts['kind']}, {'complete' if facts['whole'] else 'INCOMPLETE: ' + facts['why']}")
     for name, value in facts.items():
         if name not in ("kind", "whole", "why") and value not in (None, "", [], {}):
             click.echo(f"  {name.replace('_', ' '):<12} {_text(value)}")
@@ -100,7 +100,7 @@ def of_folder(folder: Path, every: bool = False) -> dict[str, Any]:
         facts |= {"kind": "run", "script": record.script, "began": record.began, "state": record.state}
         facts["on"] = f"{record.ranks} ranks x {record.threads} threads, hpcdem {record.version}"
         if record.state == "running" and holder is None:
-            facts["state"] = "killed (nobody holds its lock)"
+            facts["state"] = "killed (its lock is free)"
     if holder is not None:
         facts["state"] = f"running: process {holder.get('pid', '?')} on {holder.get('host', '?')}"
     every_saved = sorted(folder.glob("*.sav"), key=lambda path: (_step(path.name), path.name))
@@ -125,7 +125,7 @@ def of_folder(folder: Path, every: bool = False) -> dict[str, Any]:
     if wrong:
         facts |= {"whole": False, "why": "; ".join(wrong)}
     elif record is None and not saved and not frames:
-        facts |= {"whole": False, "why": "no run has written here"}
+        facts |= {"whole": False, "why": "no run has written into this folder"}
     return facts
 
 

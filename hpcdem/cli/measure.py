@@ -27,7 +27,7 @@ class Numbers(Words):
         try:
             return [int(word) for word in words]
         except ValueError:
-            self.fail(f"'{value}': whole numbers with commas between them are expected", param, ctx)
+            self.fail(f"'{value}': expected whole numbers separated by commas", param, ctx)
 
 
 def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
@@ -37,47 +37,49 @@ def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
 
 @click.command(
     context_settings=HELP, no_args_is_help=True,
-    epilog="Without WHAT all that the folder allows. Also under mpiexec or srun: ranks share the frames.",
+    epilog="Without WHAT: everything the folder allows. Also under mpiexec or srun: ranks share the frames.",
 )  # fmt: skip
 @click.argument("folder", type=PATH, metavar="DIR")
 @click.argument("what", type=click.Choice(WHAT), nargs=-1, metavar="[WHAT]...")
 @click.option("-o", "--output", type=PATH, metavar="DIR", help="Folder for the results [DIR/measure].")
-@click.option("--wall", "walls", type=int, multiple=True, metavar="ID", help="Wall that pushes (wedge, shortening); "
-              "walls of wallforce, may be given again [the one that goes farthest; all walls].")  # fmt: skip
+@click.option("--wall", "walls", type=int, multiple=True, metavar="ID", help="Pushing wall (wedge, shortening); walls "
+              "of wallforce; repeatable [the wall with the largest displacement; all walls].")  # fmt: skip
 @click.option("--groups", type=Words(), default="", metavar="A,B", help="Only particles, or elements, of these groups.")
 @click.option("--colors", "--colours", type=Words(), default="", metavar="A,B", help="Only particles of these colours, "
               "by name or number.")  # fmt: skip
-@click.option("--from", "first", type=click.IntRange(0), metavar="STEP", help="First step [where the wall that "
-              "pushes begins to move].")  # fmt: skip
+@click.option("--from", "first", type=click.IntRange(0), metavar="STEP", help="First step [when the pushing wall "
+              "starts to move].")  # fmt: skip
 @click.option("--to", "last", type=click.IntRange(0), metavar="STEP", help="Last step [the last].")
 @click.option("--xmove", type=FINITE, default=0.0, metavar="X", help="Add X [m] to all x [0].")
 @click.option("--ymove", type=FINITE, default=0.0, metavar="Y", help="Add Y [m] to all y [0].")
 @_length("--width", "W", "Width of the columns of the surface, and of cells for strain, in m [about three radii].")
 @click.option("--format", "formats", type=pictures.Formats(FORMATS, none=True), default="png", metavar="LIST",
-              help=f"Figures: {', '.join(FORMATS)}, with commas between them, or none [png].")  # fmt: skip
+              help=f"Figures: {', '.join(FORMATS)}, separated by commas, or none [png].")  # fmt: skip
 @_length("--strain", "E", "faults: threshold of |strain| [0.5 in sections, 0.2 from frame to frame].")
 @_length("--length", "L", "faults: shortest band in m [6 cells].")
-@click.option("--skin", type=FINITE, metavar="H", help="faults: leave out what is nearer "
-              "than H m to the base and to the wall that pushes [2 cells].")  # fmt: skip
-@click.option("--increment", is_flag=True, help="faults: strain from frame to frame even where there are sections.")
-@click.option("--ids", type=Numbers(), default="", metavar="I,J", help="tracks: particles of these ids.")
-@click.option("--near", "points", type=pictures.Numbers(2), multiple=True, metavar="X,Y", help="tracks: the particles "
-              "nearest to this point (m) in the first frame; may be given again.")  # fmt: skip
-@click.option("--number", type=click.IntRange(1), default=1, metavar="N", help="tracks: so many to each point [1].")
-@click.option("--log", type=PATH, metavar="FILE", help="cracks: log of the run, which counts breaks in tension and in "
-              "shear.")  # fmt: skip
-@click.option("--history", metavar="NAME", help="emission: history that is drawn with the events, or none [the first "
-              "of a reaction, else of a stress].")  # fmt: skip
-@click.option("--bins", type=click.IntRange(1), default=100, metavar="N", help="emission: parts of the time in which "
-              "events are counted [100].")  # fmt: skip
-@click.option("--completeness", type=FINITE, metavar="M", help="emission: magnitude from which the "
-              "b-value is taken [that of most events].")  # fmt: skip
+@click.option("--skin", type=FINITE, metavar="H", help="faults: ignore the zone within H m of the base and of the "
+              "pushing wall [2 cells].")  # fmt: skip
+@click.option("--increment", is_flag=True, help="faults: strain from frame to frame even if sections exist.")
+@click.option("--ids", type=Numbers(), default="", metavar="I,J", help="tracks: particles with these ids.")
+@click.option("--near", "points", type=pictures.Numbers(2), multiple=True, metavar="X,Y", help=
+    "tracks: the particles nearest to this point (m) in the first frame; repeatable.")  # fmt: skip
+@click.option(
+    "--number", type=click.IntRange(1), default=1, metavar="N", help="tracks: number of particles per point [1]."
+)
+@click.option("--log", type=PATH, metavar="FILE", help="cracks: log of the run, which counts tensile and shear "
+              "failures.")  # fmt: skip
+@click.option("--history", metavar="NAME", help="emission: history plotted with the events, or none [the first "
+              "reaction, else the first stress].")  # fmt: skip
+@click.option("--bins", type=click.IntRange(1), default=100, metavar="N", help="emission: number of time intervals in "
+              "which events are counted [100].")  # fmt: skip
+@click.option("--completeness", type=FINITE, metavar="M", help="emission: smallest magnitude used for the b-value [the "
+              "most frequent one].")  # fmt: skip
 @click.option("--energy", type=click.Choice(("kinetic", "released")), default="kinetic", help="emission: kinetic "
-              "energy when a joint broke, or by how much it grew since the joint's peak [kinetic].")  # fmt: skip
+              "energy when a joint breaks, or its growth since the joint's peak [kinetic].")  # fmt: skip
 @click.option("--joule", type=POSITIVE, default=1.0, metavar="F", help="emission: J per unit of energy "
               "in the files, thickness of the model included [1].")  # fmt: skip
-@click.option("--box", type=pictures.Numbers(6), metavar="X,Y,Z,X,Y,Z", help="regions: elements with their middle in "
-              "this box of the mesh, m: its least x, y, z, its greatest.")  # fmt: skip
+@click.option("--box", type=pictures.Numbers(6), metavar="X,Y,Z,X,Y,Z", help="regions: elements with their centre in "
+              "this box of the mesh, m: minimum x, y, z, maximum x, y, z.")  # fmt: skip
 def measure(**options: Any) -> None:
     """Measure the frames in DIR: tables (CSV) and figures of
 
@@ -114,13 +116,13 @@ def request(options: dict[str, Any]) -> Any:
     for word in options["colors"]:
         number = COLORS.get(word.lower(), int(word) if word.isdigit() else -1)
         if not 0 <= number <= 9:
-            raise UsageError(f"--colors {word}: no such colour; there are {', '.join(COLORS)}, or 0 to 9")
+            raise UsageError(f"--colors {word}: unknown colour; known: {', '.join(COLORS)}, or 0 to 9")
         colors.append(number)
     if options["last"] is not None and options["last"] < (options["first"] or 0):
         raise UsageError(f"--to {options['last']} is before --from {options['first']}")
     box = options["box"]
     if box is not None and not all(low < high for low, high in zip(box[:3], box[3:], strict=True)):
-        raise UsageError("--box: the least x, y and z come first, then the greatest")
+        raise UsageError("--box: give the minimum x, y, z, then the maximum")
     return Request(
         folder=Path(options["folder"]), what=tuple(dict.fromkeys(options["what"])), output=options["output"],
         walls=tuple(dict.fromkeys(options["walls"])), groups=tuple(options["groups"]), colors=tuple(colors),

@@ -34,13 +34,15 @@ PAGE = 17.0
               "pictures *.jpg that zdemss made in DIR/ss [frames].")  # fmt: skip
 @click.option("--fps", type=POSITIVE, default=10.0, metavar="N", help="Frames per second [10].")
 @click.option("--size", type=click.IntRange(64, 16384), default=1200, metavar="PX", help="Width in pixels [1200].")
-@click.option("--format", "kind", type=click.Choice(["gif", "mp4", "both"]), help="[gif, and mp4 where ffmpeg is].")
+@click.option(
+    "--format", "kind", type=click.Choice(["gif", "mp4", "both"]), help="[gif, and mp4 if ffmpeg is installed]."
+)
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="The film [DIR/movie.gif, .mp4].")
 @click.option("--name", metavar="NAME", help="Frames of blocks NAME_<step>.vtkhdf [the name most of them have].")
-@click.option("--show", type=click.Choice(list(PANELS_SHOWN)), help="Of blocks: cracks by the way "
-              "they broke, compressive stress, plastic strain, temperature, of fluid in joints pressure, saturation, "
-              "aperture or velocity, concentration of proppant; both: the first two [what there is].")  # fmt: skip
-@number("max_workers", None, "Processes that draw at a time [one per core].", POSITIVE)
+@click.option("--show", type=click.Choice(list(PANELS_SHOWN)), help="For blocks: cracks (by mode), stress "
+              "(compressive), plastic strain, temperature; for fluid in joints pressure, saturation, aperture, "
+              "velocity, proppant concentration; both: cracks and stress [all available].")  # fmt: skip
+@number("max_workers", None, "Number of drawing processes [one per core].", POSITIVE)
 @looks
 def movie(**options: Any) -> None:
     """Make a film of all frames in DIR, of particles or of blocks, drawn at one view so that nothing jumps.
@@ -120,8 +122,7 @@ def targets(options: dict[str, Any]) -> list[tuple[str, Path]]:
         kind = "both" if films.ffmpeg() is not None else "gif"
     if kind != "gif" and films.ffmpeg() is None:
         raise HpcdemError(
-            "MP4 needs ffmpeg, which is not on this machine: install it, or `pip install imageio-ffmpeg`, or take "
-            "--format gif"
+            "MP4 needs ffmpeg, which was not found: install it, or `pip install imageio-ffmpeg`, or use --format gif"
         )
     return [(k, output.with_name(f"{output.name}.{k}")) for k in ("gif", "mp4") if kind in (k, "both")]
 

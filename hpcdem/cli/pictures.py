@@ -46,7 +46,7 @@ class Formats(click.ParamType):
         for word in words:
             if word not in self.known:
                 known = ", ".join(self.known) + ", or none" * self.none
-                self.fail(f"{word!r} is not a format of pictures; expected some of {known}", param, ctx)
+                self.fail(f"{word!r} is not a picture format; expected one or more of {known}", param, ctx)
         return tuple(dict.fromkeys(words))
 
 
@@ -67,7 +67,7 @@ class Numbers(click.ParamType):
             found = ()
         if len(found) != self.count:
             also = "".join(f", or {word}" for word in self.words)
-            self.fail(f"{value!r}: expected {self.count} numbers with commas between them{also}", param, ctx)
+            self.fail(f"{value!r}: expected {self.count} numbers separated by commas{also}", param, ctx)
         return found
 
 
@@ -104,8 +104,8 @@ OPTIONS = (
     number("ymax", None, "Upper end, m [the model's]."),
     number("xmove", 0.0, "Move the model along x, m [0]."),
     number("ymove", 0.0, "Move the model along y, m [0]."),
-    number("major_locator", None, "Step of ticks with numbers, m [10000, or what suits the model].", POSITIVE),
-    number("minor_locator", None, "Step of ticks without numbers, m [1000, or what suits the model].", POSITIVE),
+    number("major_locator", None, "Step of ticks with numbers, m [10000, or suited to the model].", POSITIVE),
+    number("minor_locator", None, "Step of ticks without numbers, m [1000, or suited to the model].", POSITIVE),
     number("fontsize", 9.0, "Size of the numbers, points [9].", POSITIVE),
     number("linewidth", 0.8, "Width of lines, points [0.8].", POSITIVE),
     yes_no("leftshow", True, "Left line of the frame"),
@@ -113,13 +113,14 @@ OPTIONS = (
     yes_no("bottomshow", True, "Lower line of the frame"),
     yes_no("topshow", True, "Upper line of the frame"),
     yes_no("wallshow", True, "Walls"),
-    yes_no("surfaceshow", True, "Line over the top of the model"),
+    yes_no("surfaceshow", True, "Line along the surface of the model"),
     yes_no("ballplot", True, "Particles"),
     yes_no("bondplot", False, "Contacts: black not bonded, red bonded in tension, blue bonded in compression"),
-    click.option("--colormap", metavar="FILE", help="Ten lines of red, green, blue; searched here, in DIR, at home."),
+    click.option("--colormap", metavar="FILE", help="File with ten lines of red, green, blue; searched in this folder, "
+    "in DIR and in the home folder."),
     click.option(
         "--showlable", "--showlabel", "--showable", "showlable", default="false", metavar="BOOL|TEXT",
-        help="Step, or this text, in the corner [false].",
+        help="Show the step, or this text, in the corner [false].",
     ),
 )  # fmt: skip
 """What a picture may look like."""

@@ -21,15 +21,15 @@ class Program(NamedTuple):
 
 GROUPS: dict[str, tuple[Program, ...]] = {
     "Run": (
-        Program("resume", "[DIR]", "continue an interrupted run from its newest checkpoint"),
-        Program("console", "", "take PCDC commands and Python line by line", "console"),
-        Program("sweep", "SCRIPT", "run one script for many values and report on them", "sweep"),
+        Program("resume", "[DIR]", "resume an interrupted run from its newest checkpoint"),
+        Program("console", "", "interactive PCDC commands and Python", "console"),
+        Program("sweep", "SCRIPT", "run a script for many parameter values and report statistics", "sweep"),
     ),
     "Look": (
         Program("view", "DIR", "open a run or a script in the browser", "view"),
-        Program("draw", "DIR", "draw frames as the window shows them", "draw", looks=True),
+        Program("draw", "DIR", "draw frames as in the window", "draw", looks=True),
         Program("movie", "DIR", "make a film of a run", "movie", looks=True),
-        Program("info", "FILE", "say what a frame or a checkpoint holds", "info", looks=True),
+        Program("info", "FILE", "show the contents of a frame or a checkpoint", "info", looks=True),
     ),
     "Measure": (
         Program(
@@ -40,11 +40,11 @@ GROUPS: dict[str, tuple[Program, ...]] = {
     "Make": (
         Program("case", "[NAME]", "write the script of a ready-made model", "case"),
         Program("examples", "[NAME]", "list the examples, or copy one to this folder", "examples"),
-        Program("grade", "FILE", "make grains from a grading curve", "grade_page"),
+        Program("grade", "FILE", "generate grains from a grading curve", "grade_page"),
     ),
     "Manage": (
         Program("doctor", "", "report problems of this machine or job and the commands that fix them", "doctor"),
-        Program("warmup", "", "compile the kernels now, so that no job waits for it"),
+        Program("warmup", "", "compile the kernels in advance"),
     ),
 }
 BY_NAME = {program.name: program for group in GROUPS.values() for program in group}
@@ -54,13 +54,13 @@ FIRST = """\
 hpcdem: discrete elements for rock and sand. Usage: hpcdem SCRIPT, or hpcdem COMMAND ...
 
   hpcdem examples             list the examples; hpcdem examples push.py copies one to this folder
-  hpcdem --check SCRIPT       read a script, say what it would do, run nothing
-  hpcdem SCRIPT               run it; results go to data beside it (Ctrl-C saves and stops, --resume goes on)
-  hpcdem view data            see the results in the browser, also while the run goes on
-  hpcdem view --run SCRIPT    the same with an editor and a console
-  hpcdem doctor               what is wrong with this machine, and what to type against it
+  hpcdem --check SCRIPT       check a script and print what it would do
+  hpcdem SCRIPT               run it; results go to data beside it (Ctrl-C saves and stops, --resume continues)
+  hpcdem view data            see the results in the browser, also during the run
+  hpcdem view --run SCRIPT    also with an editor and a console
+  hpcdem doctor               report problems of this machine and the commands that fix them
 
-hpcdem --help tells everything."""
+hpcdem --help lists all commands and options."""
 """What `hpcdem` without a word says: a page that fits on a screen."""
 
 
@@ -69,6 +69,6 @@ def suggestion(word: str) -> str:
     if "." in word or "/" in word:
         path = Path(word)
         there = [one.name for one in path.parent.glob("*") if one.suffix in (".py", ".sc")]
-        return hint(path.name, there) or "; hpcdem examples lists those that come along"
+        return hint(path.name, there) or "; hpcdem examples lists the examples"
     near = nearest(word, BY_NAME)
     return f" and no such command; did you mean hpcdem {near}?" if near else " and no such command; see hpcdem --help"

@@ -39,7 +39,7 @@ _TOP = """\
 
 This page is made from the programs themselves; do not edit it (`python -m hpcdem.cli.reference >
 docs/options.md`). `--help` says the same, in part in Chinese
-([languages](running.md#language-of-messages)). `zdem` is another name of `hpcdem`. Defaults stand in brackets.
+([languages](running.md#language-of-messages)). `zdem` is another name of `hpcdem`. Defaults are in brackets.
 
 ## Exit codes
 
@@ -49,7 +49,7 @@ docs/options.md`). `--help` says the same, in part in Chinese
 | 1 | the run failed: physics, files, launch |
 | 2 | command line or script not understood; nothing was run |
 | 3 | no equilibrium (`model solve`) |
-| 85 | stopped on request with a checkpoint; go on with `--resume` |
+| 85 | stopped on request, checkpoint written; resume with `--resume` |
 """
 
 

@@ -1,4 +1,4 @@
-"""`hpcdem resume [DIR]`: go on with the run that wrote into a folder, whatever ended it."""
+"""`hpcdem resume [DIR]`: resume the run that wrote into a folder, whatever ended it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from hpcdem.runtime import run_folder
 
 @click.command(
     context_settings=HELP,
-    epilog="Any number of ranks and threads: mpiexec -n 4 hpcdem resume DIR. The script is that of the run, wherever "
-    "it is called from; if its file is gone, the text in the newest checkpoint is taken. Exit codes as for hpcdem "
-    "SCRIPT; 0 also if the run is done.",
+    epilog="Any number of ranks and threads: mpiexec -n 4 hpcdem resume DIR. The script is that of the run; if its "
+    "file no longer exists, the text in the newest checkpoint is used. Exit codes as for hpcdem SCRIPT; 0 also if the "
+    "run is complete.",
 )
 @click.argument("folder", type=PATH, metavar="[DIR]", required=False)
 @click.option("-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [as for hpcdem SCRIPT].")
@@ -31,30 +31,34 @@ from hpcdem.runtime import run_folder
     help="From the last checkpoint at or before T seconds of the model.",
 )
 @keeping
-@click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="A checkpoint so long after "
-              "the last one, or off [30:00].")  # fmt: skip
-@click.option("--figure/--no-figure", default=True, help="Draw the last state at the end [yes].")
-@click.option("--balance/--no-balance", default=True, help="Move strip borders with the measured load [yes].")
-@click.option("--draw", is_flag=True, help="Let DRAW commands make pictures, draw_<step>.jpg.")
+@click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="Time between automatic "
+              "checkpoints, or off [30:00].")  # fmt: skip
+@click.option("--figure/--no-figure", default=True, help="Draw the final state [yes].")
+@click.option(
+    "--balance/--no-balance",
+    default=True,
+    help="Balance the load: move strip boundaries with the measured times [yes].",
+)
+@click.option("--draw", is_flag=True, help="Let DRAW commands write pictures, draw_<step>.jpg.")
 def resume(**options: Any) -> None:
-    """Go on with the run that wrote into DIR [data, or this folder], from its newest checkpoint that is whole."""
+    """Resume the run that wrote into DIR [data, or this folder] from its newest complete checkpoint."""
 
 
 def resumed_options(given: dict[str, Any]) -> Options:
-    """The command line of the run that wrote into the folder, with --resume. UsageError if there is nothing to go on
-    with; leaves with exit code 0 if the run is done."""
+    """The command line of the run that wrote into the folder, with --resume. UsageError if there is nothing to resume;
+    leaves with exit code 0 if the run is complete."""
     folder = _folder(given.pop("folder"))
     try:
         record = run_folder.read(folder)
     except HpcdemError as damaged:
-        click.echo(f"warning: {damaged}; the script in the newest checkpoint is taken", err=True)
+        click.echo(f"warning: {damaged}; using the script in the newest checkpoint", err=True)
         record = None
     if record is not None and record.state == "done" and given["before"] is None:
-        click.echo(f"{folder}: the run is done, step {record.step}; there is nothing to go on with")
+        click.echo(f"{folder}: the run is complete (step {record.step}); nothing to resume")
         raise SystemExit(EXIT_OK)
     if record is not None and record.language == "python":
         words = " ".join(["hpcdem", record.script, *record.arguments])
-        raise UsageError(f"{folder} was written by a Python program, which goes on by Simulation.resume(): {words}")
+        raise UsageError(f"{folder} was written by a Python program; it resumes with Simulation.resume(): {words}")
     given["arguments"] = tuple(record.arguments) if record is not None else ()
     recorded = Path(record.script) if record is not None and record.script else None
     for script in [recorded, folder.parent / recorded.name] if recorded is not None else []:
@@ -72,4 +76,4 @@ def _folder(named: Path | None) -> Path:
             return folder.resolve()
     if not start.is_dir():
         raise UsageError(f"{start}: there is no such folder")
-    raise UsageError(f"{start.resolve()}: no run to go on with, neither {run_folder.RECORD} nor a .sav file")
+    raise UsageError(f"{start.resolve()}: nothing to resume: found neither {run_folder.RECORD} nor a .sav file")

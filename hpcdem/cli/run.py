@@ -160,12 +160,13 @@ def run_pcdc(session: Session, options: Options, source: bytes) -> None:
     name, log = str(options.script), session.log
     if options.saved_in is not None:
         raise UsageError(
-            f"{name}: there is no such script; a PCDC script is Python, which is not taken out of a checkpoint. Give "
-            "the script itself: hpcdem SCRIPT --resume"
+            f"{name}: script not found. PCDC scripts are never executed from a checkpoint; give the script: hpcdem "
+            "SCRIPT --resume"
         )
     if session.reproduction is not None:
         raise UsageError(
-            f"{name}: --check-reproducible is for models of particles; of a PCDC script compare model save"
+            f"{name}: --check-reproducible supports models of particles only. For a PCDC script, compare the files "
+            "of model save"
         )
     text = decode(source, name)
     if options.check:
@@ -220,12 +221,12 @@ def own_traceback(error: BaseException, file: str) -> str:
 def refuse_idle(options: Options) -> None:
     """UsageError for options that have nothing to act on."""
     if options.before is not None and not options.resume:
-        raise UsageError("--before T chooses the checkpoint that --resume goes on from; give --resume as well")
+        raise UsageError("--before T selects the checkpoint for --resume; add --resume")
     if not options.keep and options.autosave is None:
         given = {"--keep-steps": options.keep_steps, "--keep-every": options.keep_every, "--keep-at": options.keep_at}
         for option in (name for name, value in given.items() if value):
             raise UsageError(
-                f"{option} spares checkpoints that would be removed; none is with --autosave off and without --keep K"
+                f"{option} has no effect: without --keep K and with --autosave off no checkpoint is removed"
             )
 
 
@@ -307,7 +308,7 @@ def read_script(comm: Comm, path: Path) -> bytes:
         except FileNotFoundError:
             error = f"{path}: no such script{suggestion(str(path))}"
         except IsADirectoryError:
-            error = f"{path} is a folder: hpcdem view {path} shows results, hpcdem resume {path} goes on with their run"
+            error = f"{path} is a folder: hpcdem view {path} shows its results, hpcdem resume {path} resumes its run"
         except OSError as problem:
             error = f"{path}: cannot read the script: {problem.strerror}"
     source, error = comm.bcast((source, error))
@@ -360,7 +361,7 @@ def saved_script(comm: Comm, folder: Path, before: float = math.inf) -> bytes:
         if not found and before < math.inf:
             raise none_before(before, [folder])
         if not found:
-            raise UsageError("; ".join([f"{folder}: no checkpoint to go on from", *damaged]))
+            raise UsageError("; ".join([f"{folder}: no checkpoint to resume from", *damaged]))
         state = checkpoint.read_state(found[0])
         return str(state["script"] if "script" in state else state["extra"]["run"]["script"]).encode()
 
@@ -386,13 +387,13 @@ def seconds(context: click.Context, option: click.Parameter, value: str | None) 
     except ValueError:
         times = (math.nan,)
     if not all(0.0 <= time < math.inf for time in times):
-        raise click.BadParameter(f"{value!r}: numbers of seconds with commas between them, as 10,25.5", context, option)
+        raise click.BadParameter(f"{value!r}: expected seconds separated by commas, such as 10,25.5", context, option)
     return times
 
 
 def keeping(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options that say which checkpoints stay."""
-    of_old = "Of older checkpoints keep the last at or before "
+    of_old = "Keep also the last checkpoint at or before "
     options = [
         click.option(
             "--keep", type=click.IntRange(0), default=0, metavar="K", help="Keep the last K checkpoints [all]."
@@ -440,8 +441,8 @@ class RunCommand(click.Command):
     context_settings=HELP,
     no_args_is_help=True,
     epilog="Each command has its own help: hpcdem NAME --help. Exit codes: 0 done, 1 the run failed, 2 command line or "
-    "script not understood, 3 no equilibrium (model "
-    "solve), 85 stopped on request with a checkpoint (go on with --resume).",
+    "script not understood, 3 no equilibrium (model solve), 85 stopped on request, checkpoint written (resume with "
+    "--resume).",
 )
 @click.argument("script", type=PATH)
 @click.argument("arguments", nargs=-1, metavar="[-- ARGUMENTS]")
@@ -456,19 +457,23 @@ class RunCommand(click.Command):
 @click.option(
     "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."
 )
-@click.option("--resume", is_flag=True, help="Go on from the newest checkpoint of this script.")
+@click.option("--resume", is_flag=True, help="Resume from the newest checkpoint of this script.")
 @click.option(
     "--before", type=Finite(0.0), metavar="T", help="With --resume: from the last checkpoint at or before T "
     "seconds of the model."
 )  # fmt: skip
 @keeping
-@click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="A checkpoint so long after "
-              "the last one, or off [30:00].")  # fmt: skip
-@click.option("--check", is_flag=True, help="Read the whole script, say what it would do, run nothing.")
+@click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="Time between automatic "
+              "checkpoints, or off [30:00].")  # fmt: skip
+@click.option("--check", is_flag=True, help="Check the script and print what it would do; run nothing.")
 @click.option("--outdir", type=PATH, metavar="DIR", help="Results [data beside the script].")
-@click.option("--figure/--no-figure", default=True, help="Draw the last state at the end [yes].")
-@click.option("--balance/--no-balance", default=True, help="Move strip borders with the measured load [yes].")
-@click.option("--draw", is_flag=True, help="Let DRAW commands make pictures, draw_<step>.jpg.")
+@click.option("--figure/--no-figure", default=True, help="Draw the final state [yes].")
+@click.option(
+    "--balance/--no-balance",
+    default=True,
+    help="Balance the load: move strip boundaries with the measured times [yes].",
+)
+@click.option("--draw", is_flag=True, help="Let DRAW commands write pictures, draw_<step>.jpg.")
 @click.option(
     "--check-reproducible", type=click.IntRange(1), metavar="N", help="Log a fingerprint of the state every N steps."
 )

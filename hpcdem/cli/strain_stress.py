@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option("--addball", is_flag=True, help="Particles were added between frames (sedimentation).")
 @click.option("--delball", is_flag=True, help="Particles were deleted between frames (erosion).")
-@click.option("--leftwallid", type=int, metavar="ID", help="Leave out the particles to the left of this wall.")
-@click.option("--rightwallid", type=int, metavar="ID", help="Leave out the particles to the right of this wall.")
+@click.option("--leftwallid", type=int, metavar="ID", help="Ignore particles to the left of this wall.")
+@click.option("--rightwallid", type=int, metavar="ID", help="Ignore particles to the right of this wall.")
 @click.option("--groups", type=Words(), default="", metavar="A,B", help="Only particles of these groups.")
 @click.option("--xmove", type=FINITE, default=0.0, metavar="X", help="Add X [m] to all x [0].")
 @click.option("--ymove", type=FINITE, default=0.0, metavar="Y", help="Add Y [m] to all y [0].")
-@click.option("--increment", is_flag=True, help="Strain since the frame before, not since the first one.")
+@click.option("--increment", is_flag=True, help="Strain since the previous frame, not since the first one.")
 @click.option(
     "--smooth", is_flag=True, help="Strain fitted and averaged on the grid, not by the nearest neighbours of particles."
 )

@@ -34,7 +34,7 @@ class Jobs(click.ParamType):
         if value == "auto" or value is None:
             return None
         if not str(value).isdigit() or int(value) < 1:
-            self.fail(f"'{value}' is neither auto nor a number from 1 on", param, ctx)
+            self.fail(f"'{value}': expected auto or a number above 0", param, ctx)
         return int(value)
 
 
@@ -46,36 +46,36 @@ class Setting(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         name, equals, words = str(value).partition("=")
         if not (name.isidentifier() and equals and words):
-            self.fail(f"'{value}': NAME=VALUES is expected, as friction=0.2,0.3", param, ctx)
+            self.fail(f"'{value}': expected NAME=VALUES, such as friction=0.2,0.3", param, ctx)
         return name, words
 
 
 @click.command(
     context_settings=HELP, no_args_is_help=True,
-    epilog="VALUES: 0.2,0.3 (these), 1:10 (whole numbers), 0.1:0.5:5 (five at equal distance); with --latin or --sobol "
-    "0.1:0.5 and 1e5:1e8:log are ranges that are sampled. A parameter is a line such as friction = 0.3 at the top "
-    "level of the script (in ZDEM used as {friction}). The same words again go on with what is not done. More in "
+    epilog="VALUES: 0.2,0.3 (list), 1:10 (whole numbers), 0.1:0.5:5 (five equidistant values); with --latin or "
+    "--sobol, 0.1:0.5 and 1e5:1e8:log are sampled ranges. A parameter is a line such as friction = 0.3 at the top "
+    "level of the script (in ZDEM used as {friction}). Repeat the command to continue with unfinished members. More in "
     "docs/sweep.md; `hpcdem sweep report --help`.",
 )  # fmt: skip
 @click.argument("script", type=PATH, metavar="SCRIPT|SETTINGS.toml|DIR")
 @click.option("--set", "values", type=Setting(), multiple=True, metavar="NAME=VALUES", help="Values of a parameter of "
-              "the script; may be given again: all are crossed.")  # fmt: skip
-@click.option("--seed", metavar="VALUES", help="The same as --set seed=VALUES; in ZDEM of SET seed.")
+              "the script; repeatable: all values are combined.")  # fmt: skip
+@click.option("--seed", metavar="VALUES", help="Short for --set seed=VALUES; in ZDEM, values of SET seed.")
 @click.option("--latin", type=click.IntRange(1), metavar="N", help="N samples of the ranges: a Latin hypercube.")
 @click.option("--sobol", type=click.IntRange(1), metavar="N", help="N samples of the ranges: a Sobol sequence.")
 @click.option("--sampling-seed", type=click.IntRange(0), metavar="S", help="Seed of the sampling itself [0].")
 @click.option("--ranks", type=click.IntRange(1), metavar="N", help="Ranks of each member [1].")
 @click.option("-j", "--threads", type=click.IntRange(1), metavar="N", help="Threads of each rank [1].")
 @click.option("--jobs", type=Jobs(), metavar="N", help="Members at once [auto: as many as there are cores for].")
-@click.option("--tries", type=click.IntRange(1), metavar="N", help="So often a member is started that fails or is "
-              "killed; it goes on from its last checkpoint [2].")  # fmt: skip
+@click.option("--tries", type=click.IntRange(1), metavar="N", help="Number of starts of a member that fails or is "
+              "killed; it resumes from its last checkpoint [2].")  # fmt: skip
 @click.option("--with", "links", type=PATH, multiple=True, metavar="FILE", help="A file or folder that the script "
-              "reads from beside it; may be given again.")  # fmt: skip
+              "reads from its own folder; repeatable.")  # fmt: skip
 @click.option("-o", "--output", type=PATH, metavar="DIR", help="Folder of the sweep [SCRIPT_sweep beside the script].")
-@click.option("--plan", is_flag=True, help="Write the members and list them, run nothing.")
-@click.option("--slurm", is_flag=True, help="Submit a job array to Slurm, a task for each member that is not done.")
-@click.option("--sbatch", multiple=True, metavar="NAME=VALUE", help="Option of sbatch, as time=04:00:00; may be given "
-              "again.")  # fmt: skip
+@click.option("--plan", is_flag=True, help="Write and list the members; run nothing.")
+@click.option("--slurm", is_flag=True, help="Submit a Slurm job array with one task per unfinished member.")
+@click.option("--sbatch", multiple=True, metavar="NAME=VALUE", help="Option of sbatch, such as time=04:00:00; "
+              "repeatable.")  # fmt: skip
 @click.option("--member", type=click.IntRange(0), hidden=True)
 def sweep(**options: Any) -> None:
     """Run SCRIPT once for each combination of values of its parameters, each member in a folder of its own, many at
@@ -95,9 +95,8 @@ def _report_command() -> click.Command:
     return click.Command(
         "report", context_settings=HELP, no_args_is_help=True,
         params=[*own, *(p for p in measure.params if p.name not in apart)],
-        help="Measure all members of the sweep in DIR that are done, and put them beside each other: mean, spread and "
-        "quantiles, bands over time, dependence on the parameters. Without WHAT all that the runs allow; histories "
-        "always.",
+        help="Measure all finished members of the sweep in DIR and compute mean, spread, quantiles, bands over time "
+            "and dependence on the parameters. Without WHAT: everything the runs allow; histories always.",
         epilog=f"WHAT: {', '.join(WHAT_OF_SWEEPS)}, as for hpcdem measure. Also under mpiexec: ranks share the frames.",
     )  # fmt: skip
 
@@ -136,9 +135,9 @@ def carry_out(options: dict[str, Any]) -> int:
         options = from_file(path, options)
     log = Log()
     if options["sbatch"] and not options["slurm"]:
-        raise UsageError("--sbatch goes with --slurm")
+        raise UsageError("--sbatch requires --slurm")
     if options["slurm"] and options["tries"] is not None:
-        raise UsageError("--tries goes without --slurm: call again what has failed")
+        raise UsageError("--tries cannot be used with --slurm: repeat the command to restart failed members")
     ensemble = _opened(options)
     if ensemble.new:
         log.info(f"{ensemble.folder}: {ensemble.new} new members, {len(ensemble.members)} in all")
@@ -149,7 +148,7 @@ def carry_out(options: dict[str, Any]) -> int:
     if options["slurm"]:
         written = array.write(ensemble.plan, options["sbatch"], options["jobs"])
         job = "" if written is None else array.submit(written)
-        log.info(f"{ensemble.folder}: job array {job}" if job else f"{ensemble.folder}: nothing left to do")
+        log.info(f"{ensemble.folder}: job array {job}" if job else f"{ensemble.folder}: all members are done")
         return EXIT_OK
     states = driver.run(ensemble.plan, log, options["jobs"], options["tries"] or 2)
     counts = {state: list(states.values()).count(state) for state in dict.fromkeys(states.values())}
@@ -169,7 +168,7 @@ def _opened(options: Mapping[str, Any]) -> Sweep:
         for name in of_members:
             if options[name]:
                 raise UsageError(
-                    f"{path} is a sweep that was made; its members are settled, options of them go with a SCRIPT"
+                    f"{path} is an existing sweep, whose members are fixed: give options of members with a SCRIPT"
                 )
         return Sweep.open(path)
     values: dict[str, Any] = {}
@@ -178,9 +177,9 @@ def _opened(options: Mapping[str, Any]) -> Sweep:
             raise UsageError(f"--set {name} is given twice")
         values[name] = words
     if options["latin"] and options["sobol"]:
-        raise UsageError("--latin and --sobol are two ways of sampling; give one")
+        raise UsageError("give either --latin or --sobol")
     if options["sampling_seed"] is not None and not (options["latin"] or options["sobol"]):
-        raise UsageError("--sampling-seed goes with --latin or --sobol")
+        raise UsageError("--sampling-seed requires --latin or --sobol")
     return Sweep(
         path, values, seed=options["seed"], latin=options["latin"], sobol=options["sobol"],
         sampling_seed=options["sampling_seed"] or 0, ranks=options["ranks"] or 1, threads=options["threads"] or 1,
@@ -207,7 +206,7 @@ def from_file(path: Path, options: Mapping[str, Any]) -> dict[str, Any]:
         raise UsageError(f"{path}: {problem}") from None
     for key in given:
         if key not in _FILE and key != "set":
-            raise UsageError(f"{path}: '{key}' is unknown; there are {', '.join(_FILE)} and the table [set]")
+            raise UsageError(f"{path}: unknown key '{key}'; known: {', '.join(_FILE)} and the table [set]")
     if "script" not in given:
         raise UsageError(f"{path}: script = FILE is missing")
     if not isinstance(given.get("set", {}), dict):
@@ -228,7 +227,7 @@ def _as_typed(path: Path, key: str, value: Any) -> Iterator[str]:
     """A key of a file as words of the command line; a seed, of which there may be several, as none."""
     for one in value if key in ("with", "sbatch") and isinstance(value, list) else [value]:
         if isinstance(one, (dict, bool)) or (isinstance(one, list) and key != "seed"):
-            raise UsageError(f"{path}: {key} = {one!r}: a number or a word is expected")
+            raise UsageError(f"{path}: {key} = {one!r}: expected a number or a word")
         text = str(path.parent / one) if key in ("with", "output", "script") else str(one)
         if key != "seed":
             yield from [text] if key == "script" else [f"--{key}", text]
@@ -238,8 +237,8 @@ def _values(path: Path, name: str, value: Any) -> str | Sequence[Any]:
     """Of a parameter in a file: a word as on the command line, a number, or a list."""
     if isinstance(value, (str, list)):
         if isinstance(value, list) and any(isinstance(one, (dict, list)) for one in value):
-            raise UsageError(f"{path}: {name}: a list of numbers or words is expected")
+            raise UsageError(f"{path}: {name}: expected a list of numbers or words")
         return value
     if isinstance(value, (int, float)):
         return [value]
-    raise UsageError(f"{path}: {name} = {value!r}: a number, a word or a list of them is expected")
+    raise UsageError(f"{path}: {name} = {value!r}: expected a number, a word or a list of them")

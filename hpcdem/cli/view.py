@@ -1,4 +1,4 @@
-"""`hpcdem view DIR|FILE ...`: frames on a page in the browser, while a run goes on and afterwards."""
+"""`hpcdem view DIR|FILE ...`: frames on a page in the browser, during a run and afterwards."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ if TYPE_CHECKING:
 
 @click.command(context_settings=HELP, no_args_is_help=True)
 @click.argument("paths", type=PATH, nargs=-1, metavar="DIR|FILE...")
-@click.option("--run", "script", is_flag=False, flag_value="", metavar="[SCRIPT]", help="A console for commands and an "
-              "editor for the scripts of a folder: whoever can open the page can run programs.")  # fmt: skip
+@click.option("--run", "script", is_flag=False, flag_value="", metavar="[SCRIPT]", help="Open a console for commands "
+              "and an editor for the scripts of a folder. Anyone who can open the page can run programs.")  # fmt: skip
 @click.option("-j", "threads", type=click.IntRange(1), default=1, metavar="N", help="Threads of the console [1].")
-@click.option("--view", "view_file", type=PATH, metavar="FILE", help="Begin with this view *.mv [everything].")
+@click.option("--view", "view_file", type=PATH, metavar="FILE", help="Start with this view *.mv [everything].")
 @click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="[a free one].")
 @click.option("--no-browser", is_flag=True, help="Only print the address.")
 def view(**options: Any) -> None:
     """Show frames of particles or of blocks on a page in the browser: move, choose, colour, ask, play, save.
 
-    The folder of a run that goes on is followed. The page is open to this machine only; from a cluster take it through
-    ssh: `ssh -L PORT:127.0.0.1:PORT host`, with --port PORT here.
+    The page follows a folder into which a run writes. It is open to this machine only; on a cluster use ssh: `ssh -L
+    PORT:127.0.0.1:PORT host`, with --port PORT here.
     """
 
 
 def desk_of(options: dict[str, Any]) -> Desk | None:
-    """What --run asks for: scripts lie beside SCRIPT, else in this folder; results go to DIR, else to data there."""
+    """What --run opens: scripts of the folder of SCRIPT, else of this folder; results go to DIR, else to data there."""
     if options["script"] is None:
         if options["threads"] != 1:
-            raise UsageError("-j goes with --run: the threads of its console")
+            raise UsageError("-j requires --run (threads of its console)")
         return None
     from hpcdem.page.desk import SCRIPT, Desk
 
     script = Path(options["script"])
     folder = script.parent if options["script"] else Path()
     if options["script"] and (not script.is_file() or SCRIPT.fullmatch(script.name) is None):
-        raise UsageError(f"--run {script}: expected a script *.py or *.sc that is there")
+        raise UsageError(f"--run {script}: expected an existing script *.py or *.sc")
     outdir = options["paths"][0] if options["paths"] else folder / "data"
     if outdir.exists() and not outdir.is_dir():
-        raise UsageError(f"{outdir}: expected the folder of the results")
+        raise UsageError(f"{outdir}: expected a folder for the results")
     return Desk(folder.resolve(), outdir.resolve(), script.name, options["threads"])
 
 

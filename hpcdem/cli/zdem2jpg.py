@@ -28,14 +28,14 @@ FORMATS = ("jpg", "png", "tiff", "pdf", "svg")
 @number("pagesize", 14.0, "Width of the picture, cm [14].", POSITIVE)
 @click.option(
     "--format", "formats", type=Formats(FORMATS), default="jpg", metavar="LIST",
-    help=f"Some of {', '.join(FORMATS)} with commas between them [jpg].",
+    help=f"One or more of {', '.join(FORMATS)}, separated by commas [jpg].",
 )  # fmt: skip
-@click.option("--field", metavar="NAME", help="Particles in the colours of a field: vx, rotation, stress, ... (see "
-              "`hpcdem draw --list`) [their own].")  # fmt: skip
+@click.option("--field", metavar="NAME", help="Colour particles by a field: vx, rotation, stress, ... (see `hpcdem "
+              "draw --list`) [their own colours].")  # fmt: skip
 @click.option("--range", "limits", type=Numbers(2, "full"), metavar="A,B|full", help="--field: values of the first and "
-              "the last colour; full: the least and the greatest [those that 1 % is below or above].")  # fmt: skip
+              "the last colour; full: minimum and maximum [the 1 % and 99 % quantiles].")  # fmt: skip
 @click.option("--colours", metavar="NAME", help="--field: viridis, cividis, blue-red, ... [viridis].")
-@number("max_workers", None, "Processes that draw at a time [one per core].", POSITIVE)
+@number("max_workers", None, "Number of drawing processes [one per core].", POSITIVE)
 @click.version_option(launch.version(), "-v", "--version", prog_name="zdem2jpg", message="%(prog)s %(version)s")
 def zdem2jpg(**options: Any) -> None:
     """Draw every frame all_*.vtkhdf or all_*.dat in DIR as a picture of the same name beside it.
@@ -54,10 +54,10 @@ def of_field(options: dict[str, Any], files: list[Path]) -> Layer | None:
     looks = {name: options[name] for name in ("limits", "colours") if options[name] is not None}
     if options["field"] is None:
         if looks:
-            raise UsageError("--range and --colours go with --field")
+            raise UsageError("--range and --colours require --field")
         return None
     if not options["ballplot"]:
-        raise UsageError("--field colours particles, which --ballplot=false leaves out")
+        raise UsageError("--field colours particles, which --ballplot=false hides")
     view: ModelView = view_of({"layers": [{"object": "particles", "field": options["field"], **looks}]}, "--field")
     return shared(view, (read_moment(file) for file in files)).layers[0]
 

@@ -58,7 +58,7 @@ def _length(name: str, default: float | None, text: str, said: str | None = None
 def _limits(axis: str) -> Any:
     return click.option(
         f"--{axis}lim", type=Numbers(2), default=None, metavar="FROM,TO",
-        help=f"Where the {axis} axis begins and ends (km) [all is shown].",
+        help=f"Limits of the {axis} axis (km) [whole model].",
     )  # fmt: skip
 
 
@@ -76,7 +76,7 @@ def _ends(options: dict[str, Any], axis: str) -> tuple[float | None, float | Non
     cls=ManualCommand,
     context_settings=HELP,
     no_args_is_help=True,
-    epilog="`hpcdem -s DIR` comes first: it computes what is drawn here.",
+    epilog="Run `hpcdem -s DIR` first: it computes the data.",
 )
 @click.option("-d", "--dir", "folder", type=PATH, required=True, metavar="DIR", help="Folder of the frames.")
 @_switch("--addball", "OFF", "Particles were added between the frames")
@@ -106,8 +106,8 @@ def _ends(options: dict[str, Any], axis: str) -> tuple[float | None, float | Non
     help="GMT colour table (CPT) for both strains, or invar, invar2 [default: invar2 for the distortional one].",
 )
 @_length("--maxstress", 300.0, "Stress at the end of the colour bar (MPa)")
-@_length("--xmax", None, "Where the x axis ends (km)", "all is shown")
-@_length("--ymax", None, "Where the y axis ends (km)", "all is shown")
+@_length("--xmax", None, "End of the x axis (km)", "whole model")
+@_length("--ymax", None, "End of the y axis (km)", "whole model")
 @_limits("x")
 @_limits("y")
 @click.option(
@@ -115,9 +115,9 @@ def _ends(options: dict[str, Any], axis: str) -> tuple[float | None, float | Non
 )
 @click.option(
     "--format", "formats", type=Formats(FORMATS), default="jpg,ps", metavar="LIST",
-    help=f"Some of {', '.join(FORMATS)} with commas between them [jpg,ps].",
+    help=f"One or more of {', '.join(FORMATS)}, separated by commas [jpg,ps].",
 )  # fmt: skip
-@number("max_workers", None, "Processes that draw at a time [one per core].", POSITIVE)
+@number("max_workers", None, "Number of drawing processes [one per core].", POSITIVE)
 @click.version_option(launch.version(), "-v", "--version", prog_name="zdemss", message="%(prog)s %(version)s")
 def zdemss(**options: object) -> None:
     """Draw stress and strain of the frames in DIR, after `hpcdem -s DIR`.

@@ -72,8 +72,8 @@ def write_mp4(pictures: Sequence[Path], path: str | os.PathLike, fps: float, wid
     program = ffmpeg()
     if program is None:
         raise HpcdemError(
-            f"cannot make {os.fspath(path)}: ffmpeg is not on this machine; install it, or `pip install "
-            "imageio-ffmpeg`, or take a GIF"
+            f"cannot make {os.fspath(path)}: ffmpeg was not found: install it, or `pip install imageio-ffmpeg`, or "
+            "make a GIF"
         )
     size = film_size(pictures, width)
     size = size[0] + size[0] % 2, size[1] + size[1] % 2  # H.264 halves the colours' resolution
@@ -84,7 +84,7 @@ def write_mp4(pictures: Sequence[Path], path: str | os.PathLike, fps: float, wid
             said = _encode(program, pictures, size, fps, codec, temporary)
             if said is None:
                 return path
-        raise HpcdemError(f"cannot make {path}: ffmpeg says: {said}")
+        raise HpcdemError(f"cannot make {path}: ffmpeg reports: {said}")
 
 
 def _encode(

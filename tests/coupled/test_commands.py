@@ -219,7 +219,7 @@ def test_info_of_a_checkpoint_of_both(tmp_path, capsys):
     assert facts["disc_face_contacts"] == len(both.contacts()["id"]) > 0
     info.show(path, facts)
     shown = capsys.readouterr().out
-    assert f"{path}: checkpoint, whole" in shown and "\n  particles    2\n" in shown
+    assert f"{path}: checkpoint, complete" in shown and "\n  particles    2\n" in shown
     assert "\n  particles at step 137, time 0.000685, dt 5e-06\n" in shown
 
     content = path.read_bytes()

@@ -115,7 +115,7 @@ def test_the_first_commands_in_a_terminal(terminal: Terminal, tmp_path: Path) ->
     terminal.keys("C-c")
     terminal.end(85)
     terminal.types("hpcdem data")
-    assert "data is a folder: hpcdem view data shows results" in terminal.end(2)
+    assert "data is a folder: hpcdem view data shows its results" in terminal.end(2)
 
 
 @pytest.mark.slow
@@ -143,8 +143,8 @@ pcdc model step 3
     ("change", "words", "code", "said"),
     [
         ({}, "u.sc --resum", 2, "Did you mean '--resume'?"),
-        ({}, "nowhere.sc", 2, "nowhere.sc: no such script; hpcdem examples lists those that come along"),
-        ({}, "draw nowhere --field stress_yy", 1, "there is no folder or file nowhere"),
+        ({}, "nowhere.sc", 2, "nowhere.sc: no such script; hpcdem examples lists the examples"),
+        ({}, "draw nowhere --field stress_yy", 1, "folder or file not found: nowhere"),
         ({"model step": "model stpe"}, "u.sc", 2, r"u\.sc:4: .*did you mean 'step'"),
         ({"30e9": "30 GPa"}, "u.sc", 2, r"u\.sc:3: .*GPa"),
         ({"young 30e9": "young -30e9"}, "--check u.sc", 2, r"u\.sc:3: .*expected a number above 0"),

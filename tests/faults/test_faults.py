@@ -282,7 +282,7 @@ def test_resume_needs_no_script(resident, script, undisturbed, n, tmp_path_facto
     data = script.parent / "data"
     assert "going on from" in taken_up(resident, n, data, undisturbed, data, cwd=elsewhere).stdout
     again = resident(1, "resume", data, cwd=elsewhere)
-    assert again.returncode == 0 and "the run is done" in again.stdout
+    assert again.returncode == 0 and "the run is complete" in again.stdout
 
 
 def test_resume_takes_the_script_out_of_the_checkpoint(resident, script, undisturbed):
@@ -311,7 +311,7 @@ def test_a_moved_folder_goes_on(resident, script, undisturbed, tmp_path_factory)
 
 def test_nothing_to_resume(resident, tmp_path):
     done = resident(1, "resume", cwd=tmp_path)
-    assert done.returncode == 2 and "no run to go on with" in done.stderr
+    assert done.returncode == 2 and "nothing to resume" in done.stderr
     done = resident(1, "resume", tmp_path / "nowhere", cwd=tmp_path)
     assert done.returncode == 2 and "no such folder" in done.stderr
 
@@ -365,7 +365,7 @@ def test_old_checkpoints_are_spared_by_the_time_of_the_model(resident, script, u
 
 def test_a_run_goes_on_from_the_last_checkpoint_before_a_time(resident, script, undisturbed, stopped):
     """32.4 s are step 810. Later checkpoints of the run that was given up are passed over from then on."""
-    assert resident(1, script, "--before", "32.4", cwd=script.parent).stderr.count("give --resume as well") == 1
+    assert resident(1, script, "--before", "32.4", cwd=script.parent).stderr.count("add --resume") == 1
     none = resident(1, script, "--resume", "--before", "15.9", "--no-figure", cwd=script.parent)
     assert none.returncode == 2 and "is of 15.9 s of the model or an earlier time" in none.stderr
     cut = resident(1, "resume", "--before", "32.4", "--time-limit", "0.001", "--no-figure", cwd=script.parent)
@@ -390,10 +390,10 @@ def test_a_checkpoint_that_nobody_asked_for(resident, script, undisturbed):
 def test_info_tells_what_is_there(launch, script, stopped):
     newest = max(stopped.glob("*.sav"))
     done = launch(1, "info", newest, cwd=script.parent)
-    assert done.returncode == 0 and "checkpoint, whole" in done.stdout and "CYC" in done.stdout
+    assert done.returncode == 0 and "checkpoint, complete" in done.stdout and "CYC" in done.stdout
     done = launch(1, "info", stopped, cwd=script.parent)
     assert done.returncode == 0 and "state        stopped" in done.stdout and "hpcdem resume" in done.stdout
     whole = newest.read_bytes()
     newest.write_bytes(whole[: len(whole) // 2])
     done = launch(1, "info", newest, stopped, cwd=script.parent)
-    assert done.returncode == 1 and done.stdout.count("NOT WHOLE") == 2
+    assert done.returncode == 1 and done.stdout.count("INCOMPLETE") == 2

@@ -176,8 +176,8 @@ def test_other_origins_and_keys_are_refused(viewing: Viewing):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--run", "no.sc"], "--run no.sc: expected a script"),
-        (["-j", "2", "."], "-j goes with --run"),
+        (["--run", "no.sc"], "--run no.sc: expected an existing script"),
+        (["-j", "2", "."], "-j requires --run"),
         ([], "expected a folder or file with frames, or --run"),
     ],
 )

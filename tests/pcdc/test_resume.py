@@ -66,7 +66,7 @@ def test_it_goes_on_as_if_nothing_had_happened(resident, straight, tmp_path):
     assert again.returncode == 0, again.stderr
     assert before + said(again.stdout) == lines  # no line twice: what was printed before is not printed again
     check_equal(folder, tmp_path / "a")
-    assert "there is nothing to go on with" in resident(1, "resume", "data", cwd=tmp_path / "a").stdout
+    assert "nothing to resume" in resident(1, "resume", "data", cwd=tmp_path / "a").stdout
 
 
 @pytest.mark.slow
@@ -91,7 +91,7 @@ def test_a_changed_script_is_refused_and_a_damaged_checkpoint_passed_over(reside
     assert done.returncode == 2 and "loop.sc:19: pcdc model step 140: this line is not what was" in done.stderr
     script.unlink()
     done = resident(1, "resume", "data", cwd=folder)
-    assert done.returncode == 2 and "a PCDC script is Python, which is not taken out of a checkpoint" in done.stderr
+    assert done.returncode == 2 and "PCDC scripts are never executed from a checkpoint" in done.stderr
     script.write_text(text)
     (path,) = (folder / "data").glob("*.sav")
     content = bytearray(path.read_bytes())
@@ -136,7 +136,7 @@ def test_checkpoints_that_nobody_asked_for(resident, straight, tmp_path):
 
 def test_what_is_for_particles_only_is_refused(resident, tmp_path):
     done = start(resident, tmp_path / "a", 1, "--check-reproducible", "10")
-    assert done.returncode == 2 and "--check-reproducible is for models of particles" in done.stderr
+    assert done.returncode == 2 and "--check-reproducible supports models of particles only" in done.stderr
     assert not (tmp_path / "a" / "data").exists()
 
 

@@ -63,7 +63,7 @@ def test_an_array_that_is_killed_and_put_back_has_the_report_of_a_sweep_on_this_
     again = sweep(slurm, there, "push_sweep", "--slurm", "--sbatch", "time=10")
     assert "--array=0\n" in (there / "push_sweep" / "array.sh").read_text(), "only what is not done"
     assert slurm.wait(int(again.split("job array ")[1].split()[0])).state == "COMPLETED"
-    assert "nothing left to do" in sweep(slurm, there, "push_sweep", "--slurm")
+    assert "all members are done" in sweep(slurm, there, "push_sweep", "--slurm")
     assert "2 ranks" in (members[0].folder / "out.log").read_text()
     for folder in (here, there):
         sweep(slurm, folder, "report", "push_sweep", "--format", "none")

@@ -126,7 +126,7 @@ def test_round_trip(curve: Path, tmp_path: Path, capsys: pytest.CaptureFixture, 
         (["curve.txt", "--shape", "ellipse", "--gap", "0.9"], "gap 0.9"),
         (["wrong.txt"], r"wrong\.txt:2: "),
         (["nothing.txt"], "cannot read nothing.txt"),
-        ([], "a file with the grading is missing"),
+        ([], "the grading file is missing"),
         (["--read", "curve.txt"], r"curve\.txt:1: read 100, expected a whole number|curve\.txt:"),
     ],
 )

@@ -194,15 +194,15 @@ def test_the_program_lists_writes_and_never_replaces(launch, tmp_path):
     text = (tmp_path / "ucs.sc").read_text()
     assert text == find("ucs")(width=0.05).script()
     again = launch(1, "case", "ucs", cwd=tmp_path)
-    assert again.returncode == 2 and "ucs.sc is there already; --force replaces it" in again.stderr
+    assert again.returncode == 2 and "ucs.sc exists: use --force to replace it" in again.stderr
     assert (tmp_path / "ucs.sc").read_text() == text
     wrong = launch(1, "case", "ucs", "--force", "--width", "x", cwd=tmp_path)
     assert wrong.returncode == 2 and "width is x, expected a number" in wrong.stderr
     assert (tmp_path / "ucs.sc").read_text() == text and sorted(p.name for p in tmp_path.iterdir()) == ["ucs.sc"]
     nowhere = launch(1, "case", "ucs", "-o", "there/ucs.sc", cwd=tmp_path)
-    assert nowhere.returncode == 2 and "there is no folder there" in nowhere.stderr
+    assert nowhere.returncode == 2 and "folder there not found" in nowhere.stderr
     unknown = launch(1, "case", "usc", cwd=tmp_path)
-    assert unknown.returncode == 2 and "there is no case 'usc'" in unknown.stderr
+    assert unknown.returncode == 2 and "unknown case 'usc'" in unknown.stderr
 
 
 # ---- script, build and run are one ---------------------------------------------------------------------------------

@@ -127,7 +127,7 @@ def test_nearly_all_of_the_ready_made_models_is_in_chinese() -> None:
     there = {str(field.description) for name in CASES for field in find(name).model_fields.values()}
     there |= {find(name).title for name in CASES}
     texts = catalogue.of("case")
-    assert set(texts) <= there | {"The script; - prints it", "Replace the file if it is there"}
+    assert set(texts) <= there | {"The script; - prints it", "Replace an existing file"}
     assert len(texts) >= 0.9 * len(there)
     assert all(HAN.search(text) for text in texts.values())
 

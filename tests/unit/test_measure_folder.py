@@ -272,7 +272,7 @@ def test_the_log_tells_tension_from_shear(folder: Path, tmp_path: Path) -> None:
         (["--wall", "7"], UsageError, "no such wall"),
         (["wallforce", "--wall", "7"], UsageError, "--wall 7: not in"),
         (["--groups", "nowhere"], UsageError, "groups: high, low; colours: lg, green, yellow"),
-        (["--colors", "beige"], UsageError, "no such colour"),
+        (["--colors", "beige"], UsageError, "unknown colour"),
         (["--from", "5000"], HpcdemError, "holds no frames .* from step 5000"),
         (["--from", "50", "--to", "4"], UsageError, "--to 4 is before --from 50"),
         (["tracks", "--ids", "999999"], HpcdemError, "no frame has particle 999999"),

@@ -125,7 +125,7 @@ def test_without_ffmpeg_mp4_is_refused_at_once(folder: Path, no_ffmpeg: None) ->
     for words in (["--format=mp4"], ["--format=both"], ["-o", str(folder / "a.mp4")]):
         with pytest.raises(HpcdemError, match="MP4 needs ffmpeg"):
             make(folder, *words)
-    with pytest.raises(HpcdemError, match="ffmpeg is not on this machine"):
+    with pytest.raises(HpcdemError, match="ffmpeg was not found"):
         films.write_mp4([], folder / "a.mp4", 10.0)
     assert not list(folder.glob("*.gif"))
 
@@ -160,7 +160,7 @@ def test_what_ffmpeg_says_is_passed_on(folder: Path, tmp_path: Path, monkeypatch
     program.write_text(f"#!{sys.executable}\n" + FAKE.format(codec="none"))
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    with pytest.raises(HpcdemError, match="ffmpeg says: Unknown encoder"):
+    with pytest.raises(HpcdemError, match="ffmpeg reports: Unknown encoder"):
         make(folder, "--format=mp4", "--size=100")
     assert not list(folder.glob("movie*"))
 

@@ -139,7 +139,7 @@ def test_every_command_of_the_table_starts():
         ("viw", "no such script and no such command; did you mean hpcdem view?"),
         pytest.param("mesure", "did you mean hpcdem measure?", marks=pytest.mark.slow),
         pytest.param("xyzzyxyzzy", "see hpcdem --help", marks=pytest.mark.slow),
-        ("viw.py", "viw.py: no such script; hpcdem examples lists those that come along\n"),
+        ("viw.py", "viw.py: no such script; hpcdem examples lists the examples\n"),
     ],
 )
 def test_a_mistyped_command_is_met_with_the_nearest(word, said):
@@ -153,7 +153,7 @@ def test_examples_are_listed_and_copied(tmp_path):
     done = program("main", "examples", "specimens.py", "--into", str(tmp_path))
     assert done.returncode == 0 and {path.name for path in tmp_path.iterdir()} == {"specimens.py", "grading.txt"}
     again = program("main", "examples", "specimens", "--into", str(tmp_path))
-    assert again.returncode == 2 and "exists already" in again.stderr
+    assert again.returncode == 2 and "exists and is not overwritten" in again.stderr
     far = program("main", "examples", "../x")
     assert far.returncode == 2 and "../x: no such example. There are angle_of_repose, " in far.stderr
     wrong = program("main", "examples", "puhs")
@@ -258,7 +258,7 @@ def test_a_return_outside_of_a_function_is_found_before_the_run(resident, tmp_pa
 @pytest.mark.mpi
 def test_the_console_is_for_one_rank(launch, tmp_path):
     done = launch(2, "console", cwd=tmp_path)
-    assert done.returncode == 2 and done.stderr.count("hpcdem console is for one rank") == 1
+    assert done.returncode == 2 and done.stderr.count("hpcdem console supports one rank") == 1
 
 
 @pytest.mark.parametrize("option", ["--check", "--resume"])

@@ -129,7 +129,7 @@ def test_a_blank_after_the_sign_does_not_eat_an_option() -> None:
         (["--dri=x"], "--dir"),
         (["--dir", "x", "--fontsze=3"], "--fontsize"),
         (["--dir", "x", "-bondplt=true"], "such option"),
-        (["--dir", "x", "--format=gif"], "'gif' is not a format of pictures"),
+        (["--dir", "x", "--format=gif"], "'gif' is not a picture format"),
         (["--dir", "x", "--dpi=many"], "'many' is not a valid float"),
         (["--dir", "x", "--dpi=-3"], "-3 is not a number above 0"),
         (["--dir", "x", "--pagesize=nan"], "nan is not a number above 0"),
@@ -501,8 +501,8 @@ def test_particles_in_the_colours_of_a_field(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--field=nix"], "particles have no field nix"), (["--range=0,1"], "go with --field"),
-        (["--colours=plasma"], "go with --field"), (["--field=vx", "--ballplot=false"], "--ballplot=false leaves out"),
+        (["--field=nix"], "particles have no field nix"), (["--range=0,1"], "require --field"),
+        (["--colours=plasma"], "require --field"), (["--field=vx", "--ballplot=false"], "--ballplot=false hides"),
         (["--field=vx", "--colours=jet"], "colours"), (["--field=vx", "--range=1,0"], "1 is not below 0"),
     ],
 )  # fmt: skip

@@ -143,7 +143,7 @@ def test_nobody_measures_the_boxes_of_numbers_for_a_title(monkeypatch: pytest.Mo
         ("--addball ON", "Missing option"),
         ("-d x --addball maybe", "'maybe' is none of ON, OFF"),
         ("-d x --showlable abcd", "'abcd' is none of ON, OFF, abc"),
-        ("-d x --format gif", "'gif' is not a format"),
+        ("-d x --format gif", "'gif' is not a picture format"),
         ("-d x --xmax -3", "--xmax"),
         ("-d x --scale big", "--scale"),
         ("-d x --width 1", "--width"),

@@ -434,8 +434,9 @@ def test_a_view_of_a_file_is_drawn(tmp_path: Path):
         (("--object=particles",), "this frame has no particles"), (("--log",), "log goes with field or object"),
         (("--hide=walls",), "this frame has no walls"), (("--colours=jet", "--field=stress_yy"), "colours"),
         (("--object=elements", "--colour=red"), "colour"), (("--object=elements", "--opacity=3"), "opacity"),
-        (("--fps=3",), "--fps goes with a film"), (("--step=3",), "--step chooses frames of a folder"),
-        (("--format=png", "-o", "a.png"), "--format goes without --output"), (("-o", "a.bmp"), "pictures end in"),
+        (("--fps=3",), "--fps requires a film"), (("--step=3",), "--step selects frames of a folder"),
+        (("--format=png", "-o", "a.png"), "--format cannot be used with --output"),
+        (("-o", "a.bmp"), "pictures end in"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_by_name(tmp_path: Path, words: tuple[str, ...], message: str):
