@@ -67,7 +67,7 @@ def model_arguments(command: Command, name: str, given: Mapping[str, Any], dim: 
 
 def _there(word: str, dims: tuple[int, ...], dim: int) -> None:
     if dim not in dims:
-        what = "sim.start(dim=3) begins a model in three" if dim == 2 else "this version has it in two only"
+        what = "use sim.start(dim=3) for three dimensions" if dim == 2 else "this version has it in two only"
         raise ValueError(f"{word} is for {dims[0]} dimensions; {what}")
 
 
@@ -155,7 +155,7 @@ def _one(kind: Kind, value: Any, name: str) -> Any:
         value = os.fspath(value)
     if kind.varied and isinstance(value, (Over, Drawn)):
         if isinstance(value, Over) and AXES[value.axis] not in kind.axes:
-            raise ValueError(f"{name}: a table over {AXES[value.axis]} cannot stand for it")
+            raise ValueError(f"{name} cannot be a table over {AXES[value.axis]}")
         return value
     if kind.varied and isinstance(value, np.ndarray) and value.ndim == 1:
         return np.array([_one(kind, item, name) for item in value.tolist()], np.float64)

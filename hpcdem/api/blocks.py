@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
 
 PROPERTIES = "Change properties of the model; the others stay."
-TELL = "Say in the log how many there are, by model and group."
-GROUP = "Put them into a group; each is in one group of a set at most."
+TELL = "Report their number by model and group in the log."
+GROUP = "Assign them to a group; each is in at most one group of a set."
 
 
 @commands
@@ -70,7 +70,7 @@ class Geometry(Words):
     scale = Row("geometry scale", "factors layer?")
     translate = Row("geometry translate", "way layer?")
     export = Row("geometry export", "layers file")
-    delete = Row("geometry delete", "*layers", doc="Forget layers; meshes that were made from them keep their edges.")
+    delete = Row("geometry delete", "*layers", doc="Delete layers; meshes created from them keep their edges.")
 
 
 @commands
@@ -106,7 +106,7 @@ class Mesh(Words):
     scale = Row("model scale", "factors")
     translate = Row("model translate", "way")
     quadratic = Row("mesh quadratic")
-    quality = Row("mesh quality", doc="Say in the log how good the mesh is: angles, sizes.")
+    quality = Row("mesh quality", doc="Report the quality of the mesh in the log: angles, sizes.")
 
 
 @commands
@@ -118,9 +118,9 @@ class Elements(Stressed):
     group = Row("element group", "group set?", doc=GROUP)
     model = Models(
         "element c-model",
-        "The constitutive model, with its properties, which are listed here by the name of the model; "
-        "docs/pcdc_reference.md explains them. Models of fluid are those of the joints around the elements. Of a law "
-        'of the user: "user", law="file.py:law", parameter=[("limit", 2e5)], see docs/user_laws.md.',
+        "Assign a constitutive model and its properties, listed here by model (explained in docs/pcdc_reference.md). "
+        'Fluid models apply to the joints around the elements. For a user law: "user", law="file.py:law", '
+        'parameter=[("limit", 2e5)], see docs/user_laws.md.',
     )
     property = Row("element property", doc=PROPERTIES, loose=True)
     tell = Row("element list summary", doc=TELL)
@@ -140,7 +140,7 @@ class Faces(Fluxed):
     _word, kind = "faces", g.FACE
 
     group = Row("element-face group", "group set?", doc=GROUP)
-    model = Models("element-face c-model", "The contact model, with its properties.")
+    model = Models("element-face c-model", "Assign the contact model and its properties.")
     property = Row("element-face property", doc=PROPERTIES, loose=True)
     tell = Row("element-face list summary", doc=TELL)
     stress = Row("element-face boundary", model="mechanical-stress-boundary-condition")
@@ -155,7 +155,7 @@ class Joints(Objects):
     _word, kind = "joints", g.JOINT
 
     group = Row("face-joint group", "group set?", doc=GROUP)
-    model = Models("face-joint c-model", "The model of joints, or of what is in them, with its properties.")
+    model = Models("face-joint c-model", "Assign a model of joints, or of the fluid in them, and its properties.")
     property = Row("face-joint property", doc=PROPERTIES, loose=True)
     tell = Row("face-joint list summary", doc=TELL)
     reset_state = Row("face-joint reset state")
@@ -179,9 +179,11 @@ class Nodes(Moved):
         "node initial",
         "velocity?",
         only="velocity velocity-x velocity-y velocity-z",
-        doc="The velocity of nodes now, or some components of it.",
+        doc="Set the present velocity of nodes, or some components of it.",
     )
-    initial_temperature = Row("node initial", "temperature", only="temperature", doc="The temperature of nodes now.")
+    initial_temperature = Row(
+        "node initial", "temperature", only="temperature", doc="Set the present temperature of nodes."
+    )
     reset_velocity = Row("node reset velocity")
     reset_displacement = Row("node reset displacement")
 
@@ -195,7 +197,7 @@ class Bolts(Objects):
     group = Row("bolt-element group", "group set?", doc=GROUP)
     create = Row("bolt create polyline", "points")
     between = Row("bolt-element create", "first second mesh_size?", where=g.ELEMENT)
-    model = Models("bolt c-model", "The properties of elements of bolts, which act from then on; those of one bolt.")
+    model = Models("bolt c-model", "Assign properties to elements of bolts, from now on; values are those of one bolt.")
     delete = Row("bolt delete")
 
 
@@ -223,7 +225,7 @@ class FlowNodes(GroupedElsewhere):
         where=g.NODE,
         only="flow-node-temperature",
         names={"flow-node-temperature": "temperature"},
-        doc="The temperature of the fluid at them now.",
+        doc="Set the present temperature of the fluid at them.",
     )
 
 
@@ -250,7 +252,7 @@ class Liners(Objects):
 
     group = Row("liner-element group", "group set?", doc=GROUP)
     create = Row("liner create", where=g.FACE)
-    model = Models("liner c-model", "The properties of elements of liners, which act from then on.")
+    model = Models("liner c-model", "Assign properties to elements of liners, from now on.")
     delete = Row("liner delete")
 
 
@@ -263,7 +265,7 @@ class LinerNodes(Objects):
     group = Row("liner-node group", "group set?", doc=GROUP)
     velocity = Row("liner-node boundary", model="liner-node-constrain")
     force = Row("liner-node boundary", model="liner-node-force-boundary-condition")
-    remove_boundary = Row("liner-node boundary remove", doc="Take back what was prescribed.")
+    remove_boundary = Row("liner-node boundary remove", doc="Remove prescribed conditions.")
 
 
 @commands
@@ -339,15 +341,15 @@ class BlockCommands(Clocks):
             setattr(self, kind._word, kind(self._do))
 
     gravity = Row(
-        "model gravity", "gravity", doc="Gravity of the blocks from now on; of particles it is ``set(gravity=...)``."
+        "model gravity", "gravity", doc="Set gravity of the blocks from now on; for particles use ``set(gravity=...)``."
     )
     units = Row(
         "model units",
         "system",
-        doc="Units of what is given of blocks from now on: unlikely values are warned of, histories and charts are "
-        "labelled; no value changes. Those of particles are ``set(units=...)``.",
+        doc="Declare the units of following values of blocks: unlikely values give a warning, histories and charts "
+        "show the units; no value changes. For particles use ``set(units=...)``.",
     )
-    option = Row("model option", without="creep ecda", doc="Switches of the calculation of blocks.")
+    option = Row("model option", without="creep ecda", doc="Set switches of the calculation of blocks.")
     time_step = Row("model time-step")
     sub_step = Row("model sub-step")
     field_clock = Row("model field", "field")
@@ -362,7 +364,7 @@ class BlockCommands(Clocks):
         "model step",
         "n",
         names={"steps": "n"},
-        doc="So many steps of the blocks, and of the particles that are coupled to them.",
+        doc="Execute a number of steps of the blocks and of the particles coupled to them.",
     )
     solve = Row("model solve")
 

@@ -297,7 +297,7 @@ class Geometry(Words):
         file : name of the file, in the folder of the results.
         """
     def delete(self, *layers: str) -> None:
-        """Forget layers; meshes that were made from them keep their edges.
+        """Delete layers; meshes created from them keep their edges.
 
         Parameters
         ----------
@@ -626,7 +626,7 @@ class Mesh(Words):
         condition.
         """
     def quality(self) -> None:
-        """Say in the log how good the mesh is: angles, sizes."""
+        """Report the quality of the mesh in the log: angles, sizes."""
 
 class Elements(Stressed):
     """Elements: `sim.elements["stress-xx"]`, see `Objects`."""
@@ -635,7 +635,7 @@ class Elements(Stressed):
         name: Literal["stress-xx", "stress-yy", "stress-xy", "stress-zz", "stress-xz", "stress-yz", "plastic-state", "plastic-shear-strain", "plastic-volume-strain", "plastic-work", "creep-strain-xx", "creep-strain-yy", "creep-strain-xy", "kelvin-strain-xx", "kelvin-strain-yy", "kelvin-strain-xy", "creep-strain-zz", "creep-strain-xz", "creep-strain-yz", "kelvin-strain-zz", "kelvin-strain-xz", "kelvin-strain-yz", "creep-work", "mean-temperature", "mean-moisture", "suction", "law-state"] | str,
     ) -> np.ndarray: ...
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """Put them into a group; each is in one group of a set at most.
+        """Assign them to a group; each is in at most one group of a set.
 
         Parameters
         ----------
@@ -1168,7 +1168,7 @@ class Elements(Stressed):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def tell(self, *, where: Where | None = None) -> None:
-        """Say in the log how many there are, by model and group.
+        """Report their number by model and group in the log.
 
         Parameters
         ----------
@@ -1239,7 +1239,7 @@ class Elements(Stressed):
 class Faces(Fluxed):
     """Faces of elements: contact, and stress on surfaces; see `Objects`."""
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """Put them into a group; each is in one group of a set at most.
+        """Assign them to a group; each is in at most one group of a set.
 
         Parameters
         ----------
@@ -1306,7 +1306,7 @@ class Faces(Fluxed):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def tell(self, *, where: Where | None = None) -> None:
-        """Say in the log how many there are, by model and group.
+        """Report their number by model and group in the log.
 
         Parameters
         ----------
@@ -1385,7 +1385,7 @@ class Joints(Objects):
         name: Literal["opening", "slip", "damage", "normal-stress", "shear-stress", "state", "normal-stress-largest", "normal-stress-first", "normal-stress-middle", "normal-stress-last", "shear-stress-largest", "shear-stress-first", "shear-stress-middle", "shear-stress-last"] | str,
     ) -> np.ndarray: ...
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """Put them into a group; each is in one group of a set at most.
+        """Assign them to a group; each is in at most one group of a set.
 
         Parameters
         ----------
@@ -1796,7 +1796,7 @@ class Joints(Objects):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def tell(self, *, where: Where | None = None) -> None:
-        """Say in the log how many there are, by model and group.
+        """Report their number by model and group in the log.
 
         Parameters
         ----------
@@ -1818,7 +1818,7 @@ class Nodes(Moved):
         name: Literal["displacement", "velocity", "position-x", "position-y", "position-z", "displacement-x", "displacement-y", "displacement-z", "velocity-x", "velocity-y", "velocity-z", "reaction-x", "reaction-y", "reaction-z", "temperature", "moisture"] | str,
     ) -> np.ndarray: ...
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """Put them into a group; each is in one group of a set at most.
+        """Assign them to a group; each is in at most one group of a set.
 
         Parameters
         ----------
@@ -1940,7 +1940,7 @@ class Nodes(Moved):
         vz: float | None = None,
         where: Where | None = None,
     ) -> None:
-        """The velocity of nodes now, or some components of it.
+        """Set the present velocity of nodes, or some components of it.
 
         Parameters
         ----------
@@ -1951,7 +1951,7 @@ class Nodes(Moved):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def initial_temperature(self, temperature: float, *, where: Where | None = None) -> None:
-        """The temperature of nodes now.
+        """Set the present temperature of nodes.
 
         Parameters
         ----------
@@ -1971,7 +1971,7 @@ class Bolts(Objects):
         name: Literal["axial-force", "axial-strain", "plastic-strain", "bolt-state"] | str,
     ) -> np.ndarray: ...
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """Put them into a group; each is in one group of a set at most.
+        """Assign them to a group; each is in at most one group of a set.
 
         Parameters
         ----------
@@ -2093,7 +2093,7 @@ class BoltNodes(Conditioned):
         name: Literal["position-x", "position-y", "position-z", "displacement-x", "displacement-y", "displacement-z", "velocity-x", "velocity-y", "velocity-z", "bond-force", "slip", "bond-state", "reaction-x", "reaction-y", "reaction-z", "host", "distance"] | str,
     ) -> np.ndarray: ...
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """Put them into a group; each is in one group of a set at most.
+        """Assign them to a group; each is in at most one group of a set.
 
         Parameters
         ----------
@@ -2168,7 +2168,7 @@ class FlowNodes(GroupedElsewhere):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def initial_temperature(self, temperature: float, *, where: Where | None = None) -> None:
-        """The temperature of the fluid at them now.
+        """Set the present temperature of the fluid at them.
 
         Parameters
         ----------
@@ -2225,7 +2225,7 @@ class Liners(Objects):
         name: Literal["axial-force", "shear-force", "moment-first", "moment-last", "membrane-largest", "membrane-smallest", "membrane-xx", "membrane-yy", "membrane-xy", "membrane-zz", "membrane-xz", "membrane-yz", "bending-largest", "bending-smallest", "bending-xx", "bending-yy", "bending-xy", "bending-zz", "bending-xz", "bending-yz", "transverse-shear", "axial-strain", "plastic-strain", "plastic-rotation", "plastic-curvature", "liner-state", "bond-pressure", "bond-shear", "gap", "slip", "bond-state", "host"] | str,
     ) -> np.ndarray: ...
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """Put them into a group; each is in one group of a set at most.
+        """Assign them to a group; each is in at most one group of a set.
 
         Parameters
         ----------
@@ -2308,7 +2308,7 @@ class LinerNodes(Objects):
         name: Literal["position-x", "position-y", "position-z", "displacement-x", "displacement-y", "displacement-z", "velocity-x", "velocity-y", "velocity-z", "rotation", "rotation-x", "rotation-y", "rotation-z", "spin", "spin-x", "spin-y", "spin-z", "reaction-x", "reaction-y", "reaction-z", "reaction-moment", "reaction-moment-x", "reaction-moment-y", "reaction-moment-z", "distance"] | str,
     ) -> np.ndarray: ...
     def group(self, group: str, set: str | None = None, *, where: Where | None = None) -> None:
-        """Put them into a group; each is in one group of a set at most.
+        """Assign them to a group; each is in at most one group of a set.
 
         Parameters
         ----------
@@ -2367,7 +2367,7 @@ class LinerNodes(Objects):
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def remove_boundary(self, *, where: Where | None = None) -> None:
-        """Take back what was prescribed.
+        """Remove prescribed conditions.
 
         Parameters
         ----------
@@ -2600,15 +2600,15 @@ class BlockCommands(Clocks):
     output: Output
     def _begin_blocks(self, project: Callable[[], Project], before: Callable[[], None] = ...) -> None: ...
     def gravity(self, gravity: Point) -> None:
-        """Gravity of the blocks from now on; of particles it is ``set(gravity=...)``.
+        """Set gravity of the blocks from now on; for particles use ``set(gravity=...)``.
 
         Parameters
         ----------
         gravity : acceleration [m/s2].
         """
     def units(self, system: Literal["si", "mm-mpa-s", "km-mpa-s"]) -> None:
-        """Units of what is given of blocks from now True: unlikely values are warned of, histories and charts are
-        labelled; no value changes. Those of particles are ``set(units=...)``.
+        """Declare the units of following values of blocks: unlikely values give a warning, histories and charts show
+        the units; no value changes. For particles use ``set(units=...)``.
 
         Parameters
         ----------
@@ -2630,7 +2630,7 @@ class BlockCommands(Clocks):
         thermal: bool | None = None,
         proppant: bool | None = None,
     ) -> None:
-        """Switches of the calculation of blocks.
+        """Set switches of the calculation of blocks.
 
         Parameters
         ----------
@@ -2784,7 +2784,7 @@ class BlockCommands(Clocks):
     def tell_devices(self) -> None:
         """Reports the ranks, threads and cores of the run in the log."""
     def step(self, n: int) -> None:
-        """So many steps of the blocks, and of the particles that are coupled to them.
+        """Execute a number of steps of the blocks and of the particles coupled to them.
 
         Parameters
         ----------

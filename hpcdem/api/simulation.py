@@ -122,10 +122,10 @@ class Simulation(ParticleCommands, BlockCommands):
         if self._project is None:
             running = self._session.interpreter
             if running is not None and running.journal is not None:
-                raise CommandError("the blocks of a PCDC script are those of its pcdc lines")
+                raise CommandError("in a PCDC script create the blocks with pcdc lines")
             if self._session.reproduction is not None:
                 raise CommandError(
-                    "--check-reproducible is for models of particles; of blocks compare what save writes"
+                    "--check-reproducible is for models of particles; for blocks compare the files of save"
                 )
             folder = self._folder
             if self._engine is not None and self._engine.outdir == folder:
@@ -296,7 +296,9 @@ class Simulation(ParticleCommands, BlockCommands):
             dem.checkpoints.save(engine, self.directory / file)
             return
         if self._project.coupled is None and not self._only_blocks:
-            raise CommandError("particles and blocks that are not coupled are two states; couple() makes them one")
+            raise CommandError(
+                "particles and blocks that are not coupled cannot be saved in one file; call couple() first"
+            )
         fdem.checkpoints.save(self._project, str(file))
 
     @_command
@@ -311,10 +313,10 @@ class Simulation(ParticleCommands, BlockCommands):
             dem.checkpoints.restore(engine, path)
             return
         if kind == checkpoint.BOTH and (self._project is None or self._project.coupled is None):
-            raise CommandError(f"{file} holds particles and blocks that are coupled: couple() comes first, or resume()")
+            raise CommandError(f"{file} contains coupled particles and blocks: call couple() first, or use resume()")
         names = fdem.checkpoints.restore(self._made_project(), path)
         if names and self._log is not None:
-            self._log.info(f"{file} holds names of a script, which programs do not take: {', '.join(names)}")
+            self._log.info(f"{file} contains names of a script, which programs cannot restore: {', '.join(names)}")
 
     @_command
     def resume(self, before: float | None = None) -> bool:
@@ -329,9 +331,8 @@ class Simulation(ParticleCommands, BlockCommands):
             beside = self._newest(self._folder / "blocks")
             if beside is not None:
                 raise CommandError(
-                    f"{beside} is of blocks that were made after particles: whether it is newer than those of the "
-                    "particles alone cannot be told. Make the blocks first in programs that are to go on; or build "
-                    "both again, couple() and restore(...)"
+                    f"{beside}: the blocks were created after the particles, so resume cannot decide which checkpoint "
+                    "is newer. Create the blocks first, or rebuild both, couple() and restore(...)"
                 )
             return self._resume_particles(latest)
         project = self._made_project()
@@ -573,7 +574,7 @@ class Simulation(ParticleCommands, BlockCommands):
         if self._only_blocks:
             raise CommandError("there are no particles; energies is the budget of blocks")
         if self.engine.energy is None or self.engine.energy.start is None:
-            raise CommandError("there is no account yet: set(energy=n) comes first, then a cycle")
+            raise CommandError("no energy budget yet: call set(energy=n), then cycle(n)")
         return dataclasses.asdict(self.engine.energy.look(self.engine))
 
     def contacts(self) -> dict[str, np.ndarray]:
@@ -606,7 +607,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
         def coupled() -> Coupling:
             if self._project is None:
-                raise CommandError("there are no blocks yet: mesh.create(...) and elements.model(...) come first")
+                raise CommandError("no blocks yet: call mesh.create(...) and elements.model(...) first")
             return self._couple(self._project, friction, dt)
 
         made: Coupling = carried_out(_place(), "couple", coupled)
@@ -660,9 +661,8 @@ class Simulation(ParticleCommands, BlockCommands):
             if not str(error).endswith("no answer"):
                 raise
             raise UsageError(
-                f"{place}: the particles of one rank, as they were when the run came here, are not in the checkpoint, "
-                "so --resume cannot pass this line: use gather(...) or count, which are; or go on with a script of "
-                "your own that begins with pcdc model restore"
+                f"{place}: the checkpoint does not record the particles of a single rank, so --resume cannot execute "
+                "this line. Use gather(...) or count, or start another script with pcdc model restore"
             ) from None
         self._seen_alone = self._seen_alone or place
         if self.engine.coupled:
@@ -675,8 +675,8 @@ class Simulation(ParticleCommands, BlockCommands):
         if self._seen_alone and self.ranks > 1 and log is not None and running.keeps and not running.replays:
             log.warn_once(
                 "of this rank",
-                f"{self._seen_alone} of particles that touch blocks: --resume will not be able to pass this line "
-                "(gather(...) and count can be passed)",
+                f"{self._seen_alone} of particles coupled to blocks: --resume cannot execute this line; use "
+                "gather(...) or count",
             )
 
     def _write_into(self, folder: str | Path) -> None:
@@ -684,11 +684,11 @@ class Simulation(ParticleCommands, BlockCommands):
 
     def _refuse_coupled(self, what: str) -> None:
         if self._engine is not None and self._engine.coupled:
-            raise CommandError(f"{what} would replace particles that touch blocks: part them first, Coupling.end()")
+            raise CommandError(f"{what} would replace particles that are coupled to blocks: call Coupling.end() first")
 
     def _refuse_only_blocks(self) -> None:
         if self._only_blocks:
-            raise CommandError("there are no particles; blocks are stepped by step and solve")
+            raise CommandError("no particles: step blocks with step and solve")
 
     def frame(self, of: str | None = None) -> Frame:
         """The model as it is now, on one rank: tables for pandas and xarray, pictures; in a notebook it shows itself.
@@ -697,9 +697,11 @@ class Simulation(ParticleCommands, BlockCommands):
 
         def make() -> Frame:
             if self.ranks > 1:
-                raise CommandError("for a run on one rank; on several write frames, and read them by hpcdem.frames()")
+                raise CommandError(
+                    "only available on one rank; on several ranks write frames and read them with hpcdem.frames()"
+                )
             if running is not None and running.keeps_calls:
-                raise CommandError("a script of PCDC draws with pcdc output image")
+                raise CommandError("in a PCDC script use pcdc output image")
             kind = of or ("blocks" if self._only_blocks else "particles")
             if kind not in ("particles", "blocks"):
                 raise CommandError(f"of: expected 'particles' or 'blocks', got {of!r}")
@@ -751,9 +753,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     def _before_steps(self) -> None:
         if self._engine is not None and self._engine.watchers and self._only_blocks:
-            raise CommandError(
-                "functions of every(...) are called at steps of particles, and there are none: cancel them"
-            )
+            raise CommandError("functions of every(...) need particles, and this model has none: cancel them")
 
     def _table(self, name: str) -> dict[str, np.ndarray]:
         from hpcdem.physics.dem import diagnostics
@@ -939,8 +939,8 @@ class Coupling:
 def _parted(what: str) -> UsageError:
     file, line = _place()
     return UsageError(
-        f"{file}:{line}: {what}: particles that were parted from the blocks before the checkpoint are not in it, so "
-        "--resume cannot pass this line; go on with a script of your own that begins with pcdc model restore"
+        f"{file}:{line}: {what}: the checkpoint does not contain particles that were decoupled before it, so --resume "
+        "cannot execute this line. Start another script with pcdc model restore"
     )
 
 
@@ -958,7 +958,7 @@ def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0
             raise CommandError(f"expected an hpcdem.Simulation, got {particles!r}")
         running, projects = session.current().interpreter, session.current().projects
         if not projects:
-            raise CommandError("there are no blocks: it belongs into a PCDC script; programs have Simulation.couple")
+            raise CommandError("no blocks: couple is for PCDC scripts; programs use Simulation.couple")
 
         def both() -> Coupling:
             return particles._couple(projects[-1], friction, dt)

@@ -85,7 +85,7 @@ def test_refusals(tmp_path):
     coupling.couple(project, sim)  # nothing is left of the failed ones
     with pytest.raises(CommandError, match="coupled to particles already"):
         coupling.couple(project, sim)
-    with pytest.raises(CommandError, match="CYC would leave the blocks behind"):
+    with pytest.raises(CommandError, match="CYC would step these particles without the blocks"):
         cycles.cycle(sim, 1)
     project.clear()
     cycles.cycle(sim, 1)

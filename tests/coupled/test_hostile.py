@@ -147,7 +147,7 @@ def test_blocks_that_are_replaced(tmp_path):
 
 @pytest.mark.parametrize(
     "inside, said",
-    [("pcdc model step 1", "model step 1 cannot be used by a function that is called in the middle of model step 20"),
+    [("pcdc model step 1", "model step 1 cannot be used by a function that is called during model step 20"),
      ("s.cycle(1)", "CYC cannot be used by a function"), ("both.end()", "end cannot be used by a function"),
      ("pcdc model new", "model new cannot be used by a function"), ("1 / 0", "ZeroDivisionError: division by zero")],
 )  # fmt: skip

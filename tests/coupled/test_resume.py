@@ -160,7 +160,7 @@ def test_what_one_of_several_ranks_saw_cannot_be_asked_again(resident, tmp_path)
         (folder / "stop").touch()
         done = start(resident, folder, ranks)
         assert done.returncode == 85
-        assert done.stdout.count("--resume will not be able to pass this line") == ranks - 1
+        assert done.stdout.count("--resume cannot execute this line; use gather") == ranks - 1
         (folder / "stop").unlink()
         again = start(resident, folder, 3 - ranks, "--resume")
         if ranks == 1:
@@ -168,7 +168,7 @@ def test_what_one_of_several_ranks_saw_cannot_be_asked_again(resident, tmp_path)
             continue
         assert again.returncode == 2, again.stdout + again.stderr
         line = 1 + SCRIPT.read_text().splitlines().index("        peep = sand['x']")
-        assert f"fall.sc:{line}: ['x']: the particles of one rank" in again.stderr
+        assert f"fall.sc:{line}: ['x']: the checkpoint does not record the particles of a single rank" in again.stderr
         assert "use gather(...)" in again.stderr
 
 

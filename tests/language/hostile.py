@@ -359,11 +359,11 @@ RUNS = [
     (BEGIN + BALL + "CYC 10", "CYC: 1 particles that are free to move have no density"),
     (
         BEGIN + TWO + "PROP shear 1e9 poiss 0.2 hertz RANGE id 1\nCYC 1",
-        "CYC: particles 1 and 2 touch, but one has the law",
+        "CYC: particles 1 and 2 are in contact, but one has the law",
     ),
     (BEGIN + TWO + "GEN num 9 rad discrete 1 x 10 30 y 0 9\nCYC 1", "particles that are free to move have no density"),
-    (BEGIN + BALL + BALL, "BALL: there is a particle with id 1 already"),
-    (BEGIN + BALL + "GEN grid idmin 0 rad discrete 1 x 9 19 y 0 9", "GEN: idmin 0: ids below 2 are taken or were once"),
+    (BEGIN + BALL + BALL, "BALL: a particle with id 1 exists already"),
+    (BEGIN + BALL + "GEN grid idmin 0 rad discrete 1 x 9 19 y 0 9", "GEN: idmin 0: ids below 2 are or were in use"),
     (BEGIN + "GEN num 9 rad discrete 1 x ({left} {right}) y (0 9)", "GEN: {left}, {right}, {bottom}, {top} need"),
     (BEGIN + BALL + "FIX x y\nGEN num 9 rad discrete 1 x ({left} {right}) y (0 9)", "need at least one free particle"),
     (
@@ -412,7 +412,7 @@ RUNS = [
     ("RES good.sav\nSET dt 1e-3\nIMPLE wall id 4 xmove 1", "IMPLE: wall 4 does not move"),
     ("RES good.sav\nWALL id 9 xv 1", "WALL: there is no wall with id 9"),
     ("RES good.sav\nPLOT 7 8\nSTOP", "STOP: PLOT 8 7: there is no HIST 8"),
-    ("RES good.sav\nBALL id 1 x 50 y 5 rad 1", "BALL: there is a particle with id 1 already"),
+    ("RES good.sav\nBALL id 1 x 50 y 5 rad 1", "BALL: a particle with id 1 exists already"),
 ]
 """Scripts that read well and cannot be carried out (in a folder that holds folder/, file.txt, good.dat, good.sav); the
 last line but those after it is told, and why."""

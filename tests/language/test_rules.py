@@ -79,7 +79,7 @@ def test_gen_fills_the_rectangle_without_overlap(play):
     gap = np.hypot(x[:, None] - x, y[:, None] - y) - (r[:, None] + r) + np.eye(len(x)) * 9
     assert gap.min() >= 0.0
     assert 0.45 < math.pi * (r**2).sum() / 200 < 0.56, "as full as random insertion gets"
-    assert f"GEN: 2000 asked, {len(x)} placed" in log
+    assert f"GEN: 2000 requested, {len(x)} placed" in log
 
 
 def test_gen_draws_repeated_radii_more_often(play):
@@ -101,7 +101,7 @@ def test_a_full_box_takes_no_more_and_says_so(play):
     sim, log = play("GEN grid rad discrete 1 x (0 20) y (0 20)", "GEN num 100 rad discrete 1 x (0 20) y (0 20)", "STOP")
     assert len(sim.particles) == 100
     assert [line for line in log.splitlines() if "GEN" in line] == [
-        "GEN: 100 asked, 0 placed in 1000 attempts, 0.0 % of the area covered"
+        "GEN: 100 requested, 0 placed in 1000 attempts, 0.0 % of the area covered"
     ]
 
 
@@ -116,7 +116,7 @@ def test_gen_grid_and_idmin(play):
 
 
 def test_idmin_does_not_take_ids_twice(play):
-    with pytest.raises(ScriptError, match=r"script.py:4: GEN: idmin 3: ids below 4 are taken"):
+    with pytest.raises(ScriptError, match=r"script.py:4: GEN: idmin 3: ids below 4 are or were in use"):
         play("GEN grid rad discrete 1 x (0 4) y (0 4)", "GEN grid idmin 3 rad discrete 1 x (9 11) y (0 2)")
 
 

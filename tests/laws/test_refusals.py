@@ -30,7 +30,7 @@ def two(folder, gap: float = -0.1):
 def test_a_touching_pair_of_two_laws(tmp_path):
     sim = two(tmp_path)
     properties.prop(sim, only(12), **HERTZ)
-    with pytest.raises(CommandError, match="particles 11 and 12 touch, but one has the law linear and the other hertz"):
+    with pytest.raises(CommandError, match="11 and 12 are in contact, but one has the law linear and the other hertz"):
         cycles.cycle(sim, 1)
 
 

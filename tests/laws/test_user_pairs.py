@@ -125,12 +125,12 @@ def test_what_discs_of_two_laws_do(tmp_path):
     with pytest.raises(CommandError, match=r"have several laws, pairs\.py:sticky, own\.py:sticky; RANGE chooses"):
         properties.prop(sim, Ids(0, 5), parameter={"pull": 2.0})
     properties.fix(sim, ("x", "y", "spin"))
-    with pytest.raises(CommandError, match=r"4 and 5 touch, but one has the law pairs.py:sticky and the other own.py"):
+    with pytest.raises(CommandError, match=r"4 and 5 are in contact, .* the law pairs.py:sticky and the other own.py"):
         cycles.cycle(sim, 1)
     properties.prop(
         sim, law=STICKY, between=("own.py:sticky", STICKY), parameter={"pull": 100.0, "stiffening": 4.0}, folder=HERE
     )
-    with pytest.raises(CommandError, match=r"6 and 7 touch, but one has the law own.py:sticky and the other linear"):
+    with pytest.raises(CommandError, match=r"6 and 7 are in contact, .* the law own.py:sticky and the other linear"):
         cycles.cycle(sim, 1)
     properties.prop(sim, law="linear", between=("own.py:sticky", "linear"))
     cycles.cycle(sim, 1)
@@ -167,9 +167,12 @@ def test_between_refuses_what_makes_no_sense(tmp_path):
             "no disc was given the law pairs.py:sticky; there is",
         ),
         ({"law": STICKY, "between": (LINEAR, "linear")}, "needs pull"),
-        ({"law": "linear", "between": (LINEAR, "linear"), "parameter": {"pull": 1.0}}, "parameter belongs to a law of"),
-        ({"law": LINEAR, "between": (LINEAR, "linear"), "kn": 1.0}, "between takes a law and its parameter"),
-        ({"between": (LINEAR, "linear")}, "between takes a law and its parameter"),
+        (
+            {"law": "linear", "between": (LINEAR, "linear"), "parameter": {"pull": 1.0}},
+            "parameter applies to a user law",
+        ),
+        ({"law": LINEAR, "between": (LINEAR, "linear"), "kn": 1.0}, "between accepts only a law and its parameter"),
+        ({"between": (LINEAR, "linear")}, "between accepts only a law and its parameter"),
     ):
         with pytest.raises(CommandError, match=said):
             properties.prop(sim, folder=HERE, **given)
@@ -312,8 +315,8 @@ def test_what_makes_no_sense_is_refused(tmp_path):
         ({"law": STICKY}, "needs pull"),
         ({"law": STICKY, "parameter": {"pull": -1.0}}, "pull is -1, expected a number from 0"),
         ({"law": STICKY, "parameter": {"pull": 1.0, "push": 1.0}}, "has no property 'push'; it has pull, stiffening"),
-        ({"law": "linear", "parameter": {"pull": 1.0}}, "parameter belongs to a law of the user"),
-        ({"parameter": {"pull": 1.0}}, "there are particles without a law of the user"),
+        ({"law": "linear", "parameter": {"pull": 1.0}}, "applies to a user law"),
+        ({"parameter": {"pull": 1.0}}, "some particles have no user law"),
         ({"law": "pairs.py"}, "is named 'file.py:function'"),
         ({"law": "none.py:linear"}, "none.py cannot be read"),
     ):
@@ -323,7 +326,7 @@ def test_what_makes_no_sense_is_refused(tmp_path):
     with pytest.raises(CommandError, match="there are bonds"):
         properties.prop(sim, law=LINEAR, folder=HERE)
     sim = two(tmp_path, law=LINEAR)
-    with pytest.raises(CommandError, match=r"bonds are not for a model with a law of the user, pairs\.py:linear"):
+    with pytest.raises(CommandError, match=r"bonds are not supported with the user law pairs\.py:linear"):
         bonds.bond(sim, n_bond=1.0, s_bond=1.0)
 
 
@@ -331,15 +334,15 @@ def test_energy_is_refused_by_name_where_a_law_does_not_tell_it(tmp_path):
     sim = two(tmp_path, law=LINEAR)
     settings.set_option(sim, "energy", 10)
     history.hist(sim, 1, 10, "energy")
-    with pytest.raises(CommandError, match=r"SET energy: what the law pairs\.py:untold stores is not known"):
+    with pytest.raises(CommandError, match=r"SET energy: the stored energy of the law pairs\.py:untold is not known"):
         properties.prop(sim, law=UNTOLD, folder=HERE)
     settings.set_option(sim, "energy", 0)
-    with pytest.raises(CommandError, match=r"HIST energy: what the law pairs\.py:untold stores is not known"):
+    with pytest.raises(CommandError, match=r"HIST energy: the stored energy of the law pairs\.py:untold is not known"):
         properties.prop(sim, law=UNTOLD, folder=HERE)
     sim = two(tmp_path, law=UNTOLD)
-    with pytest.raises(CommandError, match=r"SET energy: what the law pairs\.py:untold stores is not known"):
+    with pytest.raises(CommandError, match=r"SET energy: the stored energy of the law pairs\.py:untold is not known"):
         settings.set_option(sim, "energy", 10)
-    with pytest.raises(CommandError, match=r"HIST energy: what the law pairs\.py:untold stores is not known"):
+    with pytest.raises(CommandError, match=r"HIST energy: the stored energy of the law pairs\.py:untold is not known"):
         history.hist(sim, 1, 10, "energy")
 
 

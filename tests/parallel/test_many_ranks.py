@@ -362,7 +362,7 @@ def test_each_rank_loads_its_part_of_a_frame(
 @pytest.mark.parametrize(
     ("spoilt", "message"),
     [(lambda text: text.replace("ball num : 768", "ball num : 9"), "9 balls announced, 768 found"),
-     (lambda text: text.replace(" 5.00000000e-01", "            nan", 700), "has no place or size"),
+     (lambda text: text.replace(" 5.00000000e-01", "            nan", 700), "has no position or size"),
      (lambda text: text.replace("current_step", "step"), "no line current_step"),
      (lambda text: text[: len(text) // 2], "cannot read")],
 )  # fmt: skip

@@ -650,7 +650,7 @@ WRONG = {
     "no axis": ("sim.tables.over('E', 'time')",
                 "tables.over: axis: expected 'x', 'y', 'z', 'plastic-strain', 'temperature', 'moisture', got 'time'"),
     "nothing that softens": ("sim.elements.property(young=sim.tables.over('E', 'plastic-strain'))",
-                             "young: a table over plastic-strain cannot stand for it"),
+                             "young cannot be a table over plastic-strain"),
     "unsorted table": ("sim.tables.create('v', [(1, 0), (0, 0)])", "tables.create: table 'v': times must ascend"),
     "no such table": ("sim.nodes.velocity(vx='v', where='id 0')", "nodes.velocity: there is no table 'v'"),
     "gradient of nothing": ("sim.elements.initial_stress(xx=1, gradient={'yy': (0, 1)})", "there is no stress 'yy'"),
@@ -688,7 +688,7 @@ WRONG = {
     "group that is not there": ("sim.nodes.group('a', where=g.InGroup('b'))", "there is no set 'default' of nodes"),
     "nothing chosen": ("sim.nodes.group('a', where='x 9 10')", "nodes.group: the range chooses no node"),
     "quantity that is no text": ("sim.elements[3]", "elements.values: expected the name of a quantity, got 3"),
-    "cycle without particles": ("sim.cycle(10)", "cycle: there are no particles; blocks are stepped by step and solve"),
+    "cycle without particles": ("sim.cycle(10)", "cycle: no particles: step blocks with step and solve"),
     "budget of particles": ("sim.energy()", "energy: there are no particles; energies is the budget of blocks"),
     "missing file": ("sim.restore('none.sav')", "restore: there is no file"),
 }  # fmt: skip
@@ -958,7 +958,7 @@ sim.elements.model("mech-iso-elastic", density=2700, young=1e9, poisson_ratio=0.
 REFUSED = {
     "two states": ("sim.ball(5.0, 5.0, 1.0); sim.save('a.sav')", 2, "study.py:5: save: particles and blocks that are"),
     "functions that nobody calls": ("sim.every(5, print); sim.step(3)", 2, "study.py:5: step: functions of every"),
-    "no blocks to couple": ("hpcdem.Simulation('b').couple()", 2, "study.py:5: couple: there are no blocks yet"),
+    "no blocks to couple": ("hpcdem.Simulation('b').couple()", 2, "study.py:5: couple: no blocks yet"),
     "checkpoint of both": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple(); "
                            "sim.save('a.sav'); sim.coupling.end(); sim.restore('a.sav')", 2,
                            "couple\\(\\) comes first"),
@@ -1051,4 +1051,4 @@ def test_the_programs_of_the_documentation_run(resident: Resident, tmp_path: Pat
 def test_a_script_keeps_its_own_blocks(resident: Resident, tmp_path: Path) -> None:
     (tmp_path / "a.sc").write_text("import hpcdem\nsim = hpcdem.Simulation('b')\npcdc model new\nsim.mesh.quality()\n")
     done = resident(1, "a.sc", "--no-figure", cwd=tmp_path)
-    assert done.returncode == 2 and "a.sc:4: mesh.quality: the blocks of a PCDC script are those" in done.stderr
+    assert done.returncode == 2 and "a.sc:4: mesh.quality: in a PCDC script create the blocks" in done.stderr

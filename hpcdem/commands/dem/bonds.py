@@ -67,11 +67,11 @@ def bond(
     if rubber:
         given["rubber"] = 1.0
         if sim.log is not None:
-            sim.log.warn_once("rubber", "rubber: the mark is kept and written, it has no effect on the motion")
+            sim.log.warn_once("rubber", "rubber: the mark is stored and written but has no effect on the motion")
     if conserving:
         given["conserving"] = 1.0
     if sim.own_laws:
-        raise CommandError(f"bonds are not for a model with a law of the user, {sim.own_laws.titles}")
+        raise CommandError(f"bonds are not supported with the user law {sim.own_laws.titles}")
     gap = TOLERATE if tolerate is None else tolerate
     scale = 1.0 if rext is None else rext
     largest, reach = _reach(sim, gap, scale)
@@ -153,8 +153,8 @@ def _warn_of_overstretched(sim: Simulation, which: np.ndarray) -> None:
     sim.comm.max_into(widest)
     if number and sim.log is not None:
         sim.log.warn(
-            f"{number} of these bonds are past their tensile limit where they are and will break in the next step: a "
-            f"gap counts as strain, tolerate or not; the widest gap at which one of them would hold is {widest[0]:g} m"
+            f"{number} of these bonds exceed their tensile limit and will break in the next step: a gap counts as "
+            f"strain, also with tolerate. The widest gap that one of them can carry is {widest[0]:g} m"
         )
 
 
@@ -198,14 +198,14 @@ def warn_of_two_stiffnesses(sim: Simulation) -> None:
     text = (
         f"{number} bonds have another shear stiffness open than touching, that of particles {a} and {b} most: "
         f"{said(bond_ks)} ({'G A/L of the bond' if by_modulus else 'ks at the moment of bonding'}) and "
-        f"{said(contact_ks)} (ks of the contact{', which goes to 0 with the overlap' if by_hertz else ''}). "
-        "Pairs that open and close under shear make energy from nothing; the word `conserving` in the line of the "
-        "bonds prevents it (docs/physics.md, Bonds)"
+        f"{said(contact_ks)} (ks of the contact{', which goes to 0 with the overlap' if by_hertz else ''}). Pairs that "
+        "open and close under shear create energy; add the word `conserving` to the line of the bonds to prevent this "
+        "(docs/physics.md, Bonds)"
     )
     if undamped:
         sim.log.warn_once("two shear stiffnesses", f"{text}. Nothing damps {undamped} of these pairs")
     else:
-        sim.log.info(f"{text}. Damping takes energy out, but need not be enough where little load presses them")
+        sim.log.info(f"{text}. Damping dissipates energy but may be insufficient under small loads")
 
 
 def break_bonds(sim: Simulation, where: Selection | None = None) -> int:

@@ -156,7 +156,7 @@ def join(sim: Simulation, where: Selection | None = None, group: str | None = No
     of = np.repeat(p["gid"], sim.hist.counts())
     between = np.isin(of, gid) & np.isin(sim.hist.partner, gid)
     if sim.comm.any(bool((sim.hist.bond[between] != 0).any())):
-        raise CommandError("some of the particles are bonded to each other; BOND break comes first")
+        raise CommandError("some of these particles are bonded: remove the bonds with BOND break")
     order = np.argsort(gid)
     gid, x, y, r, vx, vy, spin = (v[order] for v in (gid, x, y, r, vx, vy, spin))
     row = _joined(x, y, r, vx, vy, spin)

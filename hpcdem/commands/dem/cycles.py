@@ -121,7 +121,7 @@ def prepare(sim: Simulation, dt_known: bool = False) -> None:
 def _check_materials(sim: Simulation) -> None:
     p, rows = sim.particles, sim.materials.rows
     if (sim.settings.energy > 0 or sim.energy is not None) and (rows["xp"].any() or rows["yp"].any()):
-        raise CommandError("the account of SET energy does not know the work of xp and yp; use one of them")
+        raise CommandError("the energy budget (SET energy) does not support xp and yp; use one of them")
     free = p["fix"] != 7
     light = (rows["density"][p["material"]] <= 0.0) & free
     if sim.comm.any(bool(light.any())):
@@ -177,7 +177,7 @@ def _check_laws(sim: Simulation) -> None:
     first = [pairs[0] for pairs in sim.comm.allgather(mixed[:1]) if pairs]
     if first:
         a, b, one, other = first[0]
-        raise CommandError(f"particles {a} and {b} touch, but one has the law {one} and the other {other}")
+        raise CommandError(f"particles {a} and {b} are in contact, but one has the law {one} and the other {other}")
 
 
 def time_step(sim: Simulation) -> float:
@@ -196,9 +196,7 @@ def time_step(sim: Simulation) -> float:
         raise CommandError("no time step: SET DT or SET frac must come before the first cycle")
     light = diagnostics.lightest(sim)
     if not math.isfinite(light):
-        raise CommandError(
-            "SET frac: no particle is free to move, so there is no mass to find a time step from; use SET DT"
-        )
+        raise CommandError("SET frac: no particle is free to move, so no mass defines a time step; use SET DT")
     rows = _laws_in_use(sim)
     stiffest = max(float(np.max(rows[rows[:, 0] == 0.0, 1], initial=0.0)), diagnostics.stiffest_bond(sim))
     out, _ = diagnostics.contact_rows(sim)
@@ -230,12 +228,10 @@ def _laws_in_use(sim: Simulation) -> np.ndarray:
 def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str, int], final_frame: bool) -> None:
     """Write the `_ini` frame and run n steps."""
     if sim.progress is not None:
-        raise CommandError(
-            f"{name} cannot be used by a function that is called in the middle of {sim.progress['name']}"
-        )
+        raise CommandError(f"{name} cannot be used by a function that is called during {sim.progress['name']}")
     if sim.coupled:
         raise CommandError(
-            f"{name} would leave the blocks behind that these particles touch: `pcdc model step` steps both"
+            f"{name} would step these particles without the blocks coupled to them: use `pcdc model step` for both"
         )
     prepare(sim)
     start(sim, name, n, origin, intervals, final_frame)
@@ -317,7 +313,7 @@ def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
         elif dt > critical and not sim.log.has_warned("critical time step"):
             sim.log.warn_once(
                 "critical time step",
-                f"{text}. Beyond the estimate results may be noisy; if the run blows up, repeat it with a smaller one",
+                f"{text}. Beyond the estimate results may be noisy. Reduce the time step if the run becomes unstable",
             )
         elif 0.5 * dt * highest > TOLD * sim.told_share:
             sim.told_share = 0.5 * dt * highest
@@ -326,8 +322,8 @@ def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
         sim.log.warn_once(
             "critical time step",
             f"{when}the time step {said(dt)} is {dt / critical:.2f} times the critical one as estimated from masses "
-            f"and stiffnesses ({said(critical)}); results may be noisy, and a run that blows up should be repeated "
-            "with a smaller one",
+            f"and stiffnesses ({said(critical)}); results may be noisy. Reduce the time step if the run becomes "
+            "unstable",
         )
 
 
@@ -344,13 +340,13 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
         sim.log.warn_once("damping", f"SET damp lsm: eta dt / m is {damping:.3g} for the lightest particle, above 1")
     if braking > 1.0:
         sim.log.warn_once(
-            "dashpots", f"SET restitution: the dashpots of the contacts there are would reverse velocities in "
-            f"{1.0 / braking:.3g} steps; rebounds are not those asked for, take a smaller time step"
+            "dashpots", f"SET restitution: dashpots would reverse velocities within {1.0 / braking:.3g} steps, so the "
+            "restitution will not be met. Reduce the time step"
         )  # fmt: skip
     if sim.dashpots is not None and (sim.settings.lsm > 0.0 or (sim.materials.rows["damp"] > 0.0).any()):
         sim.log.warn_once(
-            "restitution", "SET restitution: PROP damp and SET damp lsm take energy of rebounds besides; they are "
-            "lower than asked for"
+            "restitution", "SET restitution: PROP damp and SET damp lsm dissipate additional energy, so rebounds will "
+            "be lower than requested"
         )  # fmt: skip
 
 

@@ -109,7 +109,7 @@ def _checked(comm: Comm, frame: Frame, path: str) -> Frame:
         comm.agree(f"{path}: {what.format(gid[wrong][0])}" if wrong.any() else None)
 
     whole = np.isfinite(p["x"]) & np.isfinite(p["y"]) & np.isfinite(p["radius"]) & (p["radius"] > 0.0)
-    refuse(~whole, "particle {} has no place or size")
+    refuse(~whole, "particle {} has no position or size")
     for name in ("vx", "vy", "spin"):
         if name in p:
             refuse(~np.isfinite(p[name]), f"{name} of particle {{}} is not a number")
@@ -118,7 +118,7 @@ def _checked(comm: Comm, frame: Frame, path: str) -> Frame:
             p[name] = np.zeros(len(gid))
     again = np.zeros(len(gid), bool)
     again[1:] = gid[1:] == gid[:-1]
-    refuse((gid < 0) | again, "ids of particles must not be negative, and each can stand there once")
+    refuse((gid < 0) | again, "ids of particles must not be negative, and each must be unique")
     if not np.isfinite([frame.walls["p1"], frame.walls["p2"]]).all():
         raise HpcdemError(f"{path}: an end of a wall is not a number")
     ids = frame.walls["id"].tolist()
@@ -285,6 +285,6 @@ def _tell(sim: Simulation, path: Path | str, p: dict[str, Any], number: int, unk
     )
     if unknown:
         sim.log.warn(
-            f"{path} does not say how strong {unknown} of its bonds are (frames of ZDEM have n_bond and s_bond only), "
-            "so these are left out: PROP with bond keys makes them"
+            f"{path} does not contain the strength of {unknown} of its bonds (frames of ZDEM have n_bond and s_bond "
+            "only), so these are omitted. Create them with PROP and bond keys"
         )

@@ -20,7 +20,9 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
     if interval <= 0:
         raise CommandError(f"HIST INTERVAL must be positive, got {interval}")
     if what == "energy" and (law := sim.own_laws.unaccounted()):
-        raise CommandError(f"HIST energy: what the law {law} stores is not known: pair_law(energy=) says it")
+        raise CommandError(
+            f"HIST energy: the stored energy of the law {law} is not known: define it with pair_law(energy=)"
+        )
     sim.history_origins.pop(id, None)
     name = what.split()[0] if what.split() else ""
     if name in OF_PARTS:
@@ -28,7 +30,7 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
         if origin is not None:
             sim.history_origins[id] = origin
     elif what not in followed(sim):
-        raise CommandError(f"HIST cannot follow {what}; it knows {', '.join((*followed(sim), *OF_PARTS))}")
+        raise CommandError(f"HIST cannot follow {what}; it supports {', '.join((*followed(sim), *OF_PARTS))}")
     sim.history_wishes[id] = (interval, what)
 
 

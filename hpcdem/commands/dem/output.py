@@ -131,7 +131,9 @@ def folder(sim: Simulation) -> Path:
             sim.log.place = path
         if not locked and sim.log is not None:
             sim.log.warn_once(
-                "lock", f"the file system of {path} has no locks: nobody will notice if two runs write there at once"
+                "lock",
+                f"the file system of {path} has no locks: two runs that write there at the same time cannot be "
+                "detected",
             )
     return path
 
@@ -242,7 +244,7 @@ def warn_of_overlaps(sim: Simulation) -> None:
     sim.log.warn_once(
         key,
         f"step {sim.clock.step}: {number} contacts overlap by more than half the smaller radius; the stiffness is too "
-        "small for the load, or particles were made inside each other\n" + "\n".join(lines),
+        "small for the load, or particles were created with overlaps\n" + "\n".join(lines),
     )
 
 
@@ -298,7 +300,7 @@ ENERGY_WORDS = {
     "loss_bonds": "lost when bonds broke",
     "loss_opened": "lost when contacts opened",
     "loss_stiffness": "lost by change of shear stiffness",
-    "loss_laws": "lost in pairs with a law of the user",
+    "loss_laws": "lost in pairs with a user law",
     "commands": "brought by commands",
     "box": "brought by leaving the BOX",
     "work_blocks": ACROSS,

@@ -144,7 +144,7 @@ def ball(
         if id < 0:
             raise CommandError(f"id must not be negative, got {id}")
         if sim.comm.any(bool((sim.particles["gid"] == id).any())):
-            raise CommandError(f"there is a particle with id {id} already")
+            raise CommandError(f"a particle with id {id} exists already")
     add(sim, np.array([[x, y, rad]]), sim.group_number(group), color, first_gid=id)
 
 
@@ -183,7 +183,9 @@ def gen(
     made = add(sim, rows, sim.group_number(group), color)
     if sim.log is not None:
         cover = float(np.pi * (rows[:, 2] ** 2).sum() / ((x[1] - x[0]) * (y[1] - y[0])))
-        sim.log.info(f"GEN: {num} asked, {made} placed in {tried} attempts, {100.0 * cover:.1f} % of the area covered")
+        sim.log.info(
+            f"GEN: {num} requested, {made} placed in {tried} attempts, {100.0 * cover:.1f} % of the area covered"
+        )
     return made
 
 
@@ -215,7 +217,7 @@ def gen_grid(
     rows = packing.lattice(np.array(rad), x, y, sim.settings.seed, sim.streams, first, end)
     sim.streams += 1
     if idmin is not None and idmin < sim.next_gid and sim.count(len(sim.particles)):
-        raise CommandError(f"idmin {idmin}: ids below {sim.next_gid} are taken or were once")
+        raise CommandError(f"idmin {idmin}: ids below {sim.next_gid} are or were in use")
     return add_part(sim, rows, first, total, sim.group_number(group), color, first_gid=idmin)
 
 

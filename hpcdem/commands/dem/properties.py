@@ -80,7 +80,7 @@ def prop(
     if between:
         others = (*properties.values(), xv, yv, spin, color, group, where)
         if law is None or hertz or any(other is not None for other in others):
-            raise CommandError("between takes a law and its parameter, and nothing else")
+            raise CommandError("between accepts only a law and its parameter")
         _say_between(sim, law, between, parameter or {}, folder)
         return
     given = checked(properties)
@@ -127,17 +127,19 @@ def _of_law(
         return {}
     if law == LINEAR:
         if parameter:
-            raise CommandError(f"parameter belongs to a law of the user, not to {LINEAR}")
+            raise CommandError(f"parameter applies to a user law, not to {LINEAR}")
         return {"law": 0.0, "hertz": 0.0, **dict.fromkeys(OWN, 0.0)}
     laws = sim.own_laws
     if law is None:
         column = sim.materials.rows["law"][sim.particles["material"]]
         numbers = {int(k) for part in sim.comm.allgather(np.unique(column[chosen(sim, where)]).tolist()) for k in part}
         if not numbers - {0} or 0 in numbers:
-            raise CommandError("parameter: there are particles without a law of the user; law 'file.py:function' first")
+            raise CommandError("parameter: some particles have no user law; assign law 'file.py:function' first")
         if len(numbers) > 1:
             some = ", ".join(laws.laws[k - 1].title for k in sorted(numbers))
-            raise CommandError(f"parameter: the particles have several laws, {some}; RANGE chooses those of one")
+            raise CommandError(
+                f"parameter: the particles have several laws, {some}; select the particles of one law by RANGE"
+            )
         return user_laws.given(laws.laws[numbers.pop() - 1], parameter, whole=False)
     number, values = _added(sim, law, parameter, folder)
     return {"law": float(number), **dict.fromkeys(OWN, 0.0), **values}
@@ -147,11 +149,11 @@ def _added(sim: Simulation, law: str, parameter: Mapping[str, float], folder: Pa
     """The number of a law of the user that the model has from now on, and its properties. Collective."""
     new = load_law(sim, law, folder)
     if sim.bonds_left():
-        raise CommandError("there are bonds, and a law of the user knows none: BOND break comes first")
+        raise CommandError("a user law does not support bonds: remove them with BOND break")
     if new.declared.energy is None:
-        unknown = f"what the law {new.title} stores is not known: pair_law(energy=) says it"
+        unknown = f"the stored energy of the law {new.title} is not known: define it with pair_law(energy=)"
         if sim.energy is not None or sim.settings.energy:
-            raise CommandError(f"SET energy: {unknown}, or SET energy 0 comes first")
+            raise CommandError(f"SET energy: {unknown}; switch it off with SET energy 0")
         if any(what == "energy" for _, what in sim.history_wishes.values()):
             raise CommandError(f"HIST energy: {unknown}")
     values = user_laws.given(new, parameter, whole=True)
@@ -166,10 +168,12 @@ def _say_between(sim: Simulation, law: str, pair: Sequence[str], parameter: Mapp
         raise CommandError(f"between names two laws, got {len(pair)}")
     first, second = sorted(sim.own_laws.named(one) for one in pair)
     if first == second:
-        raise CommandError(f"between names two laws, both are {pair[0]}; pairs of discs with one law follow that")
+        raise CommandError(
+            f"between needs two different laws, both are {pair[0]}; pairs of discs with the same law follow that law"
+        )
     if law == LINEAR:
         if parameter:
-            raise CommandError(f"parameter belongs to a law of the user, not to {LINEAR}")
+            raise CommandError(f"parameter applies to a user law, not to {LINEAR}")
         sim.own_laws.between[first, second] = 0, ()
     else:
         number, values = _added(sim, law, parameter, folder)

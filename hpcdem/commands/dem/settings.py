@@ -62,7 +62,9 @@ def _set_interval(sim: Simulation, name: str, value: float) -> None:
     """Steps between two outputs, 0 or less: none."""
     s = sim.settings
     if name == "energy" and value > 0 and (law := sim.own_laws.unaccounted()):
-        raise CommandError(f"SET energy: what the law {law} stores is not known: pair_law(energy=) says it")
+        raise CommandError(
+            f"SET energy: the stored energy of the law {law} is not known: define it with pair_law(energy=)"
+        )
     setattr(s, name, max(int(value), 0))
     if name == "stepbar" and sim.log is not None:
         sim.log.set_interval(explicit=s.stepbar > 0)

@@ -38,7 +38,7 @@ def wall(
         limits.check_nodes(*nodes, name=f"wall {id}")
         at_box = sim.walls.find(id)
         if at_box is not None and sim.walls.side[at_box]:
-            raise CommandError(f"wall {id} is a side of BOX, which BOX alone can place; give this wall another id")
+            raise CommandError(f"wall {id} is a side of BOX, and only BOX can move it; choose another id")
         forget(sim, sim.walls.find(id))
         sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")
     at = sim.walls.row(id)

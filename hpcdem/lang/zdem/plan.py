@@ -140,7 +140,7 @@ def _set(statement: Statement, known: _Known) -> None:
 
 def _no_energy_with_pressure(statement: Statement, known: _Known) -> None:
     if known.energy and known.pressure:
-        raise statement.error("the account of SET energy does not know the work of xp and yp; leave one of them out")
+        raise statement.error("the energy budget (SET energy) does not support xp and yp; use one of them")
 
 
 def _box(statement: Statement, known: _Known) -> None:
@@ -154,7 +154,7 @@ def _box(statement: Statement, known: _Known) -> None:
 def _wall(statement: Statement, known: _Known) -> None:
     wall = statement.get("id")
     if "nodes" in statement.arguments and known.boxed and wall in BOX_IDS.values():
-        raise statement.error(f"wall {wall} is a side of BOX, which BOX alone can place; give this wall another id")
+        raise statement.error(f"wall {wall} is a side of BOX, and only BOX can move it; choose another id")
     if "nodes" in statement.arguments:
         known.walls[wall] = (0.0, 0.0)
     elif wall not in known.walls and known.complete:

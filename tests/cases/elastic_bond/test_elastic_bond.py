@@ -239,7 +239,7 @@ def test_bonds_that_break_at_once_are_announced(tmp_path, keys, disk):
     last = np.where(np.arange(25) % 2, 120.0, 100.0) * 0.07 if "ebmod" in keys else np.full(25, 10.0)
     breaks = int((gaps > last).sum())
     bonds.bond(sim, **keys, tolerate=20.0)
-    assert len(log) == 1 and log[0].startswith(f"{breaks} of these bonds are past their tensile limit")
+    assert len(log) == 1 and log[0].startswith(f"{breaks} of these bonds exceed their tensile limit")
     widest = float(log[0].split()[-2])
     assert widest == pytest.approx(last[gaps > last].max(), rel=1e-5)
     steps(sim, 1)

@@ -138,8 +138,8 @@ def test_blocks_are_refused(tmp_path):
     ("more", "dt", "said"),
     [
         ({}, 2e-5, ""),
-        ({"damp": 0.3}, 2e-5, "PROP damp and SET damp lsm take energy of rebounds besides"),
-        ({}, 6e-2, "would reverse velocities in"),
+        ({"damp": 0.3}, 2e-5, "PROP damp and SET damp lsm dissipate additional energy"),
+        ({}, 6e-2, "would reverse velocities within"),
     ],
 )
 def test_what_is_warned_of(tmp_path, capsys, more, dt, said):
