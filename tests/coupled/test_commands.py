@@ -109,7 +109,7 @@ def test_scaled_masses_are_refused(tmp_path):
 def test_equilibrium_at_once_is_refused(tmp_path):
     project, sim = scene(tmp_path)
     coupling.couple(project, sim)
-    with pytest.raises(CommandError, match="model solve elastic would leave the particles behind"):
+    with pytest.raises(CommandError, match="model solve elastic would step these blocks without the particles"):
         stepping.solve_elastic(project)
 
 
@@ -166,9 +166,11 @@ def test_what_is_said_of_one_only_is_named(tmp_path):
     both = coupling.couple(project, sim)
     stepping.step(project, 3)
     told = said.getvalue()
-    assert told.count("gravity differs: SET gravity 0 -9.81 moves the particles, model gravity (0,0) the blocks") == 1
-    assert told.count("blocks do not touch each other; they do touch particles") == 1
-    assert told.count("is in or beyond wall 7: walls and BOX hold particles only") == 1
+    assert (
+        told.count("gravity differs: SET gravity 0 -9.81 acts on the particles, model gravity (0,0) on the blocks") == 1
+    )
+    assert told.count("there is no contact between blocks, but contact with particles") == 1
+    assert told.count("is in or beyond wall 7, and walls and BOX stop particles only") == 1
     assert told.count("is in or beyond the bottom side of the BOX") == 1 and "wall 8" not in told
     stepping.step(project, 1500)
     told = said.getvalue()

@@ -178,6 +178,6 @@ def test_blocks_in_three_dimensions(tmp_path):
     project = Project(Blocks(outdir=tmp_path / "data"), tmp_path, tmp_path / "data")
     project.clear(3)
     meshes.grid(project, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (1, 1, 1))
-    with pytest.raises(CommandError, match="discs move in a plane: they cannot be stepped with blocks in three"):
+    with pytest.raises(CommandError, match="discs move in a plane and cannot be coupled to blocks in three"):
         coupling.couple(project, discs([(0.5, 1.5, 0.1)], tmp_path / "sand", dt=5e-6))
     assert project.coupled is None

@@ -122,10 +122,10 @@ def test_profiles_along_a_fracture(tmp_path: Path) -> None:
     rows = list(csv.reader((tmp_path / "out" / "p.csv").open()))
     assert len(rows) == 1 + 9 + 8 and rows[1][:2] == ["pressure", "0.0"]
     assert float(rows[1][2]) == pytest.approx(1.0)
-    with pytest.raises(CommandError, match=r"along one line with two ends; the \d+ channels"):
+    with pytest.raises(CommandError, match=r"needs one line with two ends; the \d+ channels"):
         fdem.flow.model(model, {**WATER, "aperature_initial": 1e-4})
         fdem.charts.add(model, "p", profile="pressure")
-    with pytest.raises(CommandError, match="room for one of them"):
+    with pytest.raises(CommandError, match="give only one of cracks"):
         fdem.charts.export(model, "p", "p.png", cracks=True, fluid="pressure")
 
 

@@ -317,7 +317,7 @@ def test_what_cannot_be_is_refused() -> None:
         heat.of_fluid()
     heat.assign(None, GRANITE)
     fluid = heat.of_fluid()
-    with pytest.raises(CommandError, match="the fluid has no heat yet"):
+    with pytest.raises(CommandError, match="the fluid has no thermal model"):
         heat.prescribe_fluid(None, 1.0)
     with pytest.raises(CommandError, match="needs capacity"):
         fluid.assign(None, {"conductivity": 1.0})

@@ -433,7 +433,7 @@ def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(CommandError, match="there is no heat yet"):
         heat.of_fluid()
     heat.assign(None, GRANITE)
-    with pytest.raises(CommandError, match="the fluid has no heat yet"):
+    with pytest.raises(CommandError, match="the fluid has no thermal model"):
         heat.prescribe_fluid(None, 1.0)
     fluid = heat.of_fluid()
     fluid.assign(flow.network.channels[:2], WATER)

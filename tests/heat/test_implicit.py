@@ -199,8 +199,8 @@ def test_the_command_says_how_it_ended(tmp_path) -> None:
     assert project.solved["reason"] == "steady"
     assert fdem.queries.values(project, "node", "temperature") == pytest.approx(50.0)
     for given, text in (
-        ({}, "time or steady, one of them"), ({"time": 1.0, "steady": True}, "time or steady, one of them"),
-        ({"steady": True, "dt": 1.0}, "dt goes with time"), ({"time": 1.0, "dt": -1.0}, "must be positive"),
+        ({}, "give either time or steady"), ({"time": 1.0, "steady": True}, "give either time or steady"),
+        ({"steady": True, "dt": 1.0}, "dt needs time"), ({"time": 1.0, "dt": -1.0}, "must be positive"),
     ):  # fmt: skip
         with pytest.raises(CommandError, match=text):
             fdem.steps.solve_thermal(project, **given)

@@ -87,7 +87,7 @@ def test_what_a_script_cannot_do(tmp_path) -> None:
     with pytest.raises(CommandError, match="one of heat_flux"):
         fdem.heat.face_condition(model)
     fdem.assignments.null(model, where=(Ids(0, 1),))
-    with pytest.raises(CommandError, match="do not come back in a model with heat"):
+    with pytest.raises(CommandError, match="cannot be reinstated in a model with heat"):
         fdem.assignments.element_model(model, "mech_iso_elastic", ROCK, where=(Ids(0, 1),))
     fdem.assignments.element_model(model, "mech_iso_elastic", ROCK)
 

@@ -323,7 +323,7 @@ def test_what_makes_no_sense_is_refused(tmp_path):
         with pytest.raises(CommandError, match=said):
             properties.prop(sim, folder=HERE, **given)
     bonds.bond(sim, n_bond=1.0, s_bond=1.0)
-    with pytest.raises(CommandError, match="there are bonds"):
+    with pytest.raises(CommandError, match="a user law does not support bonds"):
         properties.prop(sim, law=LINEAR, folder=HERE)
     sim = two(tmp_path, law=LINEAR)
     with pytest.raises(CommandError, match=r"bonds are not supported with the user law pairs\.py:linear"):

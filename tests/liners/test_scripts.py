@@ -131,5 +131,5 @@ def test_errors_of_liners_that_are_there(bench: Bench, line: str, message: str) 
 def test_deleted_elements_are_no_longer_chosen(bench: Bench) -> None:
     bench(LINED + "pcdc liner delete range id 3\npcdc model step 1\nn = pcdc.numbers('liner-element')\n")
     assert bench["n"].tolist() == [0, 1, 2, *range(4, 15)]
-    with pytest.raises(ScriptError, match=r"liner-element 3 was taken out \(liner delete\)"):
+    with pytest.raises(ScriptError, match=r"liner-element 3 was removed \(liner delete\)"):
         bench("pcdc liner delete range id 3\n")

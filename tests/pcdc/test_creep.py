@@ -197,8 +197,8 @@ def test_refused_with_its_line(tmp_path, line, told):
     ("lines", "told"),
     [
         ("pcdc model creep on\npcdc model solve time 1", "need the length of a creep step: model creep on dt"),
-        ("pcdc model creep on dt 1\npcdc model solve time 1 cycles 5", "time and cycles exclude each other"),
-        ("pcdc model option dynamic on\npcdc model solve elastic time 1", "model option dynamic off comes first"),
+        ("pcdc model creep on dt 1\npcdc model solve time 1 cycles 5", "time and cycles cannot be combined"),
+        ("pcdc model option dynamic on\npcdc model solve elastic time 1", "use model option dynamic off first"),
         ("pcdc node boundary mech-vel-b-c velocity-x 1 range id 0\npcdc model creep on dt 1\npcdc model solve time 1",
          "node 0 has a prescribed motion in x"),
         ("pcdc element c-model mech-iso-e property den 1 young 1 p-r 0\npcdc model creep on dt 1\n"
@@ -217,11 +217,11 @@ def test_what_cannot_creep_is_refused(tmp_path, lines, told):
 def test_coupled_blocks_do_not_creep(tmp_path):
     rock = Rock(tmp_path, SHEAR + "pcdc model creep on dt 1\n")
     particles = SimpleNamespace(outdir=tmp_path / "particles", settings=SimpleNamespace(units=""))
-    with pytest.raises(CommandError, match="do not creep: model creep off comes first"):
+    with pytest.raises(CommandError, match="coupled blocks cannot creep: use model creep off"):
         coupling.couple(rock.project, particles)
     rock("pcdc model creep off\n")
     rock.project.coupled = particles
-    with pytest.raises(ScriptError, match="model creep would leave the particles behind"):
+    with pytest.raises(ScriptError, match="model creep would step these blocks without the particles"):
         rock("pcdc model creep on dt 1\n")
 
 

@@ -104,13 +104,13 @@ def test_what_was_chosen_is_what_is_there(desk):
 
 @pytest.mark.parametrize(
     ("line", "message"),
-    [("element property young 1e9 range group 'void' set 'stage'", r"chooses no element: all that it names \(8\) was"),
-     ("element property young 1e9 range id 18", r"element 18 was taken out \(element c-model null\)"),
-     ("node boundary mech-m-b-c type 1 range x 3 3 y 2 2", r"chooses no node: all that it names \(1\) was taken out"),
-     ("face-joint property gf1 3 range face-of 'void' set 'stage'", "chooses no face-joint: all that it names"),
+    [("element property young 1e9 range group 'void' set 'stage'", r"no element: all that it selects \(8\) was"),
+     ("element property young 1e9 range id 18", r"element 18 was removed \(element c-model null\)"),
+     ("node boundary mech-m-b-c type 1 range x 3 3 y 2 2", r"selects no node: all that it selects \(1\) was removed"),
+     ("face-joint property gf1 3 range face-of 'void' set 'stage'", "selects no face-joint: all that it selects"),
      ("element property young 1e9 range id 480", "there is no element 480; numbers go from 0 to 47"),
-     ("history create 'one' element id 18 value stress-xx", "element 18 was taken out"),
-     ("element c-model null range group 'void' set 'stage'", "chooses no element: all that it names")],
+     ("history create 'one' element id 18 value stress-xx", "element 18 was removed"),
+     ("element c-model null range group 'void' set 'stage'", "selects no element: all that it selects")],
 )  # fmt: skip
 def test_what_is_gone_is_said_to_be_gone(desk, line, message):
     with pytest.raises(HpcdemError, match=message):
@@ -181,7 +181,7 @@ def test_places_are_those_of_the_mesh_unless_it_says_present(desk):
     assert pcdc.numbers("element", group="in", set="u").tolist() == [2, 3]
     desk("pcdc element-face group 'f' set 'w' range x 1.5 2.8 present\n")
     assert {f // 4 for f in pcdc.numbers("face", group="f", set="w")} == {0, 1}
-    with pytest.raises(HpcdemError, match="chooses elements, by where their centres are now"):
+    with pytest.raises(HpcdemError, match="selects elements by their present centres"):
         desk("pcdc node group 'x' range geometry 'box' present\n")
-    with pytest.raises(HpcdemError, match="present goes with x, y and geometry"):
+    with pytest.raises(HpcdemError, match="present needs x, y or geometry"):
         desk("pcdc node group 'x' range group 'a' present\n")

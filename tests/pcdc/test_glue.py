@@ -62,7 +62,7 @@ def test_without_it_they_part_and_with_a_joint_they_hold_up_to_its_strength(desk
 def test_what_is_said(desk):
     desk.project.blocks.log = desk.log
     desk(TWO + "pcdc mesh structured (0,1) (2,2) cells 4 2 diagonal right group 'c' set 'bodies'\npcdc mesh glue\n")
-    assert "glue: 6 faces of different bodies are joints now, 8 points have become one" in desk.log.lines[-1]
+    assert "glue: 6 faces of different bodies are joints now, 8 points were merged" in desk.log.lines[-1]
 
 
 def test_only_those_between_two_groups(desk):
@@ -71,7 +71,7 @@ def test_only_those_between_two_groups(desk):
     from hpcdem.commands.fdem.choices import chosen
 
     assert len(chosen(desk.project, g.JOINT, (g.Between("a", "c", "bodies"),))) == 4
-    with pytest.raises(HpcdemError, match="chooses no face-joint"):
+    with pytest.raises(HpcdemError, match="selects no face-joint"):
         chosen(desk.project, g.JOINT, (g.Between("a", "b", "bodies"),))
 
 

@@ -97,7 +97,7 @@ def test_the_time_step_follows_its_table(tmp_path):
         seen.append(rock.blocks.clock.dt)
         assert seen[-1] == rock.blocks.tables["dt"](rock.blocks.clock.time)
     assert seen[0] == pytest.approx(1e-5 + 1e-3 * 3e-5 / 2e-3) and seen[0] > seen[1] > seen[2] == seen[3] == 5e-6
-    with pytest.raises(HpcdemError, match="table 'dt' is used by the time step: model time-step value 0 comes first"):
+    with pytest.raises(HpcdemError, match="the time step uses table 'dt': release it with model time-step value 0"):
         rock("pcdc table delete 'dt'\n")
     rock("pcdc model time-step 2e-5\npcdc table delete 'dt'\npcdc model step 1\n")
     assert rock.blocks.clock.dt == 2e-5
@@ -152,7 +152,7 @@ def test_run_time_by_the_clock_of_another_part(tmp_path):
     dt = rock.blocks.clock.dt
     rock("pcdc model solve\n")
     assert rock.project.solved["reason"] == "time" and abs(heat.time - 100.0) <= max(0.5 * dt, heat.dt)
-    with pytest.raises(HpcdemError, match="thermal has a time step of its own"):
+    with pytest.raises(HpcdemError, match="thermal has its own time step"):
         rock("pcdc model reset thermal time-step 2 current-time 0\npcdc model solve\n")
 
 
@@ -183,7 +183,7 @@ def test_clocks_are_set_and_told(tmp_path):
         ("reset proppant-transport current-time 0", "there is no proppant yet"),
         ("reset mechanical", "mechanical.* needs at least one of start-time, current-time, time-step"),
         ("cycle-option thermal", "thermal.* needs at least one of time-step, cycle-number"),
-        ("cycle-option hydraulic c-n 3 proppant-transport c-n 4", "proppant moves in the steps of the fluid"),
+        ("cycle-option hydraulic c-n 3 proppant-transport c-n 4", "proppant uses the steps of the fluid"),
     ):  # fmt: skip
         with pytest.raises(HpcdemError, match=why):
             rock(f"pcdc model {words}\n")

@@ -91,5 +91,5 @@ def test_a_diagram_beside_the_plastic_strain(tmp_path):
     left = pictures["plastic"][:, : sizes["plastic"] // 3, :3]
     coloured = (left.max(axis=2) - left.min(axis=2) > 0.1).mean()
     assert coloured > 0.1 and not np.array_equal(pictures["plastic"], pictures["cracks"])
-    with pytest.raises(ScriptError, match="room for one of them"):
+    with pytest.raises(ScriptError, match="give only one of cracks"):
         run(tmp_path, PILLAR + "pcdc model step 50\n" + chart.format("cracks plastic"))

@@ -57,7 +57,7 @@ def test_a_group_of_elements_is_not_one_of_their_joints(bench):
     bench(BOX)
     for kind in (g.JOINT, g.FACE, g.NODE):
         with pytest.raises(
-            CommandError, match=rf"no set 'domain' of .*'rock' is a group of elements: face-of .*{kind}s"
+            CommandError, match=rf"no set 'domain' of .*'rock' is a group of elements: use face-of .*{kind}s"
         ):
             numbers(bench, kind, g.InGroup("rock", "domain"))
         assert numbers(bench, kind, g.OfElements("rock", "domain"))
@@ -156,7 +156,7 @@ def test_cracks(bench):
 
 def test_a_crack_that_is_no_line_of_the_mesh_follows_its_edges(bench):
     bench(BOX + "pcdc geometry create polyline (0,0.9) (4,1.1) as-layer 'fault'\n")
-    with pytest.raises(CommandError, match="with follow the nearest edges are taken"):
+    with pytest.raises(CommandError, match="follow uses the nearest edges"):
         meshes.intersect(bench.project, "fault")
     bench("pcdc mesh intersect layer 'fault' follow\n")
     assert numbers(bench, g.JOINT, g.OnCrack()) == numbers(bench, g.JOINT, g.Span(1, 1, 1))
@@ -176,7 +176,7 @@ def test_several_bodies_are_one_mesh(bench):
     ("terms", "message"),
     [((g.Ids(3, 2),), "the first number is above the last"),
      ((g.Span(0, 2, 1),), "the first bound is above the second"),
-     ((g.Span(0, 0, 1), g.Span(0, 2, 3)), "chooses no element; each of its terms alone chooses some"),
+     ((g.Span(0, 0, 1), g.Span(0, 2, 3)), "selects no element; each of its terms alone selects some"),
      ((g.OnCrack(),), "makes no sense for elements")],
 )  # fmt: skip
 def test_ranges_that_make_no_sense(bench, terms, message):
@@ -225,7 +225,7 @@ def test_area(bench):
     )
     assert by_words(bench, g.ELEMENT, "area 0.5 2") == [0, 1]
     assert by_words(bench, g.ELEMENT, "area 3.9 4.1") == [2, 3, 4, 5]
-    with pytest.raises(CommandError, match="area chooses elements in 2 dimensions"):
+    with pytest.raises(CommandError, match="area selects elements in 2 dimensions"):
         by_words(bench, g.FACE, "area 0 9")
 
 

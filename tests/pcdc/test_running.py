@@ -84,7 +84,7 @@ def test_a_solve_without_an_aim_ends_after_10_000_cycles(bench, monkeypatch):
     monkeypatch.setattr(bench.blocks, "unbalanced_ratio", lambda: 0.4 / bench.blocks.clock.step)
     bench(BOX + "pcdc model option dynamic off\npcdc model solve\n")
     assert bench.blocks.clock.step == 10_000 and bench.project.solved["reason"] == "cycles"
-    assert "ended after 10000 cycles, which it does without an aim, at ratio 4e-05" in bench.blocks.log.lines[-1]
+    assert "without a criterion ended after 10000 cycles at ratio 4e-05" in bench.blocks.log.lines[-1]
     monkeypatch.setattr(bench.blocks, "unbalanced_ratio", lambda: 4e-2 / bench.blocks.clock.step)
     bench("pcdc model solve\n")
     assert bench.blocks.clock.step == 10_050 and bench.project.solved["reason"] == "ratio"
@@ -269,7 +269,7 @@ def test_where_a_run_ends_does_not_depend_on_where_it_was_interrupted(bench, mon
 
 def test_the_energy_budget_is_asked_for_before_it_is_recorded(bench):
     bench.blocks.budget = None
-    with pytest.raises(HpcdemError, match=r"script.sc:2: .*no energy budget is kept: model option energy on"):
+    with pytest.raises(HpcdemError, match=r"script.sc:2: .*no energy budget yet: use model option energy on"):
         bench(BOX + "pcdc history create 'e' model value kinetic-energy\n")
     bench(BOX + "pcdc model option energy on\n")
     assert bench.blocks.told("account_energy") == [((True,), {})]

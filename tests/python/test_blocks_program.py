@@ -686,7 +686,7 @@ WRONG = {
     "list of no terms": ("sim.nodes.group('a', where=('x', 0, 1))", "where: expected the text of a RANGE or terms"),
     "no terms": ("sim.nodes.group('a', where=())", r"where: expected the text of a RANGE or terms of it, got \(\)"),
     "group that is not there": ("sim.nodes.group('a', where=g.InGroup('b'))", "there is no set 'default' of nodes"),
-    "nothing chosen": ("sim.nodes.group('a', where='x 9 10')", "nodes.group: the range chooses no node"),
+    "nothing chosen": ("sim.nodes.group('a', where='x 9 10')", "nodes.group: the range selects no node"),
     "quantity that is no text": ("sim.elements[3]", "elements.values: expected the name of a quantity, got 3"),
     "cycle without particles": ("sim.cycle(10)", "cycle: no particles: step blocks with step and solve"),
     "budget of particles": ("sim.energy()", "energy: there are no particles; energies is the budget of blocks"),
@@ -961,7 +961,7 @@ REFUSED = {
     "no blocks to couple": ("hpcdem.Simulation('b').couple()", 2, "study.py:5: couple: no blocks yet"),
     "checkpoint of both": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple(); "
                            "sim.save('a.sav'); sim.coupling.end(); sim.restore('a.sav')", 2,
-                           "couple\\(\\) comes first"),
+                           "call couple\\(\\) first"),
     "no equilibrium": ("sim.option(dynamic=False); sim.nodes.force(fx=1e6); sim.solve(limit=100)", 3,
                        "study.py:5: solve: no equilibrium"),
     "start of coupled ones": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple(); "

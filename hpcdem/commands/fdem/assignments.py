@@ -55,7 +55,7 @@ def element_model(project: Project, name: str, properties: Mapping[str, Value], 
     blocks = project.ready()
     elements = chosen(project, ELEMENT, where, null_too=True)
     if elements is not None and "heat" in blocks.surface_loads and not blocks.alive[elements].all():
-        raise CommandError("elements that were taken out do not come back in a model with heat in this version")
+        raise CommandError("removed elements cannot be reinstated in a model with heat")
     changes.element_model(blocks, elements, name, properties)
     if elements is not None:
         project.alive[elements] = True
@@ -90,7 +90,7 @@ def null(project: Project, relax: float = 0.0, where: Range | None = None) -> No
     left = project.alive.copy()
     left[elements] = False
     if not left.any():
-        raise CommandError("no element would be left")
+        raise CommandError("this would remove all elements")
     changes.null(blocks, elements, relax)
     project.alive = left
 
@@ -142,8 +142,8 @@ def _usual_penalty(project: Project, numbers: np.ndarray, faces: np.ndarray) -> 
     if (young <= 0.0).any():
         lost = int(numbers[young <= 0.0][0])
         raise CommandError(
-            f"penalty-normal is left out and so 10 E, but an element beside {lost} has no model yet: element c-model "
-            "comes first"
+            f"penalty-normal defaults to 10 E, but an element next to {lost} has no model yet: assign element c-model "
+            "first"
         )
     return 10.0 * float(young[0]) if (young == young[0]).all() else 10.0 * young
 
@@ -203,7 +203,7 @@ def damp(project: Project, local: float, where: Range | None = None) -> None:
     """Local damping of nodes, from 0 to 1, in the place of that of the model."""
     blocks = project.ready()
     if local > 0.0 and blocks.budget is not None:
-        raise CommandError("the energy budget knows no local damping of nodes: model option energy off")
+        raise CommandError("the energy budget does not support local damping of nodes: use model option energy off")
     blocks.damp_nodes(chosen(project, NODE, where), local)
 
 
@@ -212,7 +212,9 @@ def move(project: Project, type: Sequence[Any], where: Range | None = None) -> N
     only."""
     kind, direction = type if len(type) == 2 else (type[0], (0.0,) * project.dim)
     if kind not in (0, 1, 2) and (kind != 3 or project.dim == 2):
-        raise CommandError(f"type {kind} is unknown: 0 free, 1 held, 2 along a vector" + ", 3 is for 3-D" * (kind == 3))
+        raise CommandError(
+            f"type {kind} is unknown: expected 0 (free), 1 (fixed), 2 (along a vector)" + ", 3 is for 3-D" * (kind == 3)
+        )
     if kind in (2, 3) and not any(direction):
         raise CommandError("type 2 needs the vector along which the nodes may move, for example type 2 (1,0)")
     project.ready().move_constraint(chosen(project, NODE, where), kind, direction)
@@ -253,7 +255,7 @@ def water(project: Project, surface: str, density: float, where: Range | None = 
     blocks = project.ready()
     faces = Water.create(blocks, chosen(project, ELEMENT, where), levels, density)
     if project.log is not None:
-        project.log.info(f"element water: {faces} faces lie below '{surface}'; those that are free are pushed on")
+        project.log.info(f"element water: {faces} faces lie below '{surface}'; water pressure loads the free ones")
 
 
 def _level(shape: Any, layer: str) -> tuple[tuple[float, ...], ...]:
@@ -261,15 +263,15 @@ def _level(shape: Any, layer: str) -> tuple[tuple[float, ...], ...]:
     if isinstance(shape, (solids.Polygon, solids.Plane)):
         at, normal = (vector.tolist() for vector in shape.plane())
         if not abs(normal[2]) > 1e-6 * float(np.hypot(*normal[:2])):
-            raise CommandError(f"layer '{layer}': a water surface that is upright has no height")
+            raise CommandError(f"layer '{layer}': a vertical water surface has no height")
         corners = () if isinstance(shape, solids.Plane) else tuple((x, y) for x, y, _ in shape.corners)
         return (tuple(at), tuple(normal), *corners)
     if not isinstance(shape, geometry.Curve):
-        raise CommandError(f"layer '{layer}': a water surface is made of planes and polygons")
+        raise CommandError(f"layer '{layer}': a water surface consists of planes and polygons")
     points = shape.points if not shape.bulges.any() else geometry.sampled(shape, shape.length() / ARC_STEPS)
     points = points if points[0, 0] < points[-1, 0] else points[::-1]
     if len(points) < 2 or shape.closed or not (np.diff(points[:, 0]) > 0.0).all():
-        raise CommandError(f"layer '{layer}': a water line goes from left to right, with one height at each place")
+        raise CommandError(f"layer '{layer}': a water line must run from left to right, with one height at each x")
     return tuple(map(tuple, points.tolist()))
 
 
@@ -346,6 +348,6 @@ def remove_table(project: Project, name: str) -> None:
     if name not in project.blocks.tables:
         _known(project, name)
     if name == project.step_table:
-        raise CommandError(f"table '{name}' is used by the time step: model time-step value 0 comes first")
+        raise CommandError(f"the time step uses table '{name}': release it with model time-step value 0")
     project.blocks.remove_table(name)
     project.relative.discard(name)

@@ -63,7 +63,7 @@ def between(
     left = float(layout.lengths(pieces[:, 1] - pieces[:, 0]).sum())
     whole = float(layout.lengths((line[1] - line[0])[None])[0])
     if project.log is not None and left < whole * (1.0 - 1e-9):
-        project.log.info(f"bolt: {whole - left:g} of {whole:g} m lie outside of the rock and are cut off")
+        project.log.info(f"bolt: {whole - left:g} of {whole:g} m lie outside the rock and were removed")
 
 
 def velocity(

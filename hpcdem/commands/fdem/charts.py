@@ -65,14 +65,14 @@ def _profile(project: Project, name: str, where: Range | None) -> list[tuple[flo
     found = path_of(network.ends[np.searchsorted(network.channels, channels)])
     if found is None:
         raise CommandError(
-            f"a profile is along one line with two ends; the {len(channels)} channels of the range make none"
+            f"a profile needs one line with two ends; the {len(channels)} channels of the range do not form one"
         )
     order, points = found
     if tuple(at[points[-1]]) < tuple(at[points[0]]):
         order, points = order[::-1], points[::-1]
     s = np.append(0.0, np.cumsum(np.hypot(*np.diff(at[points], axis=0).T)))
     if name == "temperature" and name not in flow.more:
-        raise CommandError("the fluid has no heat: face-joint c-model thermal-fluid comes first")
+        raise CommandError("the fluid has no thermal model: assign face-joint c-model thermal-fluid first")
     if name == "concentration":
         needed(project, Proppant)
     if name in ("pressure", "saturation", "temperature", "concentration"):
@@ -101,7 +101,7 @@ def export(
     figure_name(file)
     beside = [panel for panel in ("cracks" * cracks, "plastic" * plastic, "temperature" * temperature, fluid) if panel]
     if len(beside) > 1:
-        raise CommandError("cracks, plastic, temperature and fluid: beside a diagram there is room for one of them")
+        raise CommandError("give only one of cracks, plastic, temperature and fluid")
     for asked, physics in ((temperature, Heat), (fluid, Flow), (fluid == "concentration", Proppant)):
         if asked:
             needed(project, physics, use=False)

@@ -48,7 +48,7 @@ def write_checkpoint(project: Project, automatic: bool = False) -> Path:
     except CommandError as error:  # nobody asked for it here, so it must not end the run
         names = {}
         if project.log is not None:
-            project.log.warn_once("names", f"{error}; checkpoints of this run hold no m_ names")
+            project.log.warn_once("names", f"{error}; checkpoints of this run contain no m_ names")
     place = project.place()
     journal = place.get("journal") if place is not None else None
     beside = None if project.coupled is None else project.coupled.particles
@@ -99,8 +99,8 @@ def take_up(project: Project, before: float = math.inf) -> list[Any] | None:
     journal = run.get("journal") if isinstance(run, dict) else None
     if not isinstance(run, dict) or not isinstance(journal, list):
         raise UsageError(
-            f"{path} does not tell how the script came to where it was; go on with a script of your own that "
-            f"begins with pcdc model restore '{path}'"
+            f"{path} does not record the path of the script, so --resume cannot use it. Start another script with pcdc "
+            f"model restore '{path}'"
         )
     project.progress, project.resumed = run.get("progress"), True
     project.asleep, project.calls_lost = run.get("particles"), "particles" not in run
@@ -115,7 +115,7 @@ def restore_newest(project: Project, before: float = math.inf) -> bool:
         return False
     path, run = found
     if not isinstance(run, dict) or "script" in run:
-        raise CommandError(f"{path} was written by a PCDC script, which goes on from it by hpcdem SCRIPT --resume")
+        raise CommandError(f"{path} was written by a PCDC script; resume it with hpcdem SCRIPT --resume")
     project.progress, project.resumed = run.get("progress"), True
     return True
 

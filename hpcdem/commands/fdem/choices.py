@@ -49,7 +49,7 @@ def _chosen(project: Project, kind: str, where: g.Range, null_too: bool) -> np.n
     if project.hidden.any() and not any(isinstance(term, g.UseHidden) and term.on for term in where):
         mask &= objects.seen()
     if not mask.any():
-        raise CommandError(f"the range chooses no {kind}" + _why(objects, where))
+        raise CommandError(f"the range selects no {kind}" + _why(objects, where))
     return objects.on_sides(mask) if kind == g.NODE else objects.numbers[mask]
 
 
@@ -77,15 +77,15 @@ def _why(objects: _Objects, where: g.Range) -> str:
     if not objects.null_too and objects.kind not in g.SUPPORTS and not objects.project.alive.all():
         gone = int(_Objects(objects.project, objects.kind, True).all_of(where).sum())
         if gone:
-            return f": all that it names ({gone}) was taken out (element c-model null)"
+            return f": all that it selects ({gone}) was removed by element c-model null"
     if objects.project.hidden.any() and not any(isinstance(term, g.UseHidden) for term in where):
         gone = int(objects.all_of(where).sum())
         if gone:
-            return f": all that it names ({gone}) is hidden (element hide); use-hidden on chooses it all the same"
+            return f": all that it selects ({gone}) is hidden by element hide; add use-hidden on to select it"
     if len(where) == 1:
         return ""
     empty = [type(term).__name__ for term in where if not objects.mask(term).any()]
-    return "; each of its terms alone chooses some" if not empty else ""
+    return "; each of its terms alone selects some" if not empty else ""
 
 
 _ONLY_JOINTS = (g.Between, g.OnCrack, g.Around)
@@ -163,7 +163,7 @@ class _Objects:
         """(n,) bool: which of them all terms hold for."""
         self.now = any(isinstance(term, g.Present) for term in where)
         if self.now and not any(isinstance(_bare(term), _BY_PLACE) for term in where):
-            raise CommandError("present goes with x, y and geometry: it says which positions they look at")
+            raise CommandError("present needs x, y or geometry, whose positions it selects")
         mask = np.ones(len(self.numbers), bool)
         for term in where:
             mask &= self.mask(term)
@@ -246,7 +246,7 @@ class _Objects:
 
     def _of_element(self, first: int, last: int) -> np.ndarray:
         if self.kind == g.JOINT:
-            raise CommandError("element chooses faces and nodes; joints of elements: face-of, with a group")
+            raise CommandError("element selects faces and nodes; for joints of elements use face-of with a group")
         if self.kind == g.ELEMENT:
             return self._ids(first, last)
         elements = _Objects(self.project, g.ELEMENT, self.null_too)
@@ -289,7 +289,7 @@ class _Objects:
             if self.kind not in (g.NODE, g.FACE, g.JOINT) or group not in of_elements:
                 raise
             raise CommandError(
-                f"{error}. '{group}' is a group of elements: face-of chooses their {self.kind}s"
+                f"{error}. '{group}' is a group of elements: use face-of to select their {self.kind}s"
             ) from None
 
     def _ids(self, first: int, last: int) -> np.ndarray:
@@ -302,7 +302,7 @@ class _Objects:
                 how = (
                     f"{supports.class_of(self.kind).word} delete" if self.kind in g.SUPPORTS else "element c-model null"
                 )
-                raise CommandError(f"{self.kind} {first} was taken out ({how})")
+                raise CommandError(f"{self.kind} {first} was removed ({how})")
             raise CommandError(f"there is no {self.kind} {first}; numbers go from 0 to {int(known[-1])}")
         return mask
 
@@ -323,7 +323,7 @@ class _Objects:
         """By the area of elements, in space of faces."""
         wanted = {2: g.ELEMENT, 3: g.FACE}[self.mesh.dim]
         if self.kind != wanted:
-            raise CommandError(f"area chooses {wanted}s in {self.mesh.dim} dimensions, not {self.kind}s")
+            raise CommandError(f"area selects {wanted}s in {self.mesh.dim} dimensions, not {self.kind}s")
         if wanted == g.ELEMENT:
             found = self.mesh.areas()[self.numbers]
         else:
@@ -387,8 +387,8 @@ class _Objects:
             return _inside(self._curves(layer), self.places()[:, 0], layer)
         if self.now:
             raise CommandError(
-                f"geometry '{layer}' present chooses elements, by where their centres are now; which {self.kind}s lie "
-                "on its lines is known in the mesh: leave out present"
+                f"geometry '{layer}' present selects elements by their present centres; {self.kind}s on its lines are "
+                "known in the mesh only: omit present"
             )
         pairs = self.mesh.layers[layer] if layer in self.mesh.layers else edges_on(self.mesh, self._curves(layer))
         if self.kind == g.NODE:
@@ -401,7 +401,7 @@ class _Objects:
         surface of one."""
         if layer in self.mesh.layers and self.kind != g.ELEMENT:
             if self.now:
-                raise CommandError(f"which {self.kind}s lie on '{layer}' is known in the mesh: leave out present")
+                raise CommandError(f"{self.kind}s on '{layer}' are known in the mesh only: omit present")
             points = self.mesh.layers[layer]
             if self.kind == g.NODE:
                 return np.isin(self.numbers, points)
@@ -510,7 +510,7 @@ def _inside(curves: list[geometry.Curve], points: np.ndarray, layer: str) -> np.
     """(n,) bool: an odd number of sides of the closed curves lies to the right of the point (even-odd rule)."""
     outlines = [curve for curve in curves if curve.closed]
     if not outlines:
-        raise CommandError(f"layer '{layer}' has no closed line, so nothing lies inside of it")
+        raise CommandError(f"layer '{layer}' has no closed line, so it has no inside")
     odd = np.zeros(len(points), bool)
     x, y = points.T
     for curve in outlines:

@@ -41,8 +41,8 @@ def cycle_option(project: Project, **parts: Mapping[str, Any]) -> None:
         for name, value in parts.get(part, {}).items():
             if other.get(name, value) != value:
                 raise CommandError(
-                    f"proppant moves in the steps of the fluid: {name} is {parts[HYDRAULIC][name]:g} for hydraulic "
-                    f"and {parts[PROPPANT][name]:g} for proppant-transport"
+                    f"proppant uses the steps of the fluid: {name} is {parts[HYDRAULIC][name]:g} for hydraulic and "
+                    f"{parts[PROPPANT][name]:g} for proppant-transport"
                 )
     for part, given in parts.items():
         if "time_step" in given:
@@ -101,8 +101,8 @@ def time(project: Project, part: str) -> float:
     if own > 0.0:
         word = part.replace("_", "-")
         raise CommandError(
-            f"run-time counts with the blocks, and {word} has a time step of its own ({own:g} s): model reset {word} "
-            "time-step 0 lets it go with them"
+            f"run-time uses the clock of the blocks, but {word} has its own time step ({own:g} s): synchronise it with "
+            f"model reset {word} time-step 0"
         )
     return float(_physics(project, part).time)
 

@@ -31,12 +31,12 @@ def couple(project: Project, particles: Simulation, friction: float | None = Non
     from hpcdem.physics.coupling.model import Coupled
 
     if project.dim == 3:
-        raise CommandError("discs move in a plane: they cannot be stepped with blocks in three dimensions")
+        raise CommandError("discs move in a plane and cannot be coupled to blocks in three dimensions")
     if project.coupled is not None:
         raise CommandError("the blocks of this script are coupled to particles already")
     if Path(particles.outdir).resolve() == Path(project.outdir).resolve():
         raise CommandError(
-            f"particles and blocks would both write into {project.outdir}: give the particles a folder of their own, "
+            f"particles and blocks would both write into {project.outdir}: give the particles another folder, "
             'hpcdem.Simulation(outdir="...")'
         )
     if project.units != particles.settings.units and project.units and particles.settings.units:
@@ -49,7 +49,7 @@ def couple(project: Project, particles: Simulation, friction: float | None = Non
     project.refuse_inside("couple")
     blocks = project.ready()
     if blocks.creep.on:
-        raise CommandError("blocks that are coupled to particles do not creep: model creep off comes first")
+        raise CommandError("coupled blocks cannot creep: use model creep off")
     if project.continues is not None and particles.number == project.asleep:
         project.coupled = Coupled(particles, blocks, friction)  # both come out of the checkpoint, see take_up
         return project.coupled
@@ -77,7 +77,7 @@ def _by_frac(both: Coupled) -> float:
     if said > wanted:
         raise CommandError(
             f"the time steps differ: SET frac {particles.settings.frac:g} gives {wanted:g} s for the particles, model "
-            f"time-step is {said:g} s; say one of them only"
+            f"time-step is {said:g} s; set only one of them"
         )
     return said or min(wanted, both.stable_time_step())
 
@@ -91,12 +91,13 @@ def _warn(both: Coupled) -> None:
     if of_particles != of_blocks:
         sim.log.warn_once(
             f"gravity {of_particles} {of_blocks}",
-            f"gravity differs: SET gravity {of_particles[0]:g} {of_particles[1]:g} moves the particles, model gravity "
-            f"({of_blocks[0]:g},{of_blocks[1]:g}) the blocks; each is set for itself",
+            f"gravity differs: SET gravity {of_particles[0]:g} {of_particles[1]:g} acts on the particles, model "
+            f"gravity ({of_blocks[0]:g},{of_blocks[1]:g}) on the blocks; set both",
         )
     if not options.collision:
         sim.log.warn_once(
-            "collision off", "model option collision off: blocks do not touch each other; they do touch particles"
+            "collision off",
+            "model option collision off: there is no contact between blocks, but contact with particles",
         )
 
 
@@ -112,8 +113,9 @@ def _warn_of_walls(both: Coupled) -> None:
             name = f"the {side} side of the BOX" if side else f"wall {wall}"
             log.warn_once(
                 f"beyond {wall}",
-                f"step {both.blocks.clock.step}: element {element} at ({x:g}, {y:g}) is in or beyond {name}: walls and "
-                "BOX hold particles only; hold blocks by conditions of their nodes, or by a fixed body in its place",
+                f"step {both.blocks.clock.step}: element {element} at ({x:g}, {y:g}) is in or beyond {name}, and walls "
+                "and BOX stop particles only. Fix blocks by conditions of their nodes, or replace the wall by a fixed "
+                "body",
             )
 
 
@@ -164,8 +166,8 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
         sim.energy.pause(sim)
     if both.late > late and sim.log is not None:
         sim.log.warn(
-            f"{both.late - late} times particles and faces outran the search for contacts between them; a contact may "
-            "have begun a few steps late. A smaller time step avoids it"
+            f"{both.late - late} times particles or faces moved too fast for the contact search, so a contact may have "
+            "started a few steps late. Reduce the time step"
         )
 
 
@@ -211,7 +213,7 @@ def refuse(project: Project, what: str) -> None:
     """CommandError for what cannot be done of blocks that touch particles."""
     if project.coupled is not None:
         raise CommandError(
-            f"{what} would leave the particles behind that these blocks touch: model step and model solve step both"
+            f"{what} would step these blocks without the particles coupled to them: use model step or model solve"
         )
 
 

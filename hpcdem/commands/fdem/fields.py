@@ -23,7 +23,7 @@ def of(project: Project, name: str) -> Any:
         raise CommandError(f"there is no field {name}; there is {', '.join(kinds())}")
     found = kinds()[name].load_type().there(project.ready())
     if found is None:
-        raise CommandError(f"there is no {name} yet: element c-model {kinds()[name].word} comes first")
+        raise CommandError(f"no {name} yet: assign element c-model {kinds()[name].word} first")
     return found
 
 

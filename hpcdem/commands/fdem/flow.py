@@ -57,7 +57,7 @@ def proppant_condition(
     said = {kind: value for kind, value in given.items() if value is not None}
     if len(said) != 1:
         raise CommandError(
-            "proppant that comes in at a flow node has one of proppant-volumetric-concentration, "
+            "proppant inflow at a flow node needs one of proppant-volumetric-concentration and "
             "proppant-volumetric-flow-rate"
         )
     proppant = needed(project, Proppant)
@@ -78,7 +78,7 @@ def joint_property(project: Project, properties: Mapping[str, Value], where: Ran
         needed(project, Heat).of_fluid().adjust(chosen(project, JOINT, where), of_heat)
     if of_grains:
         if where is not None:
-            raise CommandError("there is one proppant in all channels: its properties are changed without a range")
+            raise CommandError("all channels have the same proppant: change its properties without a range")
         needed(project, Proppant).adjust(of_grains)
     if others:
         assignments.joint_property(project, others, where)
@@ -112,7 +112,7 @@ def _level(project: Project, point: Sequence[float]) -> float:
     down = (o.gx, o.gy, o.gz)[: project.dim]
     size = math.hypot(*down)
     if size == 0.0:
-        raise CommandError("flow-surface by a point needs gravity, which says what is up: model gravity comes first")
+        raise CommandError("flow-surface by a point needs gravity to define the vertical: set model gravity first")
     return -math.fsum(a * b for a, b in zip(point, down)) / size
 
 

@@ -31,7 +31,7 @@ def assign(
     """Give a physics of blocks (Heat, Flow) properties; if they are refused and it is new with them, it goes again.
     CommandError beside particles, where blocks do not have `what`."""
     if project.coupled is not None:
-        raise CommandError(f"blocks that are coupled to particles have no {what} in this version")
+        raise CommandError(f"coupled blocks do not support {what}")
     with begun(project, physics) as found:
         found.assign(numbers, properties)
 
@@ -49,7 +49,7 @@ def element_property(project: Project, properties: Mapping[str, Value], where: R
         if mine:
             found = kind.load_type().there(project.ready())
             if found is None:
-                raise CommandError(f"there is no {kind.name} yet: element c-model {kind.word} comes first")
+                raise CommandError(f"no {kind.name} yet: assign element c-model {kind.word} first")
             found.adjust(chosen(project, ELEMENT, where), mine)
     if others:
         assignments.element_property(project, others, where)

@@ -55,7 +55,7 @@ def create(
     if value not in UNITS.get(kind, {}):
         raise CommandError(f"a history of {kind} can follow {', '.join(UNITS.get(kind, {}))}, not {value}")
     if value in ENERGIES and project.blocks.budget is None:
-        raise CommandError("no energy budget is kept: model option energy on comes first")
+        raise CommandError("no energy budget yet: use model option energy on first")
     if (value == LAW_STATE) != bool(variable):
         raise CommandError("value law-state and variable, the name of a state variable, go together")
     if variable:
@@ -99,8 +99,8 @@ def _warn_of_nothing(project: Project, name: str, value: str, joints: Sequence[i
     if len(at) and not there.any() and project.log is not None:
         which = f"joint {at[0]} has" if len(at) == 1 else f"none of the {len(at)} joints has"
         project.log.warn(
-            f"history '{name}': {which} a model, so {value.replace('_', '-')} is nan until face-joint c-model gives one"
-            + (" (of cracks opening and slip are known)" if blocks.open[at].any() else "")
+            f"history '{name}': {which} a model, so {value.replace('_', '-')} is nan until face-joint c-model assigns "
+            "one" + (" (of cracks opening and slip are known)" if blocks.open[at].any() else "")
         )
 
 
@@ -121,7 +121,7 @@ def _nearest(project: Project, kind: str, at: tuple[float, ...]) -> int:
     middles = xy[edges.points[inner]].mean(axis=1)
     there = np.flatnonzero(~np.isnan(middles[:, 0]))
     if not len(there):
-        raise CommandError("the mesh has no joints: there is no edge between two elements")
+        raise CommandError("the mesh has no joints: no edge lies between two elements")
     return int(edges.faces[inner, 0][nearest_point(middles, at, there)])
 
 

@@ -272,7 +272,7 @@ def intersect(project: Project, layer: str, follow: bool = False) -> None:
     mesh = project.whole_mesh()
     cracked = project.comm.per_node(lambda: _cracked(project, mesh, layer, follow))
     if len(cracked.cracks) == len(mesh.cracks):
-        advice = "" if follow else "; with follow the nearest edges are taken"
+        advice = "" if follow else "; follow uses the nearest edges"
         raise CommandError(f"no joint lies on layer '{layer}'{advice}")
     if project.in_use:
 
@@ -326,21 +326,21 @@ def glue(
         sides = some, np.ones(len(some), bool)
     made: glue_of.Glued = project.comm.per_node(lambda: glue_of.glued(mesh, tolerance, sides), once=True)
     if not made.faces:
-        _say(project, "glue: the mesh is one body already")
+        _say(project, "glue: the mesh is already one body")
         return
     project.refit(made)
     merged = len(mesh.points) - len(np.unique(made.points))
     _say(
         project,
-        f"glue: {made.faces} faces of different bodies are joints now, {merged} points have become one with another "
-        f"(within {made.tolerance:g} m)",
+        f"glue: {made.faces} faces of different bodies are joints now, {merged} points were merged (within "
+        f"{made.tolerance:g} m)",
     )
     if made.cut:
         before, after = (quality.altitudes(one).min() for one in (mesh, made.mesh))
         _say(
             project,
-            f"glue: {made.cut} elements were cut, which makes {len(made.mesh.cells) - len(mesh.cells)} more, where "
-            f"points of others lie on their sides; the least altitude was {before:.3g} m and is {after:.3g} m",
+            f"glue: {made.cut} elements were cut, which makes {len(made.mesh.cells) - len(mesh.cells)} more, at "
+            f"hanging nodes; the least altitude was {before:.3g} m and is {after:.3g} m",
         )
 
 
@@ -354,7 +354,7 @@ def delete(project: Project, where: Range | None = None) -> None:
     made = project.comm.per_node(lambda: remade.without(project.whole_mesh(), elements), once=True)
     lost = len(project.whole_mesh().cells) - len(made.parent)
     project.refit(made)
-    _say(project, f"element delete: {lost} elements are gone, {len(made.parent)} are left")
+    _say(project, f"element delete: {lost} elements deleted, {len(made.parent)} left")
 
 
 def densify(

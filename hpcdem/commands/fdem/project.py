@@ -102,9 +102,7 @@ class Project:
     def refuse_inside(self, what: str) -> None:
         """CommandError in a function that is called in the middle of a command that steps."""
         if self.stepping:
-            raise CommandError(
-                f"{what} cannot be used by a function that is called in the middle of model {self.stepping}"
-            )
+            raise CommandError(f"{what} cannot be used by a function that is called during model {self.stepping}")
 
     def clear(self, dim: int = 2) -> None:
         """A new model in so many dimensions."""
@@ -150,7 +148,7 @@ class Project:
         self.take_added()
         if mesh.dim != self.dim:
             raise CommandError(
-                f"the mesh has {mesh.dim} dimensions, the model {self.dim}: model new dim {mesh.dim} makes one for it"
+                f"the mesh has {mesh.dim} dimensions, the model {self.dim}: use model new dim {mesh.dim}"
             )
         before, groups = self.mesh, self.groups[ELEMENT]
         first = 0 if before is None else len(before.cells)
@@ -269,7 +267,7 @@ class Project:
         """The mesh. CommandError if there is none."""
         self.take_added()
         if self.mesh is None:
-            raise CommandError("there is no mesh yet: mesh create, mesh structured or mesh import comes first")
+            raise CommandError("no mesh yet: use mesh create, mesh structured or mesh import first")
         return self.mesh
 
     def replace_mesh(self, mesh: Mesh) -> None:
@@ -337,7 +335,7 @@ class Project:
                 self.log.place = self.outdir
             if not locked and self.log is not None:
                 why = f"the file system of {self.outdir} has no locks"
-                self.log.warn_once("lock", f"{why}: nobody will notice if two runs write there at once")
+                self.log.warn_once("lock", f"{why}: two runs that write there at the same time cannot be detected")
         return self.outdir
 
 

@@ -128,7 +128,7 @@ def creep(
     """Elements creep from now on, or no more; see `creep.switch`."""
     coupling.refuse(project, "model creep")
     if on and dt is not None and project.dynamic:
-        raise CommandError("dt of creep is for static runs: in dynamic ones elements creep by every time step")
+        raise CommandError("dt of creep is for static runs: in dynamic runs elements creep in every time step")
     of_elements.switch(project.ready(), on, dt, change, least, greatest)
 
 

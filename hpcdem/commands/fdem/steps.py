@@ -56,7 +56,7 @@ def resume(project: Project) -> None:
     """Finish the command in which the checkpoint was written that was just taken (checkpoints.restore_newest)."""
     command = (project.progress or {}).get("command")
     if command is None:
-        raise CommandError("the checkpoint does not tell which command it was written in")
+        raise CommandError("the checkpoint does not record the command in which it was written")
     name, given = command
     of: dict[str, Callable[..., None]] = {
         "step": step, "solve": solve, "solve elastic": solve_elastic, "solve hydraulic": solve_hydraulic,
@@ -87,7 +87,8 @@ def solve(
         raise CommandError("run-time: in static runs without creep no time passes; cycles or ratio end them")
     if project.run_time and not _time_passes(project) and project.log is not None:
         project.log.warn_once(
-            "run-time", f"model run-time {project.run_time:g} s ends no static run: no time passes there without creep"
+            "run-time",
+            f"model run-time {project.run_time:g} s cannot end a static run: no time passes there without creep",
         )
     if (run := run_time or project.run_time) and _time_passes(project):
         left = _left(project, run)
@@ -105,7 +106,7 @@ def solve(
     if time is not None and not project.dynamic:
         _check_creep(project, time, cycles)
     if ratio is not None and not project.blocks.options.mechanical:
-        raise CommandError("without mechanics there are no unbalanced forces: model solve takes cycles or time")
+        raise CommandError("without mechanics no unbalanced forces exist: use model solve with cycles or time")
     first = project.step if project.progress is None else project.progress["first"]
     text = ""
     try:
@@ -129,13 +130,13 @@ def _warn_of_end(project: Project, reason: str, found: float, bare: bool) -> Non
     if reason == "ratio" and not project.dynamic:
         for name in project.blocks.changing_tables():
             project.log.warn(
-                f"{_where(project)}balance was found while table '{name}' of a condition goes on to change with each "
-                "static step: model solve cycles, or model step, goes on to its end"
+                f"{_where(project)}converged although table '{name}' of a condition still changes with each static "
+                "step. Use model solve cycles or model step to reach its end"
             )
     if bare and reason == "cycles":
         project.log.warn(
-            f"{_where(project)}model solve ended after {CYCLES} cycles, which it does without an aim, at ratio "
-            f"{found:.3g}: model solve ratio {RATIO:g} goes on to balance"
+            f"{_where(project)}model solve without a criterion ended after {CYCLES} cycles at ratio {found:.3g}: use "
+            f"model solve ratio {RATIO:g} to reach equilibrium"
         )
 
 
@@ -164,7 +165,7 @@ def solve_elastic(
     project.refuse_inside("model solve elastic")
     coupling.refuse(project, "model solve elastic")
     if not project.blocks.options.mechanical:
-        raise CommandError("model solve elastic moves the blocks: model option mechanical on comes first")
+        raise CommandError("model solve elastic moves the blocks: use model option mechanical on first")
     blocks = project.ready()
     given: dict[str, Any] = {name: value for name, value in (("ratio", ratio), ("steps", steps)) if value is not None}
     if time is not None:
@@ -195,9 +196,9 @@ def solve_hydraulic(
     project.refuse_inside("model solve hydraulic")
     coupling.refuse(project, "model solve hydraulic")
     if steady == (time is not None):
-        raise CommandError("flow is solved for some time or until it is steady: time or steady, one of them")
+        raise CommandError("flow is solved for a time or until it is steady: give either time or steady")
     if auto and time is None:
-        raise CommandError("auto compares the steps of some time: steady flow is found by implicit ones")
+        raise CommandError("auto needs a time: steady flow is found by implicit steps")
     blocks = project.ready()
     flow = Flow.there(blocks)
     if auto and flow is not None and time is not None and _explicit_is_cheaper(project, flow, time, dt, solver):
@@ -245,9 +246,9 @@ def solve_thermal(
     project.refuse_inside("model solve thermal")
     coupling.refuse(project, "model solve thermal")
     if steady == (time is not None):
-        raise CommandError("heat is solved for some time or until it is steady: time or steady, one of them")
+        raise CommandError("heat is solved for a time or until it is steady: give either time or steady")
     if steady and dt is not None:
-        raise CommandError("dt goes with time: the steady state of heat is found at once")
+        raise CommandError("dt needs time: the steady state of heat is found directly")
     if dt is not None and not dt > 0.0:
         raise CommandError(f"the time step must be positive, got {dt:g}")
     blocks = project.ready()
@@ -342,7 +343,7 @@ def _tell_of_thin(project: Project, steps: int | None, time: float | None) -> No
     if log is not None and isinstance(cost, costs.Cost) and cost.seconds > costs.LONG:
         what = "stiff fluid in thin fractures" if o.flow_dt == 0.0 else "as model time-step hydraulic says"
         log.warn(
-            f"{_where(project)}flow by explicit sub-steps, {what}: {cost} on one core; model solve hydraulic takes "
+            f"{_where(project)}flow by explicit sub-steps, {what}: {cost} on one core; model solve hydraulic uses "
             "implicit steps"
         )
 
@@ -382,7 +383,7 @@ def _check_creep(project: Project, time: float, cycles: int | None = None) -> No
     coupling.refuse(project, "model solve time in a static run")
     if cycles is not None:
         raise CommandError(
-            "time and cycles exclude each other in static runs: time passes in creep steps, not in cycles"
+            "time and cycles cannot be combined in static runs: time passes in creep steps, not in cycles"
         )
     creep.check(project.ready(), time)
 
@@ -390,7 +391,7 @@ def _check_creep(project: Project, time: float, cycles: int | None = None) -> No
 def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, Any]) -> None:
     """So much creep time [s] passes, each creep step by linear equations."""
     if project.dynamic:
-        raise CommandError("elastic with time is for static runs: model option dynamic off comes first")
+        raise CommandError("elastic with time is for static runs: use model option dynamic off first")
     _check_creep(project, time)
     blocks = project.blocks
     if project.progress is None:
@@ -569,10 +570,10 @@ def _no_equilibrium(project: Project, watch: Watch, reason: str, ratio: float, f
     step = project.step
     why = {
         "limit": f"after {step - watch.began} steps, the limit",
-        "no progress": f"for {step - watch.progress} steps the ratio has not fallen by a tenth",
+        "no progress": f"for {step - watch.progress} steps the ratio has not decreased by a tenth",
     }[reason]
     return (
-        f"no equilibrium: {why}; the ratio is {found:.3g}, the least was {watch.least:.3g}, asked {ratio:g}; "
+        f"no equilibrium: {why}; the ratio is {found:.3g}, the least was {watch.least:.3g}, required {ratio:g}; "
         f"{_what_moves(project)}"
     )
 
@@ -581,8 +582,10 @@ def _what_moves(project: Project) -> str:
     """The body that slides away, or that there is none. Collective."""
     body = convergence.sliding_body(project.blocks)
     if body is None:
-        return "no body slides away: joints may go on to yield, loads to change, or rounding allows no better balance"
-    return f"{body} {'m/s' if project.dynamic else 'm per step'}: hold it, or give it time to come to rest (window)"
+        return "no body slides away: joints may still yield, loads may change, or rounding limits the ratio"
+    return (
+        f"{body} {'m/s' if project.dynamic else 'm per step'}: fix it, or allow more steps until it is at rest (window)"
+    )
 
 
 def _follow_step_table(project: Project) -> None:

@@ -92,13 +92,15 @@ def history_name(name: str) -> str:
 def frames_name(name: str) -> None:
     """CommandError if it cannot be the first part of names of files."""
     if "/" in name:
-        raise CommandError(f"'{name}' is the first part of the names of files, in the folder of the results: no folder")
+        raise CommandError(
+            f"'{name}' is the first part of the names of files in the folder of the results; it cannot contain a folder"
+        )
 
 
 def result_name(path: str) -> None:
     """CommandError if a file of the results would come to lie elsewhere without being told so."""
     if not os.path.isabs(path) and os.path.normpath(path).split(os.sep)[0] == os.pardir:
-        raise CommandError(f"'{path}' leads out of the folder of the results; for another place give the whole path")
+        raise CommandError(f"'{path}' leads out of the folder of the results; for another folder give an absolute path")
 
 
 def figure_name(path: str) -> None:

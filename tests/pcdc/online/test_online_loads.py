@@ -89,10 +89,10 @@ def test_conditions_go_and_damping_stays(desk):
 
 def test_the_budget_does_not_know_it(desk):
     desk("tri = True\n" + BAR + "pcdc node mechanical-damp local 0.3\n")
-    with pytest.raises(HpcdemError, match="knows no local damping of nodes"):
+    with pytest.raises(HpcdemError, match="does not support local damping of nodes"):
         desk("pcdc model option energy on\n")
     desk("pcdc node mechanical-damp local 0\npcdc model option energy on\n")
-    with pytest.raises(HpcdemError, match="knows no local damping of nodes"):
+    with pytest.raises(HpcdemError, match="does not support local damping of nodes"):
         desk("pcdc node mechanical-damp local 0.3\n")
 
 

@@ -145,7 +145,7 @@ HOSTILE = [
     ("element water surface 'sea' density 1000", "there is no geometry layer 'sea'"),
     ("element water surface 'lake'", "lacks d{ensity}"),
     ("element water surface 'lake' density -1", "not negative"),
-    ("element water surface 'ring' density 1000", "goes from left to right"),
+    ("element water surface 'ring' density 1000", "must run from left to right"),
     ("element water surface 'far' density 1000", "no face of these elements lies below"),
 ]
 
