@@ -291,7 +291,7 @@ def report_end(sim: Simulation) -> None:
     output.close_histories(sim)
     output.tell_energy(sim)
     if sim.log is not None and sim.lost:
-        sim.log.info(f"{sim.lost} particles left the BOX and were deleted in all; the lines above name them")
+        sim.log.info(f"{sim.lost} particles in total left the BOX and were deleted; see the lines above")
 
 
 def draw_last_state(sim: Simulation, log: Log) -> None:
@@ -337,7 +337,7 @@ _current: Session | None = None
 
 
 def enter(session: Session | None) -> None:
-    """Make it the session that simulations made by Python code belong to; None: there is none any more."""
+    """Make it the session of simulations made by Python code; None: end it."""
     global _current
     _current = session
 
@@ -349,14 +349,14 @@ def refuse_after_stop() -> None:
 
 
 def current(threads: int | None = None) -> Session:
-    """The session of this process, opened if there is none yet. UsageError if it has another number of threads."""
+    """The session of this process, opened by the first call. UsageError if it has another number of threads."""
     if _current is None:
         enter(_open(threads))
     assert _current is not None
     if threads is not None and threads != _current.threads:
         raise UsageError(
-            f"this run has {_current.threads} thread(s) per rank already, {threads} were asked for: all simulations of "
-            "a program share them (with the program hpcdem, -j says how many)"
+            f"this run already uses {_current.threads} thread(s) per rank, {threads} requested: all simulations of a "
+            "program share them (set them with hpcdem -j)"
         )
     return _current
 
@@ -394,7 +394,7 @@ def _watch_the_end(session: Session) -> None:
         return code
 
     def on_error(kind: type[BaseException], error: BaseException, trace: Any) -> None:
-        if hasattr(sys, "ps1"):  # a conversation goes on after an error
+        if hasattr(sys, "ps1"):  # a console continues after an error
             usual(kind, error, trace)
             return
         session.close(error)

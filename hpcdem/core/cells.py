@@ -54,7 +54,7 @@ def row(key):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def first_not_before(keys, key, begin, end):
-    """Index of the first of keys[begin:end], ascending, that is not less than `key`; `end` if there is none."""
+    """Index of the first of keys[begin:end], ascending, that is not less than `key`; else `end`."""
     while begin < end:
         middle = (begin + end) // 2
         if keys[middle] < key:

@@ -24,7 +24,7 @@ class Comm(Protocol):
     rank: int
     size: int
     mpi: Any
-    """The communicator of mpi4py, None where there is none."""
+    """The communicator of mpi4py, None without MPI."""
     crowded: bool
     """More ranks than cores on some host."""
 
@@ -63,7 +63,7 @@ class Comm(Protocol):
         return made
 
     def warns_by(self, warn: Callable[[str], None]) -> None:
-        """What a user should know of the memory of a node is told by this."""
+        """Function that reports messages about the memory of a node."""
         return None
 
     def any(self, flag: bool) -> bool:

@@ -12,7 +12,7 @@ EXIT_ERROR = 1
 EXIT_USAGE = 2
 """Command line or script not understood; nothing was run and nothing was written."""
 EXIT_UNBALANCED = 3
-"""A script asked for equilibrium (model solve) and the model does not come to it."""
+"""A script requires equilibrium (model solve) and the model does not reach it."""
 EXIT_CHECKPOINT = 85
 """Stopped before the end on request (signal or time limit) after a checkpoint was written; run again with --resume.
 
@@ -46,11 +46,11 @@ class WrongValueError(ScriptError, ValueError):
 
 
 class WrongTypeError(ScriptError, TypeError):
-    """A line of a Python program gives a value of a wrong kind, or an argument that there is not: a TypeError too."""
+    """A line of a Python program gives a value of a wrong kind, or an unknown argument: a TypeError too."""
 
 
 class UnknownNameError(ScriptError, KeyError):
-    """A line of a Python program asks for a field that there is not: a KeyError too."""
+    """A line of a Python program requests an unknown field: a KeyError too."""
 
     __str__ = Exception.__str__  # that of KeyError puts the sentence in quotes
 
@@ -66,13 +66,13 @@ class PhysicsError(HpcdemError):
 
 
 class EquilibriumError(HpcdemError):
-    """Steps do not lead to the equilibrium that was asked for."""
+    """Steps do not reach the required equilibrium."""
 
     exit_code = EXIT_UNBALANCED
 
 
 class StoppedWithCheckpoint(BaseException):
-    """The run was asked to stop and left a checkpoint behind. No error that a script could deal with: its `except
+    """The run stopped on request and left a checkpoint. No error that a script could deal with: its `except
     Exception` lets it pass, as it does KeyboardInterrupt."""
 
     exit_code = EXIT_CHECKPOINT

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from hpcdem.core.errors import CommandError
 
 LARGEST = 1e60
-"""Of any number that is said of a model, whatever its unit: products of some of them stay within the range of a double.
+"""For any number given to a model, whatever its unit: products of some of them stay within the range of a double.
 """
 LONGEST, SHORTEST = 1e30, 1e-30
 """Beyond these, squares and cubes of lengths leave the range of a double."""
@@ -29,7 +29,7 @@ Point = Sequence[float]
 def check_circle(x: float, y: float, r: float) -> None:
     """CommandError unless a particle can have this centre and radius."""
     if not (math.isfinite(x) and math.isfinite(y)):
-        raise CommandError(f"the centre ({x:g}, {y:g}) is no place")
+        raise CommandError(f"the centre ({x:g}, {y:g}) is not a finite position")
     check_radius(r)
     if max(abs(x), abs(y)) > FARTHEST * r:
         raise CommandError(
@@ -77,7 +77,7 @@ def check_rectangle(radii: Sequence[float], x: Point, y: Point, grid: bool) -> N
         cells *= (high - low) / (2.0 * max(radii)) + 1.0
     if cells > MOST:
         raise CommandError(
-            f"the rectangle {x[1] - x[0]:g} m x {y[1] - y[0]:g} m is {cells:.2g} particles large; at most {MOST:g}"
+            f"the rectangle {x[1] - x[0]:g} m x {y[1] - y[0]:g} m holds {cells:.2g} particles, at most {MOST:g} allowed"
         )
 
 
@@ -85,8 +85,8 @@ def check_attempts(num: int, factor: float) -> None:
     """CommandError if GEN num would try for hours."""
     if num * factor > MOST_ATTEMPTS:
         raise CommandError(
-            f"{num:g} particles asked for, {factor:g} attempts each: that is {num * factor:.2g} attempts, at most "
-            f"{MOST_ATTEMPTS:g}"
+            f"{num:g} particles with {factor:g} attempts each require {num * factor:.2g} attempts, at most "
+            f"{MOST_ATTEMPTS:g} allowed"
         )
 
 

@@ -58,15 +58,15 @@ class Material(TypedDict, total=False):
         noun="a Poisson ratio",
     )]  # fmt: skip
     damp: Annotated[Value, Property(
-        "local damping: share of the force that acts against the motion", low=0.0, high=1.0, default="0"
+        "local damping: fraction of the force that acts against the motion", low=0.0, high=1.0, default="0"
     )]  # fmt: skip
     kn: Annotated[Value, Property("normal stiffness of the linear contact", "N/m", low=0.0)]
     ks: Annotated[Value, Property("shear stiffness of the linear contact", "N/m", low=0.0)]
     xp: Annotated[Value, Property(
-        "pressure that pushes each particle along x: force = pressure 2 R thickness (SET thickness), until it "
-        "is changed", "Pa", default="0", source="P", in_frames=False,
+        "pressure on each particle along x: force = pressure 2 R thickness (SET thickness), until "
+        "changed", "Pa", default="0", source="P", in_frames=False,
     )]  # fmt: skip
-    yp: Annotated[Value, Property("the same along y", "Pa", default="0", source="P", in_frames=False)]
+    yp: Annotated[Value, Property("pressure on each particle along y", "Pa", default="0", source="P", in_frames=False)]
 
 
 PROPERTIES: Mapping[str, Property] = {

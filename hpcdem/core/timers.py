@@ -74,7 +74,7 @@ class Summary:
 
 
 class Timers:
-    """Stopwatches by name, made when first asked for, and the work done while they ran."""
+    """Stopwatches by name, made on first use, and the work done while they ran."""
 
     def __init__(self) -> None:
         self.watches: dict[str, Stopwatch] = {}

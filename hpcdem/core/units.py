@@ -51,7 +51,7 @@ CHOICES = {"si": "SI", "mm-mpa-s": "mm-MPa-s", "km-mpa-s": "km-MPa-s"}
 @dataclass(frozen=True)
 class Kind:
     """A kind of quantity. unit: in SI; powers: of length, mass, time; low, high: magnitudes in SI beyond which a value
-    is asked about (0 never is); usual: in SI, which of several units that could be meant is the likeliest; meant:
+    is checked (0 never is); usual: in SI, which of several units that could be meant is the likeliest; meant:
     units that values are often left in, with their sizes in SI; names: of properties that it is for, () for all of
     this unit that no other row names."""
 
@@ -115,7 +115,7 @@ def kind_of(name: str, unit: str) -> Kind | None:
 
 
 def doubt(where: System, name: str, unit: str, value: float) -> str:
-    """What is to be said of a value of a property given in these units, "" if it is plausible.
+    """Warning about a value of a property given in these units, "" if it is plausible.
 
     Of the units that would make it plausible that of SI counts first, then the one that brings it nearest to what is
     usual.
@@ -131,10 +131,10 @@ def doubt(where: System, name: str, unit: str, value: float) -> str:
             if kind.low <= abs(value) * size <= kind.high]  # fmt: skip
     if not fits:
         low, high = kind.low / own, kind.high / own
-        return f"{said}: {low:.3g} to {high:.3g} was expected; it is used as it is"
+        return f"{said}: expected {low:.3g} to {high:.3g}; used unchanged"
     *_, called, size = min(fits)
     factor = size / own
-    return f"{said}: looks like {called}; x {factor:g} makes it {value * factor:g}; it is used as it is"
+    return f"{said}: looks like {called}; x {factor:g} makes it {value * factor:g}; used unchanged"
 
 
 # -- prefixes: a value in the unit that people would use for its size ----------------------------------------------

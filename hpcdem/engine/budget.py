@@ -46,7 +46,7 @@ class Budget(ABC, Generic[M, N]):
 
     @abstractmethod
     def _book_change(self, change: dict[str, N]) -> None:
-        """What is stored was changed by so much while the account stood still."""
+        """Change of the stored energy while the budget was not updated."""
 
     def begin(self, sim: M) -> None:
         """Steps follow, whose flows are booked. The model is closed, its tables are fresh. Collective."""

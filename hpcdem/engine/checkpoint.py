@@ -19,8 +19,8 @@ Contents = tuple[Mapping[str, Any], Mapping[str, Table]]
 
 
 def save(model: Model, path: Path | str, contents: Callable[[], Contents]) -> None:
-    """Write what contents() returns: the state as JSON values, and tables. Reads only: a run that saves goes on exactly
-    like one that does not. Collective."""
+    """Write what contents() returns: the state as JSON values, and tables. Reads only: a run that saves continues
+    exactly like one that does not. Collective."""
     began = time.perf_counter()
     with model.timers("checkpoint"):
         checkpoint.write(path, *contents(), model.comm)
@@ -50,7 +50,7 @@ def take_newest(
     fatal: type[CommandError],
 ) -> tuple[Path, dict[str, Any]] | None:
     """The newest whole checkpoint among the .sav files of some folders, and what take(path) returned for it; None if
-    there is none. before: that of this time of the model [s] or the last one before it, UsageError if there is none.
+    there is none. before: that of this time of the model [s] or the last one before it; UsageError without one.
     Collective.
 
     The newest is the one that is farthest in the script, then that of the latest step: clocks may go wrong. What an
@@ -60,7 +60,7 @@ def take_newest(
     comm, log = model.comm, model.log
     found, damaged = newest_first(folders, before) if comm.rank == 0 else ([], [])
     for text in damaged if log is not None else []:
-        log.warn(f"{text}; it is passed over")
+        log.warn(f"{text}; ignored")
     for path in comm.bcast(found):
         try:
             taken = take(path)
@@ -71,7 +71,7 @@ def take_newest(
                 log.warn(f"{error}; trying the checkpoint before it")
             continue
         if log is not None:
-            log.info(f"going on from {path}, step {model.clock.step}")
+            log.info(f"resuming from {path}, step {model.clock.step}")
         if before < math.inf:
             go_back_to(path, folders, comm)
         return path, taken

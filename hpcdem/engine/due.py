@@ -39,15 +39,15 @@ def first_after(step: int, tasks: Iterable[Task]) -> int:
 
 
 def answer(model: Model, request: int, save: Callable[[bool], Path], how: Callable[[Path], str]) -> None:
-    """A signal or the time limit asked for a checkpoint, perhaps for the end. save: writes one and returns its path,
-    automatic or not; how: to go on from it. StoppedWithCheckpoint. Collective."""
+    """A signal or the time limit requests a checkpoint, perhaps also the end of the run. save: writes one and returns
+    its path, automatic or not; how: the command that resumes from it. StoppedWithCheckpoint. Collective."""
     stop, log, step = model.stop, model.log, model.clock.step
     what = stop.decide(request)
     if what == "none":
         return
     path = save(what == "auto")
     if what == "stop":
-        raise stop.end(f"stopped at step {step} by {stop.reason}; checkpoint {path} written, go on with {how(path)}")
+        raise stop.end(f"stopped at step {step} by {stop.reason}; checkpoint {path} written, resume with {how(path)}")
     if log is not None:
-        why = "as the last one was long ago" if what == "auto" else "on request"
+        why = "automatically" if what == "auto" else "on request"
         log.info(f"step {step}: checkpoint {path} written {why}")

@@ -108,7 +108,7 @@ class Model(ABC):
     def step(self) -> int:
         """Advance everything by one dt. The same text for every physics, on one rank and on a thousand.
 
-        Returns what the outside asked for (0: nothing; else see runtime.stop_requests), agreed by all ranks.
+        Returns the external request (0: none; else see runtime.stop_requests), agreed by all ranks.
         """
         timers, halo, state, request, outdated = self.timers, self.halo, self.rebuild_state, 0, FRESH
         self._begin_step()
@@ -128,7 +128,7 @@ class Model(ABC):
                 try:
                     outdated, request = self._check_rebuild(due == AT_A_GLANCE)
                 except HpcdemError:  # on all ranks
-                    halo.finish()  # the script may go on
+                    halo.finish()  # the script may continue
                     raise
         with timers("halo"):
             halo.finish()
@@ -220,8 +220,8 @@ class Model(ABC):
         left: Callable[[np.ndarray, np.ndarray], object] = lambda leave, to: None,
     ) -> tuple[np.ndarray, H, Sequence[np.ndarray]]:
         """Move borders if it pays, then send rows of the tables (n, w) f8, and what they remember, to the owners of
-        their columns. room, cost, least: see `Ownership.renew`; left: is told who goes where. Returns cells, histories
-        and tables of the rows that are owned now. Collective."""
+        their columns. room, cost, least: see `Ownership.renew`; left: receives the destinations. Returns cells,
+        histories and tables of the rows that are owned now. Collective."""
         with self.timers("balance"):
             self.ownership.renew(
                 columns(cell), self.rebuild_state.side, self.clock.step, self.timers.seconds(), room, cost, least

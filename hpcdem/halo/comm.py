@@ -131,7 +131,7 @@ class MpiComm(Comm):
 
     def exchange(self, parcels: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
         """Nobody knows who sends to it. So a rank takes what comes until its own parcels have been received, enters a
-        barrier that does not block, and goes on taking until all are there: then nothing is on its way any more
+        barrier that does not block, and keeps receiving until all have arrived: then no message is in transit
         (Hoefler, Siebert & Lumsdaine 2010, NBX). A rank may be a call ahead of another, hence two tags in turn."""
         from mpi4py import MPI
 

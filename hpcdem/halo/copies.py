@@ -42,7 +42,7 @@ def moved(
 
 
 def _answered(comm: Comm, target: np.ndarray, source: np.ndarray, answers: np.ndarray) -> np.ndarray:
-    """Answers to the questions that went to the ranks `target`, in the order in which they were asked."""
+    """Answers to the queries sent to the ranks `target`, in the order of the queries."""
     _, came = comm.to_ranks(source, answers)
     out = np.empty_like(came)
     out[np.argsort(target, kind="stable")] = came

@@ -47,7 +47,7 @@ class Ownership:
         busy: seconds of own work of this rank so far; room: x range [m] in which particles may be, if known; cost:
         (n,), if it is known that some cost more than others; least: columns of a rank.
         UsageError when a new model has fewer columns than there are ranks. One that lost them on its way, or was
-        restored so, goes on with ranks that wait.
+        restored so, continues with waiting ranks.
         """
         first_time = not len(self.borders)
         if self.comm.size == 1:

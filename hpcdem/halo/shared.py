@@ -113,9 +113,9 @@ class Nodes:
         if self.warn is not None and not self._told:
             self._told = True
             self.warn(
-                f"the {self.host.size} ranks of a node keep a copy each of what they could share "
-                f"({size / 2**20:.0f} MiB so far): there is no space for it in {' or '.join(self.folders)}. A larger "
-                "/dev/shm, or TMPDIR set to a folder with space in memory, saves this memory"
+                f"the {self.host.size} ranks of a node keep separate copies ({size / 2**20:.0f} MiB so far), "
+                f"because {' or '.join(self.folders)} has no space to share them. Enlarge /dev/shm, or set TMPDIR to "
+                "a folder in memory"
             )
 
 

@@ -1,4 +1,4 @@
-"""Files that are written while the run goes on.
+"""Files that are written during the run.
 
 A writer that is handed a `Deliveries` gives rank 0's part of the work to a thread: bytes that are ready to be written,
 the flush to the disk and the new name. All that needs other ranks is done by then, so the thread never touches MPI, and

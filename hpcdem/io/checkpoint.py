@@ -3,7 +3,7 @@
 Layout: attributes `format`, `version`, `state` (JSON: everything that is not a table) on the root; one group per table,
 one dataset per column. The root attribute `sums` (JSON) holds a checksum of each dataset, and `crc` the CRC-32 of
 `state` and `sums`; they are compared after writing, before the file gets its name, and again on reading. Behind the
-HDF5 part is a seal (`io/seal.py`), which is looked at first.
+HDF5 part is a seal (`io/seal.py`), which is checked first.
 
 A file of an earlier version of this layout is read by all later programs; one of a later version is refused.
 
@@ -204,17 +204,17 @@ def _contents(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, _Colum
             table, name = full.split("/")
             first = data.id.get_offset()
             if not (table and name and data.shape and data.dtype.kind in "biuf"):
-                raise HpcdemError(f"{os.fspath(path)} is damaged: {full} is no column of numbers")
+                raise HpcdemError(f"{os.fspath(path)} is damaged: {full} is not a numeric column")
             if data.nbytes > size:  # a size that is wrong must not be asked of the memory
                 raise HpcdemError(f"{os.fspath(path)} is damaged: {full} would be larger than the file")
             if first is None and data.nbytes:
-                raise HpcdemError(f"{os.fspath(path)} is damaged: the rows of {full} do not lie in one piece")
+                raise HpcdemError(f"{os.fspath(path)} is damaged: the rows of {full} are not contiguous")
             columns[full] = _Column(first or 0, data.shape, data.dtype, expected)
         return state, columns, check
 
 
 def read_state(path: str | os.PathLike) -> dict[str, Any]:
-    """State alone: quick, whatever the size of the tables, which are not looked at. HpcdemError as for `read`."""
+    """State alone: quick, whatever the size of the tables, which are not checked. HpcdemError as for `read`."""
     with _opened(path) as (_, state, _, _):
         return state
 
@@ -244,10 +244,9 @@ def _refuse_other_formats(path: str | os.PathLike) -> None:
         return  # `reading` says why
     if start != HDF5:
         raise HpcdemError(
-            f"{os.fspath(path)} is not an hpcdem checkpoint. If ZDEM wrote it: its .sav files are in a format of its "
-            "own, which only ZDEM reads. Begin with LOAD instead: of a frame all_<step>.dat of that run (particles and "
-            "their velocities and properties, walls, bonds as far as it has them), or of what EXP of ZDEM writes (x y "
-            "r). Or make the .sav with hpcdem"
+            f"{os.fspath(path)} is not an hpcdem checkpoint. Only ZDEM reads its own .sav files: use LOAD with a "
+            "frame all_<step>.dat of that run (particles with velocities and properties, walls, bonds if present) or "
+            "with a file of EXP (x y r), or write the .sav with hpcdem"
         )
 
 

@@ -86,13 +86,13 @@ class _Reader:
         places: dict[tuple[float, float], int] = {}
         for words in rows:
             if words[0] != "clump":
-                full = f", as the clump before has all its {bodies[-1][5]:g} discs" if bodies else ""
+                full = f", because the previous clump has all its {bodies[-1][5]:g} discs" if bodies else ""
                 self._refuse(f"'{BODY}'{full}")
             body = self._numbers(words[1:], 6, f"'{BODY}'")
             self._check_body(body)
             place, begins = (body[0], body[1]), self.number
             if place in places:
-                self._refuse(f"another place than that of the clump in line {places[place]}")
+                self._refuse(f"a position different from that of the clump in line {places[place]}")
             places[place] = begins
             mine: set[tuple[float, ...]] = set()
             for k in range(int(body[5])):
@@ -111,7 +111,7 @@ class _Reader:
             bodies.append(body)
             start.append(len(discs))
         if not bodies:
-            raise HpcdemError(f"{self.name}: holds no clumps, expected lines '{BODY}'")
+            raise HpcdemError(f"{self.name}: contains no clumps, expected lines '{BODY}'")
         table, rims = np.array(bodies), np.array(discs)
         x, y, angle, area, inertia = (table[:, k].copy() for k in range(5))
         dx, dy, r = (rims[:, k].copy() for k in range(3))
@@ -143,7 +143,7 @@ class _Reader:
                 f"a disc within {FARTHEST:g} radii of gyration of the clump ({gyration:g} m) from its centroid"
             )
         if tuple(disc) in mine:
-            self._refuse("a disc that this clump does not have already")
+            self._refuse("a disc that this clump does not already contain")
         mine.add(tuple(disc))
 
     def _check_size(self, body: list[float], discs: list[list[float]], line: int) -> None:

@@ -31,15 +31,15 @@ def numbers(color: np.ndarray) -> np.ndarray:
 
 
 def find_palette(name: str, folder: str | os.PathLike) -> Path:
-    """Where a colour file is: a path is taken as it is; a bare name is looked for in the current folder, in `folder`
-    and in the home folder. Raises HpcdemError where there is none."""
+    """Where a colour file is: a path is taken as it is; a bare name is searched for in the current folder, in `folder`
+    and in the home folder. Raises HpcdemError without one."""
     given = Path(name).expanduser()
     bare = given.name == name
     places = [Path(), Path(folder), Path.home()] if bare else [Path()]
     for place in places:
         if (place / given).is_file():
             return place / given
-    where = f"neither here, nor in {os.fspath(folder)}, nor in {Path.home()}" if bare else "there is no such file"
+    where = f"neither here, nor in {os.fspath(folder)}, nor in {Path.home()}" if bare else "file not found"
     raise HpcdemError(f"cannot read the colours {name}: {where}")
 
 
@@ -58,15 +58,17 @@ def read_palette(path: str | os.PathLike) -> np.ndarray:
         try:
             row = [float(word) for word in words]
         except ValueError:
-            raise ScriptError(os.fspath(path), number, f"red, green and blue expected, not '{line.strip()}'") from None
+            raise ScriptError(os.fspath(path), number, f"expected red, green and blue, not '{line.strip()}'") from None
         if len(row) != 3:
-            raise ScriptError(os.fspath(path), number, f"three numbers expected (red, green, blue), not {len(row)}")
+            raise ScriptError(os.fspath(path), number, f"expected three numbers (red, green, blue), not {len(row)}")
         if not all(0.0 <= value <= 1.0 for value in row):
-            raise ScriptError(os.fspath(path), number, f"red, green and blue go from 0 to 1, not '{line.strip()}'")
+            raise ScriptError(
+                os.fspath(path), number, f"expected red, green and blue from 0 to 1, not '{line.strip()}'"
+            )
         if len(rows) == len(RGB):
             raise ScriptError(os.fspath(path), number, f"more than {len(RGB)} colours")
         rows.append(row)
     if len(rows) < len(RGB):
         last = len(text.splitlines())
-        raise ScriptError(os.fspath(path), last, f"{len(RGB)} colours expected, the file ends after {len(rows)}")
+        raise ScriptError(os.fspath(path), last, f"expected {len(RGB)} colours, the file ends after {len(rows)}")
     return np.array(rows)

@@ -294,14 +294,14 @@ def read_dat(
     of the particles a slab, in ascending order of ids. No rank has them all in memory, if lines end as on Unix.
 
     tables: names of the tables to read (all by default); the others come back empty, which saves most of the time.
-    Columns that the file does not have are absent from the table; columns not known here are passed over. Groups
+    Columns that the file does not have are absent from the table; unknown columns are skipped. Groups
     are numbered in order of first appearance. Raises HpcdemError if the file is no such file or is cut off.
     """
     path = os.fspath(path)
     wanted = set(_TABLES if tables is None else tables)
     parameters, places, counts, in_place = on_first(comm, lambda: _layout(path, wanted))
     if "current_step" not in parameters:
-        raise HpcdemError(f"cannot read {path}: it has no line current_step, so it is no frame of ZDEM or hpcdem")
+        raise HpcdemError(f"cannot read {path}: it is not a frame of ZDEM or hpcdem (no line current_step)")
     raw = _tables(comm, path, places, in_place)
     balls = raw.get("ball data", [])
     if comm.size > 1:
@@ -328,7 +328,7 @@ def read_dat(
     for section, found in (("wall", len(walls["id"])), ("ball", number)):
         if counts.get(section, found) != found and (section != "ball" or "particles" in wanted):
             raise HpcdemError(
-                f"cannot read {path}: {counts[section]} {section}s announced, {found} found; is it cut off?"
+                f"cannot read {path}: {counts[section]} {section}s announced, {found} found. The file may be truncated"
             )
     if comm.size > 1:
         _agree_on_columns(comm, frame)
@@ -586,7 +586,7 @@ def _wall_contacts(raw: list[_RawTable], wall_ids: np.ndarray) -> _RawTable:
     rows = {int(i): k for k, i in enumerate(wall_ids)}
     unknown = [int(i) for i in table["wall_id"] if int(i) not in rows]
     if unknown:
-        raise ValueError(f"a wall contact names wall {unknown[0]}, which is not among the walls")
+        raise ValueError(f"a wall contact refers to the unknown wall {unknown[0]}")
     wall = np.array([rows[int(i)] for i in table["wall_id"]], dtype=np.int32)
     order = np.lexsort((wall, table["ball_id"]))
     columns: _RawTable = {"id1": table["ball_id"][order].astype(np.int64), "wall": wall[order]}

@@ -240,7 +240,7 @@ def _eight_digits(n: np.uint64) -> np.uint64:
 def _split(values: np.ndarray, digits: int, n: int, whole: np.ndarray, exponent: np.ndarray, slow: np.ndarray) -> int:
     """The first n values as whole * 10**(exponent - digits + 1), whole having `digits` digits; zero stays zero.
 
-    slow: 1 where that cannot be told for certain; returns whether there is any.
+    slow: 1 where that is uncertain; returns whether there is any.
     """
     limit = _HIGH[digits]
     edge = 0.5 - 4e-16 * limit - 1e-9

@@ -1,4 +1,4 @@
-"""What is asked of the disk, and what is said when it refuses."""
+"""Requests to the disk, and messages when they fail."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _CAUSES = {
     errno.EPERM: "permission denied",
     errno.ENOENT: "the folder does not exist",
     errno.ENOTDIR: "a part of the path is not a folder",
-    errno.EISDIR: "a folder has this name",
-    errno.EFBIG: "the file would be larger than is allowed here",
+    errno.EISDIR: "a folder with this name exists",
+    errno.EFBIG: "the file would exceed the allowed size",
     errno.EIO: "the disk reports an input/output error",
 }
 

@@ -17,9 +17,9 @@ from hpcdem.core.comm import Comm
 
 
 class Columns(Mapping[str, np.ndarray]):
-    """Columns by name, each read when it is first asked for, and kept.
+    """Columns by name, each read on first use and kept.
 
-    readers: from rows to their values; most: bytes that are kept, beyond which columns that nobody has asked for lately
+    readers: from rows to their values; most: bytes that are kept, beyond which columns that were not used recently
     are read again when they are wanted."""
 
     def __init__(self, readers: Mapping[str, Callable[[slice], np.ndarray]], most: float = math.inf) -> None:
@@ -47,7 +47,7 @@ class Columns(Mapping[str, np.ndarray]):
         return len(self._readers)
 
     def was_read(self, name: str) -> bool:
-        """Whether a column was asked for before."""
+        """Whether a column was used before."""
         return name in self._read
 
     @property

@@ -63,7 +63,7 @@ def list_mesh_frames(folder: str | os.PathLike, stem: str | None = None) -> list
 
 
 def mesh_frames_by_name(folder: str | os.PathLike, stem: str | None = None) -> dict[str, list[FrameFile]]:
-    """The same of all names that there are, or of one. Raises HpcdemError if the folder cannot be read."""
+    """Mesh frames of all names, or of one. Raises HpcdemError if the folder cannot be read."""
     found: dict[str, list[FrameFile]] = {}
     for name in _names(folder)[0]:
         parts = _MESH_NAME.fullmatch(name)
@@ -88,7 +88,7 @@ def _known(path: Path, changed: int) -> bool:
 
 
 def left_out(folder: str | os.PathLike) -> str:
-    """What is to be said about frames that an earlier run has left in a folder; "" if there are none. Raises
+    """Warning about frames that an earlier run has left in a folder, or "". Raises
     HpcdemError if the folder cannot be read."""
     earlier = _names(folder)[1]
     if not earlier:
@@ -97,8 +97,8 @@ def left_out(folder: str | os.PathLike) -> str:
     which = f"of step {steps[0]}" if steps[0] == steps[-1] else f"of steps {steps[0]} to {steps[-1]}"
     count = len({name.rpartition(".")[0] for name in earlier})
     return (
-        f"{count} frame{'s' if count > 1 else ''} {which} in {os.fspath(folder)} were left by an earlier run, "
-        "and do not count; copy the frames that are wanted together into a folder of their own"
+        f"{count} frame{'s' if count > 1 else ''} {which} in {os.fspath(folder)} are from an earlier run and "
+        "ignored. To use them together, copy them into a separate folder"
     )
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-# Locks fail or block on many network file systems, and a finished file may be looked at while the run goes on.
+# Locks fail or block on many network file systems, and a finished file may be read during the run.
 os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
 
 import h5py
@@ -308,7 +308,7 @@ def reading(path: str | os.PathLike) -> Iterator[Any]:
 
 
 def columns(path: str | os.PathLike, places: Mapping[str, tuple[str, Any]]) -> Columns:
-    """Columns of a file by name, read when they are asked for. places: dataset and rows of each."""
+    """Columns of a file by name, read on use. places: dataset and rows of each."""
 
     def reader(place: str, whole: Any) -> Callable[[slice], np.ndarray]:
         def read(rows: slice) -> np.ndarray:

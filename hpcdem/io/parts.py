@@ -14,7 +14,7 @@ Parts = Sequence[tuple[int, int]]
 """First byte of each part and the one after its last."""
 
 _MORE = 4096
-"""Bytes in which the end of a line is looked for at a time."""
+"""Bytes searched at a time for the end of a line."""
 
 
 def share(n: int, comm: Comm) -> tuple[int, int]:

@@ -72,7 +72,7 @@ def write_ppdem(
     if layout not in LAYOUTS:
         raise HpcdemError(f"cannot write {os.fspath(path)}: layout '{layout}', expected one of {', '.join(LAYOUTS)}")
     if layout == "plain" and not is_circle.all():
-        raise HpcdemError(f"cannot write {os.fspath(path)}: the layout 'plain' is for circles only")
+        raise HpcdemError(f"cannot write {os.fspath(path)}: the layout 'plain' supports circles only")
     if layout == "full" and grains.roundness is None and not is_circle.all():
         raise HpcdemError(f"cannot write {os.fspath(path)}: the layout 'full' needs the roundness of the edges")
     with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii", newline="\n") as file:
@@ -112,7 +112,7 @@ def read_ppdem(path: str | os.PathLike, layout: str | None = None, angle_factor:
         raise HpcdemError(explain(path, problem, "read")) from None
     values = _values(name, data)
     if len(values) < 2:
-        raise ScriptError(name, 1, "holds no grains, expected the number of grains and a 1")
+        raise ScriptError(name, 1, "contains no grains, expected the number of grains and a 1")
     count = values[0]
     if not (count >= 1.0 and count == math.floor(count)):
         raise ScriptError(name, _line(data, 0), f"read {count:g}, expected the number of grains")
@@ -145,7 +145,7 @@ def _values(name: str, data: bytes) -> np.ndarray:
             if not re.fullmatch(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", word):
                 shown = "".join(c if c.isprintable() else " " for c in word[:40].decode("utf-8", errors="replace"))
                 raise ScriptError(name, _line(data, k), f"read '{shown}', expected a number") from None
-        raise ScriptError(name, 1, "holds what is no number") from None
+        raise ScriptError(name, 1, "contains text that is not a number") from None
     wrong = np.flatnonzero(~np.isfinite(values) | (np.abs(values) > 1e30))
     if len(wrong):
         k = int(wrong[0])
@@ -195,7 +195,7 @@ def _places(name: str, data: bytes, values: np.ndarray, n: int, per_arc: int) ->
         at[k] = here
         here += 5 if arcs == 1.0 else 1 + per_arc * int(arcs)
     if here != total:
-        text = f"ends within grain {n}" if here > total else f"goes on after {n} grains, expected the end"
+        text = f"ends within grain {n}" if here > total else f"continues after {n} grains, expected the end"
         raise ScriptError(name, _line(data, min(here, total)), text)
     return at
 
@@ -231,7 +231,6 @@ def _taken_apart(
     twice = np.add.reduceat(fx * fy[following] - fx[following] * fy, start[:-1])
     for k in np.flatnonzero(~is_circle & ~(twice > 0.0))[:1]:
         raise ScriptError(
-            name, _line(data, int(at[k])), f"grain {k + 1}: its ends go round clockwise or nowhere, expected "
-            "anticlockwise"
+            name, _line(data, int(at[k])), f"grain {k + 1}: its end points are not in anticlockwise order"
         )  # fmt: skip
     return PpdemGrains(start, x, y, np.radians(degrees), diameter, roundness, group)

@@ -46,7 +46,7 @@ class RootFile:
         self._do(self._open)
 
     def describe(self, make: Callable[[], Description]) -> None:
-        """What the file is about is told by `make`, which is called when the first pieces are written."""
+        """`make` returns the content of the file; it is called when the first pieces are written."""
         self._make = make
 
     def _describe(self, make: Callable[[], Description]) -> list[_Piece]:

@@ -21,7 +21,7 @@ from hpcdem.io.disk import explain
 
 RECORD = "run.json"
 PROGRESS = "progress.json"
-"""Beside it while the run goes on: `step`, `command`, the last `line` of the log, `speed` [steps/s], `part` of the
+"""Beside it during the run: `step`, `command`, the last `line` of the log, `speed` [steps/s], `part` of the
 command that is done and seconds `left`, `script_part` and `script_left` of the whole script; null: not known."""
 _FRAME = re.compile(r".+_(\d{10,})(_ini)?\.(vtkhdf|dat)")
 
@@ -44,7 +44,7 @@ class Record:
 
 
 def read(folder: Path) -> Record | None:
-    """What run.json of a folder says; None if there is none. HpcdemError if it cannot be read."""
+    """Content of run.json of a folder, or None. HpcdemError if it cannot be read."""
     path = folder / RECORD
     try:
         given = json.loads(path.read_text(encoding="utf-8"))

@@ -1,7 +1,7 @@
 """A seal behind an HDF5 file: a checksum of all that describes its data.
 
 HDF5 believes what it reads of groups, names, types and sizes: a wrong byte there can send it into an endless loop or
-end the process. So the seal is looked at before HDF5 looks at the file. HDF5 does not mind bytes behind its own end.
+end the process. So the seal is checked before HDF5 reads the file. HDF5 ignores bytes after its own end.
 
 Layout of the seal: JSON with the `length` of the HDF5 part and the places of its `rows`, [first byte, bytes] of each
 dataset; then the number of bytes of that JSON (u8), the CRC-32 of the HDF5 part without rows and of the JSON (u4), and

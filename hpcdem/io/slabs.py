@@ -138,7 +138,7 @@ def find_rows(comm: Comm, keys: Sequence[np.ndarray], wanted: Sequence[np.ndarra
     """Collective: the global row of each wanted key in a table held in slabs, -1 where there is no such row.
 
     keys: this rank's slab of one or two key columns, ascending over all ranks; wanted: as many columns of the keys
-    asked for, in any order. Every rank asks only the rank that would hold the row.
+    requested, in any order. Every rank queries only the rank that would hold the row.
     """
     large = any(len(k) and not (-_SMALL_GID <= np.min(k) and np.max(k) < _SMALL_GID) for k in (*keys, *wanted))
     comm.agree(f"ids beyond {_SMALL_GID} cannot be looked up in pairs" if large and len(keys) > 1 else None)
@@ -170,7 +170,7 @@ def ask(
     comm: Comm, target: np.ndarray, questions: np.ndarray, answer: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
     """Collective: the answers (n, ...) of the ranks `target` (n,) i8 to these questions (n,), row by row; `answer` is
-    what this rank says to those it is asked."""
+    the answers of this rank."""
     sources, asked = comm.to_ranks(target, questions)
     _, answers = comm.to_ranks(sources, answer(asked))
     found = np.empty_like(answers)

@@ -68,14 +68,14 @@ class TextTable:
             raise ValueError(f"column {column.name}: {len(values)} values for {self.rows} rows")
         needed = {SCI: column.digits + 7, FIXED: column.digits + 3, INT: 1, WORD: int(self._lengths.max())}[column.kind]
         if column.kind == SCI and not 1 <= column.digits <= MAX_DIGITS:
-            raise ValueError(f"column {column.name}: {column.digits} digits asked for, 1 to {MAX_DIGITS} are possible")
+            raise ValueError(f"column {column.name}: {column.digits} digits requested, expected 1 to {MAX_DIGITS}")
         if self.rows and column.kind == FIXED:
             largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
             needed += len(f"{min(largest, 1e9):.{column.digits}f}".split(".")[0]) - 1
         if self.rows and column.kind == INT:
             needed = max(len(str(values.max())), len(str(values.min())))
         if self.rows and column.kind == WORD and not (0 <= values.min() and values.max() < n_words):
-            raise ValueError(f"column {column.name}: an index without a word")
+            raise ValueError(f"column {column.name}: an index without a name")
         if needed > column.width:
             raise ValueError(f"column {column.name}: {needed} characters do not fit a width of {column.width}")
 
@@ -95,7 +95,7 @@ class TextTable:
             kernels.fill(self._plan, floats, ints, self._letters, self._lengths, n, room)
 
     def blocks(self, size: int = 4 * _BLOCK) -> Iterator[np.ndarray]:
-        """The text in uint8 arrays of about `size` bytes; each is valid until the next is asked for."""
+        """The text in uint8 arrays of about `size` bytes; each is valid until the next is requested."""
         step = max(1, size // self.width)
         out = np.empty(min(step, self.rows) * self.width, dtype=np.uint8)
         for a in range(0, self.rows, step):

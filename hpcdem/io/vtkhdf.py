@@ -46,7 +46,7 @@ def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Comm, later: Deliv
         ends = [find_rows(comm, [gid], [table.columns[k]]) for k in ("id1", "id2")]
         missing += sum(int((e < 0).sum()) for e in ends)
         links.append(np.stack(ends, axis=1))
-    comm.agree(f"cannot write {os.fspath(path)}: a contact names a particle that is not there" if missing else None)
+    comm.agree(f"cannot write {os.fspath(path)}: a contact refers to a missing particle" if missing else None)
     pairs = ("id1", "id2")
     bonded = find_rows(comm, [bonds.columns[k] for k in pairs], [contacts.columns[k] for k in pairs]) >= 0
 
@@ -158,11 +158,11 @@ def read_vtkhdf(path: str | os.PathLike, tables: Collection[str] | None = None, 
     """The frame in a file of `write_vtkhdf`, every number as it was. Serial.
 
     tables: names of the tables to read (all by default); the others come back empty. lazily: columns are read when they
-    are asked for. Raises HpcdemError.
+    are requested. Raises HpcdemError.
     """
     with h5.reading(path) as file:
         if "hpcdem" not in file or "VTKHDF" not in file:
-            raise HpcdemError(f"cannot read {os.fspath(path)}: it is no frame written by hpcdem")
+            raise HpcdemError(f"cannot read {os.fspath(path)}: it is not a frame written by hpcdem")
         head = file["hpcdem"]
         settings = {k: v.decode() if isinstance(v, bytes) else float(v) for k, v in head["settings"].attrs.items()}
         frame = Frame(

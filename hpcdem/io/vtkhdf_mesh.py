@@ -129,7 +129,7 @@ def is_mesh_frame(path: str | os.PathLike) -> bool:
 
 
 def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool = False) -> MeshState:
-    """A frame that `write_mesh_frame` wrote. lazily: columns are read when they are asked for; solid: whether it may be
+    """A frame that `write_mesh_frame` wrote. lazily: columns are read on use; solid: whether it may be
     one in three dimensions. Serial. HpcdemError if it is missing, foreign or damaged."""
     with h5.reading(path) as file:
         try:
@@ -145,7 +145,7 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool =
             ends = top["Connectivity"][int(sizes.sum()) :].reshape(-1, dim)
             whole = elements[:n].all() and len(ends) == joints.sum() and int(sizes.sum()) == len(points)
             if not whole or (len(ends) and not 0 <= ends.min() <= ends.max() < len(points)):
-                raise ValueError("cells and points do not belong together")
+                raise ValueError("cells and points do not match")
             tables: list[Mapping[str, np.ndarray]] = []
             for group, rows in (("PointData", slice(None)), ("CellData", slice(0, n)), ("CellData", slice(n, None))):
                 places = {
@@ -174,9 +174,9 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool =
                 of_elements, of_joints, names, supports, others, bytes(about.get("units", b"")).decode(),
             )  # fmt: skip
         except NotImplementedError:
-            raise HpcdemError(f"{os.fspath(path)} is a frame in three dimensions: this is for two") from None
+            raise HpcdemError(f"{os.fspath(path)} is a frame in three dimensions, expected two") from None
         except (KeyError, TypeError, AttributeError, OSError, RuntimeError, ValueError) as problem:
-            raise HpcdemError(f"{os.fspath(path)} is no frame of blocks, or damaged: {problem}") from None
+            raise HpcdemError(f"{os.fspath(path)} is not a frame of blocks, or is damaged: {problem}") from None
 
 
 def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Comm, later: Deliveries | None = None) -> None:
@@ -185,7 +185,7 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Comm, late
     corners, elements, joints = frame.corners, frame.elements, frame.joints
     keys, dim = [corners.columns["number"]], 3 if "z" in corners.columns else 2
     ends = np.stack([find_rows(comm, keys, [joints.columns[k]]) for k in CORNERS[dim]], axis=1)
-    lost = "a joint names a corner that is not there" if len(ends) and ends.min() < 0 else None
+    lost = "a joint refers to a missing corner" if len(ends) and ends.min() < 0 else None
     comm.agree(f"cannot write {os.fspath(path)}: {lost}" if lost else None)
     sizes = elements.columns["corners"]
     first = comm.exscan(int(sizes.sum()))

@@ -1,4 +1,4 @@
-"""Things that hang together, by their lowest member."""
+"""Connected components, by their lowest member."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A 128-bit number that stands for a table of rows, whatever their order and wherever they are.
 
 Each row is mixed to two 64-bit words (SplitMix64's finaliser, Steele, Lea & Flood 2014), and these are added up modulo
-2^64: sums know no order, so ranks only have to add theirs. Not a cryptographic hash: it finds differences that happen,
+2^64: sums do not depend on order, so ranks only add theirs. Not a cryptographic hash: it finds differences that happen,
 not those that somebody designs.
 """
 

@@ -1,7 +1,7 @@
 """Arguments of functions that users write, out of lanes, and what they return, into lanes (lanes.py).
 
-A function is called by its own names, in its own order. numba knows no dictionaries of such, so kernels are put
-together here, one small one per name; compilers see through all of them.
+A function is called by its own names, in its own order. numba does not support dictionaries of functions, so kernels
+are put together here, one small one per name; compilers see through all of them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Random fields: Weibull, normal and lognormal values, independent from object to object or correlated over a length.
 
 Values are pure functions of (seed, kind of object, its number) or, correlated, of (seed, place): neither ranks nor
-storage nor the other objects that are asked for matter, and a correlated field is the same on a finer mesh.
+storage nor the other requested objects matter, and a correlated field is the same on a finer mesh.
 
 Correlated: the spectral representation of a Gaussian field with covariance C(r) (Shinozuka & Deodatis 1991),
 
@@ -73,7 +73,7 @@ class RandomField:
                 f"a random field needs finite numbers, a length and a seed that are not negative: {made}"
             )
         if distribution not in (WEIBULL, NORMAL, LOGNORMAL) or covariance not in (EXPONENTIAL, GAUSSIAN):
-            raise CommandError(f"there is no random field {distribution} {covariance}")
+            raise CommandError(f"unknown random field {distribution} {covariance}")
         positive = distribution == WEIBULL or (distribution == LOGNORMAL and made.second == 0.0)
         if (positive and not (made.first > 0.0 and made.second >= 0.0)) or made.second < 0.0:
             raise CommandError(f"{distribution} {first:g} {second:g}: scale, shape and deviation must be positive")

@@ -128,7 +128,7 @@ class Curves:
         quotes: `'above' - 'below'`, also with a title and a unit before it, `load [N/m] = ...`. whole: all points.
         HpcdemError."""
         if not isinstance(x, str) or not isinstance(y, list) or not all(isinstance(one, str) for one in y):
-            raise HpcdemError("a chart has an x, and a list of y")
+            raise HpcdemError("a chart needs an x and a list of y")
         if any(len(one) > LONGEST for one in (x, *y)):
             raise HpcdemError(f"a column has at most {LONGEST} characters")
         if not 1 <= len(y) <= MOST:
@@ -168,7 +168,7 @@ class Curves:
     # ---- columns ---------------------------------------------------------------------------------------------------
 
     def _asked(self, text: str, records: dict[str, Record]) -> tuple[str, str, str]:
-        """Title, unit and expression of a column that was asked for."""
+        """Title, unit and expression of a requested column."""
         text = text.strip()
         if text in OWN and text not in records:
             return text, OWN[text], text
@@ -265,7 +265,7 @@ def _used(text: str, records: dict[str, Record]) -> dict[str, Record]:
     for found in _QUOTED.finditer(text):
         name = found[1] or found[2] or ""
         if name not in records:
-            raise HpcdemError(f"there is no history '{name}'; there is {_some(records)}")
+            raise HpcdemError(f"there is no history '{name}'; known: {_some(records)}")
         used[name] = records[name]
     return used
 

@@ -1,7 +1,7 @@
 """What `hpcdem view --run` lets the page do besides: edit the scripts of one folder, have them checked, and carry out
 commands in a process of its own.
 
-Whoever may open the page may run programs with it, as at a terminal. That is why it has to be asked for at the command
+Whoever may open the page may run programs with it, as at a terminal. Therefore it must be requested on the command
 line, and why the page's key, loopback and the check of the origin (server.py) stand before all of it.
 """
 
@@ -71,7 +71,7 @@ class Console:
         """Hand over a text; name: of a script, which gets a process of its own. HpcdemError while it is at work."""
         with self.lock:
             if self.busy:
-                raise HpcdemError("the console is at work; interrupt it first")
+                raise HpcdemError("the console is busy: interrupt it first")
             if name or not self.alive or language != self.language:
                 self.start(language)
             assert self.process is not None and self.process.stdin is not None
@@ -82,7 +82,7 @@ class Console:
                 self.process.stdin.flush()
                 self.waiting += 1
             except OSError:
-                raise HpcdemError("the console has ended; start it again") from None
+                raise HpcdemError("the console has ended: restart it") from None
 
     def start(self, language: str) -> None:
         """Begin with an empty model."""
@@ -109,7 +109,7 @@ class Console:
         """As Ctrl-C does: a run is saved and stops; a second one stops at once."""
         with self.lock:
             if not self.busy or self.process is None:
-                raise HpcdemError("nothing is being carried out")
+                raise HpcdemError("nothing is running")
             with contextlib.suppress(OSError):
                 os.kill(self.process.pid, signal.SIGINT)
 
@@ -207,10 +207,10 @@ class Desk:
     def _path(self, name: Any) -> Path:
         """The file of a script. HpcdemError if it would not lie in the folder."""
         if not isinstance(name, str) or SCRIPT.fullmatch(name) is None:
-            raise HpcdemError("a script has a name like push.py or ucs.sc, and lies in the folder of the page")
+            raise HpcdemError("a script needs a name such as push.py or ucs.sc, without folders")
         path = self.folder / name
         if path.is_symlink() or (path.exists() and not path.is_file()):
-            raise HpcdemError(f"{name} is no plain file")
+            raise HpcdemError(f"{name} is not a regular file")
         return path
 
     def read(self, name: Any) -> dict[str, Any]:
@@ -231,7 +231,7 @@ class Desk:
         if not isinstance(text, str) or len(text) > LARGEST_SCRIPT:
             raise HpcdemError(f"text: expected at most {LARGEST_SCRIPT} characters")
         if (_stamp(path) if path.exists() else None) != stamp:
-            raise HpcdemError(f"{name} was changed by others meanwhile; open it again, or save under another name")
+            raise HpcdemError(f"{name} was changed by another program: open it again, or save under another name")
         try:
             with tempfile.NamedTemporaryFile("wb", dir=self.folder, prefix=".", suffix=".tmp", delete=False) as file:
                 file.write(text.encode())
@@ -249,7 +249,7 @@ class Desk:
         path, new = self._path(name), self._path(to)
         try:
             if _stamp(path) != stamp:
-                raise HpcdemError(f"{name} was changed by others meanwhile; open it again")
+                raise HpcdemError(f"{name} was changed by another program: open it again")
             try:
                 os.link(path, new)  # unlike os.replace it refuses a name that is taken
                 path.unlink()
@@ -260,7 +260,7 @@ class Desk:
                     raise FileExistsError from None
                 path.rename(new)
         except FileExistsError:
-            raise HpcdemError(f"there is a script {to} already") from None
+            raise HpcdemError(f"script {to} exists") from None
         except OSError as problem:
             raise HpcdemError(f"cannot rename {name}: {problem.strerror}") from None
         return {"name": to, "stamp": _stamp(new)}
@@ -278,7 +278,7 @@ def _umask() -> int:
 
 
 def whole(text: Any, language: Any) -> bool:
-    """Whether what was typed can be carried out, or goes on in another line: a block of Python ends with an empty
+    """Whether the input can be executed, or continues in another line: a block of Python ends with an empty
     one."""
     if not isinstance(text, str) or len(text) > LARGEST_SCRIPT:
         raise HpcdemError("text: expected commands")
@@ -290,7 +290,7 @@ def whole(text: Any, language: Any) -> bool:
 
 
 def complete(line: Any, language: Any) -> dict[str, Any]:
-    """The words that a begun line may go on with, and how many of its last characters they replace."""
+    """The words that may continue a line, and how many of its last characters they replace."""
     if not isinstance(line, str) or len(line) > LONGEST_LINE:
         raise HpcdemError("line: expected text")
     from hpcdem.lang.pcdc.complete import candidates as of_pcdc

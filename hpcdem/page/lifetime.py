@@ -66,7 +66,7 @@ def live(server: PageServer, browser: bool, say: Callable[[str], None]) -> None:
     before = signal.signal(signal.SIGTERM, _stop)
     try:
         say(f"Page: {server.url}")
-        say("It is open to this machine only, and to those who know this address. Ctrl-C ends it.")
+        say("Only programs on this machine that know this address can open it. Ctrl-C ends it.")
         if browser and can_open():
             threading.Thread(target=webbrowser.open, args=[server.ticket()], daemon=True).start()
         server.serve_forever(poll_interval=0.2)

@@ -21,13 +21,13 @@ KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("fine", "dark"), (bool,)),
     "fps": (float, int), "view": (dict,), "y": (list,),
 }  # fmt: skip
-"""Kinds of what `hpcdem view` is asked with, by name: the same in all calls; null is as if it were left out."""
+"""Kinds of the arguments of requests to `hpcdem view`, by name, for all calls; null means not given."""
 MOST_PIXELS = 3840 * 2160
 """Pixels of a picture of `hpcdem view`; the window shows fewer, made larger, where it has more."""
 LONGEST_SIDE = 4096
 """Of them along a side."""
 PICTURES = 16
-"""Pictures, clicks and lists of fields that are asked for at a time: the rest of the CONVERSATIONS is for what needs no
+"""Pictures, clicks and lists of fields requested at a time: the rest of the CONVERSATIONS is for what needs no
 picture, such as to interrupt a run."""
 LONGEST_FILM = 1000
 """Frames of a film that the page makes."""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hpcdem.pre.specimen import Request, Specimen
 
 TABLE = "table"
-"""What messages call the table of the page, in the place of a file's name."""
+"""Name of the table of the page in messages, instead of a file name."""
 MM = 1e3
 FIGURES = ("png", "svg")
 ARCHIVE = "specimen.zip"
@@ -99,7 +99,7 @@ def request_of(wanted: dict[str, Any]) -> Request:
     for name, kind in kinds.items():
         if name in wanted:
             if not isinstance(wanted[name], kind) or isinstance(wanted[name], bool):
-                raise HpcdemError(f"{name}: read {str(wanted[name])[:20]}, which it cannot be")
+                raise HpcdemError(f"{name}: read {str(wanted[name])[:20]}, which is not allowed")
             values[name] = wanted[name]
     return Request(sizes=tuple(grading.sizes), percents=tuple(grading.percent), **values)
 
@@ -107,7 +107,7 @@ def request_of(wanted: dict[str, Any]) -> Request:
 def values_of(request: Request) -> dict[str, Any]:
     """The opposite of `request_of`. Raises HpcdemError for what the page cannot show."""
     if request.number is None:
-        raise UsageError("the page has a slider for the number of grains: give --number, not the width of the box")
+        raise UsageError("the page needs the number of grains: give --number, not --width")
     values = {field.name: getattr(request, field.name) for field in fields(request)}
     rows = [[f"{size:.12g}", f"{percent:.12g}"] for size, percent in zip(values.pop("sizes"), values.pop("percents"))]
     del values["width"]

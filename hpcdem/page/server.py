@@ -2,7 +2,7 @@
 
 The server listens on 127.0.0.1 only. Other people on the machine do not know the key that is part of every address;
 pages of other sites do not know it either, and a name of theirs that resolves to 127.0.0.1 (DNS rebinding) is refused
-by the header Host. What can be asked for are the entries of two tables made before the first request: texts, and
+by the header Host. Requests can name only entries of two tables made before the first request: texts, and
 functions of a JSON object. Nothing in a request becomes the name of a file.
 
 A connection stands at the door until its first line has shown the key: nothing else of it is read before, it has a
@@ -83,7 +83,7 @@ Call = Callable[[dict[str, Any]], Answer]
 
 
 class BusyError(HpcdemError):
-    """Too much is asked for at a time; a moment later it can be done."""
+    """Too many requests at a time; they can be repeated a moment later."""
 
     status = HTTPStatus.SERVICE_UNAVAILABLE
 
@@ -110,9 +110,7 @@ class PageServer(ThreadingHTTPServer):
             super().__init__((LOOPBACK, port), Conversation)
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise UsageError(
-                f"--port {port}: cannot listen there: {reason}; without --port a free one is taken"
-            ) from None
+            raise UsageError(f"--port {port}: cannot listen: {reason}. Without --port a free port is used") from None
 
     def server_bind(self) -> None:
         """As TCPServer does it: HTTPServer would ask the name service for the name of 127.0.0.1."""
@@ -273,7 +271,7 @@ class Conversation(BaseHTTPRequestHandler):
         self._local()
         origin = self.headers.get("Origin", f"http://{self.headers['Host']}")
         if origin != f"http://{self.headers['Host']}":
-            raise _Refused(HTTPStatus.FORBIDDEN, "this server answers its own page only")
+            raise _Refused(HTTPStatus.FORBIDDEN, "this server accepts requests of its own page only")
         name = self._permitted()
         if name not in self.server.calls:
             raise _Refused(HTTPStatus.NOT_FOUND, "there is nothing of this name")
@@ -283,7 +281,7 @@ class Conversation(BaseHTTPRequestHandler):
         """Refuse what was sent to a name that is not this machine's own."""
         hosts = self.headers.get_all("Host") or []
         if len(hosts) != 1 or _name(hosts[0]) not in NAMES:
-            raise _Refused(HTTPStatus.FORBIDDEN, "this server answers to 127.0.0.1 and localhost only")
+            raise _Refused(HTTPStatus.FORBIDDEN, "this server accepts the addresses 127.0.0.1 and localhost only")
 
     def _permitted(self) -> str:
         """Last part of the address, after the key."""
@@ -304,7 +302,9 @@ class Conversation(BaseHTTPRequestHandler):
         try:
             text = self.rfile.read(int(length))
         except TimeoutError:
-            raise _Refused(HTTPStatus.REQUEST_TIMEOUT, f"the request did not come within {BODY_SECONDS:g} s") from None
+            raise _Refused(
+                HTTPStatus.REQUEST_TIMEOUT, f"the request did not arrive within {BODY_SECONDS:g} s"
+            ) from None
         content = _read(text)
         for name, kinds in self.server.kinds.items():
             value = content.get(name)
@@ -376,7 +376,7 @@ def _look_through(content: Any) -> None:
         ]  # fmt: skip
         if not level:
             return
-    raise _UnfitError(f"more than {DEEPEST} lists and objects within each other")
+    raise _UnfitError(f"more than {DEEPEST} nested lists and objects")
 
 
 def _name(host: str) -> str | None:

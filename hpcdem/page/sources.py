@@ -1,4 +1,4 @@
-"""What `hpcdem view` shows: frames of folders and single files, which grow while a run goes on, and its histories."""
+"""What `hpcdem view` shows: frames of folders and single files, which grow during a run, and its histories."""
 
 from __future__ import annotations
 
@@ -97,13 +97,13 @@ class Sources:
         self.found = found
 
     def source(self, number: Any) -> Source:
-        """One of them, by its place. HpcdemError if there is none."""
+        """One of them, by its index. HpcdemError for an unknown one."""
         if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(self.found):
             raise HpcdemError("there are no such frames")
         return self.found[number]
 
     def frame(self, number: Any, place: Any) -> FrameFile:
-        """A frame by its source and its place, -1 the last. HpcdemError if there is none."""
+        """A frame by its source and its place, -1 the last. HpcdemError for an unknown one."""
         frames = self.source(number).frames
         if not isinstance(place, int) or isinstance(place, bool) or not -1 <= place < len(frames) or not frames:
             raise HpcdemError("there is no such frame")
@@ -162,7 +162,7 @@ class Sources:
         return told
 
     def waiting(self) -> dict[str, Any]:
-        """Why there is no frame yet: kernels are compiled, a run goes on, or nothing does."""
+        """Why there is no frame yet: kernels are compiled, a run is active, or nothing is."""
         folder = self.folders()[0] if self.folders() else self.paths[0]
         holder = run_folder.running(folder) if folder.is_dir() else None
         if holder is not None:
@@ -181,11 +181,11 @@ class Sources:
         """Ask the run that writes into the first folder to stop after a checkpoint, or to save one: the same signals as
         from a terminal. HpcdemError where none runs on this machine."""
         if what not in SIGNALS:
-            raise HpcdemError("a run can be told to stop or to save")
+            raise HpcdemError("expected stop or checkpoint")
         folder = next(iter(self.folders()), None)
         holder = None if folder is None else run_folder.running(folder)
         if holder is None:
-            raise HpcdemError("no run writes into this folder now")
+            raise HpcdemError("no run is writing into this folder")
         if holder.get("host") != socket.gethostname() or not isinstance(holder.get("pid"), int):
             raise HpcdemError(
                 f"the run is on {holder.get('host', 'another machine')}: send it {SIGNALS[what].name} there"

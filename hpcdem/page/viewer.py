@@ -103,7 +103,7 @@ class Viewer:
         self.turn = threading.Lock()
         self.places = threading.BoundedSemaphore(PICTURES)
         self.last: tuple[str, Any, Scene] | None = None
-        """What was asked for last, its picture and scene: a click is looked up there."""
+        """The last request, its picture and scene: a click is looked up there."""
 
     def calls(self) -> dict[str, Call]:
         """What POST answers."""
@@ -143,7 +143,7 @@ class Viewer:
         return self._one_of_few(call)
 
     def warm_up(self) -> None:
-        """Have the kernels compiled, or loaded, before the first picture is asked for."""
+        """Have the kernels compiled, or loaded, before the first picture is requested."""
         from hpcdem.post.view import warm_up
 
         with self.turn:

@@ -1,7 +1,7 @@
 """A process that makes what the page asks for, and the line of those who wait for it.
 
 Making a specimen cannot be interrupted from within, and while a slider moves only the last position counts: so the work
-is done by a process of its own (maker.py), which is ended and replaced when something newer is asked for and the answer
+is done by a process of its own (maker.py), which is ended and replaced when there is a newer request and the answer
 under way takes long. Both ends write a code, a length and that many bytes into a pipe.
 """
 
@@ -32,7 +32,7 @@ READY, ASKED, MADE, REFUSED, BROKEN = range(5)
 
 
 class SupersededError(HpcdemError):
-    """Something newer has been asked for; nobody waits for this answer."""
+    """There is a newer request; nobody waits for this answer."""
 
     status = 409
     """Of HTTP: conflict."""
@@ -165,7 +165,7 @@ class Worker:
         """Wait for one's turn; the number of the request and who shall answer it."""
         with self.turn:
             if self.waiting >= WAITING and not self.newest_wins:
-                raise HpcdemError("other files are still being made; try again in a moment")
+                raise HpcdemError("other files are still being written: try again in a moment")
             self.asked += 1
             mine = self.asked
             self.waiting += 1
@@ -180,7 +180,7 @@ class Worker:
                             continue
                     self.turn.wait(rest)
                 if self._superseded(mine):
-                    raise SupersededError("something newer has been asked for")
+                    raise SupersededError("superseded by a newer request")
                 maker = self._maker()
                 self.busy, self.began = mine, None
             finally:
@@ -204,8 +204,8 @@ class Worker:
             if self.ended != number:
                 return HpcdemError(f"the process that makes specimens has ended: {how}")
             if self._superseded(number):
-                return SupersededError("something newer has been asked for")
-        return HpcdemError(f"not done after {self.longest:g} s: ask for fewer grains, or for a larger void ratio")
+                return SupersededError("superseded by a newer request")
+        return HpcdemError(f"not finished after {self.longest:g} s: choose fewer grains, or a larger void ratio")
 
     def _end(self) -> None:
         """End the work under way, and the process with it."""
@@ -215,7 +215,7 @@ class Worker:
         self.maker, self.spare = self.spare, None
 
     def _maker(self) -> Maker:
-        """The process that answers, a new one if there is none or it has ended."""
+        """The process that answers, started if necessary."""
         if self.closed:
             raise HpcdemError("the server is ending")
         if self.maker is None or not self.maker.alive:

@@ -36,7 +36,7 @@ def free_memory(root: Path) -> int | None:
 
 
 def read(path: Path) -> str:
-    """The text of a file; empty where there is none."""
+    """The text of a file; empty without one."""
     try:
         return path.read_text(errors="replace")
     except OSError:

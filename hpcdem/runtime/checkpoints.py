@@ -1,4 +1,4 @@
-"""Which checkpoints a run can go on from."""
+"""Checkpoints from which a run can resume."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def newest_first(folders: list[Path], before: float = math.inf) -> tuple[list[Pa
 
 
 def go_back_to(path: Path, folders: list[Path], comm: Comm) -> None:
-    """The run goes on from this checkpoint: later ones in the folders, and frames that came after it, do not count
+    """The run resumes from this checkpoint: later ones in the folders, and frames that came after it, do not count
     any more. Collective."""
 
     def work() -> None:
@@ -41,8 +41,8 @@ def go_back_to(path: Path, folders: list[Path], comm: Comm) -> None:
 def none_before(before: float, folders: list[Path]) -> UsageError:
     """There is no checkpoint to go back to."""
     return UsageError(
-        f"no whole checkpoint in {' or '.join(map(str, folders))} is of {before:g} s of the model or an earlier time "
-        "(hpcdem info FILE.sav tells the time of each)"
+        f"no complete checkpoint in {' or '.join(map(str, folders))} at or before {before:g} s of model time (hpcdem "
+        "info FILE.sav shows the time of each)"
     )
 
 

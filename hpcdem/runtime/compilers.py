@@ -76,7 +76,7 @@ def compile_in_processes(
     warm_ups: list[Callable[[], None]], count: int, cores: Collection[int], meanwhile: Callable[[int, int], None]
 ) -> str:
     """Compile the kernels of the warm-ups into the store, with `count` processes. Returns what went wrong, empty if
-    nothing did. meanwhile: is told how many kernels are compiled, and of how many. The processes end with this one,
+    nothing did. meanwhile: receives the number of compiled kernels and their total. The processes end with this one,
     however that ends."""
     package = Path(__file__).resolve().parents[1]
     program = (  # -P and the removed entry: nothing is imported from where the run happens to be

@@ -124,7 +124,7 @@ class _OfPackage(Files):
         source = Path(function.__code__.co_filename)
         place = store()[0] / f"{source.stem}-{_digest(source)}"
         name = re.sub(r"[<>]", "", function.__qualname__)
-        given = _sources_of(function) - _sources(source)  # a factory's module knows nothing of what it is given
+        given = _sources_of(function) - _sources(source)  # a factory's module does not know its arguments
         digests = "".join(sorted(map(_digest, given)))
         made = hashlib.sha256((_made_of(function) + digests).encode()).hexdigest()[:8]
         super().__init__(place, f"{name}-{function.__code__.co_firstlineno}-{made}")

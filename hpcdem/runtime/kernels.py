@@ -3,7 +3,7 @@
 A kernel is compiled once per machine type and kept in the store (`kept.py`) as soon as it is done; every process takes
 from there what it calls, when it first calls it. What a kind of model may call is compiled before the model is made, by
 several processes, and noted when it is complete; then nothing is loaded beforehand. One process of a host compiles at a
-time. Others wait for it, and go on with what it has done if it ends early, whatever ended it.
+time. Others wait for it, and continue its work if it ends early, whatever ended it.
 """
 
 from __future__ import annotations
@@ -67,10 +67,10 @@ def prepare_kernels(comm: Comm, log: Log, warm_ups: Mapping[str, Callable[[], No
             f"the kernel cache under {kept.cache_base()} cannot be written; using {place}. NUMBA_CACHE_DIR moves it"
         )
     if problem := next(filter(None, comm.allgather(problem)), ""):
-        log.warn(f"processes that compiled kernels failed, so one went on alone ({problem})")
+        log.warn(f"processes that compiled kernels failed; continuing with one ({problem})")
     if reason := next((reasons[0] for reasons in comm.allgather(kept.unkept[:1]) if reasons), ""):
         log.warn(
-            f"compiled kernels cannot be kept in {place} ({reason}), and later runs compile them again. Make room, "
+            f"compiled kernels cannot be stored in {place} ({reason}), so later runs compile them again. Free space, "
             "or set NUMBA_CACHE_DIR"
         )
     if comm.rank == 0:
@@ -129,7 +129,7 @@ def _alone(place: Path, log: Log | None) -> Iterator[None]:
             lock.acquire(timeout=0)
         except filelock.Timeout:
             if log is not None:
-                log.info(f"waiting for {_text(holder) or 'another process'}, which compiles kernels")
+                log.info(f"waiting for {_text(holder) or 'another process'}, which is compiling kernels")
             lock.acquire(poll_interval=0.2)
         with contextlib.suppress(OSError):
             holder.write_text(f"process {os.getpid()} of {socket.gethostname()}")
@@ -173,12 +173,11 @@ class _Progress:
             return
         if self.last == -math.inf:
             self.log.info(
-                f"compiling {total} kernels (first run of this version on this machine; each one is kept as soon as it "
-                "is done)"
+                f"compiling {total} kernels (first run of this version on this machine; each is stored when done)"
             )
         elif 0 < done < total:
             left = (now - self.began) / done * (total - done)
-            self.log.info(f"{done} of {total} kernels are compiled, about {math.ceil(left)} s left")
+            self.log.info(f"{done} of {total} kernels compiled, about {math.ceil(left)} s left")
         self.last = now
 
     @contextlib.contextmanager
@@ -194,7 +193,7 @@ class _Progress:
                 self.done += 1
                 now = time.monotonic()
                 if self.log is not None and now - max(self.last, self.began) > QUIET_SECONDS:
-                    self.log.info(f"{self.done} kernels are compiled")
+                    self.log.info(f"{self.done} kernels compiled")
                     self.last = now
 
         with event.install_listener("numba:compile", Listener()):

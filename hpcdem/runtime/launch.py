@@ -64,7 +64,7 @@ def prepare_environment(threads: int) -> tuple[int, list[str]]:
     alone: it overrides what a job script left in OMP_NUM_THREADS.
     """
     if threads > MOST_THREADS:  # libgomp ends the process where it cannot start them
-        raise UsageError(f"{threads} threads per rank were asked for: {MOST_THREADS} are the most; see -j")
+        raise UsageError(f"{threads} threads per rank requested, at most {MOST_THREADS} allowed (-j)")
     os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
     os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
     set_thread_variables(threads)
@@ -80,8 +80,7 @@ def prepare_environment(threads: int) -> tuple[int, list[str]]:
         return 1, []
     set_thread_variables(1)
     return 1, [
-        f"libgomp.so.1 (OpenMP) is not on this machine, and without it {threads} threads are slower than one: going "
-        "on with 1 thread per rank. Install libgomp (it comes with gcc), or start more ranks instead"
+        "libgomp.so.1 (OpenMP) not found: using 1 thread per rank. Install libgomp (part of gcc), or use more ranks"
     ]
 
 
@@ -223,7 +222,7 @@ def start_mpi() -> Comm:
         raise HpcdemError(
             f"started as {who.size or 'several'} processes by {who.name}, but mpi4py finds no MPI library: {error}"
         ) from error
-    # Debian's h5py takes its build without MPI unless it is told; others do not read this.
+    # Debian's h5py uses its build without MPI by default; others ignore this.
     os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
     size = MPI.COMM_WORLD.Get_size()
     if size == 1 and (who.size is None and who.rank == 0):
@@ -241,12 +240,12 @@ def mpi_library() -> str:
 
 
 def first_line(text: str) -> str:
-    """The first line with anything on it, with single blanks; empty if there is none."""
+    """The first line with text, with single blanks; else empty."""
     return next((" ".join(line.split()) for line in text.replace("\0", "").splitlines() if line.strip()), "")
 
 
 def last_line(text: str) -> str:
-    """The last line with anything on it, with single blanks; empty if there is none."""
+    """The last line with text, with single blanks; else empty."""
     return first_line("\n".join(reversed(text.splitlines())))
 
 
@@ -263,7 +262,7 @@ def copies_of_rank_0(who: Launcher, library: str) -> str:
 def launcher_of(library: str, environ: Mapping[str, str] = os.environ) -> str:
     """What starts ranks that this MPI library knows of."""
     if "SLURM_JOB_ID" in environ:
-        return f"srun --mpi={slurm_mpi_type(library)} (srun --mpi=list shows what there is)"
+        return f"srun --mpi={slurm_mpi_type(library)} (srun --mpi=list shows the choices)"
     if "Open MPI" in library:
         return "Open MPI's own mpiexec"
     return "the mpiexec of this library (a wheel has it in the bin folder of the venv)"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 GRAIN = 2000
 """Particles of a thread, at least, before anything was measured."""
 WINDOW = 0.2
-"""Seconds of computing from which the cost of a step is told."""
+"""Seconds of computing from which the cost of a step is measured."""
 GAIN = 0.93
 """A number of threads is faster if a step takes this part of the time."""
 SHORTEST, LONGEST = 2.0, 60.0
@@ -27,7 +27,7 @@ SHORTEST, LONGEST = 2.0, 60.0
 
 
 class Pace:
-    """most: threads that there are; log: is told of changes."""
+    """most: available threads; log: receives changes."""
 
     def __init__(self, most: int, log: Log | None = None) -> None:
         self.most, self.log = most, log

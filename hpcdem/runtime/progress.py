@@ -1,4 +1,4 @@
-"""What the user sees while a run goes on: plain lines in a log file, a bar on a terminal, a table at the end.
+"""What the user sees during a run: plain lines in a log file, a bar on a terminal, a table at the end.
 
 Only rank 0 prints; on all other ranks the same calls do nothing, so callers never ask for the rank. What only
 another rank knows has to be brought to rank 0 first.
@@ -115,11 +115,12 @@ _missing: dict[int, int] = {}
 
 def write(stream: TextIO, text: str) -> None:
     """Text on a stream, in one piece, as launchers pass on pieces. The run matters more than a closed pipe, a lost
-    terminal or a full disk under the log: what finds no room is counted, and that is told when there is room again."""
+    terminal or a full disk under the log: lines that do not fit are counted, and the count is reported when there is
+    space again."""
     try:
         missing = _missing and _missing.get(stream.fileno(), 0)
         if missing:
-            stream.write(f"warning: {missing} lines are missing here: no space left on the disk\n")
+            stream.write(f"warning: {missing} lines are missing: no space left on the disk\n")
         stream.write(text)
         stream.flush()
         _missing.clear()
@@ -181,17 +182,17 @@ class Log:
         if not self.folds or count <= FOLDED_AFTER:
             self.info(f"warning: {text}")
         elif math.log10(count).is_integer():
-            self.info(f"warning, {count} times so far: {text}")
+            self.info(f"warning ({count} times so far): {text}")
 
     def close(self) -> None:
         """Tell how often warnings came that were not all written."""
         for kind, count in self._warnings.items():
             if self.folds and count > FOLDED_AFTER:
-                self.info(f"warning: {count} in all like this one: {kind[:100]}{'...' * (len(kind) > 100)}")
+                self.info(f"warning: {count} in total like this one: {kind[:100]}{'...' * (len(kind) > 100)}")
         self._warnings.clear()
 
     def results(self, folder: Path) -> None:
-        """Where results are, and how they are looked at: the last line of a run."""
+        """Where results are, and how to view them: the last line of a run."""
         where = shlex.quote(str(folder))
         self.info(f"results: {folder}; `hpcdem view {where}` shows them, `hpcdem measure {where}` measures them")
 

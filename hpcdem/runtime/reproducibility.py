@@ -2,7 +2,7 @@
 
 A line is made every N steps: ``state 2000: particles=<32 digits> contacts=<32 digits> walls=<32 digits>``. Two runs
 that print the same lines had the same bits, on however many ranks and threads. Several simulations of a program are
-told apart by their number: ``state 2000 of model 2: ...``.
+distinguished by their number: ``state 2000 of model 2: ...``.
 """
 
 from __future__ import annotations
@@ -72,8 +72,8 @@ class Reproduction:
         different = [name for name in parts if before.get(name) != parts[name]]
         if different:
             raise HpcdemError(
-                f"step {step} is the first that differs from {self.source}: other {', '.join(different)} (compared "
-                f"every {self.every} steps; {self.compared} states before it were equal)"
+                f"step {step} is the first that differs from {self.source}: different {', '.join(different)} "
+                f"(compared every {self.every} steps; {self.compared} states before it were equal)"
             )
         self.compared += 1
 
@@ -82,8 +82,8 @@ class Reproduction:
         if self.expected is None:
             return
         if self.compared:
-            self.log.info(f"reproducible: {self.compared} states are those of {self.source}")
+            self.log.info(f"reproducible: {self.compared} states agree with {self.source}")
         else:
             self.log.warn(
-                f"none of the states in {self.source} was met: are the steps multiples of {self.every} there?"
+                f"no state in {self.source} has a step of this run: check that its steps are multiples of {self.every}"
             )

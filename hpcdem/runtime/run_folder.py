@@ -74,7 +74,7 @@ def refuse_file(folder: Path, comm: Comm) -> None:
     def look() -> None:
         there = next((place for place in (folder, *folder.absolute().parents) if os.path.lexists(place)), None)
         if there is not None and not there.is_dir():
-            kind = "a link to nothing" if there.is_symlink() and not there.exists() else "a file"
+            kind = "a broken link" if there.is_symlink() and not there.exists() else "a file"
             raise UsageError(
                 f"cannot make the folder {folder} for the results: {there} is {kind}. Choose another with --outdir"
             )
@@ -137,7 +137,7 @@ def leave(folder: Path, comm: Comm, state: str, step: int) -> None:
 
 
 def checkpoint_name(step: int, automatic: bool = False) -> str:
-    """File name of the checkpoint of a step; automatic: of one that nobody asked for."""
+    """File name of the checkpoint of a step; automatic: written without a request."""
     return f"{'auto_' if automatic else ''}{step:010d}.sav"
 
 
@@ -195,7 +195,7 @@ def retire(folder: Path, comm: Comm, step: int, keep: Retention) -> None:
 
 
 def set_aside(folder: Path, later: Collection[Path], step: int) -> None:
-    """The run goes on from a checkpoint of `step`, which is not its newest: note in run.json that these later ones, and
+    """The run resumes from a checkpoint of `step`, which is not its newest: note in run.json that these later ones, and
     frames of later steps, are of a run before this one. Not collective."""
     record = read(folder)
     if record is None:
@@ -259,7 +259,7 @@ def _refusal(folder: Path, holder: dict[str, Any]) -> str:
     script, host, pid = (holder.get(name, "?") for name in ("script", "host", "pid"))
     return (
         f"another run is writing into {folder}: {script or 'a Python program'}, process {pid} on {host}, since "
-        f"{holder.get('began', '?')}. Wait for its end, or choose another folder with --outdir"
+        f"{holder.get('began', '?')}. Wait until it ends, or choose another folder with --outdir"
     )
 
 

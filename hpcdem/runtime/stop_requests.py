@@ -3,7 +3,7 @@
 | what | then |
 |---|---|
 | SIGUSR1, SIGTERM, first SIGINT (Ctrl-C) | save a checkpoint and stop, exit code 85 |
-| SIGUSR2 | save a checkpoint and go on |
+| SIGUSR2 | save a checkpoint and continue |
 | so much time since the last checkpoint (autosave) | the same |
 | second SIGINT, or second SIGTERM | stop at once, nothing is saved, exit code 130 or 143 |
 | first SIGINT in a loop of the script's own, without commands | the same, after a second |
@@ -58,7 +58,7 @@ SAME_REQUEST = 2.0
 
 
 AUTOSAVE = 1800.0
-"""Seconds between checkpoints that nobody asked for."""
+"""Seconds between automatic checkpoints."""
 LEAST_SHARE = 20.0
 """They are at least so many times as far apart as the last one took."""
 
@@ -186,14 +186,14 @@ class StopRequests:
         return AUTO if self._autosave is not None and time.monotonic() - self._last_file > self._pause() else NONE
 
     def overdue_request(self) -> int:
-        """STOP if the end was asked for, and no step has answered for some time; else NONE."""
+        """STOP if a stop was requested and no step has responded for some time; else NONE."""
         if self.local_request() != STOP:
             return NONE
         self._asked = self._asked or time.monotonic()
         return STOP if time.monotonic() - self._asked > GRACE else NONE
 
     def _pause(self) -> float:
-        """Seconds between checkpoints that nobody asked for."""
+        """Seconds between automatic checkpoints."""
         return max(self._autosave or 0.0, LEAST_SHARE * (self._last_save_took or 0.0))
 
     def decide(self, code: int) -> Decision:
@@ -213,7 +213,7 @@ class StopRequests:
         return "none"
 
     def end(self, message: str) -> StoppedWithCheckpoint:
-        """What ends the run, to be raised: the request is answered. A conversation goes on after it."""
+        """The exception that ends the run: the request is answered. A console continues after it."""
         end = StoppedWithCheckpoint(message)
         if not hasattr(sys, "ps1"):
             self.ended = end

@@ -1,4 +1,4 @@
-"""A process that was told to end, and does not.
+"""A process that does not end on request.
 
 Python calls its signal handlers between two of its own instructions. A rank that waits inside MPI for a rank that will
 never come, or inside the system for a disk that does not answer, never gets there: SIGTERM would do nothing at all. So
@@ -119,7 +119,7 @@ class Watchdog:
         helper = threading.Thread(target=flush, daemon=True)  # the main thread may hold the lock of stdout
         helper.start()
         helper.join(0.5)
-        text = f"hpcdem: rank {self._rank}: {why}{where}; ended, nothing was saved. Go on from the last checkpoint\n"
+        text = f"hpcdem: rank {self._rank}: {why}{where}; ended without saving. Resume from the last checkpoint\n"
         os.write(2, text.encode())
         self._leave(code)
 

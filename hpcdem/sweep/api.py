@@ -81,11 +81,11 @@ class Sweep:
                 raise UsageError("seed is given twice")
             wanted["seed"] = seed
         if latin is not None and sobol is not None:
-            raise UsageError("latin and sobol are two ways of sampling; give one")
+            raise UsageError("give either latin or sobol")
         number = latin if latin is not None else sobol
         sampling = None if number is None else Sampling("latin" if sobol is None else "sobol", number, sampling_seed)
         if number is not None and number < 1:
-            raise UsageError(f"{number} samples: at least one is expected")
+            raise UsageError(f"{number} samples: expected at least one")
         try:
             text = path.read_bytes()
         except OSError as problem:
@@ -102,7 +102,7 @@ class Sweep:
 
     @classmethod
     def open(cls, folder: Path | str) -> Sweep:
-        """The sweep in a folder. UsageError if there is none."""
+        """The sweep in a folder. UsageError without one."""
         self = cls.__new__(cls)
         self.plan, self.new = plans.load(Path(folder)), 0
         return self
@@ -145,7 +145,7 @@ class Sweep:
         for name in options:
             if name not in Options.__annotations__:
                 near = hint(name, Options.__annotations__)
-                raise UsageError(f"report has no option '{name}'{near}; there is {', '.join(Options.__annotations__)}")
+                raise UsageError(f"report has no option '{name}'{near}; known: {', '.join(Options.__annotations__)}")
         from hpcdem.core.comm import SerialComm
         from hpcdem.post.measure.scene import Request
         from hpcdem.sweep import report

@@ -33,7 +33,7 @@ set -uo pipefail
 {environment}
 {python} -m hpcdem sweep {folder} --member "$SLURM_ARRAY_TASK_ID"
 code=$?
-if ((code == 85)); then          # time was nearly up: stopped with a checkpoint, goes on from there
+if ((code == 85)); then          # time was nearly up: stopped with a checkpoint, resumes from there
     scontrol requeue "$SLURM_JOB_ID"
     sleep 60                     # the queue ends this script meanwhile
 fi
@@ -48,14 +48,14 @@ export SRUN_CPUS_PER_TASK="${SLURM_CPUS_PER_TASK:-1}"
 
 
 def write(plan: Plan, options: Sequence[str] = (), at_once: int | None = None) -> Path | None:
-    """The job script of all members that are neither done nor running; None if there are none. options: NAME=VALUE
+    """The job script of all members that are neither done nor running; None without any. options: NAME=VALUE
     or NAME of sbatch. UsageError for one that the sweep settles itself."""
     for option in options:
         name = option.split("=")[0].lstrip("-")
         if name in OURS:
-            raise UsageError(f"--sbatch {option}: the sweep settles --{name} itself")
+            raise UsageError(f"--sbatch {option}: the sweep sets --{name} automatically")
         if not name or any(char.isspace() for char in option):
-            raise UsageError(f"--sbatch '{option}': NAME=VALUE is expected, as time=04:00:00")
+            raise UsageError(f"--sbatch '{option}': expected NAME=VALUE, such as time=04:00:00")
     waiting = [k for k, member in enumerate(plan.members) if member.state not in (DONE, RUNNING)]
     if not waiting:
         return None
@@ -78,7 +78,7 @@ def submit(path: Path) -> str:
     """Hand it to Slurm; returns the number of the job. HpcdemError if Slurm refuses it."""
     program = shutil.which("sbatch")
     if program is None:
-        raise UsageError(f"--slurm: there is no sbatch here; {path} is written, submit it where there is")
+        raise UsageError(f"--slurm: sbatch not found. Submit {path} (already written) on a host with Slurm")
     done = subprocess.run(
         [program, "--parsable", str(path)], env=dict(os.environ), capture_output=True, text=True, check=False
     )  # the environment as it was: Open MPI, once loaded here, has put words into it that confuse its ranks there

@@ -58,7 +58,7 @@ def members(
     """The values of each member. wanted: by parameter, words as on the command line, or a list of values. Lists are
     crossed with each other, in the order given, and with the samples of ranges. UsageError for what cannot be."""
     if not wanted:
-        raise UsageError("nothing is varied: give --seed or --set NAME=VALUES")
+        raise UsageError("no parameter is varied: give --seed or --set NAME=VALUES")
     choices: dict[str, list[Value] | Range] = {}
     for name, words in wanted.items():
         choices[name] = _choice(script, name, words, sampling is not None and name != "seed")
@@ -66,14 +66,16 @@ def members(
     ranges = {name: values for name, values in choices.items() if isinstance(values, Range)}
     number = math.prod(map(len, lists.values())) * (1 if sampling is None else sampling.number)
     if number > MOST:
-        raise UsageError(f"these are {number} members, more than {MOST}")
+        raise UsageError(f"{number} members, at most {MOST} allowed")
     samples: list[dict[str, Value]] = [{}]
     if sampling is not None:
         if not ranges:
             raise UsageError(f"--{sampling.method}: no parameter has a range LOW:HIGH to sample")
         if sampling.method == "sobol" and sampling.number & (sampling.number - 1):
             near = 2 ** round(math.log2(sampling.number))
-            raise UsageError(f"--sobol {sampling.number}: a Sobol sequence is even for powers of two only, as {near}")
+            raise UsageError(
+                f"--sobol {sampling.number}: a Sobol sequence is uniform only for powers of two, such as {near}"
+            )
         points = sampling.points(len(ranges))
         samples = [{n: r.at(u) for (n, r), u in zip(ranges.items(), point.tolist(), strict=True)} for point in points]
     crossed = [dict(zip(lists, values, strict=True)) for values in itertools.product(*lists.values())]
@@ -84,7 +86,7 @@ def members(
 
 
 def _choice(script: Adjustable, name: str, words: str | Sequence[object], sampled: bool) -> list[Value] | Range:
-    """What is said of one parameter."""
+    """The specification of one parameter."""
     script.parameter(name)
     if not isinstance(words, str):
         values = [script.value(name, str(word)) for word in words]
@@ -93,7 +95,7 @@ def _choice(script: Adjustable, name: str, words: str | Sequence[object], sample
     if len(parts) == 1 or isinstance(script.parameters[name].value, str):
         return _different(name, [script.value(name, word.strip()) for word in words.split(",") if word.strip()])
     if len(parts) > 3:
-        raise UsageError(f"{name}={words}: LOW:HIGH or LOW:HIGH:N is expected")
+        raise UsageError(f"{name}={words}: expected LOW:HIGH or LOW:HIGH:N")
     low, high = (_number(script, name, words, part) for part in parts[:2])
     if not low < high:
         raise UsageError(f"{name}={words}: {low:g} is not below {high:g}")
@@ -104,12 +106,12 @@ def _choice(script: Adjustable, name: str, words: str | Sequence[object], sample
         return _whole_numbers(f"{name}={words}", words, low, high)
     if parts[2] == "log":
         if not sampled:
-            raise UsageError(f"{name}={words}: log goes with --latin N or --sobol N")
+            raise UsageError(f"{name}={words}: log requires --latin N or --sobol N")
         if low <= 0.0:
-            raise UsageError(f"{name}={words}: the logarithm wants numbers above 0")
+            raise UsageError(f"{name}={words}: the logarithm requires numbers above 0")
         return Range(low, high, log=True)
     if not parts[2].isdigit() or not 2 <= int(parts[2]) <= MOST:
-        raise UsageError(f"{name}={words}: '{parts[2]}' is neither log nor a number of values from 2 on")
+        raise UsageError(f"{name}={words}: expected log or a number of values, at least 2, not '{parts[2]}'")
     even = (float(f"{value:.12g}") for value in np.linspace(low, high, int(parts[2])).tolist())
     return _different(name, [script.value(name, f"{value!r}") for value in even])
 
@@ -118,8 +120,8 @@ def _whole_numbers(said: str, words: str, low: float, high: float) -> list[Value
     """From low to high."""
     if not (low.is_integer() and high.is_integer()):
         raise UsageError(
-            f"{said}: without sampling a range is of whole numbers; say how many values, as in {words}:5, or sample it "
-            "with --latin N or --sobol N"
+            f"{said}: without sampling, a range consists of whole numbers. Give the number of values, such as "
+            f"{words}:5, or use --latin N or --sobol N"
         )
     if high - low >= MOST:
         raise UsageError(f"{said}: more than {MOST} values")
@@ -135,7 +137,7 @@ def _number(script: Adjustable, name: str, words: str, part: str) -> float:
 
 def _different(name: str, values: list[Value]) -> list[Value]:
     if not values:
-        raise UsageError(f"{name}: no value is given")
+        raise UsageError(f"{name}: no value given")
     for value in values:
         if values.count(value) > 1:
             raise UsageError(f"{name}: {value} is given twice")

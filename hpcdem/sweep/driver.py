@@ -23,7 +23,7 @@ LOOK = 0.1
 
 
 def jobs_at_once(plan: Plan, jobs: int | None) -> int:
-    """So many members run at once: as many as there are cores for, or as is said. UsageError if that is too many."""
+    """Number of members run at once: as given, else as many as the cores allow. UsageError if that is too many."""
     cores, each = launch.cores(), plan.ranks * plan.threads
     if (jobs or 1) * each > cores:
         raise UsageError(
@@ -40,7 +40,7 @@ def run(plan: Plan, log: Any, jobs: int | None = None, tries: int = 2) -> dict[s
         lock = FolderLock(plan.folder, {"host": socket.gethostname(), "pid": os.getpid()})
     except Taken as taken:
         who = f"process {taken.holder.get('pid', '?')} on {taken.holder.get('host', '?')}"
-        raise UsageError(f"{plan.folder}: {who} runs this sweep already") from None
+        raise UsageError(f"{plan.folder}: {who} already runs this sweep") from None
     try:
         with _signals() as asked:
             return _Driver(plan, log, at_once, tries, asked).run()
@@ -50,7 +50,7 @@ def run(plan: Plan, log: Any, jobs: int | None = None, tries: int = 2) -> dict[s
 
 @contextmanager
 def _signals() -> Iterator[Callable[[], bool]]:
-    """A function that tells whether the sweep was asked to stop, by Ctrl-C or SIGTERM."""
+    """A function that returns whether Ctrl-C or SIGTERM requested a stop."""
     seen: list[int] = []
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
     before = {number: signal.signal(number, lambda number, frame: seen.append(number)) for number in numbers}
@@ -74,10 +74,10 @@ class _Driver:
     def run(self) -> dict[str, str]:
         """Until all are done, have failed, or somebody asks to stop."""
         found = [member.name for member in self.open if member.state == RUNNING]
-        already = f", {self.done} done before" if self.done else ""
+        already = f", {self.done} already done" if self.done else ""
         self.log.info(f"{self.plan.folder}: {len(self.plan.members)} members{already}, {self.at_once} at once")
         if found:
-            self.log.info(f"members {', '.join(found)} still run since an earlier call: waiting for them")
+            self.log.info(f"members {', '.join(found)} are still running since an earlier call: waiting for them")
         while self.open and not self.asked():
             self._look()
             time.sleep(LOOK)
@@ -130,4 +130,4 @@ class _Driver:
             self.open.remove(member)
             self.log.warn(f"{member.label()} {why}: see {member.folder / LOG}")
         else:
-            self.log.info(f"{member.label()} {why}; it goes on from its last checkpoint")
+            self.log.info(f"{member.label()} {why}; resuming from its last checkpoint")

@@ -30,12 +30,12 @@ def launcher(ranks: int, threads: int) -> list[str]:
     beside = Path(sys.executable).parent / "mpiexec"
     found = str(beside) if beside.exists() else shutil.which("mpiexec")
     if found is None:
-        raise UsageError(f"--ranks {ranks}: no mpiexec here; install the extra [mpi] or an MPI of the system")
+        raise UsageError(f"--ranks {ranks}: mpiexec not found. Install the extra [mpi] or an MPI of the system")
     return [found, "-n", str(ranks)]
 
 
 def command(plan: Plan, again: bool) -> list[str]:
-    """What is started in the folder of a member. again: it was started before, and goes on where it can."""
+    """The command started in the folder of a member. again: it was started before and resumes if it can."""
     words = [sys.executable, "-m", "hpcdem", "-j", str(plan.threads), "--no-figure"]
     return [
         *launcher(plan.ranks, plan.threads),
@@ -53,7 +53,7 @@ def _locked(plan: Plan, member: Member) -> FolderLock:
             return FolderLock(member.folder, {"host": socket.gethostname(), "pid": os.getpid()})
         except Taken:
             time.sleep(0.1)
-    raise UsageError(f"member {member.name} of {plan.folder} runs already")
+    raise UsageError(f"member {member.name} of {plan.folder} is already running")
 
 
 def run(plan: Plan, member: Member) -> int:
@@ -67,7 +67,7 @@ def run(plan: Plan, member: Member) -> int:
     again = bool(before["tries"])
     tries, began = int(before["tries"]) + 1, time.monotonic()
     state = {"state": FAILED, "code": None, "tries": tries, "seconds": before["seconds"]}
-    write_json(member.folder / STATE, state)  # what a killed run leaves: it counts as failed, and goes on when started
+    write_json(member.folder / STATE, state)  # what a killed run leaves: it counts as failed and resumes when started
     with open(member.folder / LOG, "ab") as log:
         begin = log.tell()
         process = subprocess.Popen(

@@ -71,9 +71,11 @@ class Plan:
         return [Member(self.folder / f"{k:04d}", values) for k, values in enumerate(self.values)]
 
     def member(self, number: int) -> Member:
-        """UsageError if there is none of this number."""
+        """UsageError for an unknown number."""
         if not 0 <= number < len(self.values):
-            raise UsageError(f"{self.folder} has no member {number}, but {len(self.values)} of them, from 0 on")
+            raise UsageError(
+                f"{self.folder} has no member {number}: its {len(self.values)} members are numbered from 0"
+            )
         return self.members[number]
 
 
@@ -96,11 +98,11 @@ def make(
         _check_same(before, plan, list(values[0]))
         plan.values = list(before.values)
     elif folder.exists() and any(folder.iterdir()):
-        raise UsageError(f"{folder} is not empty and holds no sweep; choose another folder with -o")
+        raise UsageError(f"{folder} is not empty and contains no sweep: choose another folder with -o")
     new = [one for one in values if one not in plan.values]
     for link in links:
         if link.name in (RECORD, STATE, PARAMETERS, LOG, "data", plan.script):
-            raise UsageError(f"--with {link.name}: each member has a file of this name of its own")
+            raise UsageError(f"--with {link.name}: each member writes a file of this name")
         if not link.exists():
             raise UsageError(f"--with {link}: there is no such file")
     plan.values += new
@@ -122,22 +124,22 @@ def _check_same(before: Plan, plan: Plan, names: list[str]) -> None:
     """UsageError if members of this plan, over parameters of these names, are none of the sweep that was before."""
     other = ""
     if (before.script, before.digest) != (plan.script, plan.digest):
-        other = f"a sweep of another text of {before.script}"
+        other = f"a sweep of a different version of {before.script}"
     elif plan.sampling is not None and (before.sampling, before.wanted) != (plan.sampling, plan.wanted):
-        other = "samples of another kind, number or range"
+        other = "samples of a different kind, number or range"
     elif before.sampling is not None and plan.sampling is None:
         other = "samples, to which a grid cannot be added"
     elif before.values and set(before.values[0]) != set(names):
         other = f"a sweep over {', '.join(before.values[0])}, not {', '.join(names)}"
     if other:
-        raise UsageError(f"{plan.folder} holds {other}; choose another folder with -o")
+        raise UsageError(f"{plan.folder} contains {other}: choose another folder with -o")
 
 
 def load(folder: Path) -> Plan:
-    """The plan in a folder. UsageError if there is none."""
+    """The plan in a folder. UsageError without one."""
     given = read_json(folder / RECORD, None)
     if given is None:
-        raise UsageError(f"{folder}: no sweep, there is no {RECORD}")
+        raise UsageError(f"{folder}: no sweep ({RECORD} not found)")
     try:
         plan = Plan(folder=folder, **given)
         whole = all(isinstance(number, int) and number > 0 for number in (plan.ranks, plan.threads))
@@ -145,7 +147,7 @@ def load(folder: Path) -> Plan:
     except TypeError:
         whole = False
     if not whole:
-        raise HpcdemError(f"{folder / RECORD} is of another version of hpcdem, or damaged")
+        raise HpcdemError(f"{folder / RECORD} was written by another version of hpcdem, or is damaged")
     return plan
 
 

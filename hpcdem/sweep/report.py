@@ -41,7 +41,9 @@ def run(comm: Comm, log: Any, plan: Plan, request: Request, kinds: Sequence[str]
     on_first(comm, lambda: tables.check(kinds))
     for what in request.what:
         if what in tables.APART:
-            raise UsageError(f"{what}: paths are of single particles, which are others in each member of a sweep")
+            raise UsageError(
+                f"{what}: a sweep does not support paths of single particles, which differ between members"
+            )
     members = on_first(comm, lambda: _done(plan, log))
     found = []
     for member in members:
@@ -53,7 +55,7 @@ def run(comm: Comm, log: Any, plan: Plan, request: Request, kinds: Sequence[str]
         if request.what or frames:
             measures.run(comm, _Quiet(log, member.name), one, without=tables.APART)
         else:
-            on_first(comm, lambda: log.warn(f"{member.name}: there are no frames to measure, only histories"))  # noqa: B023
+            on_first(comm, lambda: log.warn(f"{member.name}: no frames to measure; using its histories only"))  # noqa: B023
         found.append(on_first(comm, lambda: tables.measured(target, data)))  # noqa: B023
     return on_first(comm, lambda: _written(log, plan, request, kinds, members, found))
 
@@ -65,7 +67,9 @@ def _done(plan: Plan, log: Any) -> list[Member]:
     if not members:
         raise HpcdemError(f"{plan.folder}: no member is done: {', '.join(left[:10])}")
     if left:
-        log.warn(f"{len(left)} of {len(plan.members)} members are not in the report: {', '.join(left[:10])}")
+        log.warn(
+            f"{len(left)} of {len(plan.members)} members are unfinished and not in the report: {', '.join(left[:10])}"
+        )
     return members
 
 
@@ -81,13 +85,15 @@ def _frames_in(data: Path) -> bool:
 
 
 def data_folder(member: Member) -> Path:
-    """Where a member's results are. HpcdemError if there are none, or in several folders."""
+    """The folder of a member's results. HpcdemError without results, or if several folders have some."""
     found = sorted(path.parent for path in member.folder.rglob(RECORD))
     if not found:
-        raise HpcdemError(f"{member.folder}: no results, there is no {RECORD} below it")
+        raise HpcdemError(f"{member.folder}: no results ({RECORD} not found)")
     if len(found) > 1:
         names = ", ".join(str(path.relative_to(member.folder)) for path in found)
-        raise HpcdemError(f"{member.folder}: results are in several folders ({names}); a script of a sweep writes one")
+        raise HpcdemError(
+            f"{member.folder}: results are in several folders ({names}). The script of a sweep must write into one"
+        )
     return found[0]
 
 

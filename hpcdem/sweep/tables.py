@@ -147,7 +147,7 @@ FAULTS: dict[str, Callable[[dict[str, str]], bool]] = {
 
 
 def _faults(table: list[dict[str, str]], when: list[tuple[float, float]]) -> dict[Column, Series]:
-    """Numbers of bands over time, 0 where there is none, and their mean dip and length. The first frame has no
+    """Numbers of bands over time, 0 without bands, and their mean dip and length. The first frame has no
     strain."""
     when = when[1:]
     x, found = np.array([time for _, time in when]), {}
@@ -330,6 +330,6 @@ def check(kinds: Sequence[str]) -> None:
     """UsageError for a kind of file that cannot be written here."""
     for kind in kinds:
         if kind not in KINDS:
-            raise UsageError(f"--tables {kind}: {' or '.join(KINDS)} is expected")
+            raise UsageError(f"--tables {kind}: expected {' or '.join(KINDS)}")
     if "parquet" in kinds and importlib.util.find_spec("pyarrow") is None:
         raise HpcdemError("--tables parquet: pyarrow is not installed: pip install pyarrow")

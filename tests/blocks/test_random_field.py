@@ -117,7 +117,7 @@ def test_a_correlated_field_is_one_of_places():
     [(("weibull", 1.0, 0.0, 1), "shape of a Weibull"), (("weibull", -1.0, 2.0, 1), "must be positive"),
      (("lognormal", 0.0, 1.0, 1), "mean of a lognormal"), (("normal", 0.0, -1.0, 1), "must be positive"),
      (("normal", math.nan, 1.0, 1), "finite"), (("normal", 0.0, 1.0, 1, -1.0), "length"),
-     (("beta", 0.0, 1.0, 1), "no random field beta"), (("normal", 0.0, 1.0, -1), "seed"),
+     (("beta", 0.0, 1.0, 1), "unknown random field beta"), (("normal", 0.0, 1.0, -1), "seed"),
      (("normal", 0.0, 1.0, 1, 0.0, "exponential", 40.0, 50.0), "no value of normal"),
      (("normal", 0.0, 1.0, 1, 0.0, "exponential", 2.0, 1.0), "no value of normal")],
 )  # fmt: skip

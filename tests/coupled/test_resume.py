@@ -35,7 +35,7 @@ def stopped(resident, folder: Path, ranks: int) -> list[str]:
     folder.mkdir()
     (folder / "stop").touch()
     done = start(resident, folder, ranks)
-    assert done.returncode == 85 and "go on with --resume" in done.stderr, done.stderr
+    assert done.returncode == 85 and "resume with --resume" in done.stderr, done.stderr
     (folder / "stop").unlink()
     return said(done.stdout)
 

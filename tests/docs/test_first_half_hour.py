@@ -110,7 +110,7 @@ def test_the_first_commands_in_a_terminal(terminal: Terminal, tmp_path: Path) ->
     script = (tmp_path / "push.py").read_text()
     assert script == LONG
     terminal.types("hpcdem push.py --resume")
-    terminal.waits(r"going on from .*\.sav, step \d+", scrolled=True)
+    terminal.waits(r"resuming from .*\.sav, step \d+", scrolled=True)
     said = terminal.waits(r"steps, \d+ left")
     terminal.keys("C-c")
     terminal.end(85)

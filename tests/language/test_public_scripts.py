@@ -408,7 +408,7 @@ def test_a_sav_of_zdem_is_named_for_what_it_is(play, tmp_path):
     with pytest.raises(ScriptError) as caught:
         play(begin="RES 0000046000.sav")
     text = str(caught.value)
-    assert "in a format of its own, which only ZDEM reads" in text and "LOAD" in text and "EXP" in text
+    assert "Only ZDEM reads its own .sav files" in text and "LOAD" in text and "EXP" in text
     assert "HDF5" not in text and caught.value.line == 1
 
 

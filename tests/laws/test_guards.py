@@ -75,7 +75,7 @@ def test_who_left_the_box(tmp_path):
     assert "13 particles left the BOX and were deleted: 0 at (1" in text and "velocity (100, 1)" in text
     assert "; 9 at (" in text and "; 10 at (" not in text and "and 3 more" in text
     report_end(sim)
-    assert "13 particles left the BOX and were deleted in all" in said.getvalue() and sim.lost == 13
+    assert "13 particles in total left the BOX and were deleted" in said.getvalue() and sim.lost == 13
 
 
 @pytest.mark.parametrize("speed", [400.0, 600.0])

@@ -201,9 +201,9 @@ def test_scripts_of_the_folder(viewing: Viewing):
 
 @pytest.mark.parametrize("name", ["../a.sc", "/etc/passwd", ".a.sc", "a.txt", "b/a.sc", "", None, 7, "a.sc\n"])
 def test_names_that_are_none(desk: Desk, name: Any):
-    with pytest.raises(HpcdemError, match="a script has a name like"):
+    with pytest.raises(HpcdemError, match="a script needs a name such as"):
         desk.read(name)
-    with pytest.raises(HpcdemError, match="a script has a name like"):
+    with pytest.raises(HpcdemError, match="a script needs a name such as"):
         desk.write(name, "x", None)
 
 
@@ -211,7 +211,7 @@ def test_a_link_is_not_followed(desk: Desk, tmp_path: Path):
     (tmp_path / "outside").write_text("secret")
     (tmp_path / "link.sc").symlink_to(tmp_path / "outside")
     for call in (lambda: desk.read("link.sc"), lambda: desk.write("link.sc", "x", None)):
-        with pytest.raises(HpcdemError, match="no plain file"):
+        with pytest.raises(HpcdemError, match="not a regular file"):
             call()
     assert (tmp_path / "outside").read_text() == "secret"
 
@@ -223,9 +223,9 @@ def test_saving(desk: Desk, tmp_path: Path):
     saved = desk.write("a.sc", found["text"] + "# ü\n", found["stamp"])
     assert (tmp_path / "a.sc").read_text() == "pcdc model new\n# ü\n"
     assert (tmp_path / "a.sc").stat().st_mode & 0o777 == 0o640
-    with pytest.raises(HpcdemError, match="changed by others"):
+    with pytest.raises(HpcdemError, match="changed by another program"):
         desk.write("a.sc", "x", found["stamp"])
-    with pytest.raises(HpcdemError, match="changed by others"):
+    with pytest.raises(HpcdemError, match="changed by another program"):
         desk.write("a.sc", "x", None)
     desk.write("a.sc", "", saved["stamp"])
     desk.write("new.py", "START\n", None)
@@ -255,9 +255,9 @@ def test_a_script_is_renamed(desk: Desk, tmp_path: Path):
     found = desk.read("a.sc")
     (tmp_path / "b.sc").write_text("other")
     for name, stamp, said in (
-        ("b.sc", found["stamp"], r"there is a script b\.sc already"),
-        ("c.sc", "0 0", "changed by others"),
-        ("../c.sc", found["stamp"], "a script has a name like"),
+        ("b.sc", found["stamp"], r"script b\.sc exists"),
+        ("c.sc", "0 0", "changed by another program"),
+        ("../c.sc", found["stamp"], "a script needs a name such as"),
     ):
         with pytest.raises(HpcdemError, match=said):
             desk.rename("a.sc", name, stamp)

@@ -221,7 +221,7 @@ PICTURE = {"source": 0, "frame": -1, "view": VIEW, "width": 40, "height": 30, "f
         ("tell", {"what": {"a": 1}}, 400, "what: expected text, read names and values"),
         ("curves", {"chart": ["a"]}, 400, "chart: expected text, read a list"),
         ("curves", {"x": "time", "y": "load"}, 400, "y: expected a list, read text"),
-        ("curves", {"x": "time", "y": [["load"]]}, 422, "a chart has an x, and a list of y"),
+        ("curves", {"x": "time", "y": [["load"]]}, 422, "a chart needs an x and a list of y"),
         ("rename", {"name": "a.sc", "to": 7}, 400, "to: expected text, read a whole number"),
         ("about", {"source": "0"}, 400, "source: expected a whole number, read text"),
         ("about", {"source": True}, 400, "source: expected a whole number, read true or false"),

@@ -180,7 +180,7 @@ def test_other_methods_are_not_there(server):
 
 
 def test_a_port_in_use_is_a_clear_error(server):
-    with pytest.raises(UsageError, match=rf"--port {server.server_port}: cannot listen there: Address already in use"):
+    with pytest.raises(UsageError, match=rf"--port {server.server_port}: cannot listen: Address already in use"):
         PageServer({}, {}, server.server_port)
 
 

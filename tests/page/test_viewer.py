@@ -572,8 +572,8 @@ def test_what_may_be_asked(viewing: Viewing):
         "there is no history '../passwd'"
     )
     assert refused(viewing, "file", good | {"format": "exe"})[1].startswith("format: expected one of png")
-    assert refused(viewing, "tell", {"what": "stop"})[1] == "no run writes into this folder now"
-    assert refused(viewing, "tell", {"what": "rm"})[1] == "a run can be told to stop or to save"
+    assert refused(viewing, "tell", {"what": "stop"})[1] == "no run is writing into this folder"
+    assert refused(viewing, "tell", {"what": "rm"})[1] == "expected stop or checkpoint"
     picked = viewing.ask("pick", good | {"column": 0, "row": 0})
     assert picked == {"object": None}
     curve = viewing.ask("curves", {"x": "time", "y": ["'load'"]})["curves"][0]

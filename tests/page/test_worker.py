@@ -101,7 +101,7 @@ def test_work_that_takes_too_long_is_ended_with_advice(workers, wanted):
     worker = workers(newest_wins=False)
     worker.ask("specimen", wanted(**QUICK))
     worker.longest = 1.0
-    with pytest.raises(HpcdemError, match="not done after 1 s: ask for fewer grains"):
+    with pytest.raises(HpcdemError, match="not finished after 1 s: choose fewer grains"):
         worker.ask("specimen", wanted(**SLOW))
     worker.longest = 60.0
     assert worker.ask("specimen", wanted(**QUICK))

@@ -86,6 +86,6 @@ def test_resume_takes_the_law_of_the_script(launch, tmp_path):
     assert changed.returncode == 2 and "of another text of rock.py" in changed.stderr
     (tmp_path / "rock.py").write_text(text)
     again = launch(2, *job, "out", "--resume", cwd=tmp_path)
-    assert again.returncode == 0 and "going on from" in again.stdout, again.stderr
+    assert again.returncode == 0 and "resuming from" in again.stdout, again.stderr
     curves = [(tmp_path / name / "flow.csv").read_text() for name in ("whole", "out")]
     assert curves[0] == curves[1] and len(curves[0].splitlines()) > 5

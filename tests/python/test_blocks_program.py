@@ -898,7 +898,7 @@ def test_particles_and_blocks_in_one_program(resident: Resident, tmp_path: Path)
         words = ("--", "stop") if name == "cut" else ()
         done = resident(ranks, "study.py", "--no-figure", *words, cwd=tmp_path / name)
         assert done.returncode == (85 if words else 0), done.stdout + done.stderr
-    assert "go on with Simulation.resume()" in done.stderr
+    assert "resume with Simulation.resume()" in done.stderr
     done = resident(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
     assert done.returncode == 0, done.stdout + done.stderr
     ends = [path.read_text() for name in ("whole", "cut") for path in (tmp_path / name).glob("end_*.txt")]
@@ -939,9 +939,9 @@ def test_stopped_in_the_middle_and_taken_up(resident: Resident, tmp_path: Path) 
     done = resident(1, "study.py", "--no-figure", cwd=tmp_path / "whole")
     assert done.returncode == 0, done.stdout + done.stderr
     cut = resident(1, "study.py", "--no-figure", "--", "stop", cwd=tmp_path / "cut")
-    assert cut.returncode == 85 and "go on with Simulation.resume()" in cut.stderr, cut.stdout + cut.stderr
+    assert cut.returncode == 85 and "resume with Simulation.resume()" in cut.stderr, cut.stdout + cut.stderr
     rest = resident(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
-    assert rest.returncode == 0 and "going on from" in rest.stdout, rest.stdout + rest.stderr
+    assert rest.returncode == 0 and "resuming from" in rest.stdout, rest.stdout + rest.stderr
     ends = {name: [file.read_text() for file in (tmp_path / name).glob("end_*.txt")] for name in ("whole", "cut")}
     assert ends["cut"] == ends["whole"] * 2
     assert (tmp_path / "cut/data/history_top.csv").read_bytes() == (

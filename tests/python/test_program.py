@@ -50,7 +50,7 @@ WRONG = {
     "missing file": ("sim.load('nowhere.dat')", "load: there is no file"),
     "cycle in a function": ("sim.every(5, lambda s: s.cycle(1)); sim.cycle(10)", "cannot be used by a function"),
     "no steps": ("sim.every(0, print)", "every: expected a number of steps"),
-    "other threads": ("hpcdem.Simulation(threads=7)", "7 were asked for"),
+    "other threads": ("hpcdem.Simulation(threads=7)", "7 requested"),
     "two kinds of bond": ("sim.bond(ebmod=1e8, n_bond=1e3)", "bond: a bond is either"),
 }
 
@@ -182,7 +182,7 @@ def test_resumed_from_before_a_time(resident: Resident, tmp_path: Path) -> None:
     done = resident(1, "study.py", "--no-figure", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "0000000200.sav, step 200" in done.stdout
-    assert "no whole checkpoint in" in (tmp_path / "said.txt").read_text()
+    assert "no complete checkpoint in" in (tmp_path / "said.txt").read_text()
 
 
 LOOK = """\

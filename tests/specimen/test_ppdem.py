@@ -87,7 +87,7 @@ def test_layouts(tmp_path: Path) -> None:
         write_ppdem(path, disc, layout)
         assert path.read_text() == f"1 1\n{line}\n"
         assert (read_ppdem(path).x[0], read_ppdem(path).diameter[0]) == (0.001, 0.3)
-    with pytest.raises(HpcdemError, match="'plain' is for circles only"):
+    with pytest.raises(HpcdemError, match="'plain' supports circles only"):
         write_ppdem(path, square, "plain")
     with pytest.raises(HpcdemError, match="needs the roundness"):
         write_ppdem(path, read_ppdem(ROWS), "full")
@@ -114,8 +114,8 @@ def test_mixed_kinds(tmp_path: Path) -> None:
 @each(
     "text, line, message",
     [
-        ("", 1, "holds no grains"),
-        ("4000\n", 1, "holds no grains"),
+        ("", 1, "contains no grains"),
+        ("4000\n", 1, "contains no grains"),
         ("x 1\n", 1, "read 'x', expected a number"),
         ("1 1\n3 0 0 1 0 0 1 1_0 1 1\n", 2, "read '1_0', expected a number"),
         ("-1 1\n0 0 1 1\n", 1, "read -1, expected the number of grains"),
@@ -123,7 +123,7 @@ def test_mixed_kinds(tmp_path: Path) -> None:
         ("1 1.5\n0 0 1 1\n", 1, "read 1.5, expected a whole number"),
         ("1000000000 1\n0 0 1 1\n", 1, "1000000000 grains announced, but only 4 numbers follow"),
         ("1 1\n3 0 0 1 0\n0 1 5 5\n", 3, "ends within grain 1"),
-        ("1 1\n3 0 0 1 0\n0 1 5 5 5\n7\n", 4, "goes on after 1 grains, expected the end"),
+        ("1 1\n3 0 0 1 0\n0 1 5 5 5\n7\n", 4, "continues after 1 grains, expected the end"),
         ("2 1\n3 0 0 1 0 0 1 5 5 5\n2 0 0 1 0 5 5\n", 3, "grain 2: read 2, expected its number of arcs"),
         ("1 1\n99 0 0 1 0 0 1 5 5 5\n", 2, "grain 1: read 99"),
         ("1 1\n3.5 0 0 1 0 0 1 5 5 5\n", 2, "grain 1: read 3.5"),
@@ -131,8 +131,8 @@ def test_mixed_kinds(tmp_path: Path) -> None:
         ("1 1\n3 0 0 1e300 0 0 1 5 5 5\n", 2, "expected a number of ordinary size"),
         ("1 1\n3 0 0 1 0 0 1\n5 -5 5\n", 3, "read -5, expected the central angle"),
         ("1 1\n3 0 0 1 0 0 1\n5 5 360\n", 3, "read 360, expected the central angle of an arc, 0 to below 360"),
-        ("1 1\n3 0 0 0 1 1 0 5 5 5\n", 2, "go round clockwise or nowhere"),
-        ("1 1\n3 0 0 0 0 0 0 5 5 5\n", 2, "go round clockwise or nowhere"),
+        ("1 1\n3 0 0 0 1 1 0 5 5 5\n", 2, "not in anticlockwise order"),
+        ("1 1\n3 0 0 0 0 0 0 5 5 5\n", 2, "not in anticlockwise order"),
         ("1 1\n1 0 0 1 2\n", 2, "read 1 and 2, expected the diameter of a circle, above 0, twice"),
         ("1 1\n0 0 -1 -1\n", 2, "expected the diameter of a circle"),
         ("2 1\n0 0 1 1\n0 5 0 0\n", 3, "expected the diameter of a circle"),
@@ -148,7 +148,7 @@ def test_what_is_no_file_of_grains(tmp_path: Path, text: str, line: int, message
 
 def test_printed_sample_is_refused_where_a_zero_is_lost(tmp_path: Path) -> None:
     (tmp_path / "a.dat").write_text(ROWS.read_text().replace("0.000262679314715", "0.00262679314715"))
-    with pytest.raises(HpcdemError, match=r"a\.dat:6: grain 3: its ends go round clockwise"):
+    with pytest.raises(HpcdemError, match=r"a\.dat:6: grain 3: its end points are not in anticlockwise"):
         read_ppdem(tmp_path / "a.dat")
 
 

@@ -69,21 +69,21 @@ def test_log_ranges_are_even_in_the_logarithm():
 @pytest.mark.parametrize(
     ("wanted", "sampling", "why"),
     [
-        ({}, None, "nothing is varied"),
+        ({}, None, "no parameter is varied"),
         ({"fiction": "1"}, None, "did you mean 'friction'?"),
         ({"friction": "0.2,0.2"}, None, "0.2 is given twice"),
         ({"friction": "0.3:0.1"}, None, "0.3 is not below 0.1"),
-        ({"friction": "0.1:0.3"}, None, "say how many values"),
-        ({"friction": "0.1:0.3:log"}, None, "log goes with"),
-        ({"friction": "0.1:0.3:1"}, None, "from 2 on"),
+        ({"friction": "0.1:0.3"}, None, "Give the number of values"),
+        ({"friction": "0.1:0.3:log"}, None, "log requires"),
+        ({"friction": "0.1:0.3:1"}, None, "at least 2"),
         ({"friction": "1:2:3:4"}, None, "LOW:HIGH or LOW:HIGH:N"),
         ({"friction": "0.1,0.2"}, Sampling("latin", 4), "no parameter has a range"),
         ({"friction": "0:1:log"}, Sampling("latin", 4), "above 0"),
         ({"friction": "0:1"}, Sampling("sobol", 12), "as 16"),
         ({"friction": ","}, None, "no value"),
-        ({"friction": "1:90000", "n": "1:90000"}, None, "more than"),
+        ({"friction": "1:90000", "n": "1:90000"}, None, "at most"),
         ({"n": "1:900000000000"}, None, "more than"),
-        ({"n": "1:9"}, Sampling("sobol", 2**40), "more than"),
+        ({"n": "1:9"}, Sampling("sobol", 2**40), "at most"),
     ],
 )
 def test_what_cannot_be_is_refused(wanted, sampling, why):

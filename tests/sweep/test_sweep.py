@@ -196,7 +196,7 @@ def test_a_driver_that_is_asked_to_stop_lets_members_save_and_goes_on(tmp_path):
     words = ["push.py", "--set", "friction=0.1,0.4", "--jobs", "1"]
     first = popen([sys.executable, "-m", "hpcdem", "sweep", *words], cwd=tmp_path)
     until(lambda: any((tmp_path / "push_sweep/0000/data").glob("*.sav")))
-    assert "runs this sweep already" in call(*words, cwd=tmp_path, code=2)
+    assert "already runs this sweep" in call(*words, cwd=tmp_path, code=2)
     assert [one.state for one in hpcdem.Sweep.open(tmp_path / "push_sweep").members] == [RUNNING, "waiting"]
     first.terminate()
     out, err = first.communicate(timeout=60)
@@ -302,7 +302,7 @@ def test_a_folder_that_holds_another_sweep_is_refused(tmp_path):
     assert hpcdem.Sweep(script, seed="1:3").new == 1 and len(first.members) == 2
     with pytest.raises(UsageError, match="a sweep over seed, not gravity"):
         hpcdem.Sweep(script, {"gravity": "1,2"})
-    with pytest.raises(UsageError, match="samples of another kind"):
+    with pytest.raises(UsageError, match="samples of a different kind"):
         hpcdem.Sweep(script, {"gravity": "1.0:2.0"}, seed="1", latin=2)
     script.write_text(FALL.replace("CYC 500", "CYC 400"))
     with pytest.raises(UsageError, match=r"another text of fall\.py"):

@@ -92,10 +92,10 @@ def test_foreign_and_damaged_files_are_told(tmp_path):
             values = file[damage][...]
             del file[damage]
             file[damage] = values[:-3]
-        with pytest.raises(HpcdemError, match=r"b_0000000000.vtkhdf is no frame of blocks, or damaged"):
+        with pytest.raises(HpcdemError, match=r"b_0000000000.vtkhdf is not a frame of blocks, or is damaged"):
             read_mesh_frame(broken)
         assert not inventory.of_file(broken)["whole"]
-    with pytest.raises(HpcdemError, match="is no frame of blocks"):
+    with pytest.raises(HpcdemError, match="is not a frame of blocks"):
         read_mesh_frame(particles)
 
 

@@ -298,7 +298,7 @@ def test_a_stopped_case_goes_on(resident, written, tmp_path):
     (tmp_path / "a.sc").write_text(STOPPED)
     (tmp_path / "stop").touch()
     done = resident(1, "a.sc", "--no-figure", cwd=tmp_path, timeout=600)
-    assert done.returncode == 85 and "go on with --resume" in done.stderr, done.stderr
+    assert done.returncode == 85 and "resume with --resume" in done.stderr, done.stderr
     (tmp_path / "stop").unlink()
     again = resident(1, "a.sc", "--no-figure", "--resume", cwd=tmp_path, timeout=600)
     assert again.returncode == 0, again.stderr

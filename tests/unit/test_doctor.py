@@ -213,7 +213,7 @@ def test_a_quota_of_processor_time(make_machine, files, expected):
     found = bad(host.cpu_quota(machine))
     assert len(found) == (expected is not None)
     if found:
-        assert f"the time of {expected:g} cores" in found[0].text
+        assert f"allows {expected:g} cores" in found[0].text
         assert found[0].cure.startswith(f"mpiexec -n {max(1, int(expected))} ")
 
 
@@ -370,7 +370,7 @@ def room(free: int = 1 << 40, inodes: int = 10**6, counted: bool = True) -> Simp
         (room(), None, ""),
         (room(free=500 << 20), Level.WARNING, "only 500 MiB free"),
         (room(free=4 << 20), Level.PROBLEM, "4 MiB free"),
-        (room(inodes=12), Level.WARNING, "room for only 12 more files"),
+        (room(inodes=12), Level.WARNING, "space for only 12 more files"),
         (room(inodes=0, counted=False), None, ""),
     ],
 )
@@ -405,9 +405,9 @@ def test_a_file_system_that_does_not_answer(make_machine, monkeypatch):
         (os, "mkdir", fails(errno.EROFS), Level.PROBLEM, "cannot make a folder in {}: the file system is read-only"),
         (os, "fsync", fails(errno.EIO), Level.PROBLEM, "cannot write a file in {}: the disk reports an input/output"),
         (os, "replace", fails(errno.EPERM), Level.PROBLEM, "cannot write a file in {}: permission denied"),
-        (fcntl, "flock", fails(errno.ENOSYS), Level.WARNING, "{}: locks of files do not work"),
+        (fcntl, "flock", fails(errno.ENOSYS), Level.WARNING, "{}: file locks do not work"),
         (fcntl, "flock", fails(errno.EIO), Level.PROBLEM, "cannot lock a file in {}: the disk reports"),
-        (fcntl, "flock", lambda file, how: None, Level.WARNING, "{}: locks of files do not work"),
+        (fcntl, "flock", lambda file, how: None, Level.WARNING, "{}: file locks do not work"),
     ],
 )
 def test_what_a_run_does_with_files(make_machine, monkeypatch, module, name, call, level, text):
@@ -461,7 +461,7 @@ def test_hosts_that_see_different_folders(make_machine, tmp_path, monkeypatch):
     hosts = places(host="a") + places(host="b")
     assert not bad(storage.shared(make_machine(places=hosts, rank=1, token=tmp_path / "seen")))
     found = only(storage.shared(make_machine(places=hosts, rank=1, token=tmp_path / "unseen")))
-    assert found.level == Level.PROBLEM and "is not seen" in found.text
+    assert found.level == Level.PROBLEM and "is not visible" in found.text
     assert not bad(storage.shared(make_machine(places=places(2), token=tmp_path / "unseen")))
 
 
@@ -473,7 +473,7 @@ def test_the_file_that_all_hosts_look_for_is_made_and_removed(make_machine, monk
     assert doctor.examine(machine, SerialComm()) == []
     assert machine.token.parent == machine.directory and not list(machine.directory.iterdir())
     monkeypatch.setattr(Path, "touch", fails(errno.EACCES))
-    assert "is not seen" in only(doctor.examine(machine, SerialComm())).text
+    assert "is not visible" in only(doctor.examine(machine, SerialComm())).text
 
 
 # -- kernels -------------------------------------------------------------------------------------------------------
@@ -733,7 +733,7 @@ def test_the_right_launcher_is_at_hand(make_machine, monkeypatch, tmp_path):
 
 def test_no_launcher_at_all(make_machine, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/nowhere/bin/python")
-    assert "no mpiexec" in only(software.mpi_launcher(make_machine(library=MPICH))).text
+    assert "mpiexec is not in" in only(software.mpi_launcher(make_machine(library=MPICH))).text
     assert not list(software.mpi_launcher(make_machine(library=MPICH, places=places(1, cores=1))))
 
 
@@ -773,7 +773,7 @@ def test_nothing_is_said_outside_a_job(make_machine):
     [
         ({"SLURM_JOB_END_TIME": "1900000000"}, {}, "job 7 ends at 2030-"),
         ({}, {"squeue": (0, "2030-01-02T03:04:05\n", "")}, "job 7 ends at 2030-01-02 03:04"),
-        ({}, {"squeue": (0, "2030-01-02T03:04:05\n", ""), "scontrol": (0, SIGNAL, "")}, "asks for the signal USR1@300"),
+        ({}, {"squeue": (0, "2030-01-02T03:04:05\n", ""), "scontrol": (0, SIGNAL, "")}, "requests the signal USR1@300"),
         ({}, {"scontrol": (0, SIGNAL, "")}, "the end of job 7 is unknown"),
         ({}, {"scontrol": (0, SIGNAL.replace("#SBATCH --signal", "## --signal"), "")}, None),
         ({}, {"squeue": (1, "", "no controller")}, None),

@@ -53,7 +53,7 @@ HOSTILE = {
     "only comments": ("# nothing\n\n", ": is empty"),
     "another file": ("1.0 2.0 3.0\n", ":1: read '1.0 2.0 3.0', expected 'hpcdem clumps 1'"),
     "another version": (changed("clumps 1", "clumps 2"), ":1: read 'hpcdem clumps 2', expected 'hpcdem clumps 1'"),
-    "no bodies": ("hpcdem clumps 1\n", ": holds no clumps"),
+    "no bodies": ("hpcdem clumps 1\n", ": contains no clumps"),
     "n = 0": (changed("3.0 3.0 1\n", "3.0 3.0 0\n"), ":7: read 'clump 4 0 0 3.0 3.0 0', expected a number"),
     "n not whole": (changed("3.0 3.0 1\n", "3.0 3.0 1.5\n"), ":7: .*expected a number of discs"),
     "n negative": (changed("3.0 3.0 1\n", "3.0 3.0 -1\n"), ":7: .*expected a number of discs"),
@@ -65,7 +65,7 @@ HOSTILE = {
     "inertia in other units": (changed("3.0 3.0 1\n", "3.0 3e6 1\n"), ":7: .*a radius of gyration of 1000 m"),
     "disc far away": (changed("0 0 1\n", "3e5 0 1\n"), ":8: read '3e5 0 1', expected a disc within 100 radii"),
     "disc twice": (changed("0.5 0 0.6\nclump", "-0.5 0 0.6\nclump"), ":6: .*expected a disc that this clump does not"),
-    "body twice": (changed("clump 4 0", "clump 0.5 -0.125"), ":7: .*another place than that of the clump in line 3"),
+    "body twice": (changed("clump 4 0", "clump 0.5 -0.125"), ":7: .*a position different from that of the clump"),
     "a disc is missing": (changed("0.5 0 0.6\nclump", "clump"), ":6: read 'clump 4 .*' after 1 discs, expected the 2"),
     "the end is missing": (changed("0 0 1\n", ""), ":7: the file ends after 0 discs, expected the 1 discs of the"),
     "a disc too many": (GOOD + "1 1 1\n", ":9: read '1 1 1', expected 'clump x y angle area inertia n', as the"),
@@ -95,7 +95,7 @@ def test_no_text_at_all(tmp_path):
         read_clumps(tmp_path / "b.clumps")
     with pytest.raises(HpcdemError, match=r"cannot read .*none\.clumps"):
         read_clumps(tmp_path / "none.clumps")
-    with pytest.raises(HpcdemError, match="a folder has this name"):
+    with pytest.raises(HpcdemError, match="a folder with this name exists"):
         read_clumps(tmp_path)
 
 

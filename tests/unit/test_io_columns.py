@@ -43,6 +43,6 @@ def test_bytes_that_are_no_text_are_dropped(tmp_path):
 def test_a_folder_in_its_place_is_an_error_of_one_sentence(tmp_path):
     path = tmp_path / "walls.csv"
     path.mkdir()
-    with pytest.raises(HpcdemError, match="a folder has this name"):
+    with pytest.raises(HpcdemError, match="a folder with this name exists"):
         append_rows(path, HEADER, ["100,4.0,1"], 0, SerialComm())
     assert not list(tmp_path.glob("*.tmp"))

@@ -242,7 +242,7 @@ def test_a_file_as_zdem_writes_it(tmp_path: Path, line_end: str) -> None:
     ("text", "message"),
     [
         ("", "no line current_step"),
-        (ZDEM[: ZDEM.index("         2          4 ")], "3 balls announced, 2 found; is it cut off"),
+        (ZDEM[: ZDEM.index("         2          4 ")], "3 balls announced, 2 found. The file may be truncated"),
         (ZDEM[: ZDEM.index("8.0000000000")], "rows of unequal length"),
         (ZDEM.replace("         2          4  -2.50e-01", "         2          5  -2.50e-01"), "not list the same ids"),
     ],

@@ -54,7 +54,7 @@ def test_a_full_disk_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "cause"), [("no/a.txt", "the folder does not exist"), ("b", "a folder has this name")]
+    ("name", "cause"), [("no/a.txt", "the folder does not exist"), ("b", "a folder with this name exists")]
 )
 def test_other_causes_are_named(tmp_path: Path, name: str, cause: str) -> None:
     (tmp_path / "b").mkdir()
@@ -135,7 +135,7 @@ def test_every_writer_reports_a_file_that_cannot_grow_on_all_ranks(launch: Any, 
     done = launch.python(ranks, program, ROOT, "mpi" if ranks > 1 else "serial", cwd=tmp_path, timeout=120)
     assert done.returncode == 0, done.stderr
     lines = sorted(line for line in done.stdout.splitlines() if line.startswith("rank"))
-    cause = "the file would be larger than is allowed here"
+    cause = "the file would exceed the allowed size"
     assert lines == sorted(
         f"rank {r}: cannot write all_1.{kind}: {cause}" for r in range(ranks) for kind in ("vtkhdf", "dat", "vtk", "ps")
     )

@@ -96,9 +96,9 @@ def test_fixed_decimals_beyond_their_range_stay_numbers() -> None:
         (Column("i", INT, 3), np.array([1234]), "4 characters do not fit"),
         (Column("i", INT, 3), np.array([-123]), "4 characters do not fit"),
         (Column("x", 0, 10, 9), np.array([1.0]), "16 characters do not fit"),
-        (sci("x", 16), np.array([1.0]), "16 digits asked for"),
+        (sci("x", 16), np.array([1.0]), "16 digits requested"),
         (Column("x", FIXED, 8, 3), np.array([-99999.0]), "10 characters do not fit"),
-        (Column("w", WORD, 8), np.array([2]), "an index without a word"),
+        (Column("w", WORD, 8), np.array([2]), "an index without a name"),
         (Column("w", WORD, 3), np.array([0]), "6 characters do not fit"),
     ],
 )

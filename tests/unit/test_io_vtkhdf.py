@@ -90,7 +90,7 @@ def test_it_opens_in_the_reader_that_paraview_uses(tmp_path: Path) -> None:
 def test_a_contact_of_no_particle_is_an_error(tmp_path: Path) -> None:
     frame = make_frame(20)
     frame.tables["contacts"].columns["id2"][-1] = 10**9
-    with pytest.raises(HpcdemError, match="names a particle that is not there"):
+    with pytest.raises(HpcdemError, match="refers to a missing particle"):
         write_vtkhdf(tmp_path / "a.vtkhdf", frame, SerialComm())
     assert list(tmp_path.iterdir()) == []
 
@@ -102,7 +102,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(HpcdemError, match="cannot read"):
         read_vtkhdf(tmp_path / "text.vtkhdf")
     h5py.File(tmp_path / "other.vtkhdf", "w").close()
-    with pytest.raises(HpcdemError, match="no frame written by hpcdem"):
+    with pytest.raises(HpcdemError, match="not a frame written by hpcdem"):
         read_vtkhdf(tmp_path / "other.vtkhdf")
 
 

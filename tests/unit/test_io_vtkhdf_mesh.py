@@ -71,7 +71,7 @@ def test_a_model_without_joints(tmp_path):
 def test_a_joint_without_its_corner_is_refused(tmp_path):
     frame = made_frame(SerialComm())
     frame.joints.columns["last"] = np.array([2, 8])
-    with pytest.raises(HpcdemError, match="a joint names a corner that is not there"):
+    with pytest.raises(HpcdemError, match="a joint refers to a missing corner"):
         write_mesh_frame(tmp_path / "a.vtkhdf", frame, SerialComm())
     assert list(tmp_path.iterdir()) == []
 

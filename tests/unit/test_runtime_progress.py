@@ -277,7 +277,7 @@ def test_a_disk_that_is_full_for_a_while_leaves_a_gap_that_is_told(tmp_path):
     with open(tmp_path / "log", "w") as file:
         done = subprocess.run([sys.executable, "-c", code], stdout=file, stderr=subprocess.PIPE, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-    gap = "warning: 3 lines are missing here: no space left on the disk"
+    gap = "warning: 3 lines are missing: no space left on the disk"
     assert (tmp_path / "log").read_text().splitlines() == ["before", gap, "after", "later"]
 
 
@@ -306,10 +306,10 @@ def test_warnings_that_differ_in_numbers_alone_are_counted(log, out):
     lines = out.getvalue().splitlines()
     assert lines[:3] == [f"warning: step {k}: 2 pairs overlap by {0.1 * k:.3g} m" for k in (1, 2, 3)]
     assert lines[3:] == [
-        "warning, 10 times so far: step 10: 2 pairs overlap by 1 m",
-        "warning, 100 times so far: step 100: 2 pairs overlap by 10 m",
+        "warning (10 times so far): step 10: 2 pairs overlap by 1 m",
+        "warning (100 times so far): step 100: 2 pairs overlap by 10 m",
         "warning: another one",
-        "warning: 150 in all like this one: step #: # pairs overlap by # m",
+        "warning: 150 in total like this one: step #: # pairs overlap by # m",
     ]
 
 

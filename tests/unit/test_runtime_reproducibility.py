@@ -93,13 +93,13 @@ def test_the_first_difference_ends_it():
     check.see(model, 10, {"particles": A, "contacts": A})
     check.see(model, 15, {"particles": B, "contacts": A})  # not in the log: nothing to compare with
     with pytest.raises(
-        HpcdemError, match=r"step 20 is the first that differs from old\.txt: other contacts .* 1 states"
+        HpcdemError, match=r"step 20 is the first that differs from old\.txt: different contacts .* 1 states"
     ):
         check.see(model, 20, {"particles": A, "contacts": B})
     assert f"state 20: particles={A} contacts={B}" in out.getvalue()
 
 
-@pytest.mark.parametrize(("seen", "said"), [((10, 20), "2 states are those of old.txt"), ((5,), "none of the states")])
+@pytest.mark.parametrize(("seen", "said"), [((10, 20), "2 states agree with old.txt"), ((5,), "no state in")])
 def test_the_end(seen, said):
     out = io.StringIO()
     expected = {(1, step): {"particles": A} for step in (10, 20)}

@@ -506,7 +506,7 @@ def test_folders_without_frames(frames: list[Frame], tmp_path: Path) -> None:
         compute(write(tmp_path / "c", [broken]))
     (tmp_path / "d").mkdir()
     (tmp_path / "d" / "all_0000000001.dat").write_text("rubbish")
-    with pytest.raises(HpcdemError, match="no frame of ZDEM or hpcdem"):
+    with pytest.raises(HpcdemError, match="not a frame of ZDEM or hpcdem"):
         compute(tmp_path / "d")
 
 

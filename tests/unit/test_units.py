@@ -59,7 +59,7 @@ class Told:
         ("mm-mpa-s", "gravity", "m/s2", -9.81, "looks like m/s2; x 1000 makes it -9810"),
         ("mm-mpa-s", "gravity", "m/s2", -9810.0, ""),
         ("si", "specific-heat", "J/(kg K)", 0.8, "looks like kJ/(kg K); x 1000 makes it 800"),
-        ("si", "density", "kg/m3", 1e30, "50 to 2.5e+04 was expected"),
+        ("si", "density", "kg/m3", 1e30, "expected 50 to 2.5e+04"),
         ("si", "density", "kg/m3", 0.0, ""),
         ("si", "young", "Pa", float("inf"), ""),
         ("si", "damp", "1", 1e30, ""),

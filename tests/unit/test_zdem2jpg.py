@@ -342,11 +342,11 @@ def test_the_colours_of_a_file_are_drawn(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "line", "message"),
     [
-        ("0 0 0\n0 0\n", 2, "three numbers expected"),
+        ("0 0 0\n0 0\n", 2, "expected three numbers"),
         ("0 0 0\n\n# x\n0 red 0\n", 4, "expected, not '0 red 0'"),
         ("255 0 0\n", 1, "from 0 to 1"),
         ("0 0 nan\n", 1, "from 0 to 1"),
-        ("0 0 0\n" * 9, 9, "10 colours expected, the file ends after 9"),
+        ("0 0 0\n" * 9, 9, "expected 10 colours, the file ends after 9"),
         ("0 0 0\n" * 11, 11, "more than 10"),
     ],
 )

@@ -21,7 +21,7 @@ NEEDED, COMFORTABLE = 256 * MIB, 512 * MIB
 LIMITS = (
     ("NOFILE", 256, "ulimit -n is {}: launchers and MPI open a file for each rank of a host, and more", "-n 256"),
     ("STACK", MIB, "ulimit -s is {}: the compiler of the kernels needs a deeper stack", "-s 1024"),
-    ("AS", 4096 * MIB, "ulimit -v is {}: numba and MPI reserve far more addresses than memory", "-v 4194304"),
+    ("AS", 4096 * MIB, "ulimit -v is {}: numba and MPI reserve much more address space than memory", "-v 4194304"),
     ("NPROC", 64, "ulimit -u is {}: each rank has helper threads", "-u 64"),
     ("FSIZE", math.inf, "files may have no more than {} (ulimit -f)", "-f unlimited"),
     (
@@ -44,7 +44,7 @@ def oversubscribed(machine: Machine) -> Findings:
     mask = max(wanted, key=lambda mask: wanted[mask] - len(mask))
     if n > few:
         cure = f"srun -c {n}; mpiexec --map-by slot:PE={n} or --bind-to none; or -j 1"
-        yield warning("cores", f"{n} threads per rank, and ranks that may use only {_cores(few)}", cure)
+        yield warning("cores", f"{n} threads per rank, but ranks may use only {_cores(few)}", cure)
     elif wanted.total() > free:
         text = f"{len(machine.here)} ranks x {n} threads share {_cores(free)}: expect less speed"
         yield warning("cores", text, f"mpiexec -n {max(1, free // n)} hpcdem ...")
@@ -66,7 +66,7 @@ def cpu_quota(machine: Machine) -> Findings:
     allowed, threads = cgroups.cpu_quota(machine.root), sum(p.threads for p in machine.here)
     if allowed is None:
         return
-    text = f"the control group (container, job) allows the time of {allowed:.3g} cores"
+    text = f"the control group (container, job) allows {allowed:.3g} cores"
     if allowed < min(threads, len(frozenset.union(*(p.mask for p in machine.here)))):
         cure = f"mpiexec -n {max(1, int(allowed))} hpcdem ..."
         yield warning("cores", f"{text}, fewer than the {threads} threads on this host", cure)
@@ -97,10 +97,10 @@ def srun_cores(machine: Machine) -> Findings:
     if asked < 2 or not machine.in_step:
         return
     if n < asked and "SRUN_CPUS_PER_TASK" not in machine.environ:
-        text = f"the job asked for {asked} cores per task, this srun got {n}: it does not take -c from sbatch"
+        text = f"the job requested {asked} cores per task, srun has {n}: srun does not inherit -c from sbatch"
         yield warning("Slurm", text, "Start with: srun -c $SLURM_CPUS_PER_TASK")
     elif used < n:
-        cure = f"Ask for ranks instead (#SBATCH -n {asked} -c 1 and srun -n {asked}), or for threads (-j {asked})"
+        cure = f"Request ranks instead (#SBATCH -n {asked} -c 1 and srun -n {asked}), or threads (-j {asked})"
         yield warning("Slurm", f"{used} of the {n} cores of this job are used", cure)
 
 
@@ -108,7 +108,7 @@ def sbatch_cores(machine: Machine) -> Findings:
     """In a batch script: what srun will not take from sbatch."""
     asked = machine.slurm("CPUS_PER_TASK")
     if asked >= 2 and not machine.in_step and "SRUN_CPUS_PER_TASK" not in machine.environ:
-        text = f"the job asked for {asked} cores per task; srun (since Slurm 22.05) will not take that from sbatch"
+        text = f"the job requested {asked} cores per task; srun (since Slurm 22.05) does not inherit -c from sbatch"
         yield warning("Slurm", text, "export SRUN_CPUS_PER_TASK=$SLURM_CPUS_PER_TASK")
 
 
@@ -123,10 +123,10 @@ def slurm_end(machine: Machine) -> Findings:
         f"job {job} ends {datetime.fromtimestamp(end):at %Y-%m-%d %H:%M}" if end else f"the end of job {job} is unknown"
     )
     if end or signal:
-        yield ok("Slurm", f"{text}; its script asks for the signal {signal[1]}" if signal else text)
+        yield ok("Slurm", f"{text}; its script requests the signal {signal[1]}" if signal else text)
     else:
         cure = "#SBATCH --signal=USR1@300, or hpcdem --time-limit HH:MM:SS"
-        yield warning("Slurm", f"{text}, and no --signal was asked for: the last steps would be lost", cure)
+        yield warning("Slurm", f"{text}, and its script requests no --signal: the last steps would be lost", cure)
 
 
 def memory(machine: Machine) -> Findings:
@@ -176,7 +176,7 @@ def clocks(machine: Machine) -> Findings:
     """The time of day of the hosts: time limits and the end of a Slurm job rest on it."""
     apart = max(machine.clocks) - min(machine.clocks)
     if apart > CLOCK_SKEW:
-        text = f"the clocks of the hosts differ by {apart:.0f} s: each sees the end of a Slurm job at another time"
+        text = f"the clocks of the hosts differ by {apart:.0f} s: hosts disagree on the end of a Slurm job"
         yield warning("clock", text, "timedatectl set-ntp true")
 
 

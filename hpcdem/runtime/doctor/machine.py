@@ -78,7 +78,7 @@ class Machine:
         self.in_job, self.in_step = "SLURM_JOB_ID" in self.environ, "SLURM_STEP_ID" in self.environ
 
     def slurm(self, name: str) -> int:
-        """The number in a variable SLURM_..., 0 where there is none."""
+        """The number in a variable SLURM_..., 0 if unset."""
         word = self.environ.get(f"SLURM_{name}", "")
         return int(word) if word.isdigit() else 0
 

@@ -33,7 +33,9 @@ def packages(machine: Machine) -> Findings:
     yield ok("Python", f"hpcdem {launch.version()}, Python {platform.python_version()}: {sys.executable}")
     needs = list(_needs("hpcdem"))
     if not needs:
-        yield warning("packages", "hpcdem is not installed: its packages are not compared", "pip install -e DIR")
+        yield warning(
+            "packages", "hpcdem is not installed: versions of its packages are not checked", "pip install -e DIR"
+        )
     pairs = [("hpcdem", need) for need in needs]
     for who, need in pairs + [(own.name, need) for own in needs for need in _needs(own.name)]:
         version, wanted = _version(need.name), f"{need.name}{need.specifier}"
@@ -101,7 +103,7 @@ def libraries(machine: Machine) -> Findings:
     if ffmpeg:
         yield ok("films", f"ffmpeg: {ffmpeg}")
     else:
-        yield ok("films", "no ffmpeg: films are GIF only", "pip install imageio-ffmpeg")
+        yield ok("films", "ffmpeg not found: films are GIF only", "pip install imageio-ffmpeg")
 
 
 def petsc(machine: Machine) -> Findings:
@@ -111,7 +113,7 @@ def petsc(machine: Machine) -> Findings:
         return
     code, _, err = machine.run([sys.executable, "-c", PETSC], 60.0)
     if code:
-        text = f"petsc4py is there and its library cannot be loaded: {launch.last_line(err) or code}"
+        text = f"petsc4py is installed, but its library cannot be loaded: {launch.last_line(err) or code}"
         yield warning("PETSc", text, "export PETSC_DIR=DIR of PETSc")
     else:
         yield ok("PETSc", f"petsc4py {_version('petsc4py')} loads")
@@ -124,7 +126,7 @@ def threads(machine: Machine) -> Findings:
         text = f"NUMBA_THREADING_LAYER={layer}: starting threads takes far longer than with OpenMP"
         yield warning("threads", text, "unset NUMBA_THREADING_LAYER")
     elif launch.openmp_runtime_found():
-        yield ok("threads", f"libgomp.so.1 found, {machine.here[0].threads} thread(s) per rank asked for")
+        yield ok("threads", f"libgomp.so.1 found, {machine.here[0].threads} thread(s) per rank requested")
     else:
         text = "libgomp.so.1 (OpenMP) cannot be loaded: one thread per rank only"
         yield warning("threads", text, "apt-get install libgomp1")
@@ -155,7 +157,7 @@ def mpi_launcher(machine: Machine) -> Findings:
     path = shutil.which("mpiexec")
     program = path or (str(own) if own.exists() else None)
     if program is None:
-        yield warning("MPI", "there is no mpiexec in the PATH", "pip install mpich, or load the cluster's MPI module")
+        yield warning("MPI", "mpiexec is not in the PATH", "pip install mpich, or load the cluster's MPI module")
         return
     code, out, err = machine.run([program, "-n", "2", sys.executable, "-c", TRIAL], 30.0)
     if "hpcdem sees 2" in out:

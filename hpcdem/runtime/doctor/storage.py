@@ -22,7 +22,7 @@ NETWORK = frozenset(
     "nfs nfs4 cifs smb3 smbfs ncpfs afs ceph 9p lustre gpfs mmfs beegfs pvfs2 orangefs panfs wekafs gfs2 ocfs2 "
     "glusterfs acfs stornext virtiofs vboxsf drvfs".split()
 )
-"""File systems that other hosts can see, or that are asked over a wire."""
+"""File systems that other hosts can see, or that work over a network."""
 LOCAL_FUSE = frozenset("fuseblk fuse.fuse-overlayfs fuse.squashfuse fuse.ntfs-3g fuse.gocryptfs fuse.bindfs".split())
 RESULTS, TEMPORARY = "--outdir DIR on another file system", "export TMPDIR=DIR on another file system"
 OWN_CACHE = "export NUMBA_CACHE_DIR=DIR of your own"
@@ -44,7 +44,7 @@ def kind_of(path: Path, mountinfo: str) -> str:
 
 
 def is_network(kind: str) -> bool:
-    """Whether a file system is asked over a network. FUSE hides many of them: all but the local ones count."""
+    """Whether a file system works over a network. FUSE hides many of them: all but the local ones count."""
     return kind in NETWORK or (kind.startswith("fuse") and kind not in LOCAL_FUSE)
 
 
@@ -88,7 +88,7 @@ def _room(topic: str, path: Path, cure: str) -> Findings:
         say = problem if free < VERY_LITTLE else warning
         yield say(topic, f"only {size(free)} free in {folder}", cure)
     if found.f_files and found.f_favail < FEW_FILES:  # some do not count them
-        yield warning(topic, f"room for only {found.f_favail} more files (inodes) in {folder}", cure)
+        yield warning(topic, f"space for only {found.f_favail} more files (inodes) in {folder}", cure)
 
 
 def _trial(machine: Machine, topic: str, path: Path, cure: str) -> Findings:
@@ -115,10 +115,10 @@ def _trial(machine: Machine, topic: str, path: Path, cure: str) -> Findings:
     else:
         yield ok(topic, text)
     if not locks:
-        text = f"{folder}: locks of files do not work, so two runs in one folder cannot be told apart"
+        text = f"{folder}: file locks do not work, so two runs in one folder cannot be detected"
         yield warning(topic, text, "Mount with locks (NFS: lockd; Lustre: -o flock), or start one run per folder")
     if abs(skew) > CLOCK_SKEW:
-        text = f"files made in {folder} now carry a time {abs(skew):.0f} s in the {'future' if skew > 0 else 'past'}"
+        text = f"new files in {folder} have a time {abs(skew):.0f} s in the {'future' if skew > 0 else 'past'}"
         yield warning("clock", f"{text}: the clocks of file server and host differ", "timedatectl set-ntp true")
 
 
@@ -140,8 +140,8 @@ def shared(machine: Machine) -> Findings:
     while not (seen := machine.token.exists()) and len(machine.hosts) > 1 and time.monotonic() < end:
         time.sleep(0.1)
     if not seen and len(machine.hosts) > 1:
-        text = f"a file that rank 0 made in {machine.token.parent} is not seen: another file system is mounted there"
-        yield problem("results", text, "--outdir DIR on a file system that all hosts see")
+        text = f"a file made by rank 0 in {machine.token.parent} is not visible here: another file system is mounted"
+        yield problem("results", text, "--outdir DIR on a file system shared by all hosts")
 
 
 def quota(machine: Machine) -> Findings:
@@ -157,7 +157,7 @@ def in_memory(machine: Machine) -> Findings:
     """Results that are not on a disk."""
     kind, name = _where(machine, machine.directory)
     if kind in ("tmpfs", "ramfs", "devtmpfs"):
-        text = f"{name} is in memory: what is there is lost when the machine restarts, and counts as memory of the run"
+        text = f"{name} is in memory: its files are lost on restart and count as memory of the run"
         yield warning("results", text, "--outdir DIR on a disk")
 
 
@@ -185,7 +185,9 @@ def cache_owner(machine: Machine) -> Findings:
         who = "can be written by your group"
     if who:
         cure = f"chmod go-w {base}" if ours and not found.st_mode & stat.S_ISVTX else OWN_CACHE  # sticky: as /tmp
-        yield warning("kernels", f"the kernel cache {base} {who}, and compiled code is executed as it is found", cure)
+        yield warning(
+            "kernels", f"the kernel cache {base} {who}, and compiled code in it is executed without checks", cure
+        )
 
 
 def _private(group: int) -> bool:

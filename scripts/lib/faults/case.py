@@ -138,7 +138,7 @@ class Case:
         return end
 
     def _went_on(self, end: End) -> None:
-        found = re.search(r"going on from (\S+), step (\d+)", end.out)
+        found = re.search(r"resuming from (\S+), step (\d+)", end.out)
         if found is not None:
             step = int(found[2]) + self.model.ahead
             self.lost += max(0, self._row - step)

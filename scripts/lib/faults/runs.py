@@ -109,7 +109,7 @@ class Job:
     def at_work(self) -> bool:
         """Whether it has said where it begins: signals are answered from then on."""
         said = self.output.read_bytes()
-        return b"going on from" in said or b"starting at the beginning" in said
+        return b"resuming from" in said or b"starting at the beginning" in said
 
     def rank_pids(self) -> list[int]:
         """Process ids of the ranks in their order; those that are there."""

@@ -20,7 +20,7 @@ def jumping(case: Case) -> None:
     near = case.rng.random() < 0.5
     began = time.monotonic()
     job = case.start({"clock": _jumps(case)}, ["--time-limit", "2.5" if near else "15:00"])
-    end = case.end(job, {DONE, STOPPED} if near else {DONE}, "go on with")
+    end = case.end(job, {DONE, STOPPED} if near else {DONE}, "resume with")
     case.moments.append(0)
     if time.monotonic() - began > (2.5 + 8.0 if near else 60.0):
         case.problem("the time limit was not kept", end)

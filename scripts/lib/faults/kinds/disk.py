@@ -105,7 +105,7 @@ def small(case: Case) -> None:
 def quota(case: Case) -> None:
     largest = max((case.world.reference.data / name).stat().st_size for name in case.world.reference.names)
     job = case.start(limit=case.rng.randint(1, max(2, largest // 1024)), ranks=1)
-    end = case.end(job, {FAILED, DONE}, "larger than is allowed")
+    end = case.end(job, {FAILED, DONE}, "exceed the allowed size")
     if end.code:
         case.moments.append(case.reached())
 
@@ -199,7 +199,7 @@ def _replaced(case: Case, job: Job, name: str) -> None:
         case.end(job, {DONE})
         return
     case.spoiled.add(name)
-    end = case.end(job, {FAILED, DONE}, "a folder has this name|" + CANNOT)
+    end = case.end(job, {FAILED, DONE}, "a folder with this name exists|" + CANNOT)
     if end.code == DONE:
         case.problem(f"{name} is a folder, and the run did not notice", end)
     place.rmdir()

@@ -9,7 +9,7 @@ from faults.case import DONE, STOPPED, Case
 from faults.kind import kind
 from faults.runs import Job
 
-ASKED = "go on with"
+ASKED = "resume with"
 
 
 def _to_ranks(case: Case, job: Job, number: int) -> None:
