@@ -2060,19 +2060,18 @@ class Bolts(Objects):
         density : density [kg/m3].
         young : Young's modulus E [Pa].
         diameter : diameter of the bar [m].
-        tensile_yield_force : axial force at which it yields in tension [N] (default: never).
-        compressive_yield_force : axial force, without sign, at which it yields in compression [N] (default: that in
-            tension).
-        tension_failure_strain : lengthening of an element since it was installed, over its length, at which it
-            breaks for good (default: never).
+        tensile_yield_force : axial yield force in tension [N] (default: never).
+        compressive_yield_force : axial yield force in compression, without sign [N] (default: that in tension).
+        tension_failure_strain : elongation of an element since its installation, over its length, at which it breaks
+            (default: never).
         shear_stiffness_rock_bolt : force of the grout per length of bolt and displacement [N/m/m].
         grout_thickness : thickness of the grout around the bar [m].
         cohesion_rock_grout : cohesion between rock and grout [Pa].
         cohesion_grout_bolt : cohesion between grout and bolt [Pa].
         friction_rock_grout : friction angle between rock and grout [degrees] (default: 0).
         friction_grout_bolt : friction angle between grout and bolt [degrees] (default: 0).
-        spacing : from bolt to bolt across the plane [m] (default: 1).
-        pretension_force : tension with which it is installed [N] (default: 0).
+        spacing : spacing of bolts across the plane [m] (default: 1).
+        pretension_force : tension at installation [N] (default: 0).
         damp_factor : viscous damping of the motion along the bar, part of 2 A sqrt(rho E); without effect in static
             runs (default: 0).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.

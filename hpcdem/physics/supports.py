@@ -27,5 +27,5 @@ def of(blocks: Any, kind: str) -> Structure:
     support = class_of(kind)
     found = support.there(blocks)
     if found is None:
-        raise CommandError(f"there are no {support.name} yet: {support.word} create comes first")
+        raise CommandError(f"no {support.name} yet: use {support.word} create first")
     return found

@@ -172,7 +172,7 @@ def test_what_lies_in_the_place_is_named():
     while diagnostics.values(sim, "position_y", fallen).min() > 1.05:
         convergence.advance(sim, 10)
     changes.element_model(sim, top, ELASTIC, ROCK)  # above of it
-    with pytest.raises(CommandError, match=r"cannot come back: element \d+ reaches 0\.\d+ m into its place"):
+    with pytest.raises(CommandError, match=r"cannot be reinstated: element \d+ intrudes by 0\.\d+ m"):
         changes.element_model(sim, hole, ELASTIC, ROCK)
     assert not sim.alive[hole].any() and sim.alive[top].all()
 
@@ -183,7 +183,7 @@ def test_a_place_that_has_closed_is_refused():
     sim.close_model()
     sim.open_model()
     sim.x[:, 1::2] *= -1.0  # as no run would leave it
-    with pytest.raises(CommandError, match="its place has closed"):
+    with pytest.raises(CommandError, match="its void has closed"):
         changes.element_model(sim, right, ELASTIC, FILL)
 
 

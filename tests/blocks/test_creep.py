@@ -548,8 +548,8 @@ def test_refusals():
     for given, message in (
         ({"dt": 0.0}, "dt of creep must be positive, got 0"),
         ({"dt": math.nan}, "dt must be finite"),
-        ({"change": 0.1}, "change of creep goes with dt"),
-        ({"dt": 1.0, "least": 0.1}, "change is missing"),
+        ({"change": 0.1}, "change of creep needs dt"),
+        ({"dt": 1.0, "least": 0.1}, "add change"),
         ({"dt": 1.0, "change": 1.0}, "below 1, got 1"),
         ({"dt": 1.0, "change": 0.1, "greatest": 0.5}, "must lie between least, 0.01 s, and greatest, 0.5 s"),
     ):
@@ -560,7 +560,7 @@ def test_refusals():
     with pytest.raises(CommandError, match="model creep on"):
         creep.check(sim, 1.0)
     creep.switch(sim, True)
-    with pytest.raises(CommandError, match="no element can creep: element c-model mech-burgers comes first"):
+    with pytest.raises(CommandError, match="no element can creep: assign element c-model mech-burgers first"):
         creep.check(sim, 1.0)
     sim = body()
     creep.switch(sim, True)

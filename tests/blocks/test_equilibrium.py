@@ -314,7 +314,7 @@ def test_soft_rock_under_stiff_rock(powers):
     sim.stress_condition(edges.faces[top, 0], yy=-0.1)
     sim.option(**QUIET, large_strain=False)
     if powers == 12:
-        refused(sim, "does not converge: .* rounded to the last bit, .* too many powers of ten")
+        refused(sim, "did not converge: .* rounding of positions .* too many orders of magnitude")
         return
     equilibrium_.solve_elastic(sim)
     m = 1e3 * 0.75 / (1.25 * 0.5)
@@ -336,7 +336,7 @@ def test_far_from_the_origin():
         sim.log = type("Log", (), {"info": lambda self, text, lines=lines: lines.append(text)})()
         found.append((equilibrium_.solve_elastic(sim).ratio, diagnostics.values(sim, "stress_yy"), lines))
     (near, exact, quiet), (far, rounded, told) = found
-    assert near < 1e-8 < far < 1e-3 and not quiet and "rounded more coarsely" in told[-1]
+    assert near < 1e-8 < far < 1e-3 and not quiet and "smaller than the rounding of positions" in told[-1]
     assert rounded == pytest.approx(exact, abs=1e-2 * np.abs(exact).max())
 
 
@@ -456,7 +456,7 @@ def test_joints_that_would_pass_their_peak():
     equilibrium_.solve_elastic(sim)
     convergence.advance(sim, 40)
     assert diagnostics.joint_counts(sim)[1] > 0
-    refused(sim, r"\d+ joints are behind their peak already")
+    refused(sim, r"\d+ joints are past their peak already")
 
 
 def test_surfaces_that_touch():
@@ -484,7 +484,7 @@ def test_a_crack_that_closes(speed, touches):
     sim.velocity_condition(np.flatnonzero(y > 1.0 - 1e-9), vx=0.0, vy=speed)
     sim.option(dynamic=False)
     if touches:
-        refused(sim, r"\d+ pairs of surfaces touch in the equilibrium that was found")
+        refused(sim, r"\d+ pairs of surfaces are in contact in the equilibrium")
         return
     equilibrium_.solve_elastic(sim)
     slow = model(sim.mesh)
@@ -500,7 +500,7 @@ def test_a_crack_that_closes(speed, touches):
 def test_loads_that_turn_elements_inside_out():
     sim = on_floor(rectangle(2, 2, 1.0, 1.0))
     sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] > 1.0 - 1e-9), vx=0.0, vy=-1.5)
-    refused(sim, "does not converge|inside out|singular")
+    refused(sim, "did not converge|inverted|singular")
 
 
 def test_without_petsc(monkeypatch):
@@ -520,7 +520,7 @@ def test_without_petsc(monkeypatch):
     monkeypatch.setattr(equilibrium, "MANY", 10)
     sim.log = Log()
     assert equilibrium_.solve_elastic(sim).solver.startswith("direct")
-    assert "are solved on one rank, as petsc4py is not there" in sim.log.lines[0]
+    assert "are solved on one rank, as petsc4py is missing" in sim.log.lines[0]
 
 
 @pytest.mark.petsc

@@ -223,5 +223,5 @@ def test_relaxation_says_what_it_lets_flow_on_the_way(tmp_path):
             assert not log.said and not flowed
         else:
             assert len(log.said) == 1 and flowed
-            assert f"{len(plan.alive)} elements are beyond their strength where they lie" in log.said[0]
+            assert f"{len(plan.alive)} elements exceed their strength in the present state" in log.said[0]
             assert f"by {9e6 - BEARS:.2g}"[:4] in log.said[0]

@@ -140,7 +140,7 @@ def test_refused_by_name_and_nothing_is_changed(tmp_path):
     sim.move_constraint([0, 1], 1)
     before = saved_state.state_of(sim, {})["scene"]["conditions"], sim.corner_row.tolist()
     with pytest.raises(
-        CommandError, match=r"at node 0 at \(0, 0\): held \(type 1\) and velocity-x 0.1\. One of them is"
+        CommandError, match=r"at node 0 at \(0, 0\): held \(type 1\) and velocity-x 0.1\. Remove one of them"
     ):
         sim.velocity_condition([0, 5], vx=0.1)
     assert (saved_state.state_of(sim, {})["scene"]["conditions"], sim.corner_row.tolist()) == before

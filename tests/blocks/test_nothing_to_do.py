@@ -179,5 +179,5 @@ def test_what_is_no_balance_is_still_said():
     sim.option(collision=False, dynamic=False)
     sim.velocity_condition(np.flatnonzero(mesh.points[:, 1] == 1e9), vx=0.0, vy=0.0)
     sim.gravity(0.0, -9.81)
-    with pytest.raises(CommandError, match="positions are rounded to the last bit"):
+    with pytest.raises(CommandError, match="rounding of positions alone causes"):
         equilibrium.solve_elastic(sim)

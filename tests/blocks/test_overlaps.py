@@ -181,7 +181,7 @@ def test_a_deep_overlap_is_said_with_its_place():
 
 
 def test_a_deep_overlap_stops_a_run_on_request():
-    with pytest.raises(PhysicsError, match=r"pairs of elements overlap .* stopped, as model option deep-overlap stop"):
+    with pytest.raises(PhysicsError, match=r"pairs of elements overlap .* stopped by model option deep-overlap stop"):
         sinks(0.035, deep_overlap="stop")
     sinks(0.02, deep_overlap="stop")
     with pytest.raises(CommandError, match="deep-overlap is one of warn, stop, got maybe"):

@@ -305,7 +305,7 @@ def test_what_comes_too_late_or_cannot_be():
         sim.option(plane_stress=False)
     other = plate()
     other.step()
-    with pytest.raises(CommandError, match="model plane-strain comes before the first step"):
+    with pytest.raises(CommandError, match="model plane-strain must precede the first step"):
         other.option(plane_stress=False)
 
 

@@ -89,7 +89,7 @@ def test_without_the_word_joints_stay_before_their_peak():
     refused(sim, "1 joints would pass their peak")
     equilibrium.solve_elastic(sim, softening=True)
     assert diagnostics.joint_counts(sim) == (0, 1, 0)
-    refused(sim, "1 joints are behind their peak already")
+    refused(sim, "1 joints are past their peak already")
 
 
 @pytest.mark.parametrize("way", [7e-5, 9e-5])
@@ -156,8 +156,8 @@ def test_a_part_that_comes_loose_is_refused_and_the_joint_is_whole():
     edges = sim.mesh.edges()
     right = (sim.mesh.points[edges.points][:, :, 0] > 0.2 - 1e-9).all(axis=1)
     sim.stress_condition(edges.faces[right, 0], xx=2.5e6)
-    with pytest.raises(CommandError, match=r"does not converge|can move|singular") as told:
+    with pytest.raises(CommandError, match=r"did not converge|can move|singular") as told:
         equilibrium.solve_elastic(sim, softening=True)
-    assert told.match("balance was found with|can move")
-    refused(sim, "does not converge|can move|singular", softening=True)
+    assert told.match("it converged with|can move")
+    refused(sim, "did not converge|can move|singular", softening=True)
     assert diagnostics.joint_counts(sim) == (1, 0, 0) and not sim.broken.any() and not sim.event_rows

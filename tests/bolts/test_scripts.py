@@ -94,12 +94,12 @@ def test_frames_hold_a_table_and_figures_show_it(bench: Bench, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        (f"bolt c-model mech-e-p property {STEEL}", "there are no bolts yet: bolt create comes first"),
-        ("bolt create polyline (5,5) (6,6)", "no node of the bolt is in an element"),
-        ("bolt create polyline (0.5,1) (0.5,[0.5+0.5])", "two points of the bolt that follow each other are the same"),
-        ("history create 'h' bolt-node value slip id 0", "there are no bolts yet"),
+        (f"bolt c-model mech-e-p property {STEEL}", "no bolts yet: use bolt create first"),
+        ("bolt create polyline (5,5) (6,6)", "no node of the bolt lies in an element"),
+        ("bolt create polyline (0.5,1) (0.5,[0.5+0.5])", "two consecutive points of the bolt coincide"),
+        ("history create 'h' bolt-node value slip id 0", "no bolts yet"),
         ("history create 'h' bolt-node value axial-force id 0", "a history of bolt-node can follow"),
-        ("history create 'h' bolt-element value axial-force nearest (1,1)", "there are no bolts yet"),
+        ("history create 'h' bolt-element value axial-force nearest (1,1)", "no bolts yet"),
     ],
 )
 def test_errors_name_file_and_line(bench: Bench, line: str, message: str) -> None:
@@ -111,11 +111,11 @@ def test_errors_name_file_and_line(bench: Bench, line: str, message: str) -> Non
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("model step 1", r"bolt-element 0 has no model \(7 in all\): bolt c-model comes first"),
+        ("model step 1", r"bolt-element 0 has no model \(7 in all\): assign bolt c-model first"),
         (f"bolt c-model mech-e-p property {STEEL} range id 99", "there is no bolt-element 99; numbers go from 0 to 6"),
         ("bolt-node boundary b-n-f-b-c force-x 1 range group 'q'", "there is no set 'default' of bolt-nodes"),
         ("bolt-node boundary b-n-f-b-c force-x table 'q'", "there is no table 'q'"),
-        ("model solve elastic", "the static solve knows no bolts"),
+        ("model solve elastic", "the static solve does not support bolts"),
     ],
 )
 def test_errors_of_bolts_that_are_there(bench: Bench, line: str, message: str) -> None:

@@ -100,7 +100,7 @@ def test_no_account_of_energy(tmp_path):
     both = pair(tmp_path, held())
     both.particles.energy = Budget()
     both.release()
-    with pytest.raises(CommandError, match="no account of energy for clumps that touch blocks"):
+    with pytest.raises(CommandError, match="budget does not support clumps that are coupled to blocks"):
         both_again = type(both)(both.particles, both.blocks)
         both_again.settle_time_step()
         both_again.advance(1)

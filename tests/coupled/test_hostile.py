@@ -23,7 +23,7 @@ def both_of(tmp_path, y=0.71, **options):
 @pytest.mark.parametrize("kind", ["cross", "quad"])
 def test_a_disc_inside_an_element(tmp_path, kind):
     both = together(discs([(0.31, 0.33, 0.02)], tmp_path, dt=5e-6), body(rectangle(6, 3, 1.2, 0.6, kind=kind)))
-    with pytest.raises(CommandError, match=r"the centre of particle 0 is inside element \d+"):
+    with pytest.raises(CommandError, match=r"the centre of particle 0 lies inside element \d+"):
         both.advance(1)
 
 
@@ -37,14 +37,14 @@ def test_a_disc_deeper_than_its_radius_but_outside(tmp_path):
 def test_a_disc_that_goes_through_a_face(tmp_path):
     both = both_of(tmp_path)
     properties.prop(both.particles, kn=1e2, yv=-50.0)
-    with pytest.raises(PhysicsError, match=r"particle 0, now at .* went through the surface of an element"):
+    with pytest.raises(PhysicsError, match=r"particle 0, now at .* passed through the surface of an element"):
         both.advance(3000)
 
 
 def test_time_steps_that_differ(tmp_path):
     blocks = body(rectangle(6, 3, 1.2, 0.6))
     blocks.time_step(value=4e-6)
-    with pytest.raises(CommandError, match="SET dt 5e-06 s of the particles, model time-step 4e-06 s of the blocks"):
+    with pytest.raises(CommandError, match="SET dt 5e-06 s and model time-step 4e-06 s differ"):
         together(discs([(0.5, 0.8, 0.1)], tmp_path, dt=5e-6), blocks)
 
 

@@ -94,7 +94,7 @@ def test_what_implicit_steps_refuse_is_stepped(tmp_path) -> None:
         rock("pcdc model solve hydraulic auto steady\n")
     with pytest.raises(ScriptError, match="auto goes with hydraulic"):
         rock("pcdc model solve auto\n")
-    with pytest.raises(CommandError, match="steps of some time"):
+    with pytest.raises(CommandError, match="auto needs a time"):
         steps.solve_hydraulic(rock.project, steady=True, auto=True)
 
 

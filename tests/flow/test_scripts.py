@@ -103,7 +103,7 @@ def test_what_a_script_cannot_do(tmp_path) -> None:
     fdem.settings.option(model, mechanical=False)
     with pytest.raises(CommandError, match="no unbalanced forces"):
         fdem.steps.solve(model, ratio=1e-5)
-    with pytest.raises(CommandError, match="mechanical on comes first"):
+    with pytest.raises(CommandError, match="use model option mechanical on first"):
         fdem.steps.solve_elastic(model)
     fdem.steps.solve(model, time=1e-9)
     assert math.isfinite(model.blocks.clock.time)

@@ -340,5 +340,5 @@ def test_what_makes_no_sense_is_refused() -> None:
         sim.step()
     bare = model(rectangle(2, 2, 1.0, 1.0))
     bare.heat_clock(dt=1.0)
-    with pytest.raises(CommandError, match="time-step of heat was said, but no element has a thermal model"):
+    with pytest.raises(CommandError, match="time-step of heat is set, but no element has a thermal model"):
         bare.step()

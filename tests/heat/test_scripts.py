@@ -66,7 +66,7 @@ def test_sub_steps_are_those_of_a_cycle(tmp_path) -> None:
     fdem.steps.step(model, 2)
     assert model.blocks.clock.time == 100.0
     fdem.settings.option(model, thermal=False)
-    with pytest.raises(CommandError, match="nothing would happen"):
+    with pytest.raises(CommandError, match="nothing to compute"):
         fdem.steps.step(model, 1)
 
 

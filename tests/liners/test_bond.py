@@ -227,7 +227,7 @@ def test_creep_asks_for_nodes_that_are_not_driven() -> None:
     changes.element_model(sim, None, "mech_burgers", rock)
     creep.switch(sim, True, dt=1.0)
     liners.condition(np.array([2]), does_x=VELOCITY, at_x=0.0, does_turn=VELOCITY, at_turn=0.1)
-    with pytest.raises(CommandError, match="liner-node 2 has a prescribed motion: in static runs nodes move so far"):
+    with pytest.raises(CommandError, match="liner-node 2 has a prescribed motion, which in static runs acts per step"):
         creep.check(sim, 1.0)
     liners.delete(np.array([1, 2]))  # both that end there
     creep.check(sim, 1.0)
@@ -259,7 +259,7 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing() -> None:
     assert len(liners) == 6 and len(liners.rows) == 1
     other = model(rectangle(2, 2, 1.0, 1.0))
     _, elements = Liners.of(other).create(near(other.mesh, 1, 1.0))
-    with pytest.raises(CommandError, match=r"liner-element 0 has no model \(2 in all\): liner c-model comes first"):
+    with pytest.raises(CommandError, match=r"liner-element 0 has no model \(2 in all\): assign liner c-model first"):
         other.step()
 
 

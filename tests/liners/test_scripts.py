@@ -101,10 +101,10 @@ def test_frames_hold_a_table_and_figures_show_it(bench: Bench, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        (f"liner c-model beam property {CONCRETE}", "there are no liners yet: liner create comes first"),
+        (f"liner c-model beam property {CONCRETE}", "no liners yet: use liner create first"),
         ("liner create", r"face 1 is not free, an element lies beside it"),
         ("history create 'h' liner-node value gap id 0", "a history of liner-node can follow"),
-        ("liner delete", "there are no liners yet"),
+        ("liner delete", "no liners yet"),
         ("liner c-model beam property density 1 young 1 n-s 1 s-s 0", "needs its thickness"),
     ],
 )
@@ -117,10 +117,10 @@ def test_errors_name_file_and_line(bench: Bench, line: str, message: str) -> Non
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("model step 1", r"liner-element 0 has no model \(10 in all\): liner c-model comes first"),
+        ("model step 1", r"liner-element 0 has no model \(10 in all\): assign liner c-model first"),
         ("liner create range boundary y 1 1", "face [0-9]+ has a liner already"),
         ("liner-node boundary l-n-f-b-c moment table 'q'", "there is no table 'q'"),
-        ("model solve elastic", "the static solve knows no liners"),
+        ("model solve elastic", "the static solve does not support liners"),
     ],
 )
 def test_errors_of_liners_that_are_there(bench: Bench, line: str, message: str) -> None:

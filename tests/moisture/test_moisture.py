@@ -122,7 +122,7 @@ def test_what_is_refused() -> None:
     with pytest.raises(CommandError, match="moisture_residual must be below moisture_saturated"):
         moisture.adjust(None, {"moisture_residual": 0.5})
     moisture.clock(on=False)
-    with pytest.raises(CommandError, match="nothing would happen"):
+    with pytest.raises(CommandError, match="nothing to compute"):
         sim.step()
 
 

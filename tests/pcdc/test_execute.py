@@ -73,7 +73,7 @@ def test_expressions_see_what_python_sees_there(bench):
     ("text", "message"),
     [
         ("pcdc model new\npcdc node group 'a' range x 0 1\n",
-         "script.sc:2: pcdc node group 'a' range x 0 1: there is no mesh yet"),
+         "script.sc:2: pcdc node group 'a' range x 0 1: no mesh yet"),
         ("for i in range(3):\n    n = i - 2\n    pcdc model step [n]\n",
          "script.sc:3: pcdc model step [n]: read -2 from '[n]', expected a whole number, not negative"),
         ("def m_f(n):\n    pcdc geometry delete 'x[n]'\ndef m_g():\n    m_f(4)\n\nm_g()\n",
@@ -85,7 +85,7 @@ def test_expressions_see_what_python_sees_there(bench):
          "script.sc:2: pcdc model step [1/0]: ZeroDivisionError: division by zero (called from line 3)"),
         ("pcdc geometry create circle (0,0) \\\n   [a] \\\n   as-layer 'x'\n", "script.sc:1: pcdc geometry create"),
         ("pcdc element-face boundary m-s-b-c s-n table 'blast'\n", "there is no table 'blast'; there is none so far"),
-        ("pcdc element group 'rock' range set 'none'\n", "there is no mesh yet"),
+        ("pcdc element group 'rock' range set 'none'\n", "no mesh yet"),
         (BOX + "pcdc element group 'a' range group 'rok' set 'domain'\n",
          "set 'domain' has no group 'rok' of elements; it has 'rock'"),
         (BOX + "pcdc element group 'a' range group 'rock'\n",

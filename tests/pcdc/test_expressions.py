@@ -182,7 +182,7 @@ def test_names_of_tables_too(name):
      ("history create 'h' [v] value [w] max", ("model", "time"), "a history of the model takes no maximum"),
      ("history create 'h' [v] value [w] max", ("cell", "time"), "expected one of node, element, joint, bolt-node"),
      ("model new dim [v]", (4,), "expected 2 or 3"),
-     ("model time-step auto [v] value 1e-6", (True,), "value and auto on exclude each other"),
+     ("model time-step auto [v] value 1e-6", (True,), "value and auto on cannot be combined"),
      ("node boundary mech-m-b-c type [v] range id 1", (0.5,), "read 0.5 from '[v]', expected 0 free, 1 held or 2")],
 )  # fmt: skip
 def test_what_expressions_give_is_held_to_the_same_rules(words, values, message):

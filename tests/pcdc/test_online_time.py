@@ -137,7 +137,7 @@ def test_run_time_and_whatever_comes_first(tmp_path):
     rock("pcdc model solve run-time 1.2e-3\npcdc model run-time 0\npcdc model solve cycle 3\n")
     assert rock.blocks.clock.step == 123
     rock("pcdc model run-time 1\npcdc model dynamic off\npcdc model solve cycle 2\n")
-    assert rock.blocks.clock.step == 125 and any("ends no static run" in line for line in rock.blocks.log.lines)
+    assert rock.blocks.clock.step == 125 and any("cannot end a static run" in line for line in rock.blocks.log.lines)
     for words, why in (("run-time 1", "run-time: in static runs"), ("elastic run-time 1", "goes with a run by steps")):
         with pytest.raises(HpcdemError, match=why):
             rock(f"pcdc model solve {words}\n")

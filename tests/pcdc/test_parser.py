@@ -125,9 +125,9 @@ def test_values_of_the_wrong_kind(words, values, message):
 BOLT = "den 7850 young 200e9 diam 0.02 s-s-r-b 1e9 g-t 0.01 c-r-g 1e6 c-g-b 1e6"
 WATER = "property f-den 1000 f-bulk 2e9 vis 1e-6 a-initial 1e-5 a-min 1e-6"
 REFUSED = [
-    ("bolt create polyline (0,0)", "a bolt goes through two points at least, got 1"),
-    ("bolt create polyline (0,0) (0,0) (1,1)", "two points of the bolt that follow each other are the same"),
-    ("bolt create polyline (0,0) (1,1) segments 4 length 0.1", "segments and length exclude each other"),
+    ("bolt create polyline (0,0)", "a bolt needs at least two points, got 1"),
+    ("bolt create polyline (0,0) (0,0) (1,1)", "two consecutive points of the bolt coincide"),
+    ("bolt create polyline (0,0) (1,1) segments 4 length 0.1", "segments and length cannot be combined"),
     ("bolt create polyline (0,0) (1,1) segments 0", "read '0', expected a whole number above 0 for 'segments'"),
     ("bolt create polyline (0,0) (1,1) grout -1 2", "read '-1', expected a number, not negative for 'grout'"),
     ("bolt create line (0,0) (1,1)", "read 'line' after 'bolt create'"),
@@ -146,14 +146,14 @@ REFUSED = [
     (f"face-joint c-model hydr-p-m {WATER} m-permeability 1e-15", "goes with leak-off, which is off"),
     ("face-joint c-model hydr-p-m aperture-initial -1", "expected a number, not negative"),
     ("node boundary hydra-c-f-b", "needs at least one of"),
-    ("node boundary hydra-c-f-b pressure 1 flow-rate 2", "pressure and flow-rate exclude each other"),
+    ("node boundary hydra-c-f-b pressure 1 flow-rate 2", "pressure and flow-rate cannot be combined"),
     ("flow-node initial", "needs at least one of"),
-    ("flow-node initial pressure 1 saturation 1", "pressure and saturation exclude each other"),
+    ("flow-node initial pressure 1 saturation 1", "pressure and saturation cannot be combined"),
     ("flow-node initial saturation 1.5", "expected a number from 0 to 1"),
     ("flow-node initial pressure -1", "expected a number, not negative"),
     ("model sub-step", "needs at least one of"), ("model sub-step mechanical 0", "a whole number above 0"),
     ("model time-step hydraulic -1", "expected a number, not negative"),
-    ("bolt-n boundary b-n-c velocity-x 1 acceleration-x 1", "exclude each other"),
+    ("bolt-n boundary b-n-c velocity-x 1 acceleration-x 1", "cannot be combined"),
     ("", "the line ends where a command: model, geometry,"),
     ("foo bar", "read 'foo' after 'pcdc', expected one of model, geometry"),
     ("modle new", "did you mean 'model'?"),
@@ -233,7 +233,7 @@ REFUSED = [
     ("history create 'h' model value time id 3", "a history of the model takes no id"),
     ("chart add 'c'", "a curve has either y, the name of a history, or values or profile, got none"),
     ("chart add 'c' values (0,0) scale-x 2", "scale-x goes with histories"),
-    ("model time-step auto on value 1e-6", "exclude each other"),
+    ("model time-step auto on value 1e-6", "cannot be combined"),
 ]  # fmt: skip
 
 

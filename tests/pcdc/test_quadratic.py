@@ -45,7 +45,7 @@ def test_a_line_inside_them_cracks_nothing_unless_it_is_followed(bench):
     """The middle of a row of six-node triangles is a line of edges inside them."""
     line = "pcdc geometry create polyline (0,0.25) (2,0.25) as-layer 'l'\npcdc mesh intersect layer 'l'"
     mesh = "pcdc mesh structured (0,0) (2,1) cells 4 2 diagonal right\npcdc mesh quadratic\n"
-    with pytest.raises(HpcdemError, match="no joint lies on layer 'l'; with follow"):
+    with pytest.raises(HpcdemError, match="no joint lies on layer 'l'; follow uses"):
         bench(f"{mesh}{line}\n")
     bench(f"pcdc model new\n{mesh}{line} follow\n")
     made = bench.project.mesh

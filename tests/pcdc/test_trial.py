@@ -20,7 +20,7 @@ REFUSED = [
     ("node boundary mech-m-b-c type -1", "0 free, 1 held or 2"),
     ("node boundary mech-m-b-c type 2", "type 2 needs the vector"),
     ("node boundary mech-m-b-c type 2 (0,0)", "type 2 needs the vector"),
-    ("node boundary mech-vel-b-c velocity-x 1 acceleration-x 2", "velocity-x and acceleration-x exclude each other"),
+    ("node boundary mech-vel-b-c velocity-x 1 acceleration-x 2", "velocity-x and acceleration-x cannot be combined"),
     ("node boundary mech-vel-b-c velocity-y table 'v' acceleration-y 2", "velocity-y and acceleration-y exclude"),
     (ROCK + "young 1e9 poisson-ratio 0.49995", "expected a number above -1, at most 0.4999 for 'poisson-ratio'"),
     (ROCK + "young 1e9 poisson-ratio 0.3 shear 1e9", "needs two of"),

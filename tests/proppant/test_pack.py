@@ -176,7 +176,7 @@ def test_a_fracture_closes_on_its_pack(dim: int, modulus: float) -> None:
 def test_the_static_solve_refuses_a_pack_that_bears() -> None:
     sim, flow, proppant = closed(0.0, proppant_modulus=1e7)
     sim.option(large_strain=False)
-    with pytest.raises(CommandError, match="the static solve knows no proppant"):
+    with pytest.raises(CommandError, match="the static solve does not support proppant"):
         equilibrium.solve_elastic(sim)
     proppant.adjust({"proppant_modulus": 0.0})
     equilibrium.solve_elastic(sim)

@@ -107,7 +107,7 @@ def test_what_lies_in_the_place_is_named():
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     hole = np.flatnonzero(np.arange(len(mesh.cells)) // 6 == 13)
     changes.null(sim, hole)
-    with pytest.raises(CommandError, match=r"cannot come back: element 16\d reaches 0\.\d+ m into its place"):
+    with pytest.raises(CommandError, match=r"cannot be reinstated: element 16\d intrudes by 0\.\d+ m"):
         changes.element_model(sim, hole, "mech_iso_elastic", ROCK)
     assert not sim.alive[hole].any()
 
@@ -115,7 +115,7 @@ def test_what_lies_in_the_place_is_named():
 def test_a_part_of_a_hexahedron_does_not_come_back_alone():
     sim, hole = block(hexes)
     changes.null(sim, hole)
-    with pytest.raises(CommandError, match="are one hexahedron: they go together, only 3 of them were given"):
+    with pytest.raises(CommandError, match="are one hexahedron, of which only 3 were given"):
         changes.element_model(sim, hole[:3], "mech_iso_elastic", FILL)
 
 

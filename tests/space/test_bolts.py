@@ -190,7 +190,7 @@ def test_what_makes_no_sense_is_refused() -> None:
         bolts.create([(0.5, 0.5), (0.5, 0.9)])
     with pytest.raises(CommandError, match=r"are the same, \(0.5,0.5,0.5\)"):
         bolts.create([(0.5, 0.5, 0.5), (0.5, 0.5, 0.5)])
-    with pytest.raises(CommandError, match="no node of the bolt is in an element"):
+    with pytest.raises(CommandError, match="no node of the bolt lies in an element"):
         bolts.create([(2.0, 2.0, 2.0), (3.0, 3.0, 3.0)])
     _, elements = bolts.create([(0.5, 0.5, 0.5), (0.5, 0.5, 0.9)])
     with pytest.raises(CommandError, match="spacing must be 1, got 2"):
@@ -265,7 +265,7 @@ pcdc model step 10
     ("line", "message"),
     [
         ("bolt create polyline (0.5,1) (0.5,0.3)", "vector"),
-        ("bolt create polyline (5,5,5) (6,6,6)", "no node of the bolt is in an element"),
+        ("bolt create polyline (5,5,5) (6,6,6)", "no node of the bolt lies in an element"),
     ],
 )
 def test_errors_name_file_and_line(bench: Bench, line: str, message: str) -> None:

@@ -453,7 +453,7 @@ def test_bodies_that_overlap_are_moved_apart() -> None:
     """By a static stage, after which the dynamic one begins without a word."""
     sim, block = on_a_plate(box((1, 1, 1), (0.2, 0.2, 0.2)), (0.43, 0.21, 0.199))
     sim.option(overlap="relax")
-    with pytest.raises(CommandError, match="moved apart by a static stage"):
+    with pytest.raises(CommandError, match="relax separates them in a static stage"):
         sim.step()
     sim.option(dynamic=False)
     for _ in range(300):

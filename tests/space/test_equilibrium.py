@@ -374,7 +374,7 @@ def test_a_plane_and_a_velocity_leave_the_line_that_they_have_in_common():
     assert abs(x[0]) < 1e-18 and abs(y[0]) < 1e-18 and abs(z[0]) > 1e-9
 
 
-@pytest.mark.skipif(not linear.petsc_there(), reason="petsc4py is not there")
+@pytest.mark.skipif(not linear.petsc_there(), reason="petsc4py is missing")
 @pytest.mark.parametrize("with_joints", [False, True])
 def test_petsc_finds_the_same(with_joints):
     one, other = leaning(with_joints), leaning(with_joints)

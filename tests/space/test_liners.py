@@ -199,7 +199,7 @@ pcdc model step 10
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        (f"liner c-model beam property {WORDS}", "there are no liners yet: liner create comes first"),
+        (f"liner c-model beam property {WORDS}", "no liners yet: use liner create first"),
         ("liner create range z 0.3 0.4", "is not free, an element lies beside it"),
     ],
 )
@@ -215,7 +215,7 @@ def test_errors_name_file_and_line(bench: Bench, line: str, message: str) -> Non
         ("liner-node boundary l-n-c spin 0", "spin.* is for two dimensions"),
         (f"liner c-model beam property {WORDS} inertia 1e-4", "inertia.* is for two dimensions"),
         ("history create 'h' liner-element value moment-first id 0", "no quantity moment-first of a liner-element"),
-        ("model solve elastic", "the static solve knows no liners"),
+        ("model solve elastic", "the static solve does not support liners"),
     ],
 )
 def test_words_of_the_plane_are_refused(bench: Bench, line: str, message: str) -> None:

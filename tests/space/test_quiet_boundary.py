@@ -116,5 +116,5 @@ def test_a_checkpoint_keeps_them_and_static_stages_say_that_they_do_not_act(tmp_
     sim.option(dynamic=False)
     sim.step()
     assert any("quiet faces act in dynamic runs only" in text for text in told)
-    with pytest.raises(CommandError, match="quiet on goes with incoming-x and incoming-y and incoming-z"):
+    with pytest.raises(CommandError, match="add quiet on to incoming-x and incoming-y and incoming-z"):
         sim.stress_condition(right, quiet=False, incoming_z=1.0)

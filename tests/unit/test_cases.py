@@ -170,7 +170,7 @@ def test_included_text_has_names_of_its_own_and_the_line_of_the_caller(tmp_path)
     [
         ("\npcdc modle new", r"^more\.sc:2: "),
         ("a = 1\npcdc model step [1/0]", r"^more\.sc:2: .*ZeroDivisionError"),
-        ("pcdc element group 'a' range y 0 1", r"^more\.sc:1: .*there is no mesh yet.*called from line 2"),
+        ("pcdc element group 'a' range y 0 1", r"^more\.sc:1: .*no mesh yet.*called from line 2"),
         ("\n\nraise KeyError('x')", r"more\.sc ended with an error(.|\n)*line 3"),
         ("def f(:", r"^more\.sc:1: "),
     ],

@@ -63,12 +63,12 @@ def _structured(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] |
 
 def _bolt(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if "segments" in arguments and "length" in arguments:
-        raise ValueError("segments and length exclude each other: both say where a bolt is divided")
+        raise ValueError("segments and length cannot be combined: both define the division of a bolt")
 
 
 def _fluid(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if "pressure" in arguments and "saturation" in arguments:
-        raise ValueError("pressure and saturation exclude each other: below full saturation there is no pressure")
+        raise ValueError("pressure and saturation cannot be combined: below full saturation there is no pressure")
 
 
 def _stage(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -103,9 +103,9 @@ def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | 
         raise ValueError("update-frequency goes with auto on")
     said = [told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)]
     if len(said) > 1:
-        raise ValueError(f"{said[0]} and {said[1]} exclude each other: both say what the time step is")
+        raise ValueError(f"{said[0]} and {said[1]} cannot be combined: both set the time step")
     if said == ["value"] and "safety" in arguments:
-        raise ValueError("value and safety exclude each other: a time step that is given is taken as it is")
+        raise ValueError("value and safety cannot be combined: a given time step is used unchanged")
 
 
 def _parts(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None, words: str) -> None:
@@ -129,7 +129,7 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
     if watched and ("elastic" in arguments or not by_ratio):
         raise ValueError(f"{watched[0]} goes with a ratio that steps lead to")
     if "limit" in watched and "cycles" in arguments:
-        raise ValueError("limit and cycles exclude each other: a run that reaches its cycles has not failed")
+        raise ValueError("limit and cycles cannot be combined: a run that reaches its cycles has not failed")
     for part in ("hydraulic", "thermal"):
         if part in arguments:
             _implicit(arguments, part)
@@ -176,7 +176,7 @@ def _rayleigh(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | N
 
 def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if "every" in arguments and "off" in arguments:
-        raise ValueError("every and off exclude each other")
+        raise ValueError("every and off cannot be combined")
 
 
 LOOKS = ("limits", "full", "log", "colours", "opacity", "edges", "size", "vectors", "arrows", "filter")
@@ -204,7 +204,7 @@ def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
 
 def _glue(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if terms is not None and "between" in arguments:
-        raise ValueError("between and range exclude each other: both say which faces are glued")
+        raise ValueError("between and range cannot be combined: both say which faces are glued")
 
 
 _RULES: dict[str, Callable[[Mapping[str, Any], Sequence[tuple[str, Any]] | None], None]] = {

@@ -156,9 +156,9 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
     elif name in ("mechanical-velocity-boundary-condition", BOLT_VELOCITY.keyword.name):
         for axis in "xyz":
             if f"velocity-{axis}" in arguments and f"acceleration-{axis}" in arguments:
-                raise CommandError(f"velocity-{axis} and acceleration-{axis} exclude each other")
+                raise CommandError(f"velocity-{axis} and acceleration-{axis} cannot be combined")
     elif name in (FLOW_CONDITION.keyword.name, PROPPANT_CONDITION.keyword.name) and len(arguments) > 1:
-        raise CommandError(f"{' and '.join(arguments)} exclude each other: a flow node has one of them")
+        raise CommandError(f"{' and '.join(arguments)} cannot be combined: a flow node has one of them")
 
 
 def _changes(model: properties.Model, given: dict[str, Any]) -> None:

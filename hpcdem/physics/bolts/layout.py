@@ -24,13 +24,13 @@ def checked(points: Sequence[Sequence[float]], dim: int) -> np.ndarray:
         raise CommandError(f"the points of a bolt are vectors of {dim} numbers")
     line = np.asarray(points, np.float64).reshape(-1, dim)
     if len(line) < 2:
-        raise CommandError(f"a bolt goes through two points at least, got {len(line)}")
+        raise CommandError(f"a bolt needs at least two points, got {len(line)}")
     if not np.isfinite(line).all():
         raise CommandError("the points of a bolt must be finite")
     twice = np.flatnonzero((np.diff(line, axis=0) == 0.0).all(axis=1))
     if len(twice):
         at = ",".join(f"{c:g}" for c in line[twice[0]])
-        raise CommandError(f"two points of the bolt that follow each other are the same, ({at})")
+        raise CommandError(f"two consecutive points of the bolt coincide, ({at})")
     return line
 
 

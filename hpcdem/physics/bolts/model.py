@@ -44,7 +44,7 @@ NODE_QUANTITIES: dict[str, tuple[str, str]] = {
     **{f"velocity_{axis}": ("m/s", f"velocity in {axis}") for axis in "xyz"},
     "bond_force": ("N/m", "force of the grout per length of one bolt, towards its last point"),
     "slip": ("m", "slip of the bar in the grout, towards its last point"),
-    "bond_state": ("1", "slips 1, has slipped 2"),
+    "bond_state": ("1", "slipping 1, has slipped 2"),
     **{f"reaction_{axis}": ("N", f"force in {axis} by which conditions act on one bolt") for axis in "xyz"},
     "host": ("1", "element that holds the node, -1: none"),
     "distance": ("m", "distance from the first point along the bolt, as installed"),
@@ -53,7 +53,7 @@ ELEMENT_QUANTITIES: dict[str, tuple[str, str]] = {
     "axial_force": ("N", "axial force of one bolt, tension positive"),
     "axial_strain": ("1", "lengthening since it was installed, over its length"),
     "plastic_strain": ("1", "plastic part of it"),
-    "bolt_state": ("1", "yields in tension 1, in compression 2; did so before 4, 8; broken 16; deleted 32"),
+    "bolt_state": ("1", "yielding in tension 1, in compression 2; has yielded before 4, 8; broken 16; deleted 32"),
 }
 QUANTITIES = {BOLT_NODE: NODE_QUANTITIES, BOLT_ELEMENT: ELEMENT_QUANTITIES}
 """What can be asked of nodes and elements of bolts: unit and meaning."""
@@ -118,21 +118,21 @@ class Bolts(Structure):
         blocks, dim = self.blocks, self.blocks.dim
         line = layout.checked(points, dim)
         if segments is not None and length is not None:
-            raise CommandError("segments and length exclude each other: both say where a bolt is divided")
+            raise CommandError("segments and length cannot be combined: both define the division of a bolt")
         if (segments is not None and segments < 1) or (length is not None and not 0.0 < length < math.inf):
-            raise CommandError("a bolt has one segment at least, of a length above 0")
+            raise CommandError("a bolt needs at least one segment, of a length above 0")
         total = float(layout.lengths(np.diff(line, axis=0)).sum())
         begin, end = (0.0, total) if grout is None else grout
         if not 0.0 <= begin < end or begin >= total:
-            raise CommandError(f"grout goes from a distance of 0 or more to a larger one on a bolt of {total:g} m, "
-                               f"got {begin:g} to {end:g}")  # fmt: skip
+            raise CommandError(f"grout must start at 0 or more and end farther on the bolt of {total:g} m, got "
+                               f"{begin:g} to {end:g}")  # fmt: skip
         cells = blocks.the_mesh().cells
         corners = diagnostics.corner_values(blocks, "position").reshape(-1, 4, dim)
         x = layout.split(line, corners, np.where(blocks.alive[:, None], cells, -1), blocks.mean_edge, segments, length)
         host, weight = layout.hosts(x, corners, cells, blocks.alive)
         held = np.flatnonzero(host >= 0)
         if not len(held):
-            raise CommandError("no node of the bolt is in an element")
+            raise CommandError("no node of the bolt lies in an element")
         if plate and host[0] < 0:  # in front of the face: tied to the element in which the bolt begins
             e = int(host[held[0]])
             host[0], weight[0] = e, layout.coordinates(x[0], corners[e], bool(cells[e, 3] >= 0))
@@ -163,7 +163,7 @@ class Bolts(Structure):
         blocks.changed()
         free = int((host < 0).sum())
         if blocks.log is not None and free:
-            blocks.log.info(f"{free} of the {n} nodes of the bolt are in no element: no grout holds them")
+            blocks.log.info(f"{free} of the {n} nodes of the bolt lie outside the mesh and are not grouted")
         return numbers
 
     def assign(self, elements: np.ndarray, given: Mapping[str, float]) -> None:
@@ -171,7 +171,9 @@ class Bolts(Structure):
         the difference of the pretension."""
         values = BOLT.complete(given)
         if self.blocks.dim == 3 and values["spacing"] != 1.0:
-            raise CommandError(f"in space each bolt is there by itself: spacing must be 1, got {values['spacing']:g}")
+            raise CommandError(
+                f"bolts in three dimensions are single bolts: spacing must be 1, got {values['spacing']:g}"
+            )
         self._check_spacing(elements, values["spacing"])
         blocks, bars = self.blocks, self.elements
         blocks.before_change()
@@ -195,8 +197,8 @@ class Bolts(Structure):
         if others.any():
             e = int(np.flatnonzero(others)[0])
             raise CommandError(
-                f"bolt-element {e} has the spacing {self._column('spacing')[e]:g} m: all of a bolt has one spacing, "
-                f"which stays; got {spacing:g}"
+                f"bolt-element {e} has the spacing {self._column('spacing')[e]:g} m: the spacing of a bolt is uniform "
+                f"and fixed, got {spacing:g}"
             )
 
     # ---- what is asked -------------------------------------------------------------------------------------------
@@ -472,7 +474,7 @@ class Bolts(Structure):
         if self._account is not None:
             self.commands += self._stored() - stored
         if self.blocks.log is not None:
-            self.blocks.log.info(f"{int(lost.sum())} nodes of bolts are no longer in rock: it was taken out")
+            self.blocks.log.info(f"{int(lost.sum())} bolt nodes lost their rock, which was removed")
 
     def _let_go(self, elements: np.ndarray) -> None:
         """Half of the grout of a node goes with each of its elements, and with it its part of the force."""

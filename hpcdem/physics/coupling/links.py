@@ -86,7 +86,7 @@ class Link:
         mine = [(float(p.hot[i, X]), float(p.hot[i, Y])) for i in rows]
         ((x, y),) = [place for part in self.comm.allgather(mine) for place in part]
         raise PhysicsError(
-            f"step {self.blocks.clock.step}: the centre of particle {gid}, now at ({x:g}, {y:g}), went through the "
+            f"step {self.blocks.clock.step}: the centre of particle {gid}, now at ({x:g}, {y:g}), passed through the "
             "surface of an element; its stiffness is too small for this load, or the time step too large"
         )
 
@@ -227,7 +227,7 @@ class Link:
         every = [pair for pair in self.comm.allgather((int(found[0]), int(found[1]))) if pair[0] >= 0]
         if every:
             gid, element = min(every)
-            raise CommandError(f"the centre of particle {gid} is inside element {element}: it has no outside to be on")
+            raise CommandError(f"the centre of particle {gid} lies inside element {element}: move the particle outside")
 
     # ---- messages ----------------------------------------------------------------------------------------------------
 

@@ -56,7 +56,7 @@ class Coupled(SurfaceLoad):
         if self.name in blocks.surface_loads or particles.coupled:
             raise CommandError("these blocks or particles are coupled already")
         if particles.settings.restitution < 1.0:
-            raise CommandError("SET restitution does not go with contacts with blocks, which have laws of their own")
+            raise CommandError("SET restitution does not support contacts with blocks, which have their own law")
         self.particles, self.blocks = particles, blocks
         self.comm = particles.comm
         self.friction = math.inf if friction is None else float(friction)
@@ -139,14 +139,11 @@ class Coupled(SurfaceLoad):
         """CommandError for options of the blocks that do not go with particles."""
         options = self.blocks.options
         if not options.dynamic:
-            raise CommandError("particles move in time: blocks that are coupled to them need model option dynamic on")
+            raise CommandError("coupled blocks need model option dynamic on, as particles move in time")
         if options.auto:
-            raise CommandError("blocks that are coupled to particles have one time step: time-step auto must be off")
+            raise CommandError("coupled blocks need a constant time step: use time-step auto off")
         if options.mass_scaling > 0.0:
-            raise CommandError(
-                "blocks that are coupled to particles keep their masses, which particles feel: time-step mass-scaling "
-                "must be 0"
-            )
+            raise CommandError("coupled blocks need their true masses: use time-step mass-scaling 0")
 
     def _check(self) -> None:
         """CommandError if the two cannot be stepped together."""
@@ -158,7 +155,7 @@ class Coupled(SurfaceLoad):
                 "for both (SET dt and model time-step), or `settle_time_step` called again"
             )
         if self.accounted and self.particles.clumps:
-            raise CommandError("there is no account of energy for clumps that touch blocks: leave it off")
+            raise CommandError("the energy budget does not support clumps that are coupled to blocks: switch it off")
 
     def links(self) -> Link:
         """The contacts that can come about now."""
@@ -298,13 +295,13 @@ class Coupled(SurfaceLoad):
         said = [value for value in (particles.settings.dt, blocks.options.dt) if value > 0.0]
         if dt <= 0.0 and len(set(said)) > 1:
             raise CommandError(
-                f"the time steps differ: SET dt {said[0]:g} s of the particles, model time-step {said[1]:g} s of the "
-                "blocks; say the same for both, or leave one of them out"
+                f"SET dt {said[0]:g} s and model time-step {said[1]:g} s differ: set the same value, or only one of "
+                "them"
             )
         stable = self.stable_time_step()
         dt = dt if dt > 0.0 else said[0] if said else stable
         if not math.isfinite(dt):
-            raise CommandError("there is no time step: neither contacts nor elements give a limit; say one (SET dt)")
+            raise CommandError("no time step: neither contacts nor elements limit it; use SET dt")
         particles.settings.dt = dt
         if particles.clock.dt != dt:
             particles.clock.dt = dt

@@ -65,7 +65,7 @@ def stop_on_runaway(
     what = "a number is not finite" if broken else "a particle moves over half its radius per step"
     guess = f"the time step {dt:g} s is probably too large, or particles were made overlapping"
     if broken and mixed_laws:
-        guess = "there are particles of different laws, and a pair of both has no law"
+        guess = "some particles have different laws, and no law is assigned to pairs of them"
     named = "\n".join(
         f"  particle {g} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g}), rank {rank}" for g, x, y, vx, vy, rank in rows
     )
@@ -98,7 +98,7 @@ def name_slipped(sim: Any) -> None:
             names = places(p, which, sim.comm)
             more = f"; and {len(gids) - NAMED} more" if len(gids) > NAMED else ""
             if sim.log is not None:
-                sim.log.warn(f"step {sim.clock.step}: {len(gids)} particles slipped through {what}: {names}{more}")
+                sim.log.warn(f"step {sim.clock.step}: {len(gids)} particles passed through {what}: {names}{more}")
 
 
 def drop_outside(sim: Any, box: tuple[float, float, float, float]) -> None:

@@ -58,10 +58,10 @@ class Dashpots:
 def _refuse(sim: Any) -> None:
     others = {
         "clumps, whose discs have no mass of their own": bool(sim.clumps),
-        "a law of the user, whose stiffness is not known": bool(sim.own_laws),
-        "contacts with blocks, which have laws of their own": sim.coupled,
-        "SET energy, whose account does not know what dashpots take": sim.settings.energy > 0 or sim.energy is not None,
+        "a user law, whose stiffness is not known": bool(sim.own_laws),
+        "contacts with blocks, which have their own law": sim.coupled,
+        "SET energy, whose budget does not include dashpots": sim.settings.energy > 0 or sim.energy is not None,
     }
     for what, there in others.items():
         if there:
-            raise CommandError(f"SET restitution does not go with {what}; SET restitution 1 takes the dashpots away")
+            raise CommandError(f"SET restitution does not support {what}; SET restitution 1 removes the dashpots")

@@ -69,7 +69,7 @@ class Walls:
         at, wanted = self.of_side(side), BOX_IDS[side]
         if at is None and self.find(wanted) is not None:
             raise CommandError(
-                f"BOX makes the walls {_SIDES}, and there is a wall {wanted} already; give it another id"
+                f"BOX creates the walls {_SIDES}, and wall {wanted} exists already; choose another id for it"
             )
         at = self.put(wanted if at is None else int(self.id[at]), p1, p2, one_sided=True)
         self.side[at] = 1 + list(BOX_IDS).index(side)

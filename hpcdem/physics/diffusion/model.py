@@ -29,8 +29,8 @@ class Diffusion:
     name: ClassVar[str] = "diffusion"
     fields: ClassVar[Mapping[str, tuple[str, str, float]]] = {
         "temperature": ("K", "temperature", 0.0),
-        "heat_source": ("W", "heat that is given to the particle", 0.0),
-        "heat_given": ("J", "heat that its source has given", 0.0),
+        "heat_source": ("W", "heat supplied to the particle", 0.0),
+        "heat_given": ("J", "heat supplied by its source", 0.0),
     }
     energies: ClassVar[tuple[str, ...]] = ("heat", "heat_given")
 
@@ -58,7 +58,7 @@ class Diffusion:
     def prepare(self, sim: Simulation) -> None:
         """CommandError if there are clumps, whose discs have no contacts with each other, or particles without mass."""
         if sim.clumps:
-            raise CommandError("diffusion: no heat would flow inside clumps; it needs a model without them")
+            raise CommandError("diffusion: heat inside clumps is not supported; use a model without clumps")
         light = sim.count(int((sim.body[:, 0] <= 0.0).sum()))
         if light:
             raise CommandError(f"diffusion: {light} particles have no mass, so they can hold no heat (PROP density)")

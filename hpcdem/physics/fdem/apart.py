@@ -38,8 +38,8 @@ def check(sim: State, local: Local, error: type[Exception]) -> None:
     at = ", ".join(f"{c:g}" for c in mesh.points[mesh.face_points(np.array([face]))][0].mean(axis=0))
     name = sim.joint_rows.name(sim.joint_row[face]).replace("_", "-")
     said = (
-        f"the sides of face-joint {face} ({name}) at ({at}) are {way:.3g} m apart, {share:.2g} of its size: they stay "
-        "partners, and press and rub on all of it as if they still lay on each other"
+        f"face-joint {face} ({name}) at ({at}) has slipped or opened by {way:.3g} m, {share:.2g} of its size. Its "
+        "sides still interact over the whole joint"
     )
     advice = "longer edges along the joint, or classic-intrinsic-cohesive-interface, whose broken faces meet as contact"
     if share > GONE:

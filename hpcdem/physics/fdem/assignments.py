@@ -180,9 +180,8 @@ class Assignments(Settings):
         if len(cracks := joints[self.open[joints]]):
             at = ", ".join(f"{c:g}" for c in self._mesh().points[self._mesh().face_points(cracks)][0].mean(axis=0))
             raise CommandError(
-                f"face-joint {cracks[0]} at ({at}) is a crack ({len(cracks)} in all): its sides are free and meet by "
-                f"contact, so {name.replace('_', '-')} would not act there. mesh create embed, in the place of crack, "
-                "makes edges along a line that are whole; a range leaves out what broke"
+                f"face-joint {cracks[0]} at ({at}) is a crack ({len(cracks)} in all), so {name.replace('_', '-')} has "
+                "no effect there. Use mesh create embed instead of crack, or exclude cracks by a range"
             )
 
     def joint_property(self, joints: Numbers, properties: Mapping[str, Value]) -> None:
@@ -212,7 +211,7 @@ class Assignments(Settings):
     ) -> None:  # fmt: skip
         """Change properties of objects that have a model; keep: what stays of the old ones beside the new."""
         if not len(of):
-            raise CommandError(f"no {on} has a model whose properties could be changed: {on} c-model comes first")
+            raise CommandError(f"no {on} has a model whose properties could be changed: assign {on} c-model first")
 
         def find() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             old = getattr(self, column[0])[column[1]]

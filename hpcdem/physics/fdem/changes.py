@@ -31,8 +31,8 @@ def crack(sim: Blocks, joints: Numbers) -> None:
     if len(slides := at[sim.slides()[at]]):
         raise CommandError(
             f"face-joint {slides[0]} ({len(slides)} in all) has the model "
-            f"{sim.joint_rows.name(sim.joint_row[slides[0]]).replace('_', '-')}, whose joints slide and never "
-            "break: as a crack it would follow contact instead. Leave it out, or give it a cohesive model before"
+            f"{sim.joint_rows.name(sim.joint_row[slides[0]]).replace('_', '-')}, whose joints slide and never break, "
+            "so it cannot become a crack. Exclude it, or assign a cohesive model first"
         )
     sim.before_change()
     sim.open_faces(at)
@@ -50,7 +50,7 @@ def null(sim: Blocks, elements: Numbers, relax: float = 0.0) -> None:
     if span < 0.0:
         raise CommandError(f"relax must not be negative, got {relax:g}")
     if len(at) == int(sim.alive.sum()):
-        raise CommandError("all elements that are left would be taken out")
+        raise CommandError("this would remove all remaining elements")
     dying = np.zeros(len(sim.alive), bool)
     dying[at] = True
     left = _forces_left_behind(sim, dying) if span > 0.0 and len(at) else None
@@ -80,8 +80,8 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
     if MARK in name and sim.budget is not None:
         raise CommandError(
-            f"an energy budget is kept, but what the law {name.partition(MARK)[0]} stores and loses is not known: "
-            "model option energy off comes first"
+            f"the energy budget does not support the law {name.partition(MARK)[0]}, whose stored and lost energy is "
+            "not known: use model option energy off"
         )
     if elements is not None:
         sim.refuse_laws(asked, name, given)
@@ -150,9 +150,8 @@ def _bring_back(sim: Blocks, back: np.ndarray) -> None:
     sim.ownership.wanted = True
     if sim.log is not None:
         sim.log.info(
-            f"{len(back)} elements are there again, where their place is now and free of stress; they hang "
-            f"together with their neighbours by {int((hold & ~np.isin(over // 4, back)).sum())} faces, without "
-            "joints"
+            f"{len(back)} elements reinstated at their present position, free of stress; connected to neighbours by "
+            f"{int((hold & ~np.isin(over // 4, back)).sum())} faces, without joints"
         )
 
 
@@ -166,7 +165,7 @@ def _refuse_overlap(sim: Blocks, back: np.ndarray, places: np.ndarray, allowed: 
         flat = np.union1d(flat, moved.hexes[bad, 8])
     if len(flat):
         raise CommandError(
-            f"element {flat[0]} cannot come back: its place has closed, an element there would be turned inside out"
+            f"element {flat[0]} cannot be reinstated: its void has closed, and the element would be inverted"
         )
     everyone = diagnostics.corner_values(sim, "position").reshape(-1, 4, sim.dim)
     everyone[back] = places
@@ -174,8 +173,8 @@ def _refuse_overlap(sim: Blocks, back: np.ndarray, places: np.ndarray, allowed: 
     if problem is not None:
         e, f, deep = problem
         raise CommandError(
-            f"element {e} cannot come back: element {f} reaches {deep:.3g} m into its place; what lies there is "
-            f"taken out first: element c-model null range id {f}"
+            f"element {e} cannot be reinstated: element {f} intrudes by {deep:.3g} m. Remove it first: element c-model "
+            f"null range id {f}"
         )
 
 
@@ -317,9 +316,9 @@ def reset_state(sim: Blocks, elements: Numbers = None) -> None:
         names = sorted({sim.element_rows.name(row) for row in np.unique(sim.element_row[at]).tolist() if row})
         sim.log.warn_once(
             f"reset state {names}",
-            "element reset state changes nothing: it forgets that elements have yielded, and states of laws of users; "
-            f"no element has either ({', '.join(names) or 'there is no law yet'}). For joints: face-joint reset state, "
-            "for creep: element reset kelvin-strain",
+            "element reset state has no effect: no element has yielded or has a user law with state variables "
+            f"({', '.join(names) or 'there is no law yet'}). For joints: face-joint reset state, for creep: element "
+            "reset kelvin-strain",
         )
 
 

@@ -211,8 +211,8 @@ class Conditions(InitialStress):
         if more.any():
             count = len(np.unique(self._mesh().cells.reshape(-1)[at[more]]))
             self.note(
-                f"{count} of these nodes have a move constraint already, which holds besides the new one (type 0 takes "
-                "constraints back)"
+                f"{count} of these nodes have a move constraint already, which remains in force (type 0 removes "
+                "constraints)"
             )
 
     def _new_sides(self, at: np.ndarray, forces: Sequence[str]) -> np.ndarray:
@@ -250,9 +250,9 @@ class Conditions(InitialStress):
             mesh = self._mesh()
             point = int(mesh.cells.reshape(-1)[at[0]])
             raise CommandError(
-                f"conditions contradict each other at node {point} at {place(mesh.points[point])}: {error}. One of "
-                "them is taken back first (node boundary remove, or type 0 of a move constraint), or the range leaves "
-                "the node out"
+                f"conditions contradict each other at node {point} at {place(mesh.points[point])}: {error}. Remove one "
+                "of them first (node boundary remove, or type 0 of a move constraint), or exclude the node by the "
+                "range"
             ) from None
 
     def acting(self) -> list[NodeCondition]:
@@ -363,7 +363,9 @@ class Conditions(InitialStress):
         their dashpots see the velocity less twice this."""
         self._only_in_space("stress zz, xz and yz, and incoming z, on faces", zz, xz, yz, incoming_z)
         if dip is not None and self.dim == 3:
-            raise CommandError("dip is for two dimensions: shear on faces in three is stress-xy, stress-xz, stress-yz")
+            raise CommandError(
+                "dip is for two dimensions: in three use stress-xy, stress-xz and stress-yz for shear on faces"
+            )
         given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal, "zz": zz, "xz": xz, "yz": yz, "dip": dip}
         changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
         waves = {"incoming_x": incoming_x, "incoming_y": incoming_y, "incoming_z": incoming_z}
@@ -377,7 +379,7 @@ class Conditions(InitialStress):
             wanted = replace(self.loads[row], **changes)
             if not wanted.quiet and any(getattr(wanted, name) != 0.0 for name in waves):
                 axes = " and ".join(f"incoming-{axis}" for axis in "xyz"[: self.dim])
-                raise CommandError(f"a wave comes in through quiet faces only: quiet on goes with {axes}")
+                raise CommandError(f"waves enter through quiet faces only: add quiet on to {axes}")
         middles = self._mesh().points[self._mesh().face_points(at)].mean(axis=1)
         for name, value in changes.items():
             user_functions.check(f"stress {name}", value, middles, self.time_now())

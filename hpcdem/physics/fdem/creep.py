@@ -30,7 +30,7 @@ FASTEST = 2.0
 """Most by which one creep step differs from the one before."""
 FULL = 1.0 - 1e-9
 """A creep step this near to the end goes there."""
-PER_STEP = ": in static runs nodes move so far per step, not in creep time; in dynamic runs they do"
+PER_STEP = ", which in static runs acts per step and not in creep time: use a dynamic run"
 
 
 def switch(
@@ -56,13 +56,13 @@ def switch(
             raise CommandError(f"{name} of creep must be positive, got {value:g}")
     follows = [name for name in ("change", "least", "greatest") if name in numbers]
     if follows and "dt" not in numbers:
-        raise CommandError(f"{follows[0]} of creep goes with dt, the first creep step")
+        raise CommandError(f"{follows[0]} of creep needs dt, the first creep step")
     if follows and "change" not in numbers:
         raise CommandError(
-            f"{follows[0]} of creep bounds a creep step that follows the change of stress: change is missing"
+            f"{follows[0]} of creep limits a creep step that is adapted to the change of stress: add change"
         )
     if numbers.get("change", 0.0) >= 1.0:
-        raise CommandError(f"change of creep is a part of the largest stress, below 1, got {numbers['change']:g}")
+        raise CommandError(f"change of creep is a fraction of the largest stress, below 1, got {numbers['change']:g}")
     step = numbers.get("dt", 0.0)
     low, high = numbers.get("least", step / RANGE), numbers.get("greatest", RANGE * step)
     if not low <= step <= high:
@@ -80,7 +80,7 @@ def check(sim: Blocks, time: float) -> None:
     if not sim.creep.on:
         raise CommandError("time does not pass in static runs: use ratio or cycles; or model creep on")
     if not sim.creeping().any():
-        raise CommandError("no element can creep: element c-model mech-burgers comes first")
+        raise CommandError("no element can creep: assign element c-model mech-burgers first")
     if sim.creep.dt == 0.0:
         raise CommandError("static runs need the length of a creep step: model creep on dt")
     if not time > 0.0:
@@ -162,5 +162,5 @@ def _warn_of_long_step(sim: Blocks) -> None:
         sim.log.warn_once(
             "long creep step",
             f"the creep step {sim.creep.passed:g} s is above 2 eta_K / G_K = {longest:g} s: strains of Kelvin units "
-            "go to and fro about their rest; a shorter one is more exact",
+            "oscillate about equilibrium. Use a shorter creep step",
         )

@@ -96,10 +96,10 @@ QUANTITIES: dict[str, Quantity] = {
     "volume": Quantity("element", "m3", "volume in the mesh", dims=(3,)),
     "element_model": Quantity("element", "1", "row of the table of element models", dims=BOTH),
     "plastic_state": Quantity(
-        "element", "1", "yields in shear 1, in tension 2; did so before in shear 4, in tension 8", dims=BOTH
+        "element", "1", "yielding in shear 1, in tension 2; has yielded before in shear 4, in tension 8", dims=BOTH
     ),
     "plastic_shear_strain": Quantity(
-        "element", "1", "shear of the plastic strain along its way, sqrt(e : e / 2) of the deviator", dims=BOTH
+        "element", "1", "accumulated plastic shear strain, sqrt(e : e / 2) of the deviator", dims=BOTH
     ),
     "plastic_volume_strain": Quantity("element", "1", "volume of the plastic strain", dims=BOTH),
     "plastic_work": Quantity("element", "J/m", "work of plastic flow", dims=BOTH),
@@ -115,20 +115,22 @@ QUANTITIES: dict[str, Quantity] = {
         )
         for c in COMPONENTS[3]
     },
-    "creep_work": Quantity("element", "J/m", "work lost in the dashpots of creep", dims=BOTH),
+    "creep_work": Quantity("element", "J/m", "work dissipated in the dashpots of creep", dims=BOTH),
     **_vector("position", "node", "m", "position"),
     **_vector("displacement", "node", "m", "displacement"),
     **_vector("velocity", "node", "m/s", "velocity"),
     **{name: Quantity("node", unit, f"length of the {name}", False, BOTH) for name, unit in LENGTHS.items()},
-    **_vector("reaction", "node", "N/m", "force by which conditions act on the node", False),
+    **_vector("reaction", "node", "N/m", "force of conditions on the node", False),
     **_vector("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included", False),
     "temperature": Quantity("node", "K", "temperature; NaN without a thermal model", dims=BOTH),
     **{
         one.name: Quantity("node", one.unit, f"{one.doc}; NaN without a model of it", dims=BOTH)
         for one in kinds().values()
     },
-    "state": Quantity("joint", "1", "0 free, 1 intact, 2 behind its peak, 3 broken", dims=BOTH),
-    "mode": Quantity("joint", "1", "how it broke, from 1 (opened) to 2 (slid); 0 if it is not broken", dims=BOTH),
+    "state": Quantity("joint", "1", "0 free, 1 intact, 2 past its peak, 3 broken", dims=BOTH),
+    "mode": Quantity(
+        "joint", "1", "mode of failure, from 1 (opening) to 2 (sliding); 0 if it is not broken", dims=BOTH
+    ),
     "break_time": Quantity("joint", "s", "model time at which it broke; NaN if it is not broken", dims=BOTH),
     "break_energy": Quantity(
         "joint", "J/m", "kinetic energy of its two elements when it broke; NaN if it is not", dims=BOTH
@@ -217,7 +219,7 @@ def total(sim: Blocks, name: str, numbers: Numbers = None) -> float:
 def quantity(sim: Blocks, name: str) -> Quantity:
     """The quantity of this name. CommandError if there is none. Not collective."""
     if name not in QUANTITIES and name in user_laws.quantities(sim):
-        return Quantity("element", user_laws.unit(name), "state variable of a law of the user")
+        return Quantity("element", user_laws.unit(name), "state variable of a user law")
     there = [one for one, about in QUANTITIES.items() if sim.dim in about.dims]
     if name not in there:
         plane = f" in {'two' if sim.dim == 2 else 'three'} dimensions" if name in QUANTITIES else ""
@@ -721,14 +723,14 @@ def added_mass(sim: Blocks) -> float:
 def account_energy(sim: Blocks, on: bool = True) -> None:
     """Keep the energy budget from now on. In dynamic mode only. Collective."""
     if on and not sim.options.dynamic:
-        raise CommandError("the energy budget is kept in dynamic mode: masses of the static mode are fictitious")
+        raise CommandError("the energy budget needs dynamic mode: masses of the static mode are fictitious")
     if on and (laws := user_laws.in_use(sim)):
         raise CommandError(
-            f"no energy budget can be kept: what the law {laws[0].title} of {user_laws.some(sim)} stores and loses is "
-            "not known"
+            f"the energy budget does not support the law {laws[0].title} of {user_laws.some(sim)}, whose stored and "
+            "lost energy is not known"
         )
     if on and sim.most_damped():
-        raise CommandError("no energy budget can be kept: it knows no local damping of nodes (node mechanical-damp)")
+        raise CommandError("the energy budget does not support local damping of nodes (node mechanical-damp)")
     sim.open_model()
     sim.cold.pop("work", None)
     sim.budget = Budget() if on else None
@@ -744,7 +746,7 @@ def energies(sim: Blocks) -> dict[str, float]:
     of all.
     """
     if sim.budget is None:
-        raise CommandError("no energy budget is kept: ask for it before the steps that shall be in it")
+        raise CommandError("no energy budget: switch it on before the steps that it should include")
     sim.close_model()
     budget = sim.budget
     return sim._once("budget", lambda: budget.reading(sim))

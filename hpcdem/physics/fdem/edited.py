@@ -88,10 +88,9 @@ class Edited(State):
         if len(other):
             self.log.warn_once(
                 "initial stress follows",
-                f"{len(other)} elements have other moduli than when their initial stress was said: it follows them, "
-                f"element {other[0]} has {notices.pascals(self.initial_stresses(other[:1])[0])} in place of "
-                f"{notices.pascals(self.stress0[other[0]])}; element initial after the models sets it for the present "
-                "ones",
+                f"{len(other)} elements: initial stress was rescaled to the new moduli (element {other[0]}: "
+                f"{notices.pascals(self.initial_stresses(other[:1])[0])} instead of "
+                f"{notices.pascals(self.stress0[other[0]])}). Use element initial after the models to set it",
             )
 
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
@@ -141,7 +140,7 @@ class Edited(State):
         plate whose faces bear nothing; off: in plane strain. Said before stress and steps are."""
         before = self.options.dynamic
         if plane_stress not in (None, self.options.plane_stress) and self.clock.step > 0:
-            raise CommandError(f"model plane-{'stress' if plane_stress else 'strain'} comes before the first step")
+            raise CommandError(f"model plane-{'stress' if plane_stress else 'strain'} must precede the first step")
         if dynamic is not None and dynamic != before:
             self.drop_creep_step()
             if dynamic:

@@ -159,19 +159,17 @@ def solve_elastic(
     if steps < 1:
         raise CommandError(f"steps must be positive, got {steps}")
     for load in [load for load in sim.surface_loads if not load.stays]:
-        raise CommandError(
-            f"the static solve knows no {load.name}: model solve relaxes blocks with them to equilibrium"
-        )
+        raise CommandError(f"the static solve does not support {load.name}: use model solve")
     if laws := user_laws.in_use(sim):
         raise CommandError(
-            f"{user_laws.some(sim)} has the law {laws[0].title}: the static solve has no tangent of it; model solve "
-            "relaxes such elements to equilibrium"
+            f"{user_laws.some(sim)} has the law {laws[0].title}, whose tangent is not known to the static solve: use "
+            "model solve"
         )
     sim.close_model()
     if sim.comm.any(bool((sim.local.slot_state == BROKEN).any())):
         sim._renew_lists()
     if not softening:
-        _refuse_yielded(sim, int((_lower_states(sim) == YIELDED).sum()), "are behind their peak already")
+        _refuse_yielded(sim, int((_lower_states(sim) == YIELDED).sum()), "are past their peak already")
     nodes = all_nodes(sim)
     nodes.least = forces_of_heat(sim)
     unknowns = unknowns_of(sim, nodes, cycles)
@@ -190,9 +188,9 @@ def solve_elastic(
             )
         sim.relaxations = []
         settle(sim, nodes, x, unknowns.given / cycles)
-        refuse_touching(sim, touching(sim), "touch in the equilibrium that was found")
+        refuse_touching(sim, touching(sim), "are in contact in the equilibrium")
         if sim.comm.any(inverted(sim)):
-            raise CommandError("an element is turned inside out in the equilibrium that was found: loads are too large")
+            raise CommandError("an element is inverted in the equilibrium: loads are too large")
         apart.check(sim, sim.local, CommandError)
     except CommandError:
         sim.relaxations = relaxations
@@ -286,7 +284,8 @@ def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
     for row in np.unique(sim.corner_row).tolist():
         for function in user_functions.used(sim.conditions[row]).values():
             raise CommandError(
-                f"a condition of nodes follows the function {function.title}: the static solve takes numbers and tables"
+                f"a condition of nodes follows the function {function.title}: the static solve supports numbers and "
+                "tables only"
             )
     there = nodes.lead >= 0
     of_nodes = np.zeros(len(nodes.lead), np.int64)
@@ -321,8 +320,8 @@ def refuse_changing_tables(sim: Blocks, what: str) -> None:
     """CommandError if conditions of the blocks go on to change while implicit steps count no static ones."""
     for name in sim.changing_tables():
         raise CommandError(
-            f"table '{name}' of a condition of blocks goes on to change, with each static step by one unit of time: "
-            f"{what} do not count static steps. Bring it to its end before (model step, model solve), or say a number"
+            f"table '{name}' of a condition still changes with static steps, which {what} do not count. Reach its end "
+            "with model step or model solve, or give a number"
         )
 
 
@@ -346,7 +345,7 @@ def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[np.ndarray, np.n
         if oblique and held.any() and not held.all() and (kind == space.ACROSS or touched.any()):
             raise CommandError(
                 f"node {point} moves {'along' if kind == moving.ALONG else 'across'} an oblique line and has some "
-                "components prescribed: the static solve takes a move constraint alone, or with all components"
+                "components prescribed: the static solve supports a move constraint alone, or with all components"
             )
         way, first = _ways(along)
         free = np.zeros(sim.dim)
@@ -414,7 +413,7 @@ def refuse_loose_bodies(sim: Blocks, nodes: Nodes, unknowns: Unknowns) -> None:
     place = ", ".join(f"{c:g}" for c in centre[at])
     raise CommandError(
         f"the body of {len(members)} elements around ({place}), with element {members[0]}, can move {words}{others}: "
-        "hold it by conditions of nodes, or use relaxation (model solve)"
+        "fix it by conditions of nodes, or use relaxation (model solve)"
     )
 
 
@@ -437,8 +436,8 @@ def _refuse_yielded(sim: Blocks, mine: int, what: str) -> None:
     count = int(sim.comm.sum_into(np.array([mine], np.int64))[0])
     if count:
         raise CommandError(
-            f"{count} joints {what}: the static solve follows joints up to their peak only; use relaxation (model "
-            "solve), or face-joint reset state if they shall be whole"
+            f"{count} joints {what}: the static solve supports joints up to their peak only. Use relaxation (model "
+            "solve), or face-joint reset state to make them intact"
         )
 
 
@@ -461,7 +460,7 @@ def refuse_touching(sim: Blocks, pairs: list[tuple[int, int]], what: str) -> Non
         a, b = pairs[0]
         raise CommandError(
             f"{len(pairs)} pairs of surfaces {what}, the first of elements {a} and {b}: the static solve does not "
-            "follow contact; use relaxation (model solve), or model option collision off if they may overlap"
+            "support contact. Use relaxation (model solve), or model option collision off if they may overlap"
         )
 
 
@@ -541,8 +540,8 @@ def linear_solver(sim: Blocks, wanted: str, unknowns: Unknowns, nodes: Nodes) ->
         if not there and sim.log is not None:
             sim.log.warn_once(
                 "static solve",
-                f"{unknowns.count} unknowns are solved on one rank, as petsc4py is not there: this may need "
-                "minutes and many GB of history",
+                f"{unknowns.count} unknowns are solved on one rank, as petsc4py is missing: this may need minutes and "
+                "many GB of memory",
             )
     if there:
         return Petsc(sim.comm, unknowns, nodes.owner, nodes.x if nodes.x.shape[-1] == 3 else None)
@@ -593,8 +592,8 @@ def _follow(
             del sim.cold[BEFORE], sim.cold[AFTER]
     if found.ratio > enough and sim.log is not None:
         sim.log.info(
-            f"unbalanced over all forces is {found.ratio:.3g} instead of {enough:g}: strains are so small that "
-            "positions are rounded more coarsely than that"
+            f"unbalanced force ratio {found.ratio:.3g} instead of {enough:g}: strains are smaller than the rounding of "
+            "positions"
         )
     return x, Balanced(found.ratio, iterations, factors, unknowns.count, solver.name, increments)
 
@@ -608,7 +607,7 @@ def _warm(sim: Blocks, part: float) -> None:
 
 
 def _reached(part: float) -> str:
-    return f"; balance was found with {100.0 * part:.3g} % of what is new in the loads"
+    return f"; it converged with {100.0 * part:.3g} % of the load increment"
 
 
 def _balance(
@@ -644,7 +643,7 @@ def _balance(
     before.put_back(sim)
     sim.close_model()
     hold_still(sim)
-    found.error = found.error or f"the static solve does not converge: elements still flow after {PASSES} balances"
+    found.error = found.error or f"the static solve did not converge: elements still yield after {PASSES} passes"
     return found
 
 
@@ -663,7 +662,7 @@ def commit(
     if broke:
         sim._renew_lists()
         refuse_loose_bodies(sim, nodes, unknowns)
-        refuse_touching(sim, touching(sim), "touch after joints broke")
+        refuse_touching(sim, touching(sim), "are in contact after joints broke")
     return broke
 
 
@@ -736,14 +735,14 @@ def _newton(
     if not error and (left > 0.0 or not ratio <= max(enough, min(noise, WORST))):
         noise = rounding / total if 0.0 < total < math.inf else noise
         why = (
-            f"positions are rounded to the last bit, which alone makes about {noise:.1g}: coordinates are too "
-            "large, or properties differ by too many powers of ten"
+            f"rounding of positions alone causes about {noise:.1g}: coordinates are too large, or properties differ by "
+            "too many orders of magnitude"
             if noise > enough
-            else "the loads may be more than the model can bear: use relaxation (model solve)"
+            else "the loads may exceed the capacity of the model: use relaxation (model solve)"
         )
         error = (
-            f"the static solve does not converge: unbalanced over all forces is {ratio:.3g} after {iterations} "
-            f"iterations, {enough:g} is asked for; {why}"
+            f"the static solve did not converge: ratio {ratio:.3g} after {iterations} iterations, required {enough:g}; "
+            f"{why}"
         )
     return _Balance(x, ratio, iterations, factors, past, error, ratios, total)
 

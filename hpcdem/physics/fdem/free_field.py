@@ -66,7 +66,7 @@ class FreeField(SurfaceLoad):
         CommandError if they are not upright faces of the surface, or in static mode.
         """
         if not blocks.options.dynamic:
-            raise CommandError("free-field sides act in dynamic runs only: they are said after dynamic on")
+            raise CommandError("free-field boundaries need a dynamic run: use model option dynamic on first")
         faces = blocks.numbers_of_faces(chosen)
         if not len(faces):
             raise CommandError("a free-field side needs faces: the range holds none")
@@ -114,8 +114,8 @@ class FreeField(SurfaceLoad):
             if not gone[side == one].all():
                 missing = load.faces["face"][(side == one) & ~gone, 0]
                 raise CommandError(
-                    f"a free-field side goes as a whole: face {missing[0]} of it ({len(missing)} in all) is not in the "
-                    "range"
+                    f"a free-field side can only be removed completely: face {missing[0]} of it ({len(missing)} in "
+                    "all) is not in the range"
                 )
         if not gone.any():
             return
@@ -208,22 +208,22 @@ class FreeField(SurfaceLoad):
         element = self.faces["face"][:, 0] // 4
         if not o.dynamic:
             return (
-                "free-field sides act in dynamic runs only: element-face boundary remove takes them back before "
+                "free-field boundaries need a dynamic run: remove them with element-face boundary remove before "
                 "dynamic off"
             )
         if o.mass_scaling > 0.0:
-            return "beside free-field sides nodes keep their masses: time-step mass-scaling must be 0"
+            return "free-field boundaries need true masses: use time-step mass-scaling 0"
         if not blocks.alive[element].all():
             gone = element[~blocks.alive[element]][0]
-            return f"element {gone} of a free-field side is not there: element-face boundary remove comes first"
+            return f"element {gone} of a free-field side was removed: use element-face boundary remove first"
         obeys = user_laws.numbers(blocks)[element] > 0
         if obeys.any():
-            return f"element {element[obeys][0]} of a free-field side has a law of the user: columns are elastic"
+            return f"element {element[obeys][0]} of a free-field side has a user law: columns are elastic"
         if blocks.log is not None and blocks.yielding()[element].any():
             blocks.log.warn_once("free field", "elements of free-field sides can yield: their columns are elastic")
         quiet = blocks.quiet_faces()[self.faces["face"][:, 0]]
         if quiet.any():
-            return f"face {self.faces['face'][quiet][0, 0]} of a free-field side is quiet too: quiet off comes first"
+            return f"face {self.faces['face'][quiet][0, 0]} of a free-field side is quiet too: use quiet off first"
         points = self.nodes["point"][:, 0]
         base = np.setdiff1d(self.faces["low"], self.faces["low"] + 1)
         above = np.setdiff1d(np.arange(len(points)), base)
@@ -231,7 +231,7 @@ class FreeField(SurfaceLoad):
         for point in points[above].tolist():
             one = blocks.acting()[rows[point]]
             if one.does_x != moving.FREE or one.constraint == moving.FIXED:
-                return f"node {point} of a free-field side is held in x: node boundary remove comes first"
+                return f"node {point} of a free-field side is fixed in x: use node boundary remove first"
         return self._drive(base, points[base])
 
     def _rows(self) -> np.ndarray:
@@ -372,12 +372,12 @@ def _chains(blocks: Blocks, faces: np.ndarray) -> tuple[dict[str, np.ndarray], d
     k2 = (k + 1) % connectivity.corner_counts(mesh.cells[element])
     inside = blocks.closed_faces()[faces] | ~blocks.alive[element]
     if inside.any():
-        raise CommandError(f"face {faces[inside][0]} is not on the surface: no free-field side can be there")
+        raise CommandError(f"face {faces[inside][0]} is not on the surface and cannot be a free-field side")
     way = mesh.points[mesh.cells[element, k2]] - mesh.points[mesh.cells[element, k]]
     leans = np.abs(way[:, 0]) > UPRIGHT * np.abs(way[:, 1])
     if leans.any():
         raise CommandError(
-            f"face {faces[leans][0]} is not upright ({int(leans.sum())} in all): free-field sides are vertical"
+            f"face {faces[leans][0]} is not vertical ({int(leans.sum())} in all): free-field sides must be vertical"
         )
     sign = np.sign(way[:, 1])
     lower, upper = np.where(sign > 0.0, k, k2), np.where(sign > 0.0, k2, k)

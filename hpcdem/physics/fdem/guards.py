@@ -23,7 +23,7 @@ def stop_on_runaway(sim: State, broken: bool, inverted: bool) -> None:
     named = sorted(row for part in sim.comm.allgather(mine) for row in part)[:10]
     total = int(sim.comm.sum_into(np.array([bad.sum()], np.int64))[0])
     what = "a number is not finite" if broken else (
-        "an element is turned inside out" if inverted else "an element moves over half an edge per step"
+        "an element is inverted" if inverted else "an element moves over half an edge per step"
     )  # fmt: skip
     text = "\n".join(f"  element {e} at {_vector(at)}, velocity {_vector(speed)}" for e, at, speed in named)
     if not sim.options.dynamic and not broken and not inverted:

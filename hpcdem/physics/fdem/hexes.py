@@ -54,7 +54,7 @@ class Hexes:
         self.nodes = of[:, :8]
         self.rows = sim.where[of[:, 8, None] + np.arange(PARTS)]
         if not (np.diff(self.rows, axis=1) == 1).all():
-            raise AssertionError("the rows of a hexahedron do not lie one after the other")
+            raise AssertionError("the rows of a hexahedron are not consecutive")
         models = sim.element_row[of[:, 8, None] + np.arange(PARTS)]
         apart = np.flatnonzero((models != models[:, :1]).any(axis=1))
         if len(apart):

@@ -23,8 +23,8 @@ MANY_IN_SPACE = 20_000
 CONDENSED = 2000
 """Most unknowns of joints and fluid for dense matrices."""
 SINGULAR = (
-    "the stiffness matrix is singular: something can move without resistance (a joint without tensile strength that is "
-    "open, or properties that differ by more than 1e15)"
+    "the stiffness matrix is singular: part of the model can move without resistance (an open joint without tensile "
+    "strength, or properties that differ by more than 1e15)"
 )
 
 
@@ -171,7 +171,7 @@ class Direct:
         except RuntimeError:
             return SINGULAR
         except MemoryError:
-            return f"the factors of {n} unknowns do not fit into memory: take PETSc and more ranks, or relaxation"
+            return f"the factors of {n} unknowns do not fit into memory: use PETSc and more ranks, or relaxation"
         return None
 
     def solve(self, force: np.ndarray, share: float) -> np.ndarray:

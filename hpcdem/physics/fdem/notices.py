@@ -24,9 +24,9 @@ def tell_of_tables(sim: Any) -> None:
         table = sim.tables[name]
         if table(then) != table(now):
             sim.log.warn(
-                f"table '{name}' of a condition goes from {table(then):g} to {table(now):g}: static mode, where a "
-                f"step is one unit of time, had come to {then:g}, and the model time is {now:g} s. Say the "
-                "condition again, by a number or another table, if that is not what is wanted"
+                f"table '{name}' of a condition goes from {table(then):g} to {table(now):g}: static mode, where a step "
+                f"is one unit of time, reached {then:g}, and the model time is {now:g} s. If this is not intended, "
+                "assign the condition again with a number or another table"
             )
 
 
@@ -39,9 +39,9 @@ def warn_of_quick_tables(sim: Any) -> None:
         if sim.tables[name].times[-1] - now < 1.0:
             sim.log.warn_once(
                 f"table {name} in a static step",
-                f"table '{name}' of a condition goes from {sim.tables[name](now):g} to "
-                f"{sim.tables[name].values[-1]:g} within one static step, which is one unit of time: say the "
-                "condition after the static stage if it belongs to motion in time, or give the table in steps",
+                f"table '{name}' of a condition goes from {sim.tables[name](now):g} to {sim.tables[name].values[-1]:g} "
+                "within one static step, which is one unit of time. Assign the condition after the static stage if it "
+                "belongs to motion in time, or define the table in steps",
             )
 
 
@@ -57,8 +57,8 @@ def warn_of_flow(sim: Any) -> None:
     sim.close_model()
     if not sim.options.dynamic and sim.options.mechanical:
         _tell_beyond(sim,
-            MUCH, sim.alive, "are beyond their strength where they lie: they flow before balance is found, for "
-            "good; model solve elastic before it, or the change in small parts, finds balance first",
+            MUCH, sim.alive, "exceed their strength in the present state and yield permanently before equilibrium is "
+            "reached. Use model solve elastic first, or make the change in small parts",
         )  # fmt: skip
 
 
@@ -101,8 +101,8 @@ def warn_of_locking(sim: State) -> None:
     if count and sim.log is not None:
         sim.log.warn_once(
             "locking",
-            f"{count} tetrahedra have a Poisson's ratio up to {most:.3g}: as they have one "
-            "strain each they are much too stiff near 0.5 (they lock); hexahedra are not",
+            f"{count} tetrahedra have a Poisson's ratio up to {most:.3g}: constant-strain tetrahedra lock near 0.5; "
+            "use hexahedra",
         )
 
 
@@ -137,8 +137,8 @@ def warn_of_snap_back(sim: State) -> None:
         sim.log.warn_once(
             f"snap back {row} {energy}",
             f"joints with {strength} {t[row]:g} Pa, {energy} {g[row]:g} N/m{others} break within a tenth of their "
-            f"elastic way, {elastic[worst]:.3g} m at {where} of {longest[row]:.3g} m: what the body stores is set "
-            "free at once; smaller elements or a higher penalty help",
+            f"elastic displacement, {elastic[worst]:.3g} m at {where} of {longest[row]:.3g} m, which releases the "
+            "stored energy suddenly. Use smaller elements or a higher penalty",
         )
 
 

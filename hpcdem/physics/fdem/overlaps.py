@@ -47,13 +47,13 @@ def check(sim: State, local: Local) -> None:
     said = f"{len(found)} pairs of elements overlap before the first step, {places}"
     if o.overlap == REFUSE:
         raise CommandError(
-            f"{said}: contact would throw them apart. Move them apart, or say model option overlap relax and let a "
-            "static stage do it (keep: they start as they are)"
+            f"{said}: contact would repel them violently. Separate them, or use model option overlap relax in a static "
+            "stage (keep: start with the overlap)"
         )
     if o.overlap == RELAX and o.dynamic:
         raise CommandError(
-            f"{said}: with model option overlap relax they are moved apart by a static stage: model option dynamic "
-            "off, model solve, then dynamic on"
+            f"{said}: model option overlap relax separates them in a static stage: model option dynamic off, model "
+            "solve, then dynamic on"
         )
     if sim.log is not None:
         sim.log.info(said)
@@ -80,12 +80,11 @@ def tell(sim: State, local: Local) -> None:
         for depth, *place, share, a, b in found[:NAMED]
     )
     said = (
-        f"step {sim.clock.step}: {len(found)} pairs of elements overlap by more than {DEEP:g} of an altitude: {places}."
-        " "
-        "Contact is too soft for what presses there: take a larger penalty-normal (10 to 100 E)"
+        f"step {sim.clock.step}: {len(found)} pairs of elements overlap by more than {DEEP:g} of an altitude: "
+        f"{places}. Contact is too soft for the load: use a larger penalty-normal (10 to 100 E)"
     )
     if o.deep_overlap == STOP:
-        raise PhysicsError(f"{said}; stopped, as model option deep-overlap stop asks for")
+        raise PhysicsError(f"{said}; stopped by model option deep-overlap stop")
     if sim.log is not None:
         sim.log.warn(f"{said}; model option deep-overlap stop ends the run there")
 

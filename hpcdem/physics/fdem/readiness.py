@@ -25,15 +25,15 @@ def check(sim: State) -> None:
     if len(lacking):
         raise CommandError(f"element {lacking[0]} has no model ({len(lacking)} elements in all)")
     if not sim.alive.any():
-        raise CommandError("there are no elements left")
+        raise CommandError("no elements are left")
     _check_warmth(sim)
     six_nodes.check(sim)
     if sim.options.plane_stress:
         user_laws.check_plane_stress(sim)
     if sim.options.stiffness_damping and user_laws.in_use(sim):
         raise CommandError(
-            f"the stiffness of {user_laws.some(sim)}, which has a law of the user, is not known: Rayleigh damping "
-            "can have its part mass only"
+            f"the stiffness of {user_laws.some(sim)}, which has a user law, is not known: Rayleigh damping supports "
+            "part mass only"
         )
 
 
@@ -69,9 +69,9 @@ def check_parts(sim: State) -> None:
         raise CommandError("in two dimensions there is no choice of the potential of contact")
     if not o.mechanical:
         if not any(load.keeps_time for load in sim.surface_loads):
-            raise CommandError("nothing would happen: model option mechanical is off, and neither fluid nor heat flows")
+            raise CommandError("nothing to compute: model option mechanical is off, and neither fluid nor heat flows")
         if not o.dynamic:
-            raise CommandError("without mechanics time passes by flow and heat: model option dynamic on comes first")
+            raise CommandError("without mechanics time passes by flow and heat: use model option dynamic on first")
         others = [load.name for load in sim.surface_loads if not load.own_clock]
         if others:
             raise CommandError(f"{others[0].replace('_', '-')} move with the blocks: model option mechanical on")
@@ -82,10 +82,11 @@ def check_parts(sim: State) -> None:
         said = "sub-step"
     if said and "fluid" not in sim.surface_loads:
         raise CommandError(
-            f"{said} of flow was said, but no joint has a hydraulic model: face-joint c-model hydraulic-porous-medium"
+            f"{said} of flow is set, but no joint has a hydraulic model: assign face-joint c-model "
+            "hydraulic-porous-medium"
         )
     if (o.heat_steps > 0 or o.heat_dt > 0.0) and "heat" not in sim.surface_loads:
         name = "sub-step" if o.heat_steps > 0 else "time-step"
         raise CommandError(
-            f"{name} of heat was said, but no element has a thermal model: element c-model thermal-iso-heat"
+            f"{name} of heat is set, but no element has a thermal model: assign element c-model thermal-iso-heat"
         )

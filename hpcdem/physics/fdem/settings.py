@@ -122,7 +122,7 @@ class Settings(Topology):
         if self.mesh is not None and self.mesh.dim == 3:
             raise CommandError(f"{word} is for models of the plane")
         if self.stress0 is not None:
-            raise CommandError(f"{word} comes before element initial: the stress across the plane depends on it")
+            raise CommandError(f"{word} must precede element initial: the stress across the plane depends on it")
 
     def parts(
         self,
@@ -197,9 +197,9 @@ class Settings(Topology):
         wanted = [name for name in ("dt", "mass_scaling", "auto") if changes.get(name)]
         if len(wanted) > 1:
             one, other = ({"dt": "value", "mass_scaling": "mass scaling"}.get(name, name) for name in wanted[:2])
-            raise CommandError(f"{one} and {other} exclude each other: both say what the time step is")
+            raise CommandError(f"{one} and {other} cannot be combined: both set the time step")
         if wanted == ["dt"] and safety is not None:
-            raise CommandError("value and safety exclude each other: a time step that is given is taken as it is")
+            raise CommandError("value and safety cannot be combined: a given time step is used unchanged")
         if wanted:
             changes = {"dt": 0.0, "mass_scaling": 0.0, "auto": False, **changes}
         self._set(**changes)
@@ -226,7 +226,7 @@ class Settings(Topology):
             self._set(mass_damping=0.0, stiffness_damping=0.0)
             return
         if frequency is None:
-            raise CommandError("Rayleigh damping needs the frequency at which it has its ratio")
+            raise CommandError("Rayleigh damping needs the frequency of its ratio")
         omega = 2.0 * math.pi * float(finite("the frequency of Rayleigh damping", [frequency])[0])
         if omega <= 0.0:
             raise CommandError(f"the frequency of Rayleigh damping must be positive, got {frequency:g} Hz")
@@ -237,8 +237,8 @@ class Settings(Topology):
         options = replace(self.options, **changes)
         if not options.dynamic and (options.mass_damping or options.stiffness_damping):
             raise CommandError(
-                "Rayleigh damping acts in dynamic runs only: it is said after dynamic on, and taken back by ratio 0 "
-                "before dynamic off"
+                "Rayleigh damping needs a dynamic run: set it after dynamic on, and reset it with ratio 0 before "
+                "dynamic off"
             )
         self.before_change()
         self.options = options

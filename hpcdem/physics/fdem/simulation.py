@@ -358,7 +358,7 @@ class Blocks(Edited):
                 self._remember("softening", STRENGTH_HISTORY)
         creeps = self.creeping().any()
         if self.creep.on and not creeps and self.log is not None:
-            self.log.warn_once("no creep", "creep is on, but no element can creep: element c-model mech-burgers can")
+            self.log.warn_once("no creep", "creep is on, but no element can creep: assign element c-model mech-burgers")
         if creeps or "creep" in self.cold:
             self._remember("creep", self.memory("creep"))
         for kind, needed in (("yielding", "plastic" in self.cold), ("creep", "creep" in self.cold)):

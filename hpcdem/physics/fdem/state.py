@@ -258,7 +258,6 @@ class State(ModelDefinition, Model):
         if dt > critical * (1.0 + 1e-9):
             self.log.warn_once(
                 f"critical time step {dt > limit}",
-                f"the time step {said(dt)} is {dt / limit:.2f} of the stability limit of {said(limit)}, more than the "
-                f"safety factor {o.safety:g} allows ({said(critical)}); a run that blows up should be repeated with a "
-                "smaller one",
+                f"the time step {said(dt)} is {dt / limit:.2f} of the stability limit of {said(limit)}; the safety "
+                f"factor {o.safety:g} allows {said(critical)}. Reduce it if the run becomes unstable",
             )

@@ -187,7 +187,7 @@ class Structure(SurfaceLoad):
         bare = np.flatnonzero((self.elements["row"] == 0) & self.alive(self.parts[0]))
         if len(bare):
             raise CommandError(
-                f"{self.parts[0]} {bare[0]} has no model ({len(bare)} in all): {self.word} c-model comes first"
+                f"{self.parts[0]} {bare[0]} has no model ({len(bare)} in all): assign {self.word} c-model first"
             )
 
     def _take_properties(self, elements: np.ndarray, values: Mapping[str, float]) -> None:

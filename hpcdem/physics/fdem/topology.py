@@ -83,11 +83,11 @@ class Topology:
     def refuse_in_space(self, what: str) -> None:
         """CommandError for what is there in the plane only."""
         if self.dim == 3:
-            raise CommandError(f"{what}: this version has it in two dimensions only")
+            raise CommandError(f"{what}: available in two dimensions only")
 
     def _mesh(self) -> Mesh:
         if self.mesh is None:
-            raise CommandError("there is no mesh yet")
+            raise CommandError("no mesh yet")
         return self.mesh
 
     def _vector(self, what: str, given: Sequence[float]) -> np.ndarray:
@@ -120,8 +120,8 @@ class Topology:
             if len(part):
                 first = mesh.macros[part[0], -1]
                 raise CommandError(
-                    f"elements {first} to {first + macro.stored - 1} are one {macro.name}: they go together, only "
-                    f"{count[part[0]]} of them were given"
+                    f"elements {first} to {first + macro.stored - 1} are one {macro.name}, of which only "
+                    f"{count[part[0]]} were given: give all of them"
                 )
 
     def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
@@ -214,7 +214,7 @@ class Topology:
         gone = ""
         if not len(bad):
             bad = asked[~there[asked]]
-            gone = "" if self.alive.all() else "; elements were taken out"
+            gone = "" if self.alive.all() else "; elements were removed"
         if len(bad):
             raise CommandError(f"there is no {what} {bad[0]}{gone}")
         return asked

@@ -50,7 +50,7 @@ class Water(SurfaceLoad):
         """Water of this density stands before faces of these elements that lie below the levels; 0: none. Returns
         before how many faces it will stand once they are free. Collective."""
         if density and not blocks.gravity_down() > 0.0:
-            raise CommandError("element water needs gravity along the last axis, as model gravity (0,-9.8) makes it")
+            raise CommandError("element water needs gravity along the last axis, for example model gravity (0,-9.8)")
         mesh = blocks.the_mesh()
         chosen = np.zeros(len(mesh.cells), bool)
         chosen[slice(None) if elements is None else np.asarray(elements, np.int64)] = True
@@ -67,9 +67,7 @@ class Water(SurfaceLoad):
             higher = height > best
             best[higher], which[higher] = height[higher], first + k + 1
         if density and not (which > 0).any():
-            raise CommandError(
-                "no face of these elements lies below the water line: where it does not reach is no water"
-            )
+            raise CommandError("no face of these elements lies below the water line; beyond its ends is no water")
         if known is None and not density:
             return 0
         blocks.before_change()

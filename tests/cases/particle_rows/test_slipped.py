@@ -34,7 +34,7 @@ CYC 4500
 def named(log: str) -> dict[str, list[int]]:
     """Ids by what they slipped through, in the order of the log."""
     out: dict[str, list[int]] = {}
-    for what, names in re.findall(r"particles slipped through (a row of GLINE|a wall): (.*)", log):
+    for what, names in re.findall(r"particles passed through (a row of GLINE|a wall): (.*)", log):
         out.setdefault(what, []).extend(int(name) for name in re.findall(r"(\d+) at \(", names))
     return out
 

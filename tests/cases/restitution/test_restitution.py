@@ -116,12 +116,12 @@ def test_what_it_does_not_go_with(tmp_path):
         particles.ball(sim, gid, 2.0 * gid, 0.0, 0.5)
     law(sim, False)
     settings.set_option(sim, "energy", 5)
-    with pytest.raises(CommandError, match="SET restitution does not go with SET energy"):
+    with pytest.raises(CommandError, match="SET restitution does not support SET energy"):
         cycles.cycle(sim, 1)
     settings.set_option(sim, "energy", 0)
     cycles.cycle(sim, 1)
     clumps.join(sim)
-    with pytest.raises(CommandError, match="SET restitution does not go with clumps"):
+    with pytest.raises(CommandError, match="SET restitution does not support clumps"):
         cycles.cycle(sim, 1)
     for wrong in (0.0, -0.1, 1.2, math.nan):
         with pytest.raises(CommandError, match="above 0 and not above 1"):
@@ -130,7 +130,7 @@ def test_what_it_does_not_go_with(tmp_path):
 
 def test_blocks_are_refused(tmp_path):
     blocks = Blocks(outdir=tmp_path)
-    with pytest.raises(CommandError, match="SET restitution does not go with contacts with blocks"):
+    with pytest.raises(CommandError, match="SET restitution does not support contacts with blocks"):
         Coupled(model(tmp_path, restitution=0.5), blocks)
 
 

@@ -169,7 +169,7 @@ HOSTILE = [
     ("element densify pattern 1 1", "lacks m{aximum}-l{ength}"),
     ("element densify max-length 1e-6", "more than 2e\\+07"),
     ("element delete", "this would remove all elements"),
-    ("element glue between 'a' 'b' range x 0 1", "exclude each other"),
+    ("element glue between 'a' 'b' range x 0 1", "cannot be combined"),
     ("model scale (0,1)", "factors above 0"),
     ("model scale (-1,1)", "factors above 0"),
     ("model scale (1e-300,1)", "flat|same place|lie in"),

@@ -27,8 +27,8 @@ def check(sim: State) -> None:
     parts = parts[sim.alive[parts[:, 0]]]
     row = sim.element_row[parts]
     for wrong, what in (
-        (row != row[:, :1], "has several materials: its parts have one"),
-        ((row >= 0) & ("free_field" in sim.surface_loads), "cannot stand beside free-field sides"),
+        (row != row[:, :1], "has several materials: give all its parts the same"),
+        ((row >= 0) & ("free_field" in sim.surface_loads), "cannot be next to free-field sides"),
     ):
         bad = np.flatnonzero(wrong.any(axis=1))
         if len(bad):
