@@ -18,12 +18,14 @@ from numba import njit, prange
 
 from hpcdem.core.units import counted
 from hpcdem.physics.fdem import hexahedra
-from hpcdem.physics.fdem.elements.kind import HEXAHEDRON, KINDS, QUAD, TETRAHEDRON, TRIANGLE, Kind
+from hpcdem.physics.fdem.elements.kind import HEXAHEDRON, QUAD, TETRAHEDRON, TRIANGLE, Kind
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.mesh import Mesh
     from hpcdem.physics.fdem.simulation import Blocks
 
+CONDUCT = TRIANGLE, QUAD, TETRAHEDRON, HEXAHEDRON
+"""Kinds whose parts conduct; in six-node triangles the triangles that they are stored as do."""
 ROUNDING = 1e-12
 """What flows from low to high, over what an element conducts, that is rounding."""
 OF_PART = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
@@ -43,10 +45,10 @@ def _pairs_of_parts(kind: Kind) -> np.ndarray:
     return np.array([[row[tuple(pair)] for pair in part] for part in ends.tolist()])
 
 
-PAIRS = {kind.corners: _pairs_of(kind) for kind in KINDS}
+PAIRS = {kind.corners: _pairs_of(kind) for kind in CONDUCT}
 """By the number of corners of an element the pairs of them between which something flows."""
-_PARTS = {kind: (np.array(kind.parts), _pairs_of_parts(kind)) for kind in KINDS}
-_SHARE = {kind: kind.overlays * math.factorial(kind.dim) for kind in KINDS}
+_PARTS = {kind: (np.array(kind.parts), _pairs_of_parts(kind)) for kind in CONDUCT}
+_SHARE = {kind: kind.overlays * math.factorial(kind.dim) for kind in CONDUCT}
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -144,7 +146,8 @@ def conduct_threaded(threads, g, at, g_there, t, q):
 
 def of_kinds(mesh: Mesh, number: np.ndarray) -> Iterator[tuple[Kind, np.ndarray, np.ndarray]]:
     """These elements (n,) of the mesh by their kinds: which they are (m,), of hexahedra their first parts, and where
-    their corners are (m, c), element * 4 + k."""
+    their corners are (m, c), element * 4 + k. All kinds that the mesh has, also those that none of these are of: ranks
+    gather matrices kind by kind, so all have them in one order."""
     hexes, there = mesh.hexes, np.ones(len(number), bool)
     if len(hexes):
         of = mesh.macro_of()[number]
@@ -152,10 +155,10 @@ def of_kinds(mesh: Mesh, number: np.ndarray) -> Iterator[tuple[Kind, np.ndarray,
         at = np.flatnonzero(~there & (np.append(hexes[:, -1], -1)[of] == number))
         mine = hexes[of[at]]
         yield HEXAHEDRON, at, 4 * mine[:, 8:] + hexahedra.places(mesh.cells, mine)[0]
-    wide = mesh.cells[number, 3] >= 0
-    for kind, rows in ((TRIANGLE, ~wide), (QUAD if mesh.dim == 2 else TETRAHEDRON, wide)):
-        at = np.flatnonzero(rows & there)
-        if len(at):
+    wide = mesh.cells[:, 3] >= 0
+    for kind, known in ((TRIANGLE, ~wide), (QUAD if mesh.dim == 2 else TETRAHEDRON, wide)):
+        if known.any():
+            at = np.flatnonzero(known[number] & there)
             yield kind, at, 4 * number[at][:, None] + np.arange(kind.corners)
 
 
