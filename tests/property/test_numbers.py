@@ -95,11 +95,11 @@ def test_exported_particles_come_back(rows: list[tuple[float, float, float, str]
         sim = model(Path(name))
         for x, y, r, group in rows:
             particles.ball(sim, None, x, y, r, group=group)
-        particles.export(sim, one, with_group=True)
+        particles.export(sim, one, group=True)
         again = model(Path(name))
         assert particles.load(again, one) == len(rows)
         for column, word in enumerate(("x", "y", "radius")):
             assert near(again.particles[word], np.array([row[column] for row in rows]), 13).all()
         assert [again.groups[k] for k in again.particles["group"]] == [row[3] for row in rows]
-        particles.export(again, other, with_group=True)
+        particles.export(again, other, group=True)
         assert one.read_bytes() == other.read_bytes()

@@ -7,6 +7,7 @@ import importlib
 import inspect
 import re
 import shutil
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -610,6 +611,12 @@ def test_a_property_for_each_object(bench: Bench) -> None:
     sim.elements.model("mech-iso-elastic", density=2500, young=young, poisson_ratio=0.2)
     (((_, _, given), _),) = bench.blocks.told("element_model")
     assert given["young"].tolist() == young.tolist() and given["poisson_ratio"] == 0.2
+    for some in (young, young[:1]):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # of arrays that are compared with something else
+            sim.elements.property(young=some)
+        (*_, ((_, given), _)) = bench.blocks.told("element_property")
+        assert given["young"].tolist() == some.tolist()
 
 
 WRONG = {

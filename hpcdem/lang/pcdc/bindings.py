@@ -83,7 +83,8 @@ class Call:
             own = {argument(option.name): self._plain(value["value"])} if option.values else {}
             more = {argument(name): self._plain(one) for name, one in value.items() if name != "value"}
             return {**own, **more} if option.values else {argument(option.name): more}
-        return {argument(option.name): True if value == () else self._plain(value)}
+        left_out = isinstance(value, tuple) and not value
+        return {argument(option.name): True if left_out else self._plain(value)}
 
     def properties(self) -> dict[str, Any]:
         """Those of a model, tables and functions by their names."""
