@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.network import SHAPES, normals
 from hpcdem.physics.flow.tangent import Tangent
 from hpcdem.physics.flow.wells import PRESSURE, RATE, SHUT
 from hpcdem.pre.mesh import structured
@@ -22,6 +25,24 @@ from tests.flow import exact
 from tests.flow.support import WATER, at, hold, inner, line, over, standing
 
 # ---- flow alone ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_slip_that_is_rounding_opens_nothing_along_the_normal(dim: int) -> None:
+    """The aperture of a joint that opens along its normal grows with that, whatever the slip that should be nothing."""
+    law = np.zeros((1, kernels.LAW))
+    law[0, [kernels.LEAST, kernels.MOST, kernels.DILATE, kernels.GAIN]] = -1.0, 1.0, 0.3, 1e-3
+    facing, rng, worst = np.array(SHAPES[dim].facing), np.random.default_rng(1), 0.0
+    for _ in range(300):
+        near = rng.uniform(-5.0, 5.0, (dim, dim))
+        normal = normals(near[None])[0]
+        normal /= np.linalg.norm(normal)
+        x = np.concatenate([near, near[facing] + 1e-4 * rng.random() * normal])
+        fluid = SimpleNamespace(laws=law, law=np.zeros(len(SHAPES[dim].links), int), dim=dim, m=1,
+                                at=np.arange(2 * dim)[None])  # fmt: skip
+        opens = Tangent(cast(Any, fluid))._opens(x, np.array([1e-5])).reshape(2 * dim, dim)
+        worst = max(worst, abs(opens[dim:].sum(axis=0) @ normal - 1.0))
+    assert worst < 1e-9
 
 
 @pytest.mark.parametrize("viscosity", [1e-6, 1e-9])

@@ -32,6 +32,7 @@ class Tangent:
         slip = away - (away * across).sum(axis=1)[:, None] * across
         size = np.linalg.norm(slip, axis=1)
         along = slip / np.maximum(size, 1e-300)[:, None]
+        along -= (along * across).sum(axis=1)[:, None] * across  # of what is rounding it is any direction
         gains = law[:, kernels.DILATE] * size < law[:, kernels.GAIN]
         opens = across + np.where(gains[:, None], dilate, 0.0) * along
         side = np.repeat([-1.0, 1.0], k)[:, None] / k
