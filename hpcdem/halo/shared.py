@@ -1,8 +1,9 @@
 """What is equal on all ranks, held once per node of the machine.
 
-The first rank of a node computes it, and puts its large arrays into files in memory that have no name any more; the
-others map them. Every rank may write to what it got: the pages it wrote to are its own from then on (copy on write),
-and nobody else sees them. So what is done alike on all ranks stays alike, and `share` makes one copy of it again.
+The first rank of a node computes it, and puts its large arrays into files in memory; the others map them. The files
+have no names: a job that is killed at any moment leaves none of them behind. Every rank may write to what it got: the
+pages it wrote to are its own from then on (copy on write), and nobody else sees them. So what is done alike on all
+ranks stays alike, and `share` makes one copy of it again.
 """
 
 from __future__ import annotations
@@ -11,10 +12,8 @@ import contextlib
 import mmap
 import os
 import pickle
-import shutil
 import tempfile
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ SMALL = 1 << 16
 """Bytes of an array that is not worth a file: it travels with the rest."""
 PIECE = 1 << 30
 """Bytes of a message at most."""
-PREFIX = "hpcdem-shared-"
 
 
 class Nodes:
@@ -82,40 +80,39 @@ class Nodes:
         """Arrays in memory of the node; None if there is no space for them."""
         if not sizes:
             return []
-        place = self.host.bcast(self._written(large) if self.host.rank == 0 else None)
-        if place is None:
-            return None
+        files = self._written(large) if self.host.rank == 0 else []
+        opened = self.host.bcast([(f"/proc/{os.getpid()}/fd/{file}", _identity(file)) for file in files])
         blocks: list[Any] = []
         try:
-            blocks = [_map(Path(place) / str(k), size) for k, size in enumerate(sizes)]
+            blocks = [_map(path, identity, size) for (path, identity), size in zip(opened, sizes)]
         except OSError:
             pass
-        failed = self.host.any(len(blocks) < len(sizes))  # all have them: now they need no names
-        if self.host.rank == 0:
-            shutil.rmtree(place, ignore_errors=True)
+        failed = self.host.any(len(blocks) < len(sizes))  # nobody opens the files after this
+        for file in files:
+            os.close(file)
         return None if failed else blocks
 
-    def _written(self, large: list[Any]) -> str | None:
-        """A new folder with a file for each; None if no folder has space."""
+    def _written(self, large: list[Any]) -> list[int]:
+        """Open files with them, without names; none if no folder has space."""
         for folder in self.folders:
-            place = None
+            files: list[int] = []
             try:
-                place = tempfile.mkdtemp(prefix=PREFIX, dir=folder)
-                for k, one in enumerate(large):
-                    _write(Path(place) / str(k), one)
-                return place
+                for one in large:
+                    files.append(os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o600))
+                    _write(files[-1], one)
+                return files
             except OSError:
-                if place is not None:
-                    shutil.rmtree(place, ignore_errors=True)
-        return None
+                for file in files:
+                    os.close(file)
+        return []
 
     def _notice(self, size: int) -> None:
         if self.warn is not None and not self._told:
             self._told = True
             self.warn(
-                f"the {self.host.size} ranks of a node keep separate copies ({size / 2**20:.0f} MiB so far), "
-                f"because {' or '.join(self.folders)} has no space to share them. Enlarge /dev/shm, or set TMPDIR to "
-                "a folder in memory"
+                f"the {self.host.size} ranks of a node keep separate copies ({size / 2**20:.0f} MiB so far), because "
+                f"{' or '.join(self.folders)} has no space to share them, or /proc hides the ranks from each other. "
+                "Enlarge /dev/shm, or set TMPDIR to a folder in memory"
             )
 
 
@@ -142,19 +139,22 @@ def _sendable(error: Exception) -> Exception:
     return RuntimeError(f"{type(error).__name__}: {error}")
 
 
-def _write(path: Path, content: np.ndarray) -> None:
-    file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-    try:
-        os.posix_fallocate(file, 0, len(content))  # what there is no space for must not end in a bus error
-        with mmap.mmap(file, len(content)) as room:
-            room[:] = content.data
-    finally:
-        os.close(file)
+def _write(file: int, content: np.ndarray) -> None:
+    os.posix_fallocate(file, 0, len(content))  # what there is no space for must not end in a bus error
+    with mmap.mmap(file, len(content)) as room:
+        room[:] = content.data
 
 
-def _map(path: Path, size: int) -> mmap.mmap:
+def _identity(file: int) -> tuple[int, int]:
+    found = os.fstat(file)
+    return found.st_dev, found.st_ino
+
+
+def _map(path: str, identity: tuple[int, int], size: int) -> mmap.mmap:
     file = os.open(path, os.O_RDONLY)
     try:
+        if _identity(file) != identity:
+            raise OSError(f"{path} is another file: that of a process in another container")
         return mmap.mmap(file, size, access=mmap.ACCESS_COPY)
     finally:
         os.close(file)

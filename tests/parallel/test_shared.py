@@ -10,11 +10,12 @@ import pytest
 from tests.conftest import Launcher
 
 SHARED = """\
-import mmap, os, sys
+import mmap, os, sys, tempfile
 from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 from hpcdem.core.errors import CommandError, ScriptError
+from hpcdem.halo import shared
 from hpcdem.halo.comm import MpiComm
 
 comm = MpiComm(MPI.COMM_WORLD)
@@ -40,7 +41,22 @@ inodes = comm.allgather(inode(made["large"]))
 assert len(set(inodes)) == 1 and inodes[0] is not None, inodes
 assert made["twice"][0] is made["twice"][1] and made["twice"][0].flags.f_contiguous and made["text"] == "a"
 assert made["large"].flags.writeable and made["large"].flags.aligned
-assert not list(Path("/dev/shm").glob("hpcdem-shared-*")) or comm.rank  # their names are gone
+# A rank that is killed while others map its files leaves none behind: they have no names.
+usual, folder = comm.nodes.folders, comm.bcast(tempfile.mkdtemp(dir="/dev/shm") if comm.rank == 0 else None)
+comm.nodes.folders, mapped, names = (folder,), shared._map, []
+shared._map = lambda *of: names.append(os.listdir(folder)) or mapped(*of)
+assert inode(comm.per_node(make)["large"])[1] != "0"
+assert names and not any(names), names
+comm.barrier()
+if comm.rank == 0:
+    os.rmdir(folder)
+comm.nodes.folders, shared._map = usual, mapped
+# In a container with processes of its own the number of a process may be that of another one there.
+known = shared._identity
+shared._identity = lambda file: (0, 0) if comm.rank == 1 else known(file)
+made = comm.per_node(make)
+assert (made["large"] == np.arange(50_000)).all() and inode(made["large"])[1] == "0"
+shared._identity = known
 comm.barrier()
 if comm.rank == 1:
     made["large"][:] = -1  # its own pages from here on

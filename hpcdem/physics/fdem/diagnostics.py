@@ -193,7 +193,7 @@ _AT_POINTS = tuple(f"{name}_stress_{point}" for name in ("normal", "shear") for 
 
 def probe(sim: Blocks, name: str, numbers: Numbers = None) -> Probe:
     """A quantity of these elements, nodes or joints (None: all), to be asked for again and again. CommandError if
-    there is no such quantity or number. Not collective."""
+    there is no such quantity or number. Collective."""
     on = quantity(sim, name).on
     some = numbers_on(sim, on, numbers)
     if name.startswith(("reaction", "unbalanced")):
@@ -228,7 +228,7 @@ def quantity(sim: Blocks, name: str) -> Quantity:
 
 
 def numbers_on(sim: Blocks, on: str, numbers: Numbers) -> np.ndarray:
-    """Checked numbers of elements, nodes (or their sides, sides.py) or joints; None: all. Not collective."""
+    """Checked numbers of elements, nodes (or their sides, sides.py) or joints; None: all. Collective."""
     sizes = {"element": len(sim.alive), "node": len(sim.the_mesh().points), "joint": len(sim.partner)}
     if numbers is not None:
         asked = np.asarray(numbers, np.int64).reshape(-1)

@@ -21,6 +21,8 @@ from bench.tables import Lines, say
 
 LISTED = 1 << 16
 """Bytes from which on an array is listed."""
+NAMELESS = re.compile(r"/#\d+ \(deleted\)$")
+"""Of lines of /proc/self/maps: files that never had a name."""
 
 WATCH = """\
 import os, select, sys
@@ -171,7 +173,7 @@ def files_of() -> dict[str, int]:
     """Bytes by file of what the ranks of the node share."""
     out: dict[str, int] = {}
     for line in Path("/proc/self/maps").read_text().splitlines():
-        if "hpcdem-shared-" in line:
+        if NAMELESS.search(line):
             first, last = (int(text, 16) for text in line.split()[0].split("-"))
             inode = line.split()[4]
             out[inode] = out.get(inode, 0) + last - first
@@ -184,7 +186,7 @@ def listed(project: Any) -> list[tuple[str, Any, bool]]:
 
     files = []
     for line in Path("/proc/self/maps").read_text().splitlines():
-        if "hpcdem-shared-" in line:
+        if NAMELESS.search(line):
             files.append([int(text, 16) for text in line.split()[0].split("-")])
     out = []
     for name, array in arrays(project, "project"):
