@@ -12,6 +12,7 @@ import contextlib
 import mmap
 import os
 import pickle
+import resource
 import tempfile
 from collections.abc import Callable
 from typing import Any
@@ -24,6 +25,8 @@ SMALL = 1 << 16
 """Bytes of an array that is not worth a file: it travels with the rest."""
 PIECE = 1 << 30
 """Bytes of a message at most."""
+FILES = 1 << 16
+"""Files that a rank may have open, as far as the system lets it: each array that is mapped keeps one open."""
 
 
 class Nodes:
@@ -37,6 +40,10 @@ class Nodes:
         self.folders = folders or ("/dev/shm", tempfile.gettempdir())
         self.warn: Callable[[str], None] | None = None
         self._told = self._making = False
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        wanted = FILES if hard == resource.RLIM_INFINITY else min(FILES, hard)
+        if soft != resource.RLIM_INFINITY and soft < wanted:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
     def share(self, make: Callable[[], Any], once: bool) -> Any:
         """See `Comm.per_node`."""

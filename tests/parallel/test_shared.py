@@ -10,7 +10,7 @@ import pytest
 from tests.conftest import Launcher
 
 SHARED = """\
-import mmap, os, sys, tempfile
+import mmap, os, resource, sys, tempfile
 from pathlib import Path
 import numpy as np
 from mpi4py import MPI
@@ -62,6 +62,11 @@ if comm.rank == 1:
     made["large"][:] = -1  # its own pages from here on
 comm.barrier()
 assert (made["large"] == (-1 if comm.rank == 1 else np.arange(50_000))).all()
+# Many large arrays, as of groups, each keep a file open.
+resource.setrlimit(resource.RLIMIT_NOFILE, (100, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+comm = MpiComm(MPI.COMM_WORLD)
+many = comm.per_node(lambda: [np.full(10_000, k) for k in range(150)])
+assert inode(many[-1])[1] != "0" and (many[-1] == 149).all()
 # From inside of another `make` there is nobody to share with.
 assert comm.per_node(lambda: comm.per_node(lambda: 7) + 1) == 8
 
