@@ -116,7 +116,7 @@ class Outputs:
         return text.getvalue()
 
     def summary(self) -> dict[str, Any]:
-        """What was asked for and what came of it, as JSON takes it; lengths in mm."""
+        """Request and result as JSON values; lengths in mm."""
         made = self.specimen
         asked, d = made.request, made.density
         facts: dict[str, Any] = {

@@ -6,7 +6,7 @@
 
     case = UCS(width=0.05, cohesion=12e6)
     case.script()          # the text of a script, complete and readable
-    case.build()           # the model of that script in this run; go on with lines of your own
+    case.build()           # the model of that script in this run; continue with your own lines
     case.load()            # its loading; a small object of results
     case.run()             # both
 
@@ -36,7 +36,7 @@ __all__ = ["CASES", "find", *CASES.values()]
 
 
 def find(name: str) -> type[Case]:
-    """The class of a case by its name on the command line. KeyError if there is none."""
+    """The class of a case by its name on the command line. KeyError for an unknown one."""
     return getattr(importlib.import_module(f"hpcdem.cases.{name.replace('-', '_')}"), CASES[name])
 
 
@@ -44,7 +44,7 @@ def __getattr__(name: str) -> Any:
     for case, made in CASES.items():
         if name == made:
             return find(case)
-    raise AttributeError(f"module 'hpcdem.cases' has no attribute '{name}'; it has {', '.join(CASES.values())}")
+    raise AttributeError(f"module 'hpcdem.cases' has no attribute '{name}'; known: {', '.join(CASES.values())}")
 
 
 def __dir__() -> list[str]:

@@ -78,7 +78,7 @@ class Case(BaseModel):
         except ValidationError:
             kind = type(self).__name__
             raise ScriptError(
-                *place(), f"{kind} is frozen: {name} is given when it is made, {kind}({name}={value!r})"
+                *place(), f"{kind} cannot be changed: give {name} to the constructor, {kind}({name}={value!r})"
             ) from None
 
     # ---- text ------------------------------------------------------------------------------------------------------
@@ -136,7 +136,7 @@ class Case(BaseModel):
     def load(self) -> Any:
         """Load the model that `build` made; the results. Collective."""
         if self._carrier is None:
-            raise ScriptError(*place(), f"{type(self).__name__}.load: there is no model yet; build() makes it")
+            raise ScriptError(*place(), f"{type(self).__name__}.load: no model yet. Call build() first")
         model, loading = self._pieces()
         lines = model.count("\n")  # so messages have the lines of the whole script
         self._carrier.carry_out("\n" * lines + loading)
@@ -173,7 +173,7 @@ def explained(kind: type[Case], error: ValidationError) -> str:
     name = str(first["loc"][0])
     known = kind.model_fields
     if name not in known:
-        return f"{kind.__name__} has no parameter '{name}'{hint(name, known) or '.'} There are {', '.join(known)}"
+        return f"{kind.__name__} has no parameter '{name}'{hint(name, known) or '.'} Known: {', '.join(known)}"
     unit = unit_of(known[name])
     what = known[name].description if unit in ("", "1") else f"{known[name].description}, {unit}"
     expected = validation.said(first) or validation.expected(first)

@@ -55,7 +55,7 @@ class ThreePointBend(Rock):
     )
     size: float = quantity(0.0025, "m", "edges of the elements at mid-span", gt=0)
     coarse: float = quantity(0.008, "m", "edges of the elements at the ends", gt=0)
-    band: float = quantity(0.015, "m", "joints are where the elements lie no farther than this from mid-span", gt=0)
+    band: float = quantity(0.015, "m", "distance from mid-span within which elements have joints", gt=0)
     damping: float = quantity(0.05, "1", "viscous damping of the elements, part of the critical", ge=0, le=1)
     friction: float = quantity(35.0, "degrees", "friction angle of joints and cracks", ge=0, lt=90)
     cohesion: float = quantity(20e6, "Pa", "cohesion of the joints", gt=0)
@@ -63,11 +63,14 @@ class ThreePointBend(Rock):
     gf1: float = quantity(50.0, "N/m", "fracture energy of opening (mode I)", gt=0)
     gf2: float = quantity(500.0, "N/m", "fracture energy of sliding (mode II)", gt=0)
     penalty_overlay: float = quantity(10.0, "1", "penalty of closed joints, over young", gt=0)
-    periods: float = quantity(4.0, "1", "slowest swings of the beam until the elastic stress is the strength", ge=1)
-    hurry: float = quantity(3.0, "1", "the load is moved so many times as fast once it has fallen to 0.7 of its peak",
+    periods: float = quantity(
+        4.0, "1", "periods of the lowest mode of the beam until the elastic stress reaches the strength", ge=1
+    )
+    hurry: float = quantity(3.0, "1", "factor on the loading speed after the load has fallen to 0.7 of its peak",
                             ge=1)  # fmt: skip
-    stop: float = quantity(0.03, "1", "the end: the load has fallen to this part of its peak", gt=0, lt=0.7)
-    most: float = quantity(100.0, "1", "the end in any case: deflection over that of the elastic beam at its strength",
+    stop: float = quantity(0.03, "1", "end of the test: fraction of the peak load", gt=0, lt=0.7)
+    most: float = quantity(100.0, "1",
+                           "end of the test in any case: deflection over that of the elastic beam at its strength",
                            gt=1)  # fmt: skip
 
     @model_validator(mode="after")
@@ -127,7 +130,7 @@ pcdc node boundary mech-m-b-c type 1 (0,0) range group 'left' set 'held'
 pcdc node boundary mech-m-b-c type 2 (1,0) range group 'right' set 'held'
 """
 LOADING = """
-# The slowest swing of a beam on two supports says how fast it may be loaded.
+# The lowest mode of a beam on two supports limits the loading speed.
 plane = young / (1 - poisson**2)
 period = 2 * span**2 / (math.pi * height) * math.sqrt(12 * density / plane)
 elastic = tensile_strength * span**2 / (6 * plane * height)       # deflection at which the stress is the strength

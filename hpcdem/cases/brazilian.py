@@ -47,13 +47,15 @@ class Brazilian(Rock):
     diameter: float = quantity(0.05, "m", "diameter of the disc", gt=0)
     flat: float = quantity(0.0, "degrees", "angle, seen from the centre, of its flat ends at the platens", ge=0, le=45)
     guided: bool = choice(
-        False, "edges (in space faces) of the mesh along the loaded diameter, so that the crack can run straight"
+        False,
+        "edges (in three dimensions faces) of the mesh along the loaded diameter, so that the crack can "
+        "propagate straight",
     )
-    joints: bool = choice(True, "joints, along which it breaks; without them it stays elastic")
+    joints: bool = choice(True, "with joints, along which it breaks; without them it is elastic")
     platen_friction: float = quantity(0.0, "degrees", "friction angle between platens and disc", ge=0, lt=90)
-    transits: float = quantity(40.0, "1", "waves cross the disc so often per 0.1 % of shortening", ge=5)
-    stop: float = quantity(0.5, "1", "the end: the force has fallen to this part of its peak", gt=0, lt=1)
-    most_strain: float = quantity(0.005, "1", "the end in any case: shortening over diameter", gt=0, le=0.2)
+    transits: float = quantity(40.0, "1", "wave transits of the disc per 0.1 % of shortening", ge=5)
+    stop: float = quantity(0.5, "1", "end of the test: fraction of the peak force", gt=0, lt=1)
+    most_strain: float = quantity(0.005, "1", "end of the test in any case: shortening over diameter", gt=0, le=0.2)
 
     @model_validator(mode="after")
     def _fits(self) -> Brazilian:

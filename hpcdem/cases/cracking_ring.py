@@ -25,7 +25,7 @@ class Cracked:
 
 
 class CrackingRing(Ring):
-    """The hole of a jointed ring is warmed slowly: the outer rim is pulled until it cracks."""
+    """The hole of a jointed ring is heated slowly; tension at the outer rim grows until it cracks."""
 
     name: ClassVar[str] = "cracking-ring"
     title: ClassVar[str] = "A ring that cracks by heat"
@@ -40,7 +40,7 @@ class CrackingRing(Ring):
     size: float = quantity(0.025, "m", "edges of the elements", gt=0)
     penalty: float = quantity(100.0, "1", "penalty of the joints, over young", gt=0)
     begin: float = quantity(
-        0.9, "1", "warmed to so much of the difference of the closed form in three parts", gt=0, lt=1
+        0.9, "1", "fraction of the temperature difference of the closed form that is applied in three parts", gt=0, lt=1
     )
     rise: float = quantity(0.045, "1", "of one difference to the next from there on", gt=0, le=0.2)
     end: float = quantity(1.17, "1", "last one", gt=1, le=10)

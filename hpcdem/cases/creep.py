@@ -1,4 +1,4 @@
-"""A creep test: a specimen under a load that stays, beside its closed form."""
+"""A creep test: a specimen under constant load, compared with its closed form."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Creep(Case):
     """A specimen of Burgers rock under a constant load, in plane strain, its ends without friction."""
 
     name: ClassVar[str] = "creep"
-    title: ClassVar[str] = "Creep of a specimen of rock under a load that stays"
+    title: ClassVar[str] = "Creep of a rock specimen under constant load"
     result: ClassVar[type] = CreepTest
 
     width: float = quantity(0.05, "m", "width of the specimen", gt=0)

@@ -14,7 +14,7 @@ from hpcdem.cases.water import CHANNELS, ROCK, STEADY, Water
 @dataclass(frozen=True)
 class Uplift:
     """uplift [N/m]: force of the water on the base; linear [N/m]: that of the line between both heads; exact [N/m]: of
-    the closed form, whose curtain lets nothing through and which knows no drain; discharge [m2/s]: what comes out below
+    the closed form, whose curtain is impermeable and which has no drain; discharge [m2/s]: what comes out below
     the dam, drained [m2/s]: in the drain; exact_discharge [m2/s]: of the closed form, with the permeability of a
     lattice; error: largest difference of the pressure on the base from the closed form, over that of the head;
     diagram: (x [m], pressure [Pa], closed form [Pa]) along the base; safety: against sliding of a triangular dam;

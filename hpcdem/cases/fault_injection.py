@@ -63,9 +63,9 @@ class FaultInjection(Case):
     fluid_density: float = quantity(1000.0, "kg/m3", "density of the fluid", gt=0)
     fluid_bulk: float = quantity(2.2e8, "Pa", "bulk modulus of the fluid; that of water with some gas in it", gt=0)
     rate: float = quantity(5e-5, "m2/s", "volume that is pumped in", gt=0)
-    limit: float = quantity(8e6, "Pa", "pressure above which less is pumped", gt=0)
-    duration: float = quantity(10.0, "s", "so long it is pumped", gt=0)
-    shut_in: float = quantity(2.0, "s", "so long it is shut in afterwards", gt=0)
+    limit: float = quantity(8e6, "Pa", "pressure above which the rate is reduced", gt=0)
+    duration: float = quantity(10.0, "s", "duration of pumping", gt=0)
+    shut_in: float = quantity(2.0, "s", "duration of shut-in afterwards", gt=0)
     steps: int = quantity(30000, "1", "steps of the model in all that time", ge=1000)
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""A plane hydraulic fracture driven from its middle (KGD), beside its closed forms."""
+"""A plane hydraulic fracture driven from its middle (KGD), compared with its closed forms."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hpcdem.cases.kgd_solutions import resolution
 
 @dataclass(frozen=True)
 class Fracture:
-    """length [m]: half length, to the damage 0.2 (toughness) or to the last joint behind its peak (viscosity); opening
+    """length [m]: half length, to the damage 0.2 (toughness) or to the last joint past its peak (viscosity); opening
     [m] and pressure [Pa, above the confinement] in the middle; front [m]: of the fluid; *_error: relative, to the
     closed form; balance: what of the fluid does not add up; energy_error: what of the energy does not, over what was
     pumped in; curve: (time [s], length, opening, pressure) at ten times, or at the end; steps: implicit ones."""
@@ -40,7 +40,7 @@ class HydraulicFracture(Case):
     result: ClassVar[type] = Fracture
 
     regime: Literal["toughness", "viscosity"] = choice(
-        "toughness", "closed form and tip: of a fluid with little viscosity, or of rock with little toughness"
+        "toughness", "closed form and tip: toughness-dominated (low viscosity), or viscosity-dominated (low toughness)"
     )
     young: float = quantity(30e9, "Pa", "Young's modulus of the rock", gt=0)
     poisson: float = quantity(0.25, "1", "Poisson's ratio of the rock", ge=0, lt=0.5)
@@ -51,12 +51,12 @@ class HydraulicFracture(Case):
     viscosity: float = quantity(1e-5, "Pa s", "dynamic viscosity of the fluid", gt=0)
     fluid_bulk: float = quantity(1e11, "Pa", "bulk modulus of the fluid", gt=0)
     aperture: float = quantity(2e-7, "m", "hydraulic aperture of closed joints", gt=0)
-    time: float = quantity(5.0, "s", "pumped for so long", gt=0)
+    time: float = quantity(5.0, "s", "duration of pumping", gt=0)
     reach: float = quantity(4.0, "m", "length of the line of joints", gt=0)
-    far: float = quantity(20.0, "1", "the model is so many times as large", ge=3)
+    far: float = quantity(20.0, "1", "size of the model over reach", ge=3)
     size: float = quantity(0.02, "m", "edges on the line", gt=0)
     stiffness: float = quantity(100.0, "1", "penalty of the joints over Young's modulus", ge=10)
-    steps_at_most: float = quantity(200.0, "1", "the longest time step is so small a part of the time", ge=10)
+    steps_at_most: float = quantity(200.0, "1", "largest time step, as a fraction of the time", ge=10)
 
     @model_validator(mode="after")
     def _fits(self) -> HydraulicFracture:
@@ -77,7 +77,7 @@ class HydraulicFracture(Case):
     def loading(self) -> str:
         tip = "0.2" if self.regime == "toughness" else "0.0"
         form = "slightly_viscous(plane, energy, viscosity, rate, t)"
-        # Where the lag behind the tip closes surfaces touch in the end, and implicit steps do not go on from there.
+        # Where the lag behind the tip closes surfaces touch in the end, and implicit steps cannot continue.
         parts = "10" if self.regime == "toughness" else "1"
         return (
             LOADING.replace("TIP", tip)

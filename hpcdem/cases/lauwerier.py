@@ -13,7 +13,7 @@ from hpcdem.cases.water import WARM, Warm
 
 @dataclass(frozen=True)
 class Front:
-    """error: largest difference of the water's temperature from the closed form at the times asked for, over that
+    """error: largest difference of the water's temperature from the closed form at the given times, over that
     between inflow and beginning; rock_error: the same of the rock at the distance `aside`; water, rock: (time [s],
     distance along the fracture [m], part of the difference of temperature, of the closed form) at quarters of the way;
     account: what of the heat does not add up."""
@@ -44,7 +44,7 @@ class Lauwerier(Warm):
     rock_temperature: float = quantity(373.15, "K", "of rock and water at the beginning", gt=0)
     first: float = quantity(50.0, "days", "the first of two times", gt=0)
     second: float = quantity(150.0, "days", "the second one", gt=0)
-    aside: float = quantity(5.0, "m", "distance from the fracture at which the rock is looked at", gt=0)
+    aside: float = quantity(5.0, "m", "distance from the fracture at which the rock temperature is evaluated", gt=0)
     steps: int = quantity(300, "1", "implicit steps up to the second time", ge=10)
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""A penny-shaped hydraulic fracture driven from its middle, beside its closed forms."""
+"""A penny-shaped hydraulic fracture driven from its middle, compared with its closed forms."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hpcdem.cases.kgd_solutions import resolution
 
 @dataclass(frozen=True)
 class Penny:
-    """radius [m]: of the circle with the area that is damaged by 0.2 (toughness) or behind its peak (viscosity);
+    """radius [m]: of the circle with the area that is damaged by 0.2 (toughness) or past its peak (viscosity);
     opening [m] in the middle; pressure [Pa, above the confinement] at half the radius, pressure_well: in the middle;
     *_error: relative, to the closed form, means over the last fifth of the time; balance: what of the fluid does not
     add up; energy_error: what of the energy does not, over what was pumped in; curve: (time [s], radius, opening,
@@ -41,7 +41,7 @@ class PennyFracture(Case):
     result: ClassVar[type] = Penny
 
     regime: Literal["toughness", "viscosity"] = choice(
-        "toughness", "closed form and tip: of a fluid with little viscosity, or of rock with little toughness"
+        "toughness", "closed form and tip: toughness-dominated (low viscosity), or viscosity-dominated (low toughness)"
     )
     young: float = quantity(30e9, "Pa", "Young's modulus of the rock", gt=0)
     poisson: float = quantity(0.25, "1", "Poisson's ratio of the rock", ge=0, lt=0.5)
@@ -52,14 +52,14 @@ class PennyFracture(Case):
     viscosity: float = quantity(1e-5, "Pa s", "dynamic viscosity of the fluid", gt=0)
     fluid_bulk: float = quantity(1e11, "Pa", "bulk modulus of the fluid", gt=0)
     aperture: float = quantity(2e-7, "m", "hydraulic aperture of closed joints", gt=0)
-    time: float = quantity(1.0, "s", "pumped for so long", gt=0)
+    time: float = quantity(1.0, "s", "duration of pumping", gt=0)
     reach: float = quantity(2.0, "m", "radius of the fine part of the mesh", gt=0)
-    far: float = quantity(12.5, "1", "the model is so many times as large", ge=3)
+    far: float = quantity(12.5, "1", "size of the model over reach", ge=3)
     size: float = quantity(0.1, "m", "distance of the circles of nodes", gt=0)
     turn: float = quantity(20.0, "degrees", "angle of the sector", gt=0, le=60)
     parts: int = quantity(2, "1", "elements around it", ge=1, le=12)
     stiffness: float = quantity(100.0, "1", "penalty of the joints over Young's modulus", ge=10)
-    steps_at_most: float = quantity(100.0, "1", "the longest time step is so small a part of the time", ge=20)
+    steps_at_most: float = quantity(100.0, "1", "largest time step, as a fraction of the time", ge=20)
 
     @model_validator(mode="after")
     def _fits(self) -> PennyFracture:

@@ -44,8 +44,8 @@ class Pillar(Rock):
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = PillarTest
 
-    row: bool = choice(True, "one of an endless row of pillars; otherwise the pillar between two rooms in wide rock")
-    joints: bool = choice(False, "elastic rock with joints that crack; otherwise rock that yields and softens")
+    row: bool = choice(True, "one of an infinite row of pillars; otherwise the pillar between two rooms in wide rock")
+    joints: bool = choice(False, "elastic rock with joints that crack; otherwise elastoplastic rock with softening")
     quads: bool = choice(True, "quads; otherwise triangles")
     width: float = quantity(4.0, "m", "width of the pillar after the last stage", gt=0)
     height: float = quantity(4.0, "m", "height of the pillar and of the rooms", gt=0)
@@ -62,31 +62,28 @@ class Pillar(Rock):
     cohesion: float = quantity(8e6, "Pa", "cohesion", gt=0)
     tensile_strength: float = quantity(1.5e6, "Pa", "tensile strength", gt=0)
     residual_cohesion: float = quantity(
-        0.2, "1", "what stays of cohesion and tensile strength, over the first ones (without joints)", ge=0, le=1
+        0.2, "1", "residual over initial cohesion and tensile strength (without joints)", ge=0, le=1
     )
     softening: float = quantity(
-        0.005, "1", "plastic strain at which no more than these are left (without joints)", gt=0
+        0.005, "1", "plastic strain at which the residual values are reached (without joints)", gt=0
     )
     gf1: float = quantity(100.0, "N/m", "fracture energy of opening (mode I)", gt=0)
     gf2: float = quantity(1000.0, "N/m", "fracture energy of sliding (mode II)", gt=0)
     penalty_overlay: float = quantity(10.0, "1", "penalty of closed joints, over young", gt=0)
     openings: int = quantity(4, "1", "stages in which the rooms are opened", ge=1, le=20)
-    relax: float = quantity(
-        20.0, "1", "waves cross the model so often while rock that is taken out lets go (joints)", gt=0
-    )
-    rest: float = quantity(20.0, "1", "and so often afterwards (joints)", gt=0)
-    transits: float = quantity(
-        100.0, "1", "waves cross the model so often while the roof comes down by 0.1 % of height", ge=10
-    )
-    stop: float = quantity(0.6, "1", "the end: the stress has fallen to this part of the strength", gt=0, lt=1)
-    most_strain: float = quantity(0.01, "1", "the end in any case: convergence over height", gt=0, le=0.1)
+    relax: float = quantity(20.0, "1", "wave transits of the model while excavated rock is released (joints)", gt=0)
+    rest: float = quantity(20.0, "1", "wave transits of the model afterwards (joints)", gt=0)
+    transits: float = quantity(100.0, "1", "wave transits of the model per convergence of 0.1 % of height", ge=10)
+    stop: float = quantity(0.6, "1", "end of the test: fraction of the strength", gt=0, lt=1)
+    most_strain: float = quantity(0.01, "1", "end of the test in any case: convergence over height", gt=0, le=0.1)
 
     @model_validator(mode="after")
     def _fits(self) -> Pillar:
         least = min(self.width, self.height, self.opening / self.openings)
         if self.size > 0.25 * min(self.width, self.height) or self.size > self.opening / self.openings:
-            raise ValueError(f"size is {self.size:g}, expected at most a quarter of the pillar, and what a stage takes "
-                             f"out, {least:g} m")  # fmt: skip
+            raise ValueError(
+                f"size is {self.size:g}, expected at most a quarter of the pillar, and of the excavation of a stage, "
+                f"{least:g} m")  # fmt: skip
         if self.coarse < self.size:
             raise ValueError(f"coarse is {self.coarse:g}, expected at least size, {self.size:g} m")
         if self.dilation > self.friction:
@@ -127,7 +124,7 @@ for sense in (-1, 1):
     for k in range(openings + 1 if side > wall else openings):
         x = sense * (0.5 * width + half * k / openings)
         pcdc geometry create polyline ([x],[-0.5*height]) ([x],[0.5*height]) as-layer 'lines'
-    for k in range(openings):                    # what stage k + 1 takes out, on this side
+    for k in range(openings):                    # excavation of stage k + 1, on this side
         inner, outer = (sense * (wall - half * part / openings) for part in (k + 1, k))
         pcdc geometry create polygon ([inner],[-0.5*height]) ([outer],[-0.5*height]) ([outer],[0.5*height]) \\
             ([inner],[0.5*height]) as-layer 'stage [k+1]'
@@ -151,7 +148,7 @@ pcdc element c-model mech-m-c property density [density] young [young] poisson-r
     dilation [dilation] cohesion table 'cohesion' over plastic-strain tensile table 'tensile' over plastic-strain
 """
 JOINTED = """
-# Joints are in the pillar and in the rock that is taken out or lies beside it; roof and floor are elastic.
+# Joints are in the pillar and in the excavated and neighbouring rock; roof and floor are elastic.
 pcdc element group 'near' set 'jointed' range y [-0.75*height] [0.75*height] x [-wall] [wall]
 """ + PROPERTIES.replace("face-of 'rock' set 'body'", "face-of 'near' set 'jointed'").lstrip()
 HELD = """

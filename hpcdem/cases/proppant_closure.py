@@ -46,7 +46,7 @@ class ProppantClosure(Case):
     pore: float = quantity(5e6, "Pa", "pressure of the water in the rock", ge=0)
     permeability: float = quantity(1e-16, "m2", "of the rock", gt=0)
     concentration: float = quantity(0.2, "1", "volume of grains over that of the slurry", gt=0)
-    limit: float = quantity(0.6, "1", "the same of a pack", gt=0, le=0.74)
+    limit: float = quantity(0.6, "1", "volume fraction of grains in a pack", gt=0, le=0.74)
     modulus: float = quantity(100e6, "Pa", "of the pack", gt=0)
     grain_size: float = quantity(20e-6, "m", "diameter of the grains", gt=0)
     time: float = quantity(800.0, "s", "from shut-in on", gt=0)

@@ -40,7 +40,7 @@ class ProppantSlot(Case):
     size: float = quantity(0.005, "m", "length of its channels", gt=0)
     aperture: float = quantity(5e-3, "m", "of the fracture", gt=0)
     concentration: float = quantity(0.2, "1", "volume of grains over that of the slurry at the beginning", gt=0)
-    limit: float = quantity(0.6, "1", "the same of a pack", gt=0, le=0.74)
+    limit: float = quantity(0.6, "1", "volume fraction of grains in a pack", gt=0, le=0.74)
     grain_size: float = quantity(0.5e-3, "m", "diameter of the grains", gt=0)
     grain_density: float = quantity(2650.0, "kg/m3", "density of the grains", gt=0)
     fluid_density: float = quantity(1000.0, "kg/m3", "density of the fluid", gt=0)

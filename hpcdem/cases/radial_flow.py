@@ -1,4 +1,4 @@
-"""Steady flow from a hole to a circle around it, beside its closed form."""
+"""Steady flow from a hole to a circle around it, compared with its closed form."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ pcdc face-joint c-model c-i-c-i property friction [friction] cohesion [cohesion]
 """Joints between the elements of group 'rock' set 'body'."""
 
 SURFACES = """\
-# A low penalty lets the time step be large; broken joints go on with the stiffness they had in any case.
+# A low penalty lets the time step be large; broken joints keep their stiffness in any case.
 pcdc element-face c-model contact-m-c property friction [friction] penalty-normal [2*young] penalty-shear [2*young]
 """
 """Contact of all surfaces."""

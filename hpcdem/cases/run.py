@@ -23,7 +23,7 @@ class Carrier:
         if outdir is not None:
             running = self.session.interpreter
             if running is not None and running.journal is not None:
-                raise CommandError("outdir is for Python programs; for a PCDC script the option --outdir says it")
+                raise CommandError("outdir applies to Python programs: a PCDC script uses the option --outdir")
             folder = self.session.directory / outdir
             project = self.session.project(folder)
             project.directory = folder

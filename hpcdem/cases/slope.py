@@ -34,7 +34,7 @@ class Stages:
 
 
 class Slope(Rock):
-    """A slope with benches: level ground under gravity, in which benches are taken out one below the other."""
+    """A slope with benches: level ground under gravity, in which benches are excavated from top to bottom."""
 
     name: ClassVar[str] = "slope"
     title: ClassVar[str] = "A slope with benches, excavated stage by stage"
@@ -42,7 +42,7 @@ class Slope(Rock):
     result: ClassVar[type] = Stages
 
     elements: Literal["tri", "quad"] = choice("tri", "triangles or quads")
-    joints: bool = choice(False, "joints, which crack; without them the rock is elastic and every stage static")
+    joints: bool = choice(False, "with joints that crack; without them the rock is elastic and every stage static")
     benches: int = quantity(4, "1", "number of benches", ge=1, le=50)
     bench_height: float = quantity(2.5, "m", "height of a bench", gt=0)
     bench_width: float = quantity(2.0, "m", "width of the berms between the benches", gt=0)
@@ -60,8 +60,8 @@ class Slope(Rock):
     tensile_strength: float = quantity(20e3, "Pa", "tensile strength of the joints", gt=0)
     gf1: float = quantity(1.0, "N/m", "fracture energy of opening (mode I)", gt=0)
     gf2: float = quantity(10.0, "N/m", "fracture energy of sliding (mode II)", gt=0)
-    relax: float = quantity(5.0, "1", "waves cross the model so often while the rock taken out lets go (joints)", gt=0)
-    rest: float = quantity(10.0, "1", "and so often until the next bench (joints)", gt=0)
+    relax: float = quantity(5.0, "1", "wave transits of the model while excavated rock is released (joints)", gt=0)
+    rest: float = quantity(10.0, "1", "wave transits of the model until the next bench (joints)", gt=0)
 
     @model_validator(mode="after")
     def _fits(self) -> Slope:
@@ -84,7 +84,7 @@ class Slope(Rock):
 
 
 GROUND = """
-# y = 0 is the lowest floor, x = 0 the highest crest. The benches, from the top: what is taken out, as polygons.
+# y = 0 is the lowest floor, x = 0 the highest crest. The benches, from the top: excavated polygons.
 top = benches * bench_height
 run = bench_height / math.tan(math.radians(face)) if face < 90 else 0.0      # of a face, along x
 left, right = -behind, benches * run + (benches - 1) * bench_width + before

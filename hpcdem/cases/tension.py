@@ -32,7 +32,7 @@ class Tension:
 
 
 class DirectTension(Rock):
-    """Direct tension: both ends of a specimen are drawn apart until it breaks."""
+    """Direct tension: both ends of a specimen are pulled until it breaks."""
 
     name: ClassVar[str] = "tension"
     title: ClassVar[str] = "Direct tension of a specimen of rock"
@@ -53,10 +53,8 @@ class DirectTension(Rock):
     damping: float = quantity(1.0, "1", "viscous damping of the elements, part of the critical", ge=0, le=1)
     friction: float = quantity(45.0, "degrees", "friction angle of joints and cracks", ge=0, lt=90)
     cohesion: float = quantity(25e6, "Pa", "cohesion of the joints", gt=0)
-    transits: float = quantity(
-        25.0, "1", "waves cross the specimen so often while the stress rises to the strength", ge=5
-    )
-    stop: float = quantity(0.5, "1", "the end: the stress has fallen to this part of its peak", gt=0, lt=1)
+    transits: float = quantity(25.0, "1", "wave transits of the specimen while the stress rises to the strength", ge=5)
+    stop: float = quantity(0.5, "1", "end of the test: fraction of the peak stress", gt=0, lt=1)
 
     @model_validator(mode="after")
     def _fits(self) -> DirectTension:

@@ -1,4 +1,4 @@
-"""A ring that is warmer inside than outside, beside its closed form."""
+"""A ring that is hotter inside than outside, compared with its closed form."""
 
 from __future__ import annotations
 

@@ -41,15 +41,15 @@ class ThermalShock(Rock):
     size: float = quantity(0.003, "m", "edges of the elements", gt=0)
     width: float = quantity(0.24, "m", "of the slab", gt=0)
     depth: float = quantity(0.12, "m", "of the slab", gt=0)
-    drop: float = quantity(60.0, "K", "by which the surface is colder", gt=0)
+    drop: float = quantity(60.0, "K", "cooling of the surface", gt=0)
     expansion: float = quantity(1e-5, "1/K", "linear thermal expansion", gt=0)
     conductivity: float = quantity(
         3.0, "W/(m K)", "thermal conductivity; the specific heat follows from transits", gt=0
     )
     front: float = quantity(0.08, "m", "thermal length 2 (kappa t)^0.5 at the end", gt=0)
-    transits: float = quantity(12.0, "1", "waves cross the depth so often until then", ge=5)
+    transits: float = quantity(12.0, "1", "wave transits of the depth until then", ge=5)
     scatter: float = quantity(10.0, "1", "shape of Weibull's distribution of the strength of joints", gt=1)
-    seed: int = quantity(1, "1", "another one, another field of strength", ge=0)
+    seed: int = quantity(1, "1", "seed of the strength field", ge=0)
 
     @model_validator(mode="after")
     def _fits(self) -> ThermalShock:

@@ -13,7 +13,7 @@ from hpcdem.cases.rock import CRACKS, ELASTIC, JOINTS, SURFACES, WAVES, Rock, in
 
 @dataclass(frozen=True)
 class Strength:
-    """peak [Pa], peak_strain: greatest stress along z, and its strain; criterion [Pa]: strength after Mohr and Coulomb
+    """peak [Pa], peak_strain: greatest stress along z, and its strain; criterion [Pa]: Mohr–Coulomb strength
     under the least pressure p, 2 c sqrt(N) + N p; curve: (strain, stress along z [Pa]) pairs, compression positive;
     tension, mixed, shear: broken joints by mode; energy_error: closing error of the energy budget
     over its largest flow."""
@@ -43,9 +43,9 @@ class Triaxial(Rock):
     penalty_overlay: float = quantity(10.0, "1", "penalty of closed joints, over young", gt=0)
     least: float = quantity(5e6, "Pa", "pressure along x", ge=0)
     middle: float = quantity(15e6, "Pa", "pressure along y", ge=0)
-    transits: float = quantity(20.0, "1", "waves cross the cube so often per 0.1 % of strain", ge=5)
-    stop: float = quantity(0.7, "1", "the end: the stress has fallen to this part of its peak", gt=0, lt=1)
-    most_strain: float = quantity(0.01, "1", "the end in any case: strain along z", gt=0, le=0.2)
+    transits: float = quantity(20.0, "1", "wave transits of the cube per 0.1 % of strain", ge=5)
+    stop: float = quantity(0.7, "1", "end of the test: fraction of the peak stress", gt=0, lt=1)
+    most_strain: float = quantity(0.01, "1", "end of the test in any case: strain along z", gt=0, le=0.2)
 
     @model_validator(mode="after")
     def _fits(self) -> Triaxial:

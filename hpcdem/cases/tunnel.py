@@ -35,7 +35,7 @@ class Excavation:
 
 
 class Tunnel(Rock):
-    """A tunnel: rock under stress, from which a circle or a horseshoe is taken out little by little."""
+    """A tunnel: rock under stress, from which a circle or a horseshoe is excavated gradually."""
 
     name: ClassVar[str] = "tunnel"
     title: ClassVar[str] = "A tunnel that is excavated in rock under stress"
@@ -46,7 +46,7 @@ class Tunnel(Rock):
         "circular", "circular; horseshoe: a half circle over walls and a level floor"
     )
     elements: Literal["tri", "quad"] = choice("tri", "triangles or quads")
-    joints: bool = choice(False, "joints around the tunnel, which crack; without them the rock is elastic")
+    joints: bool = choice(False, "with joints that crack around the tunnel; without them the rock is elastic")
     radius: float = quantity(2.0, "m", "radius of the tunnel, or of its crown", gt=0)
     wall: float = quantity(2.0, "m", "height of the walls of the horseshoe", gt=0)
     reach: float = quantity(12.0, "1", "from the centre to the sides of the model, over radius", ge=4)
@@ -54,9 +54,9 @@ class Tunnel(Rock):
     coarse: float = quantity(4.0, "m", "edges of the elements at the sides of the model", gt=0)
     stress_xx: float = quantity(-10e6, "Pa", "horizontal stress before the excavation, compression negative", le=0)
     stress_yy: float = quantity(-20e6, "Pa", "vertical stress before the excavation", le=0)
-    zone: float = quantity(2.5, "1", "joints reach so far from the centre, over radius", gt=1)
-    relax: float = quantity(20.0, "1", "waves cross the jointed zone so often while the rock taken out lets go", gt=0)
-    rest: float = quantity(20.0, "1", "and so often afterwards", gt=0)
+    zone: float = quantity(2.5, "1", "radius of the jointed zone, over radius", gt=1)
+    relax: float = quantity(20.0, "1", "wave transits of the jointed zone while excavated rock is released", gt=0)
+    rest: float = quantity(20.0, "1", "wave transits of the jointed zone afterwards", gt=0)
     cohesion: float = quantity(6e6, "Pa", "cohesion of the joints", gt=0)
     gf1: float = quantity(100.0, "N/m", "fracture energy of opening (mode I)", gt=0)
     gf2: float = quantity(1000.0, "N/m", "fracture energy of sliding (mode II)", gt=0)
@@ -70,7 +70,7 @@ class Tunnel(Rock):
             raise ValueError(f"coarse is {self.coarse:g}, expected at least size, {self.size:g} m")
         if self.shape == "horseshoe" and self.wall > 0.5 * self.reach * self.radius:
             most = 0.5 * self.reach * self.radius
-            raise ValueError(f"wall is {self.wall:g}, expected at most half the way to the side, {most:g} m")
+            raise ValueError(f"wall is {self.wall:g}, expected at most half the distance to the side, {most:g} m")
         if self.zone > 0.9 * self.reach:
             raise ValueError(f"zone is {self.zone:g}, expected at most 0.9 of reach, {0.9 * self.reach:g}")
         if self.stress_xx == 0.0 and self.stress_yy == 0.0:

@@ -40,7 +40,7 @@ class TunnelFace(Case):
     density: float = quantity(2500.0, "kg/m3", "density", gt=0)
     size: float = quantity(0.5, "m", "edges of the elements at the tunnel", gt=0)
     coarse: float = quantity(5.0, "m", "edges of the elements far from it", gt=0)
-    balance: float = quantity(1e-5, "1", "unbalanced ratio at which it rests", gt=0, le=1e-3)
+    balance: float = quantity(1e-5, "1", "unbalanced ratio of equilibrium", gt=0, le=1e-3)
 
     @model_validator(mode="after")
     def _fits(self) -> TunnelFace:

@@ -46,9 +46,9 @@ class UCS(Rock):
     platen_width: float = quantity(0.056, "m", "width of the platens", gt=0)
     platen_height: float = quantity(0.010, "m", "height of the platens", gt=0)
     platen_friction: float = quantity(0.0, "degrees", "friction angle between platens and specimen", ge=0, lt=90)
-    transits: float = quantity(40.0, "1", "waves cross the specimen so often per 0.1 % of strain", ge=5)
-    stop: float = quantity(0.5, "1", "the end: the stress has fallen to this part of its peak", gt=0, lt=1)
-    most_strain: float = quantity(0.01, "1", "the end in any case: strain of the specimen", gt=0, le=0.2)
+    transits: float = quantity(40.0, "1", "wave transits of the specimen per 0.1 % of strain", ge=5)
+    stop: float = quantity(0.5, "1", "end of the test: fraction of the peak stress", gt=0, lt=1)
+    most_strain: float = quantity(0.01, "1", "end of the test in any case: strain of the specimen", gt=0, le=0.2)
 
     @model_validator(mode="after")
     def _fits(self) -> UCS:

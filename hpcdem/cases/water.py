@@ -1,4 +1,4 @@
-"""Water in jointed rock that stands still: parameters and lines that several cases share."""
+"""Water in fixed jointed rock: parameters and lines that several cases share."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ pcdc face-joint c-model hydr-p-m property fluid-density [fluid_density] fluid-bu
     aperature-minumum [0.5*aperture] RANGE
 pcdc face-joint c-model t-f property conductivity [fluid_conductivity] capacity [fluid_capacity] \\
     transfer-coeficient [exchange] RANGE
-pcdc model option mechanical off                 # the rock stands still
+pcdc model option mechanical off                 # the rock is fixed
 pcdc flow-node initial saturation 1
 """
 """Channels of a RANGE, full of water, with heat; the elements have theirs."""
 
 ROCK = """
 pcdc element c-model mech-iso-e property density 2500 young 50e9 poisson-r 0.25
-pcdc model option mechanical off                 # the rock stands still
+pcdc model option mechanical off                 # the rock is fixed
 """
 CHANNELS = """\
 pcdc face-joint c-model hydr-p-m property fluid-density [fluid_density] fluid-bulk 2.2e9 \\

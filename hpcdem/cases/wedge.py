@@ -53,18 +53,18 @@ class Wedge(Case):
     density: float = quantity(2600.0, "kg/m3", "density", gt=0)
     young: float = quantity(5e9, "Pa", "Young's modulus", gt=0)
     poisson: float = quantity(0.25, "1", "Poisson's ratio", ge=0, lt=0.5)
-    first: float = quantity(1.0, "1", "the factor that is tried first", gt=0)
+    first: float = quantity(1.0, "1", "first trial factor", gt=0)
     precision: float = quantity(0.02, "1", "the factor lies in a range of this width over itself", gt=0, le=0.2)
-    balance: float = quantity(1e-4, "1", "unbalanced ratio at which the wedge stays", gt=0, le=1e-2)
-    patience: int = quantity(20000, "1", "steps after which it does not stay", ge=1000)
+    balance: float = quantity(1e-4, "1", "unbalanced ratio below which the wedge is stable", gt=0, le=1e-2)
+    patience: int = quantity(20000, "1", "steps after which it is unstable", ge=1000)
     collapse: float = quantity(1e-3, "1", "displacement with which it slides, over height", gt=0, le=0.1)
 
     @model_validator(mode="after")
     def _fits(self) -> Wedge:
         if not 0.0 < self.plunge() < self.face:
             raise ValueError(
-                f"the joints meet along a line that plunges by {self.plunge():.3g} degrees against the face, expected "
-                f"more than 0 and less than face, {self.face:g}: else no wedge can slide out"
+                f"the joints meet along a line that plunges by {self.plunge():.3g} degrees against the face, "
+                f"expected more than 0 and less than face, {self.face:g}: otherwise no wedge can slide out"
             )
         if self.coarse < self.size or self.size > 0.5 * self.height:
             raise ValueError("size: expected at most half of height, and at most coarse")

@@ -232,7 +232,7 @@ def refuse_idle(options: Options) -> None:
 
 def go_on(sim: Simulation, script: Script, log: Log, before: float = math.inf) -> bool:
     """Collective: finish a script from its newest checkpoint that is whole, or the last one not after `before` [s];
-    False if there is none."""
+    False without one."""
     from hpcdem.lang.zdem import execute
     from hpcdem.physics.dem import saved_state
 

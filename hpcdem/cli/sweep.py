@@ -79,7 +79,7 @@ class Setting(click.ParamType):
 @click.option("--member", type=click.IntRange(0), hidden=True)
 def sweep(**options: Any) -> None:
     """Run SCRIPT once for each combination of values of its parameters, each member in a folder of its own, many at
-    once; or go on with the sweep in DIR."""
+    once; or continue the sweep in DIR."""
 
 
 def _report_command() -> click.Command:

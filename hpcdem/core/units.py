@@ -172,7 +172,7 @@ _PLAIN = ("kg/m3", "kg/m2", "m/s2", "s/m")
 
 def ladder(unit: str) -> Sequence[tuple[float, str]]:
     """Sizes in SI, and names, of the multiples in which a unit of SI is written, smallest first; the unit alone if
-    there are none."""
+    without any."""
     if unit in _LADDERS:
         return _LADDERS[unit]
     head = re.match(r"[A-Za-z]+(?=[ /])", unit)

@@ -50,7 +50,7 @@ def take_newest(
     fatal: type[CommandError],
 ) -> tuple[Path, dict[str, Any]] | None:
     """The newest whole checkpoint among the .sav files of some folders, and what take(path) returned for it; None if
-    there is none. before: that of this time of the model [s] or the last one before it; UsageError without one.
+    without one. before: that of this time of the model [s] or the last one before it; UsageError without one.
     Collective.
 
     The newest is the one that is farthest in the script, then that of the latest step: clocks may go wrong. What an

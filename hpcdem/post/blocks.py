@@ -1,4 +1,4 @@
-"""Pictures of blocks: cracks coloured by the way they broke, axial forces of bolts, forces and moments of liners,
+"""Pictures of blocks: cracks coloured by mode, axial forces of bolts, forces and moments of liners,
 contours of the compressive stress and of plastic strain, and fluid in channels.
 
 matplotlib is imported where it is used, and only its file-writing parts: no window system, no global state.
@@ -292,7 +292,7 @@ def supports(axes: Any, state: MeshState) -> list[Any]:
 
 
 def _kinds(state: np.ndarray, mode: np.ndarray) -> list[tuple[np.ndarray, str, float, str]]:
-    """Joints, colour, part of the line width, word of the legend, in the order of drawing; what there is none of is
+    """Joints, colour, part of the line width, word of the legend, in the order of drawing; what is missing is
     left out."""
     broken = state == BROKEN
     rows = [(np.flatnonzero(state == YIELDED), YIELD, 0.45, "yielded")]

@@ -195,7 +195,7 @@ def _comments(text: str) -> tuple[str, list[str]]:
         if found := re.match(r"#\s*COLOR_MODEL\s*=\s*\+?\s*(RGB|HSV|CMYK)\b", line, re.IGNORECASE):
             model = found[1].upper()
         elif found := re.match(r"#\s*((?:HARD_|SOFT_)?HINGE|RANGE|CYCLIC)\b", line, re.IGNORECASE):
-            notes.append(f"{found[1].upper()} is ignored: values are taken as they stand in the table")
+            notes.append(f"{found[1].upper()} is ignored: values of the table are used unchanged")
     return model, notes
 
 
@@ -232,13 +232,13 @@ def _slice(words: list[str], label: str, model: str) -> Slice:
 
 
 def _fits(slices: list[Slice], new: Slice) -> None:
-    """ValueError unless the new slice goes on where the last one ended."""
+    """ValueError unless the new slice begins where the last one ended."""
     last = slices[-1]
     if (last.low == last.high) != (new.low == new.high):
-        raise ValueError("slices and single values cannot stand in one table")
+        raise ValueError("a table contains either slices or single values")
     if new.low == new.high:
         if any(s.low == new.low for s in slices):
-            raise ValueError(f"the value {new.low:g} has a colour already")
+            raise ValueError(f"the value {new.low:g} already has a colour")
     elif new.low != last.high:
         raise ValueError(f"this slice begins at {new.low:g}, the one before ends at {last.high:g}")
 

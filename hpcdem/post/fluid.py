@@ -28,7 +28,7 @@ class Shown:
     colours: str
 
     def values(self, state: MeshState) -> np.ndarray:
-        """(nj,) of joints, NaN where there is none."""
+        """(nj,) of joints, else NaN."""
         found = np.abs(state.of_joints.get(self.column, np.full(len(state.joints), np.nan)))
         if not self.dry and there(state):
             found = np.where(state.of_joints["saturation"] < WET, np.nan, found)

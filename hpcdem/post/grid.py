@@ -2,7 +2,7 @@
 
 Nodes lie at whole multiples of the spacing, so that grids of different frames fall on each other. Sums are taken in the
 order of the particles, one neighbouring place of the node after the other: a node's sum has the same bits whichever
-columns are asked for.
+columns are requested.
 """
 
 from __future__ import annotations

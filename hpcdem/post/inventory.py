@@ -24,7 +24,7 @@ def of_file(path: Path) -> Facts:
         status = path.stat()
         facts |= {"written": _when(status.st_mtime), "bytes": status.st_size}
         if path.suffix == ".tmp":
-            facts |= {"kind": "unfinished file", "why": "a run was ended while it wrote it; it may be deleted"}
+            facts |= {"kind": "unfinished file", "why": "its run ended during writing; the file can be deleted"}
         elif path.suffix == ".sav":
             facts["kind"] = "checkpoint"
             facts |= _checkpoint(path)
@@ -52,7 +52,7 @@ def _checkpoint(path: Path) -> Facts:
             if kind == checkpoint.BOTH:
                 facts |= _beside_blocks(state["particles"], tables)
         else:
-            raise HpcdemError(f"{path} is a checkpoint, but of what ('{kind}') this program does not know")
+            raise HpcdemError(f"{path} is a checkpoint of the unknown kind '{kind}'")
     except (KeyError, TypeError, ValueError, AttributeError) as problem:
         raise HpcdemError(f"{path} is damaged: {problem!r}") from None
     return facts

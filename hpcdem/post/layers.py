@@ -28,7 +28,7 @@ BALL = 3.0
 @dataclass(frozen=True)
 class Look:
     """palette (10, 3): colours by number; line: width of walls and of the surface in points; of_field: what colours
-    particles in the place of their numbers."""
+    particles instead of their numbers."""
 
     palette: np.ndarray = field(default_factory=lambda: colours.RGB)
     line: float = 1.0
@@ -156,7 +156,7 @@ def rotations(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def mesh(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """A square grid of twice the largest diameter, about the cells in which neighbours are looked for."""
+    """A square grid of twice the largest diameter, about the cells in which neighbours are searched."""
     radius = frame.tables["particles"].columns["radius"]
     if not len(radius):
         return

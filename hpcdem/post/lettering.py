@@ -13,7 +13,7 @@ PREFERRED = (
     "WenQuanYi Micro Hei", "Microsoft YaHei", "SimHei", "PingFang SC", "Hiragino Sans GB", "Heiti SC", "SimSun",
     "Noto Sans CJK JP", "Droid Sans Fallback", "Arial Unicode MS",
 )  # fmt: skip
-"""Fonts that are looked at first."""
+"""Preferred fonts."""
 WIDE = "\u2e80"
 """From here on letters are those of Chinese, Japanese and Korean."""
 PACKAGES = "fonts-noto-cjk or fonts-wqy-zenhei (Debian, Ubuntu), google-noto-sans-cjk-fonts (Fedora)"
@@ -47,13 +47,13 @@ def lettered(figure: Any, kind: str = "png") -> str:
     if not lost:
         return ""
     advice = f": install {PACKAGES}" if max(lost) >= WIDE else ""
-    line = f"no font of this machine has the letters {''.join(sorted(lost)[:8])}{advice}"
+    line = f"no installed font has the letters {''.join(sorted(lost)[:8])}{advice}"
     if advice not in _told:
         _told.add(advice)
         sys.stderr.write(f"warning: {line}\n")
     if kind != "svg":  # in letters that can be read
         figure.text(
-            0.004, 0.004, f"no font of this machine has some of these letters{advice}", fontsize=6.0, color="#c81e1e",
+            0.004, 0.004, f"no installed font has some of these letters{advice}", fontsize=6.0, color="#c81e1e",
             va="bottom", parse_math=False,
         )  # fmt: skip
     return line
@@ -61,7 +61,7 @@ def lettered(figure: Any, kind: str = "png") -> str:
 
 @cache
 def font_of(letters: frozenset[str]) -> tuple[str, str] | None:
-    """Name and file of a font that has all of these letters, None if there is none."""
+    """Name and file of a font that has all of these letters, or None."""
     return next(((name, path) for name, path in _fonts() if letters <= _letters(path)), None)
 
 

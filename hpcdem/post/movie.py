@@ -25,8 +25,8 @@ _RIMS = 0.0, 0.35, 0.65
 
 def pages(folder: str | os.PathLike, without: Collection[str] = ()) -> list[Path]:
     """The numbered pictures *.jpg of a folder in the order of time, as `frames.list_frames`; the most frequent
-    kind where there are several. without: names of frames whose pictures do not count. Raises HpcdemError where there
-    is none."""
+    kind where there are several. without: names of frames whose pictures do not count. Raises HpcdemError without
+    frames."""
     try:
         names = sorted(os.listdir(folder))
     except OSError as failure:

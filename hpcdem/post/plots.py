@@ -67,7 +67,7 @@ class Style:
         else:
             x, y = seen.ticks(major, minor)
         if max(len(ticks.major) + len(ticks.minor) for ticks in (x, y)) > _MOST_TICKS:
-            raise UsageError(f"more than {_MOST_TICKS} ticks along an axis: take larger steps")
+            raise UsageError(f"more than {_MOST_TICKS} ticks along an axis: use larger steps")
         return x, y
 
 

@@ -47,11 +47,11 @@ def save(figure: Any, target: str | IO[bytes], kind: str, dpi: float, picture: o
     if kind in ("jpg", "png", "tiff") and (max(width, height) > LONGEST_SIDE or width * height > MOST_PIXELS):
         raise HpcdemError(
             f"cannot draw {picture}: {width:.0f} x {height:.0f} pixels, at most {LONGEST_SIDE} along a side and "
-            f"{MOST_PIXELS / 1e6:.0f} million in all; take a smaller page or fewer dots per inch"
+            f"{MOST_PIXELS / 1000000.0:.0f} million in total: use a smaller page or fewer dots per inch"
         )
     lettered(figure, kind)
     with matplotlib.rc_context(SAVED), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from")  # it was told, once
+        warnings.filterwarnings("ignore", "Glyph .* missing from")  # it was reported, once
         figure.savefig(target, format=kind, dpi=dpi, **_saving(kind))
 
 

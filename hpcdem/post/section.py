@@ -126,4 +126,4 @@ def read_section(path: str | os.PathLike) -> Section:
             bool(arrays.get("smooth", True)), float(arrays.get("average", 0.0)),
         )  # fmt: skip
     except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise HpcdemError(f"{path}: not a section written by hpcdem -s: {error}") from None
+        raise HpcdemError(f"{path} is not a section written by hpcdem -s: {error}") from None

@@ -127,8 +127,8 @@ def _in_processes(tasks: Sequence[Task], workers: int) -> Iterator[tuple[int, st
             yield number.pop(drawn), drawn.result()
     except BrokenProcessPool:
         raise HpcdemError(
-            f"one of the {workers} processes that draw was ended from outside, perhaps for want of memory: take fewer "
-            "(--max_workers), or a smaller --dpi"
+            f"one of {workers} drawing processes was killed, perhaps for lack of memory: use fewer (--max_workers), "
+            "or a smaller --dpi"
         ) from None
     finally:
         pool.shutdown(cancel_futures=True)

@@ -47,7 +47,7 @@ class Options:
     particles are left out; xmove, ymove [m]: added to all coordinates; addball, delball: whether particles may be
     added or deleted between frames; increment: strain since the frame before instead of since the first one; smooth:
     strain fitted around the nodes of the grid and averaged, instead of by the nearest neighbours of each particle;
-    groups: names of those whose particles count, all if there are none."""
+    groups: names of those whose particles count, all by default."""
 
     folder: Path
     size: float = 200.0
@@ -80,7 +80,10 @@ def run(comm: Comm, log: Any, options: Options) -> Path:
         f"nodes every {spacing:g} m{ranks * (comm.size > 1)}"
     )
     if len(frames) == 1:
-        log.warn(f"{frames[0].path.name} is the only frame: its strain is zero, there is nothing to compare it with")
+        log.warn(
+            f"{frames[0].path.name} is the only frame: its strain is zero, because there is no other frame to "
+            "compare with"
+        )
     try:
         if len(frames) >= comm.size:
             _rounds(comm, log, frames, options, _Output(fresh, spacing), grids.sums)
@@ -104,7 +107,7 @@ def _frames(folder: Path, log: Any) -> list[FrameFile]:
     if others := left_out(folder):
         log.warn(others)
     if not frames:
-        raise HpcdemError(f"{folder} holds no frames (all_<step>.vtkhdf or all_<step>.dat)")
+        raise HpcdemError(f"{folder} contains no frames (all_<step>.vtkhdf or all_<step>.dat)")
     return frames
 
 
@@ -133,7 +136,7 @@ def _make_fresh(folder: Path) -> None:
 
 
 def _replace(fresh: Path, results: Path, names: list[str]) -> None:
-    """Put the new files in the place of the old ones; files of other names stay."""
+    """Replace the old files by the new ones; files of other names stay."""
     os.makedirs(results, exist_ok=True)
     ours = {name + suffix for name in names for suffix in SUFFIXES}
     for old in results.iterdir():
@@ -167,7 +170,7 @@ def _tried(action: Callable[[], _T]) -> tuple[_T | None, str | None]:
 class Snapshot:
     """What is needed of a frame: particles (in the order of ids) and walls, after --xmove and --ymove.
 
-    inside: not beyond --leftwallid or --rightwallid, and of the groups asked for; moments (n, 4): V s [N m]; volume
+    inside: not beyond --leftwallid or --rightwallid, and of the requested groups; moments (n, 4): V s [N m]; volume
     (n,); thickness [m]; held (n,): in contact with anything; fixed (n,): along x and y.
     """
 
@@ -193,10 +196,10 @@ def look(path: Path, options: Options) -> Snapshot:
     frame = read_frame(path)
     p = frame.tables["particles"].columns
     if not len(frame.tables["particles"]):
-        raise HpcdemError(f"{path} has no particles; take it out of the folder")
+        raise HpcdemError(f"{path} has no particles: remove it from the folder")
     bad = ~np.isfinite(p["x"] + p["y"] + p["radius"])
     if bad.any():
-        raise HpcdemError(f"{path}: the place of particle {p['gid'][bad][0]} is not a number")
+        raise HpcdemError(f"{path}: the position of particle {p['gid'][bad][0]} is not a number")
     fixed = held_fast(p, len(p["x"]))
     try:
         moments, held = stress.moments(frame)
@@ -210,7 +213,7 @@ def look(path: Path, options: Options) -> Snapshot:
         what = (
             f"smaller than a particle ({diameter:.4g} m across)" if options.size < diameter else "larger than the model"
         )
-        raise UsageError(f"-g {options.size:g}: {what} in {path}, {extent:.4g} m wide; give a spacing in between")
+        raise UsageError(f"-g {options.size:g}: {what} in {path}, {extent:.4g} m wide: choose a spacing in between")
     inside = np.ones(len(x), dtype=bool)
     for wall, sign in ((options.left_wall, 1.0), (options.right_wall, -1.0)):
         if wall is not None:
@@ -283,8 +286,8 @@ def link(earlier: Earlier, now: Snapshot, options: Options, sums: strain.Sums = 
     ):
         if number and not leave:
             raise HpcdemError(
-                f"between {earlier.name} and {now.name} {number} particle{'s were' if number > 1 else ' was'} {what}: "
-                f"give {option}, or take out of the folder the frames that do not belong to it"
+                f"{number} particle{'s were' if number > 1 else ' was'} {what} between {earlier.name} and "
+                f"{now.name}: use {option}, or remove unrelated frames from the folder"
             )
     both = there & now.inside
     both[both] = earlier.inside[at[both]]
@@ -382,7 +385,7 @@ def solid_fraction(
     """(ny, nx): area of discs per area of the section around each node, without the share of empty space outside.
 
     The mean over the nodes at most AROUND spacings away that lie INSIDE spacings from any empty place; the mean over
-    all of these where there is none near; over all that discs reach where the model is thin everywhere.
+    all of these if none is near; over all that discs reach where the model is thin everywhere.
     """
     inner = _each_way(np.logical_and, total["number"] > 0, INSIDE)
     if not inner.any():

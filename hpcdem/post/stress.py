@@ -82,14 +82,14 @@ def _finder(gid: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
 
     def find(ids: np.ndarray) -> np.ndarray:
         if n == 0:
-            raise HpcdemError(f"a contact names the particle {ids[0]}, which is not there")
+            raise HpcdemError(f"a contact refers to the missing particle {ids[0]}")
         if rows is None:
             at = np.minimum(np.searchsorted(gid, ids), n - 1)
         else:
             at = rows[np.clip(ids - low, 0, len(rows) - 1)]
         wrong = gid[at] != ids
         if wrong.any():
-            raise HpcdemError(f"a contact names the particle {ids[wrong][0]}, which is not there")
+            raise HpcdemError(f"a contact refers to the missing particle {ids[wrong][0]}")
         return at
 
     return find
@@ -97,7 +97,7 @@ def _finder(gid: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
 
 def _force(table: dict[str, np.ndarray], name: str) -> tuple[np.ndarray, np.ndarray]:
     if "fx" not in table or "fy" not in table:
-        raise HpcdemError(f"its {name} have no forces (globalFx, globalFy), so there is no stress to compute")
+        raise HpcdemError(f"its {name} have no forces (globalFx, globalFy), so stress cannot be computed")
     return table["fx"], table["fy"]
 
 
@@ -146,7 +146,7 @@ def volume_rule(frame: Frame, bed: np.ndarray | None = None) -> tuple[np.ndarray
     p = frame.tables["particles"].columns
     radius, disk = p["radius"], str(frame.settings.get("disk", "off"))
     if disk not in mass.SPHERES:
-        raise HpcdemError(f"its rule for volumes, disk {disk}, is none of {', '.join(mass.SPHERES)}")
+        raise HpcdemError(f"its rule for volumes is disk {disk}, expected one of {', '.join(mass.SPHERES)}")
     volume = mass.volume(radius, disk)
     if "clump" in p:
         volume = np.where(p["clump"] >= 0, p["mass"] / p["density"], volume)

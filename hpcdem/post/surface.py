@@ -26,7 +26,7 @@ def bed(x: np.ndarray, y: np.ndarray, radius: np.ndarray, fixed: np.ndarray) -> 
 
 
 def in_large_pieces(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Whether each disc is in a piece of at least LOOSE of all. Discs hang together where the squares of a grid, as
+    """Whether each disc is in a piece of at least LOOSE of all. Discs are connected where the squares of a grid, as
     wide as the largest diameter, do."""
     from scipy import ndimage
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def newest_first(folders: list[Path], before: float = math.inf) -> tuple[list[Path], list[str]]:
     """The checkpoints of the runs that wrote last into some folders, the newest first, and what is wrong with those of
     which not even the state can be read; before: only those of this time of the model [s] and earlier ones. Tables are
-    not looked at. Not collective."""
+    not checked. Not collective."""
     ranked, damaged = _ranked(folders)
     latest = before + run_folder.ROUNDING * abs(before)
     return [path for _, time, path in ranked if time <= latest], damaged

@@ -242,7 +242,7 @@ def test_info_of_a_checkpoint_of_both(tmp_path, capsys):
         slabs = {name: Table(columns, 0, len(next(iter(columns.values())))) for name, columns in tables.items()}
         checkpoint.write(broken, {**state, **change}, slabs, SerialComm())
         facts = inventory.of_file(broken)
-        assert not facts["whole"] and ("of what ('plasma')" in facts["why"] or "is damaged" in facts["why"])
+        assert not facts["whole"] and ("unknown kind 'plasma'" in facts["why"] or "is damaged" in facts["why"])
 
 
 def rows_of(text, title):

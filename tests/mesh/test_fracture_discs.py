@@ -108,8 +108,8 @@ def test_densities_that_are_reached(measure: str) -> None:
         (DiscSet(Poles("normal", 0.0), RADII, "p32", 1.0), "fixed or fisher, not normal"),
         (DiscSet(Poles("fixed", 0.0, 0.0, 5.0), RADII, "p32", 1.0), "has no spread"),
         (DiscSet(Poles("fixed", 90.0), RADII, "p10", 1.0), "meets none of them"),
-        (DiscSet(Poles("fixed", 0.0), RADII, "p10", 1.0, reached=True), "p10 holds in the mean"),
-        (DiscSet(Poles("fixed", 0.0), RADII, "p32", 1e7), "discs are expected"),
+        (DiscSet(Poles("fixed", 0.0), RADII, "p10", 1.0, reached=True), "p10 holds on average"),
+        (DiscSet(Poles("fixed", 0.0), RADII, "p32", 1e7), "discs expected"),
     ],
 )
 def test_what_makes_no_sense(one: DiscSet, said: str) -> None:

@@ -108,7 +108,7 @@ def test_layers_by_name_and_back_from_arrays():
         (lambda: geometry.rectangle((0, 0), (0, 1)), "no area"),
         (lambda: geometry.circle((0, 0), 0.0), "radius must be positive"),
         (lambda: geometry.circle((0, 0), math.inf), "radius must be positive"),
-        (lambda: geometry.arc((0, 0), 1.0, 90.0, 450.0), "the same"),
+        (lambda: geometry.arc((0, 0), 1.0, 90.0, 450.0), "are equal"),
         (lambda: transformed(geometry.circle((0, 0), 1), scale=(1, 2)), "ellipses"),
         (lambda: transformed(geometry.circle((0, 0), 1), scale=0.0), "not zero"),
         (lambda: transformed(geometry.circle((0, 0), 1), rotate=math.inf), "finite"),
@@ -171,7 +171,7 @@ def test_drawing(drawing):
     np.testing.assert_allclose(found["holes"][0].points, [(10, 5), (10, 6)], atol=1e-12)
     np.testing.assert_array_equal(found["stations"][0].points, [(7, 8)])
     assert list(read_dxf(path, only={"fault"})) == ["fault"]
-    with pytest.raises(HpcdemError, match="nothing is drawn in layer 'Fault'"):
+    with pytest.raises(HpcdemError, match="layer 'Fault' is empty or missing"):
         read_dxf(path, only={"Fault"})
 
 
@@ -183,7 +183,7 @@ def test_drawing(drawing):
             r"3DFACE \(handle \w+, layer 'top'\)",
         ),
         (lambda s, d: s.add_polyline3d([(0, 0, 0), (1, 0, 3)]), "two-dimensional"),
-        (lambda s, d: s.add_circle((0, 0), 1, dxfattribs={"extrusion": (0, 1, 0)}), "plane of its own"),
+        (lambda s, d: s.add_circle((0, 0), 1, dxfattribs={"extrusion": (0, 1, 0)}), "its own plane"),
         (lambda s, d: s.add_line((1, 1), (1, 1)), r"LINE .* points 1 and 2 are the same"),
         (lambda s, d: s.add_text("only a note"), "contains no line"),
     ],
@@ -249,7 +249,7 @@ def test_units_of_a_drawing(ezdxf, tmp_path, code, scale, factor, said):
     document.modelspace().add_lwpolyline([(0, 0), (2000, 0), (2000, 1000), (0, 1000)], close=True)
     document.saveas(tmp_path / "site.dxf")
     project = Project(FakeBlocks(), tmp_path, tmp_path / "data")
-    commands.import_file(project, "slope", "site.dxf", scale=scale)
+    commands.import_file(project, "site.dxf", "slope", scale=scale)
     assert abs(enclosed_area(project.layers["slope"][0])) == pytest.approx(2e6 * factor**2)
     (line,) = project.log.lines
     assert re.search(said, line) and f"to ({2000 * factor:g}, {1000 * factor:g}) m" in line
@@ -262,7 +262,7 @@ def test_what_leaves_the_plane_is_refused(ezdxf, tmp_path):
     document.modelspace().add_spline([(0, 0, 0), (1, 1, 0), (2, 0, 1)], dxfattribs={"layer": "bent"})
     document.saveas(tmp_path / "high.dxf")
     assert list(read_dxf(tmp_path / "high.dxf", only={"level"})) == ["level"]
-    for layer, said in (("slanted", "LINE .* runs from z = 0 to 5"), ("bent", "SPLINE .* runs from z = .* to 1")):
+    for layer, said in (("slanted", "LINE .* extends from z = 0 to 5"), ("bent", "SPLINE .* extends from z = .* to 1")):
         with pytest.raises(HpcdemError, match=said):
             read_dxf(tmp_path / "high.dxf", only={layer})
 

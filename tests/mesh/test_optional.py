@@ -35,7 +35,7 @@ def test_missing_libraries_of_the_system_are_named(monkeypatch, tmp_path):
 
 def test_a_wheel_without_its_library(monkeypatch):
     monkeypatch.setitem(sys.modules, "gmsh", ModuleType("gmsh"))
-    with pytest.raises(HpcdemError, match="without its library libgmsh"):
+    with pytest.raises(HpcdemError, match="lacks its library libgmsh"):
         optional.gmsh()
 
 

@@ -103,5 +103,5 @@ def test_nothing_to_move():
 
 @pytest.mark.usefixtures("gmsh")
 def test_quads_are_refused():
-    with pytest.raises(CommandError, match="smooth is for triangles"):
+    with pytest.raises(CommandError, match="smooth supports triangles only"):
         meshed({"o": geometry.rectangle((0, 0), (3, 2))}, 0.2, kind="quad", irregular=False)

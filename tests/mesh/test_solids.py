@@ -99,9 +99,9 @@ def test_surfaces_are_flat() -> None:
         (("polygon", ((0, 0, 0), (1, 0, 0))), "three corners, got 2"),
         (("polygon", ((0, 0, 0), (1, 0, 0), (2, 0, 0))), "on one line"),
         (("polygon", ((0, 0, 0), (1, 0, 0), (1, 1, 0.1), (0, 1, 0))), "in one plane"),
-        (("extrude", L_SHAPE, (1, 0, 1)), "the way lies in it"),
-        (("revolve", L_SHAPE, (0, 0, 0), (0, 1, 0), 360.0), "lies in its plane"),
-        (("revolve", L_SHAPE, (1, 0, 0), (0, 0, 1), 360.0), "does not cross it"),
+        (("extrude", L_SHAPE, (1, 0, 1)), "must not lie in the plane"),
+        (("revolve", L_SHAPE, (0, 0, 0), (0, 1, 0), 360.0), "must lie in the plane"),
+        (("revolve", L_SHAPE, (1, 0, 0), (0, 0, 1), 360.0), "must not cross"),
         (("revolve", L_SHAPE, (0, 0, 0), (0, 0, 1), 400.0), "from 0 to 360"),
         (("disc", (0, 0, 0), (0, 0, 0), 1.0), "normal"),
         (("plane", (0, 0, 0), (0, 0, 0)), "normal"),
@@ -159,9 +159,9 @@ def test_binary_shells_with_bytes_at_their_end_in_millimetres(tmp_path: Path) ->
         (body,) = cad.read(path, scale=1e-3, notes=notes)
         np.testing.assert_allclose(body.bounds(), [[0, 0, 0], [1e-3] * 3], atol=1e-12)
     assert notes[1] == notes[0] == "files *.stl name no unit: a unit is 0.001 m, as scale says"
-    assert notes[2] == "50 bytes after the last triangle are passed over" and notes[4].startswith("5 bytes")
+    assert notes[2] == "ignored 50 bytes after the last triangle" and notes[4].startswith("ignored 5 bytes")
     path.write_bytes(binary(CUBE)[:-60])
-    with pytest.raises(HpcdemError, match=r"cube\.stl: .* of the 12 triangles that its head names it has 10"):
+    with pytest.raises(HpcdemError, match=r"cube\.stl: .*its header declares 12 triangles, it has 10"):
         cad.read(path)
     text = stl(path, CUBE).read_text()
     path.write_text(text.upper() + "\n  made by some program \0\0 vertex \n")
@@ -246,7 +246,7 @@ def test_hostile_files_are_refused_by_name(tmp_path: Path, name: str, content: b
         (CUBE[:-1], "the shell is not closed"),
         ([*CUBE, *(tuple((x + 3.0, y, z) for x, y, z in t) for t in CUBE)], "make 2 shells, expected one"),
         ([*CUBE, ((0, 0, 0), (0, 0, float("nan")), (1, 0, 0))], "not finite"),
-        ([((0, 0, 0), (0, 0, 0), (0, 0, 0))], "in one point"),
+        ([((0, 0, 0), (0, 0, 0), (0, 0, 0))], "coincide"),
     ],
 )
 def test_shells_that_are_none_are_refused(tmp_path: Path, triangles: list, said: str) -> None:

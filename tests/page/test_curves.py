@@ -55,7 +55,7 @@ def test_what_is_computed_has_a_title_and_a_unit(tmp_path: Path):
     [
         ("time", ["'none'"], "there is no history 'none'; there is 'force above', 'force below'"),
         ("time", ["2 *"], "expected a history, such as 'force above'"),
-        ("time", ["__import__('way top')"], "no function __import__"),
+        ("time", ["__import__('way top')"], "unknown function __import__"),
         ("'way top' < 1", ["'way top'"], "expected"),
         ("time", ["'way top'" + " " * 10**6], "at most 500 characters"),
         ("time", [], "1 to 12 curves"), ("time", "a", "a list of y"), (3, ["a"], "an x"),

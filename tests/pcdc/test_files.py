@@ -139,12 +139,12 @@ def test_what_is_nested_too_deeply_has_a_line(bench, text, line, message):
 @pytest.mark.parametrize(
     ("words", "message"),
     [("structured (0,0) (1,1) cells 1000000 1000",
-      r"cells 1000000 1000 would make some 2e\+09 elements, more than 2e\+07"),
-     ("structured (0,0) (1,1) cells 3000 3000 diagonal both", r"would make some 3.6e\+07 elements"),
-     ("structured (0,0) (1,1) cells 100000000000 1 type quad", r"would make some 1e\+11 elements"),
-     ("equilateral (0,0) (1,1) size 1e-5", r"size 1e-05 would make some 2.3e\+10 elements"),
-     ("equilateral (0,0) (1,1e-9) size 1e-12", "elements, more than"),
-     ("equilateral (0,0) (1,1) size 1e-320", "size 9.99989e-321 would make some inf elements")],
+      r"cells 1000000 1000 would make about 2e\+09 elements, at most 2e\+07"),
+     ("structured (0,0) (1,1) cells 3000 3000 diagonal both", r"would make about 3.6e\+07 elements"),
+     ("structured (0,0) (1,1) cells 100000000000 1 type quad", r"would make about 1e\+11 elements"),
+     ("equilateral (0,0) (1,1) size 1e-5", r"size 1e-05 would make about 2.3e\+10 elements"),
+     ("equilateral (0,0) (1,1e-9) size 1e-12", "elements, at most"),
+     ("equilateral (0,0) (1,1) size 1e-320", "size 9.99989e-321 would make about inf elements")],
 )  # fmt: skip
 def test_meshes_that_are_too_large_are_refused_before_they_are_made(bench, words, message):
     with pytest.raises(ScriptError, match=message):

@@ -77,11 +77,11 @@ def test_only_those_between_two_groups(desk):
 
 @pytest.mark.parametrize(
     ("second", "line", "message"),
-    [("(2.1,0) (4,1) cells 4 2", "", "no faces of different bodies lie on each other within 0.0004[0-9]* m"),
+    [("(2.1,0) (4,1) cells 4 2", "", "no faces of different bodies coincide within 0.0004[0-9]* m"),
      ("(2,0) (4,1) cells 4 2", "tolerance 0.6", "too large: points .* of one element"),
      ("(1,0) (2,1) cells 2 2", "", "lie on the same side of their common face at"),
-     ("(2,1) (4,2) cells 4 2", "", "no faces of different bodies lie on each other"),
-     ("(2,0) (4,1) cells 4 2", "between 'a' 'a' set 'bodies'", "no faces of different bodies lie on each other"),
+     ("(2,1) (4,2) cells 4 2", "", "no faces of different bodies coincide"),
+     ("(2,0) (4,1) cells 4 2", "between 'a' 'a' set 'bodies'", "no faces of different bodies coincide"),
      ("(2,0) (4,1) cells 4 2", "between 'a' 'z' set 'bodies'", "has no group 'z' of elements")],
 )  # fmt: skip
 def test_refusals(desk, second, line, message):
@@ -112,7 +112,7 @@ def test_edges_of_other_lengths(desk, second, joints, kind):
 def test_the_tolerance_decides(desk):
     text = ("pcdc mesh structured (0,0) (2,1) cells 4 2 diagonal right\n"
             "pcdc mesh structured (2.003,0) (4,1) cells 4 2 diagonal right\n")  # fmt: skip
-    with pytest.raises(HpcdemError, match="no faces of different bodies lie on each other within"):
+    with pytest.raises(HpcdemError, match="no faces of different bodies coincide within"):
         desk(text + "pcdc mesh glue tolerance 0.002\n")
     desk("pcdc mesh glue tolerance 0.004\n")
     x = desk.project.mesh.points[:, 0]

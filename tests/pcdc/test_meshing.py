@@ -112,7 +112,7 @@ def test_smooth_moves_points_but_not_those_on_lines(bench):
     ("line", "message"),
     [
         ("mesh create from-layer 'ou' size 1", "there is no geometry layer 'ou' (layers so far: 'out')"),
-        ("mesh create from-layer 'out' size 1 type quad smooth", "smooth is for triangles"),
+        ("mesh create from-layer 'out' size 1 type quad smooth", "smooth supports triangles only"),
         ("mesh create from-layer 'out' size 1 hole 'h'", "there is no geometry layer 'h'"),
         ("geometry create fractures orientation fixed 0 length fixed 1 inside 'out' seed 1 as-layer 'd'",
          "one density"),

@@ -680,7 +680,7 @@ WRONG = {
     "curve of nothing": ("sim.charts.add('c')", "charts.add: a curve has either y"),
     "figure of no kind": ("sim.charts.export('c', 'c.txt')", "a figure is a file"),
     "range of no objects": ("sim.output.image('f', where='id 0')", "range goes with object, one of elements, joints"),
-    "looks of nothing": ("sim.output.image('f', log=True)", "log goes with field or object"),
+    "looks of nothing": ("sim.output.image('f', log=True)", "log requires field or object"),
     "no such colours": ("sim.output.image('f', colours='jet')", "colours: expected one of viridis"),
     "frames every and off": ("sim.output.vtk('f', every=1, off=True)", "every and off cannot be combined"),
     "wrong RANGE": ("sim.nodes.group('a', where='z 0 1')", "a range in z needs a model in three dimensions"),

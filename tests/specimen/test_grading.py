@@ -104,8 +104,8 @@ def test_file(tmp_path: Path) -> None:
 @each(
     "text, line, message",
     [
-        ("", 1, "holds no rows"),
-        ("# 1 2\n\n", 2, "holds no rows"),
+        ("", 1, "contains no rows"),
+        ("# 1 2\n\n", 2, "contains no rows"),
         ("10 100\n5\n", 2, "read '5', expected a size in mm and the per cent finer"),
         ("10 100\n5 95 3\n", 2, "expected a size"),
         ("10 100\nfive 95\n", 2, "read 'five 95'"),

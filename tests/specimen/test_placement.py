@@ -175,8 +175,8 @@ def test_grading_by_true_areas(curve: tuple, shape: str) -> None:
         ({"number": None}, "either the number of grains or the width"),
         ({"width": 0.01}, "either the number of grains or the width"),
         ({"number": None, "width": -1.0}, "width -1, expected a number above 0"),
-        ({"number": None, "width": 1e-6}, "a box 1e-06 m wide holds .* such grains"),
-        ({"number": None, "width": 100.0}, "a box 100 m wide holds .* such grains"),
+        ({"number": None, "width": 1e-6}, "a box 1e-06 m wide contains .* such grains"),
+        ({"number": None, "width": 100.0}, "a box 100 m wide contains .* such grains"),
         ({"slenderness": 0.0}, "slenderness 0, expected"),
         ({"slenderness": math.nan}, "slenderness nan, expected"),
         ({"void_ratio": -0.5}, "void ratio -0.5, expected"),
@@ -186,8 +186,8 @@ def test_grading_by_true_areas(curve: tuple, shape: str) -> None:
         ({"cell": 0.5}, "cell 0.5 times"),
         ({"seed": -1}, "seed -1, expected"),
         ({"number": 1}, "the box is .* mm wide and .* mm high, the largest grain 0.3 mm long"),
-        ({"number": 30, "slenderness": 200.0}, "take more grains, or another slenderness"),
-        ({"number": 30, "slenderness": 0.01}, "take more grains, or another slenderness"),
+        ({"number": 30, "slenderness": 200.0}, "use more grains, or another slenderness"),
+        ({"number": 30, "slenderness": 0.01}, "use more grains, or another slenderness"),
     ],
 )
 def test_refused(words: dict, message: str) -> None:

@@ -142,7 +142,7 @@ def test_a_script_is_told_its_line(tmp_path):
 
 
 def test_parameters_stay_as_they_are():
-    with pytest.raises(ScriptError, match=r"UCS is frozen: .* is given when it is made, UCS\("):
+    with pytest.raises(ScriptError, match=r"UCS cannot be changed: give .* to the constructor, UCS\("):
         find("ucs")().width = 3.0  # type: ignore[attr-defined]
 
 

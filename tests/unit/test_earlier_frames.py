@@ -221,7 +221,7 @@ def test_sections_and_pages_of_the_run_before_are_left_out(folder: Path) -> None
     assert "2 frames of steps 3000 to 4000" in log and "movie.gif: 3 frames" in log
     os.utime(folder / f"{all_(1000)}.vtkhdf")
     log = say(zdemss, "zdemss", folder, "--format", "jpg", "--width", "6", "--max_workers", "1", "-d")
-    assert f"1 frames have been written again since `hpcdem -s`, {all_(1000)} first" in log
+    assert f"1 frames are newer than their sections, first {all_(1000)}" in log
     for step in STEPS:
         (folder / "ss" / "data" / f"{all_(step)}.npz").unlink()
     with pytest.raises(HpcdemError, match="sections of an earlier run only: run `hpcdem -s"):

@@ -68,7 +68,7 @@ HOSTILE = {
     "body twice": (changed("clump 4 0", "clump 0.5 -0.125"), ":7: .*a position different from that of the clump"),
     "a disc is missing": (changed("0.5 0 0.6\nclump", "clump"), ":6: read 'clump 4 .*' after 1 discs, expected the 2"),
     "the end is missing": (changed("0 0 1\n", ""), ":7: the file ends after 0 discs, expected the 1 discs of the"),
-    "a disc too many": (GOOD + "1 1 1\n", ":9: read '1 1 1', expected 'clump x y angle area inertia n', as the"),
+    "a disc too many": (GOOD + "1 1 1\n", ":9: read '1 1 1', expected 'clump x y angle area inertia n', because the"),
     "words": (changed("0 0 1\n", "0 zero 1\n"), ":8: read '0 zero 1', expected 'dx dy r' of a disc, 3 numbers"),
     "a number is missing": (changed("0 0 1\n", "0 0\n"), ":8: .*'dx dy r' of a disc, 3 numbers"),
     "a number too many": (changed("4 0 0", "4 0 0 0"), ":7: .*expected 'clump x y angle area inertia n', 6 numbers"),

@@ -204,10 +204,10 @@ def test_dip_and_dip_direction():
     ("words", "message"),
     [
         (["fluid"], "have no channels"),
-        (["wedge"], "holds no frames"), (["--groups=floor"], "no element is of group floor; there is base, roof"),
-        (["regions", "--box=9,9,9,10,10,10"], "--box: no element"),
+        (["wedge"], "contains no frames"), (["--groups=floor"], "no element of group floor; known: base, roof"),
+        (["regions", "--box=9,9,9,10,10,10"], "--box: no measured element"),
         (["--box=1,0,0,0,1,1"], "--box: give the minimum x"),
-        (["fragments", "--box=0,0,0,1,1,1"], "--box goes with regions"),
+        (["fragments", "--box=0,0,0,1,1,1"], "--box requires regions"),
         (["--colors=red"], "--colors: blocks have groups, no colours"),
     ],
 )  # fmt: skip

@@ -89,7 +89,7 @@ def test_errors_are_explained(tmp_path: Path) -> None:
 
 
 def test_a_picture_too_large_for_its_format_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(HpcdemError, match=r"\d+ x \d+ pixels, at most 65535 along a side and 250 million in all"):
+    with pytest.raises(HpcdemError, match=r"\d+ x \d+ pixels, at most 65535 along a side and 250 million in total"):
         plot_frame(make_frame(1), tmp_path / "a.jpg", dpi=20000)
 
 

@@ -78,13 +78,13 @@ def test_a_sphere_on_a_floor() -> None:
 
 
 def test_what_does_not_fit_is_named() -> None:
-    with pytest.raises(HpcdemError, match="particle 99, which is not there"):
+    with pytest.raises(HpcdemError, match="the missing particle 99"):
         stress.moments(frame_of([(0, 0, 1), (2, 0, 1)], [(10, 99, -7.0, 0.0, 1.0, 0.0)]))
     frame = frame_of([(0, 0, 1), (2, 0, 1)], [(10, 11, -7.0, 0.0, 1.0, 0.0)])
     del frame.tables["contacts"].columns["fx"]
     with pytest.raises(HpcdemError, match="contacts have no forces"):
         stress.moments(frame)
-    with pytest.raises(HpcdemError, match="disk cubes, is none of on"):
+    with pytest.raises(HpcdemError, match="disk cubes, expected one of on"):
         stress.volume_rule(frame_of([(0, 0, 1)], disk="cubes"))
 
 

@@ -441,7 +441,7 @@ class Deadly:
 @pytest.mark.slow
 def test_a_process_that_is_killed_is_reported(three: Path) -> None:
     jobs = [Job(three / "all_0000001000.dat", three / f"{k}.jpg", Deadly()) for k in range(2)]  # type: ignore[arg-type]
-    with pytest.raises(HpcdemError, match=r"want of memory.*--max_workers"):
+    with pytest.raises(HpcdemError, match=r"lack of memory.*--max_workers"):
         draw_all(jobs, SerialComm(), 2)
 
 

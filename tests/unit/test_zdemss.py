@@ -496,7 +496,7 @@ def test_the_view_holds_all_sections_unless_it_is_given() -> None:
     far = replace(outlines[0], extent=(90000.0, 130000.0, -3000.0, 2000.0), reach=(90000.0, 130000.0))
     seen = survey.common_view([far])
     assert (seen.left, seen.right, seen.bottom) == (90000.0, 130000.0, -3000.0)
-    with pytest.raises(UsageError, match="nothing is left to draw between x = 90 km and x = 1 km"):
+    with pytest.raises(UsageError, match="nothing to draw between x = 90 km and x = 1 km"):
         survey.common_view([far], x=(None, 1000.0))
 
 

@@ -114,7 +114,7 @@ def test_without_one_a_line_says_which_package_brings_it(
 ):  # fmt: skip
     assert red(titled(tmp_path)) > 50
     said = capsys.readouterr().err
-    assert said.startswith(f"warning: no font of this machine has the letters {LETTER}: install fonts-noto-cjk or ")
+    assert said.startswith(f"warning: no installed font has the letters {LETTER}: install fonts-noto-cjk or ")
     assert said.count("\n") == 1
     titled(tmp_path)
     assert capsys.readouterr().err == ""  # once in a process

@@ -80,13 +80,13 @@ def test_cracks_of_a_mesh_are_seen_with_it(tmp_path: Path) -> None:
         ("field 'stres'", "this frame has no field stres; did you mean 'stress_zz'? It has elements: "),
         ("object bolts", "this frame has no bolts; it has elements, joints"),
         ("field 'stress-yy' object joints", "joints have no field stress_yy in this frame"),
-        ("object elements filter 'nix > 1'", "filter 'nix > 1': there is no field nix"),
-        ("object elements filter '__import__(1) > 1'", "there is no function __import__"),
+        ("object elements filter 'nix > 1'", "filter 'nix > 1': unknown field nix"),
+        ("object elements filter '__import__(1) > 1'", "unknown function __import__"),
         ("view 'none.mv'", "none.mv"), ("object elements opacity 3", "opacity"),
         ("field 'stress-yy' range x 0 1", "range goes with object, one of elements, joints, channels"),
-        ("edges", "edges goes with field or object"), ("object walls", "this frame has no walls"),
+        ("edges", "edges requires field or object"), ("object walls", "this frame has no walls"),
         ("field 'aperture'", "this frame has no field aperture"), ("object spheres", "expected one of elements"),
-        ("camera (1,0) (0,1)", "left below right"),
+        ("camera (1,0) (0,1)", "left < right"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_with_its_line(tmp_path: Path, words: str, message: str) -> None:

@@ -163,7 +163,7 @@ def test_objects_and_fields_of_blocks(rock: Moment):
     assert rock.of("bolts").values("axial_force", "").tolist() == [1e3, 2e3]
     with pytest.raises(HpcdemError, match="this frame has no particles; it has elements, joints, channels"):
         rock.of("particles")
-    with pytest.raises(HpcdemError, match="joints have no field stress_yy in this frame; they have"):
+    with pytest.raises(HpcdemError, match="joints have no field stress_yy in this frame; known:"):
         with_field(default_view(rock), rock, "stress_yy", "joints")
 
 
@@ -336,7 +336,7 @@ def test_arrows_are_as_long_as_they_say(rock: Moment):
     arrows = scene(rock, bare(layer)).layers[0].arrows
     assert arrows is not None
     assert np.hypot(*arrows[1].T).max() == pytest.approx(2.0 * 0.05 * 3.0)  # two twentieths of 3 m
-    with pytest.raises(HpcdemError, match="elements have no vectors force in this frame; there is displacement, vel"):
+    with pytest.raises(HpcdemError, match="elements have no vectors force in this frame; known: displacement, vel"):
         scene(rock, bare(Layer(object="elements", vectors="force")))
 
 
@@ -431,7 +431,7 @@ def test_a_view_of_a_file_is_drawn(tmp_path: Path):
     [
         (("--field=nix",), "this frame has no field nix; it has elements: group_rock, number, stress_yy"),
         (("--field=state", "--object=elements"), "elements have no field state in this frame"),
-        (("--object=particles",), "this frame has no particles"), (("--log",), "log goes with field or object"),
+        (("--object=particles",), "this frame has no particles"), (("--log",), "log requires field or object"),
         (("--hide=walls",), "this frame has no walls"), (("--colours=jet", "--field=stress_yy"), "colours"),
         (("--object=elements", "--colour=red"), "colour"), (("--object=elements", "--opacity=3"), "opacity"),
         (("--fps=3",), "--fps requires a film"), (("--step=3",), "--step selects frames of a folder"),

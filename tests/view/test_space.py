@@ -254,7 +254,7 @@ def test_colours_without_a_field_one_colour_and_logarithms(rock: Moment, tmp_pat
         (("--eye=0,0,0",), "eye: expected"), (("--section=x",), "section: expected x=1.5, x<1.5"),
         (("--section=q=1",), "section: expected"), (("--section=1,2,3,0,0,0",), "section: expected"),
         (("--section=x=nan",), "section: expected"), (("--field=stress_xq",), "this frame has no field stress_xq"),
-        (("--filter=w > 1", "--object=elements"), "there is no field w; there is x, y, z"),
+        (("--filter=w > 1", "--object=elements"), "unknown field w; known: x, y, z"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_by_name(tmp_path: Path, words: tuple[str, ...], message: str):

@@ -191,7 +191,7 @@ def _image(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
     if "field" not in arguments and "object" not in arguments:
         for word in LOOKS:
             if word in arguments:
-                raise ValueError(f"{word} goes with field or object, which say of what")
+                raise ValueError(f"{word} requires field or object")
 
 
 def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:

@@ -31,7 +31,7 @@ FRAGMENT_COLOURS = (
 
 
 def times(values: np.ndarray, timed: bool) -> tuple[np.ndarray, str]:
-    """Places on the axis of time and its name, µs to years; steps where time stands still."""
+    """Places on the axis of time and its name, µs to years; steps if the time is constant."""
     if not timed:
         return values / 1000.0, "thousand steps"
     largest = float(np.abs(values).max(initial=0.0))
@@ -306,7 +306,7 @@ def fragments(parts: Sequence[Part], state: MeshState) -> Any:
     ax = sheet.maps[0]
     last = pieces[-1]
     shades = np.array([*FRAGMENT_COLOURS, "#f2f0ea"], object)
-    # Dust of single elements stays pale, and so does what was not asked for.
+    # Single elements stay pale, and so does what was not requested.
     kind = np.where((last.of >= 0) & (last.elements[last.of] > 1), last.of % len(FRAGMENT_COLOURS), -1)
     _elements(ax, state, shades[kind])
     broken = np.isin(state.of_joints["state"], (blocks.BROKEN, blocks.FREE))

@@ -4,7 +4,7 @@ Damage index: length of the joints times their damage (0 before the peak, 1 brok
 the length of all joints. P21: length of broken joints per area (Dershowitz & Herda 1992, Proc. 33rd US Symp. Rock
 Mech., 323-330). Both by the lengths and areas of the mesh.
 
-Fragments are connected components of elements: two hang together where they share an edge that is no joint, or a joint
+Fragments are connected components of elements: two are connected where they share an edge that is no joint, or a joint
 that holds. Size of a fragment: diameter of the circle of its area; passing: part of the area in fragments up to a size.
 """
 
@@ -35,7 +35,7 @@ from hpcdem.post.view.moment import faces_of_joints, neighbours
 
 INTACT = 1.0
 SHARES = 0.2, 0.5, 0.8
-"""Parts of the area for which the size is told that holds as much in smaller fragments."""
+"""Fractions of the area for which the passing size is reported."""
 HEAD = ("step", "time[s]")
 MEASURES = {2: ("length", "area"), 3: ("joint_area", "volume")}
 """Columns of frames: of the size of joints and of elements, by dimensions of space."""
@@ -43,7 +43,7 @@ MEASURES = {2: ("length", "area"), 3: ("joint_area", "volume")}
 
 @dataclass(frozen=True)
 class Pieces:
-    """Fragments of a frame, the largest first: fragment of each element that is asked for (n,), -1: not asked for;
+    """Fragments of a frame, the largest first: fragment of each requested element (n,), -1: not requested;
     area [m2], in space volume [m3], elements in it (m,) each; at (m, dim): their middles [m]."""
 
     of: np.ndarray
@@ -71,7 +71,7 @@ class Pieces:
 
 @dataclass(frozen=True)
 class Cracks:
-    """Joints of a frame: how many there are, behind their strength, broken by MODES (3,); lengths of all, of those, of
+    """Joints of a frame: numbers in all, past their strength, broken by MODES (3,); lengths of all, of those, of
     these [m], in space areas [m2]; damage index; area of the elements [m2], in space volume [m3]; kinetic energy of the
     broken ones when they broke [J/m], in space [J]."""
 
@@ -116,13 +116,13 @@ class Part:
 
 
 def frames(request: Request) -> list[FrameFile]:
-    """The frames of blocks that are asked for. Raises HpcdemError if the folder cannot be read."""
+    """The requested frames of blocks. Raises HpcdemError if the folder cannot be read."""
     first, last = request.first or 0, request.last
     return [f for f in list_mesh_frames(request.folder) if f.step >= first and (last is None or f.step <= last)]
 
 
 def read(file: FrameFile, request: Request) -> MeshState:
-    """A frame, moved as asked for."""
+    """A frame, moved as requested."""
     state = read_mesh_frame(file.path, solid=True)
     state.points = state.points + np.array([request.xmove, request.ymove, 0.0])[: state.points.shape[1]]
     return state
@@ -134,7 +134,7 @@ def dim_of(file: FrameFile) -> int:
 
 
 def part(state: MeshState, request: Request, what: Sequence[str]) -> Part:
-    """Joints, and fragments if they are asked for, of a frame."""
+    """Joints, and fragments if requested, of a frame."""
     wanted = chosen(state, request)
     pieces = fragments(state, wanted) if "fragments" in what else None
     fluid = fluid_of(state, wanted) if "fluid" in what else None
@@ -147,7 +147,7 @@ def part(state: MeshState, request: Request, what: Sequence[str]) -> Part:
 
 
 def chosen(state: MeshState, request: Request) -> np.ndarray:
-    """(ne,) elements of the groups that are asked for. UsageError if no set has one of them."""
+    """(ne,) elements of the requested groups. UsageError if no set has one of them."""
     keep = np.zeros(len(state.cells), bool)
     if not request.groups:
         return ~keep
@@ -157,7 +157,7 @@ def chosen(state: MeshState, request: Request) -> np.ndarray:
         rows = [k for k, name in enumerate(names) if name in request.groups]
         keep |= np.isin(state.of_elements[column], rows)
     if not set(request.groups) & set(known):
-        raise UsageError(f"no element is of group {', '.join(request.groups)}; there is {', '.join(known) or 'none'}")
+        raise UsageError(f"no element of group {', '.join(request.groups)}; known: {', '.join(known) or 'none'}")
     return keep
 
 
@@ -183,7 +183,7 @@ def _between(state: MeshState, wanted: np.ndarray) -> np.ndarray:
     if wanted.all():
         return np.ones(len(state.joints), bool)
     lower, upper = sides(state)
-    there = np.append(wanted, True)  # the last: what was taken out
+    there = np.append(wanted, True)  # the last: removed elements
     return there[lower] & there[upper]
 
 
@@ -218,8 +218,8 @@ def _pairs(state: MeshState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Inner edges: rows of the two elements (m,), that with the lower number first, and number of its face."""
     if "node" not in state.of_points:
         raise HpcdemError(
-            f"step {state.step}: this frame is of an earlier version and does not tell which elements are neighbours; "
-            "run the model again"
+            f"step {state.step}: this frame is of an earlier version and does not record neighbouring elements: run "
+            "the model again"
         )
     node, cells = state.of_points["node"], state.cells
     count = np.where(cells[:, 3] >= 0, 4, 3)
@@ -239,7 +239,7 @@ def _within(count: np.ndarray) -> np.ndarray:
 
 
 def sides(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of the elements on both sides of each joint (nj,), the lower first; -1: it was taken out."""
+    """Rows of the elements on both sides of each joint (nj,), the lower first; -1: removed."""
     if state.points.shape[1] == 3:
         lower = faces_of_joints(state)
         other = tetrahedra.face_partners(state.of_points["node"][state.cells].astype(np.int64))[lower]
@@ -302,7 +302,7 @@ def orientation(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def parted(state: MeshState, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """How far both sides of joints in space (rows) have come apart across them and along them (n,) [m], as means of the
-    three corners; NaN where one side was taken out."""
+    three corners; NaN where one side was removed."""
     lower, node = faces_of_joints(state)[rows], state.of_points["node"].astype(np.int64)
     upper = tetrahedra.face_partners(node[state.cells])[lower]
     mine, other = (tetrahedra.face_points(state.cells, faces) for faces in (lower, np.maximum(upper, 0)))
@@ -454,7 +454,7 @@ def events_of(request: Request, files: Sequence[FrameFile]) -> Events:
         found = _in_frame(read_mesh_frame(files[-1].path, solid=True))
     keep = (found.step >= (request.first or 0)) & (request.last is None or found.step <= (request.last or 0))
     if request.groups and not files:
-        raise UsageError(f"--groups: {request.folder} has no frames of blocks, which tell the groups of elements")
+        raise UsageError(f"--groups: {request.folder} has no frames of blocks, which record the groups of elements")
     if request.groups:
         state = read_mesh_frame(files[0].path, solid=True)
         keep &= np.isin(found.joint // 4, state.of_elements["number"][chosen(state, request)])
@@ -468,7 +468,7 @@ def _in_frame(state: MeshState) -> Events:
     j = state.of_joints
     if "break_time" not in j:
         raise HpcdemError(
-            f"step {state.step}: this frame is of an earlier version and does not tell when joints broke; run the "
+            f"step {state.step}: this frame is of an earlier version and does not record when joints broke: run the "
             "model again"
         )
     rows = np.flatnonzero(j["state"] == BROKEN)
@@ -484,13 +484,15 @@ def _in_frame(state: MeshState) -> Events:
 
 
 def emitted(request: Request, files: Sequence[FrameFile]) -> Emission:
-    """Statistics of the joints that broke. HpcdemError if there are none, or if the history asked for is missing."""
+    """Statistics of the joints that broke. HpcdemError without any, or if the requested history is missing."""
     events = events_of(request, files)
     if not len(events):
         raise HpcdemError(f"emission: no joint broke in {request.folder}")
     energy = request.joule * (events.released() if request.released else events.kinetic)
     if request.released and np.isnan(energy).all():
-        raise HpcdemError(f"--energy released: {request.folder} has no {emission.TABLE}, and frames do not tell it")
+        raise HpcdemError(
+            f"--energy released: {request.folder} has no {emission.TABLE}, and frames do not record the released energy"
+        )
     magnitude = emission.magnitudes(energy)
     timed = bool(np.ptp(events.time) > 0.0)
     history = None if request.history == "none" else emission.load_history(request.folder, request.history)

@@ -81,7 +81,7 @@ def regions(state: MeshState, request: Request, wanted: np.ndarray) -> list[Regi
         middle = homes(state)[state.cells].mean(axis=1)
         rows = np.flatnonzero(wanted & ((low <= middle) & (middle <= high)).all(axis=1))
         if not len(rows):
-            raise UsageError("--box: no element that is measured has its middle in it")
+            raise UsageError("--box: no measured element has its centre in the box")
         found.append(region("", "box", rows))
     return found
 

@@ -88,5 +88,5 @@ def read_log(path: str | os.PathLike) -> np.ndarray:
         raise HpcdemError(explain(path, failure, "read")) from None
     rows = np.array([[int(w) for w in m.groups()] for m in found if m is not None], np.int64).reshape(-1, 3)
     if not len(rows):
-        raise HpcdemError(f"{os.fspath(path)}: no line tells of bonds broken in tension and in shear")
+        raise HpcdemError(f"{os.fspath(path)}: no line reports bonds broken in tension and in shear")
     return rows

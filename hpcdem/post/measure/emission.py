@@ -94,7 +94,7 @@ def read_events(path: Path) -> Events:
     columns = COLUMNS[3 if "z [m]" in head else 2]
     missing = [name for name in columns if name not in head]
     if missing:
-        raise HpcdemError(f"{path} is no table of broken joints: it has no column '{missing[0]}'")
+        raise HpcdemError(f"{path} is not a table of broken joints: column '{missing[0]}' is missing")
     place = [head.index(name) for name in columns]
     table = np.empty((len(lines) - 1, len(place)))
     for k, row in enumerate(lines[1:]):
@@ -103,7 +103,7 @@ def read_events(path: Path) -> Events:
                 raise ValueError
             table[k] = [float(row[p]) for p in place]
         except ValueError:
-            raise HpcdemError(f"{path}:{k + 2}: {len(head)} numbers are expected, not '{','.join(row)}'") from None
+            raise HpcdemError(f"{path}:{k + 2}: expected {len(head)} numbers, not '{','.join(row)}'") from None
     found = {"z": np.zeros(0)} | dict(zip(columns.values(), table.T.copy()))
     for name in ("step", "joint"):
         found[name] = found[name].astype(np.int64)
@@ -188,22 +188,22 @@ def read_history(path: Path) -> Curve:
     except OSError as failure:
         raise HpcdemError(explain(path, failure, "read")) from None
     except ValueError as problem:
-        raise HpcdemError(f"{path} is no history, or damaged: {problem}") from None
+        raise HpcdemError(f"{path} is not a history, or is damaged: {problem}") from None
     value, _, unit = head[-1].rpartition(" [")
     if head[:2] != ["step", "time [s]"] or not value or (rows.size and rows.shape[1] != 3):
-        raise HpcdemError(f"{path} is no history: its first line is not 'step,time [s],<value> [<unit>]'")
+        raise HpcdemError(f"{path} is not a history: its first line is not 'step,time [s],<value> [<unit>]'")
     step, time, values = rows.reshape(-1, 3).T
     return Curve(path.stem.removeprefix("history_"), value, unit.rstrip("]"), step.astype(np.int64), time, values)
 
 
 def load_history(folder: Path, name: str | None) -> Curve | None:
     """The history that is drawn beside the events: of this name; None: the first of a force of supports, else of a
-    stress of elements. HpcdemError if there is none of the name."""
+    stress of elements. HpcdemError for an unknown name."""
     if name is not None:
         path = folder / f"history_{name}.csv"
         if not path.is_file():
             known = ", ".join(sorted(p.stem.removeprefix("history_") for p in folder.glob("history_*.csv"))) or "none"
-            raise HpcdemError(f"there is no {path}; histories in {folder}: {known}")
+            raise HpcdemError(f"{path} not found; histories in {folder}: {known}")
         return read_history(path)
     found = [read_history(path) for path in sorted(folder.glob("history_*.csv"))]
     for begins in ("reaction", "stress"):

@@ -76,7 +76,7 @@ def _straight(places: np.ndarray, weight: np.ndarray, shortest: float) -> list[n
     """Rows of the cells of each straight band among connected cells; places (n, 2) and lengths in cells.
 
     Again and again the strip, 2 _NARROW wide, with most weight in one run, among all directions; it is widened as long
-    as half of the cells at its sides are there, and taken out with them.
+    as half of the cells at its sides exist, and removed with them.
     """
     left = np.arange(len(places))
     found: list[np.ndarray] = []

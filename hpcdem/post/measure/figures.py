@@ -103,7 +103,7 @@ def key(ax: Any, columns: int = 1, **more: Any) -> None:
 
 
 def when(stamps: Sequence[Stamp], steps: bool = False) -> tuple[np.ndarray, str]:
-    """Places on the axis of time and its name: shortening (or extension) where a wall moves, else (or if asked for)
+    """Places on the axis of time and its name: shortening (or extension) where a wall moves, else (or on request)
     thousands of steps."""
     way = np.array([s.shortening for s in stamps])
     if not steps and np.isfinite(way).all() and np.ptp(way) > 0.0:
@@ -264,7 +264,7 @@ def wallforce(curves: dict[int, Curve], pusher: Curve | None, name: str) -> Any:
         shade = LINES[k % len(LINES)]
         for ax, values in zip(axes, (curve.force[:, 0] / newton, curve.force[:, 1] / newton, curve.work / joule)):
             ax.plot(at, values, lw=0.9, color=shade, label=f"wall {wall}")
-    axis = f"way of {name} ({unit})" if ways else "time (s)"
+    axis = f"displacement of {name} ({unit})" if ways else "time (s)"
     label(axes[0], None, f"$F_x$ on the wall ({force_unit})")
     label(axes[1], None, f"$F_y$ on the wall ({force_unit})")
     label(axes[2], axis, f"work of the wall ({work_unit})")

@@ -81,7 +81,7 @@ def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grain
     x, y, r = (np.asarray(p.get(name, none), dtype=float)[order] for name in ("x", "y", "radius"))
     bad = ~np.isfinite(x + y + r)
     if bad.any():
-        raise HpcdemError(f"{path}: the place of particle {gid[order][bad][0]} is not a number")
+        raise HpcdemError(f"{path}: the position of particle {gid[order][bad][0]} is not a number")
     color = np.asarray(p.get("color", np.zeros(len(gid))), dtype=np.int64)[order]
     names = np.array([*frame.group_names, ""], dtype=object)
     row = np.asarray(p.get("group", np.full(len(gid), -1)), dtype=np.int64)[order]
@@ -125,7 +125,7 @@ def common(a: Grains, b: Grains) -> tuple[Grains, Grains]:
 
 
 def middle(walls: Walls, wall: int) -> np.ndarray:
-    """(2,): middle of a wall [m]; NaN where there is none."""
+    """(2,): middle of a wall [m], else NaN."""
     return np.mean(walls[wall], axis=0) if wall in walls else np.full(2, np.nan)
 
 

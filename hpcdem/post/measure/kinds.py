@@ -49,7 +49,8 @@ def surface_sheets(done: Done, plan: Plan) -> list[Sheet]:
 
 
 def wedge_part(scene: Scene) -> wedge.Shape | str:
-    """Shape of the wedge in front of the wall, or why there is none; x is mirrored if that pushes to the left."""
+    """Shape of the wedge in front of the wall, or the reason why it is missing; x is mirrored if the wall pushes to
+    the left."""
     bed, plan = scene.bed, scene.plan
     sign = plan.forward
     walls = {i: ((sign * a[0], a[1]), (sign * b[0], b[1])) for i, (a, b) in bed.walls.items()}
@@ -263,7 +264,7 @@ def layers_sheets(done: Done, plan: Plan) -> list[Sheet]:
 @dataclass(frozen=True)
 class Cracks:
     """Bonds of a frame; what changed since the frame before (all bonds of the first frame are new); ids of the
-    particles asked for."""
+    requested particles."""
 
     bonds: int
     change: cracks.Change
@@ -276,7 +277,7 @@ def cracks_part(scene: Scene) -> Cracks:
         before = replace(now.take(np.zeros(0, np.int64)), bonds=now.bonds[:0])
     change = cracks.change(before, now)
     gid = scene.grains.gid
-    if len(gid) < len(now):  # both ends must be asked for
+    if len(gid) < len(now):  # both ends must be requested
         broken, made = (np.isin(pairs, gid).all(axis=1) for pairs in (change.broken, change.made))
         change = cracks.Change(
             change.broken[broken], change.place[broken], change.parted[broken], change.made[made], change.lost

@@ -52,7 +52,7 @@ FRAMES = {
 
 def run(comm: Comm, log: Any, request: Request, without: Sequence[str] = ()) -> list[Path]:
     """Collective: the files that were written (on rank 0). Without `what` all that the folder allows, `without` some,
-    else exactly what is asked for. Raises HpcdemError on all ranks."""
+    else exactly what is requested. Raises HpcdemError on all ranks."""
     began = time.monotonic()
     what = [kind for kind in KINDS if kind in request.what or (not request.what and kind not in without)]
     of_blocks = on_first(comm, lambda: _of_blocks(request))
@@ -72,7 +72,7 @@ def run(comm: Comm, log: Any, request: Request, without: Sequence[str] = ()) -> 
             work = lambda: _write(kind, parts[kind], plan, final)  # noqa: B023, E731
         files, problem = on_first(comm, lambda: _tried(work, bool(request.what)))  # noqa: B023
         if problem is not None:
-            log.info(f"left out: {problem}")
+            log.info(f"skipped: {problem}")
         elif files:
             log.info(f"{kind}: {', '.join(path.name for path in files)}")
         if kind == "wedge" and files:
@@ -92,8 +92,7 @@ def _tell(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
     held, of_bed = int(final.fixed.sum()), [kind for kind in ("surface", "wedge", "tracks") if kind in what]
     if held and of_bed and held < len(final):
         log.info(
-            f"{held} particles are fixed along x and y, as rows that stand for walls: "
-            f"they do not count for {', '.join(of_bed)}"
+            f"{held} particles fixed along x and y (rows that represent walls) are ignored for {', '.join(of_bed)}"
         )
     if others := left_out(plan.request.folder):
         log.warn(others)
@@ -106,7 +105,7 @@ def _tell_of_no_wedge(log: Any, done: Done) -> None:
         (first, reason), (last, _) = flat[0], flat[-1]
         at = f"at step {first.step}" if len(flat) == 1 else f"in {len(flat)} frames, steps {first.step} to {last.step}"
         of = "" if len(flat) == 1 else f"; at step {first.step}"
-        log.info(f"wedge: no wedge yet {at}{of}: {reason}; the column `note` of wedge.csv says it of each frame")
+        log.info(f"wedge: no wedge yet {at}{of}: {reason}; see the column `note` of wedge.csv for each frame")
 
 
 def _tried(work: Callable[[], list[Path]], must: bool) -> tuple[list[Path], str | None]:
@@ -177,12 +176,12 @@ def _one_field(parts: list[dict[str, Any]]) -> None:
 
 
 def _of_blocks(request: Request) -> list[str]:
-    """What can be measured of blocks in the folder, of what is asked for. Raises HpcdemError where a word asks for
-    blocks, and there are none."""
+    """The requested measurements that are possible for blocks in the folder. Raises HpcdemError where a word requires
+    blocks that are missing."""
     frames = blocks.frames(request)
     solid = bool(frames) and blocks.dim_of(frames[-1]) == 3
     if request.box is not None and not solid:
-        raise UsageError("--box: only frames of blocks in three dimensions are measured in a box")
+        raise UsageError("--box: supported only for blocks in three dimensions")
     if frames:
         others = {*BLOCK_KINDS, *SOLID_KINDS} - {*(SOLID_KINDS if solid else BLOCK_KINDS)} - {*KINDS}
         for kind in request.what:
@@ -193,7 +192,7 @@ def _of_blocks(request: Request) -> list[str]:
         if request.colors and not list_frames(request.folder):
             raise UsageError("--colors: blocks have groups, no colours")
         if request.box is not None and request.what and "regions" not in request.what:
-            raise UsageError("--box goes with regions")
+            raise UsageError("--box requires regions")
         last = blocks.read(frames[-1], request)
         missing = [] if fluid.there(last) else ["fluid"]
         missing += [] if len(last.joints) else ["cracks", "emission"]
@@ -205,14 +204,14 @@ def _of_blocks(request: Request) -> list[str]:
     there["emission"] = bool(frames) or (request.folder / emission.TABLE).is_file()
     for kind in request.what:
         if kind in (*BLOCK_KINDS, *SOLID_KINDS) and kind not in KINDS and not there[kind]:
-            raise HpcdemError(f"{kind}: {request.folder} holds no frames of blocks of these steps")
+            raise HpcdemError(f"{kind}: {request.folder} contains no frames of blocks of these steps")
     if any(there.values()) and request.colors and not list_frames(request.folder):
         raise UsageError("--colors: blocks have groups, no colours")
     return [kind for kind in BLOCK_KINDS if there[kind] and (kind in request.what or not request.what)]
 
 
 def _blocks(comm: Comm, log: Any, request: Request, what: Sequence[str]) -> list[Path]:
-    """Collective: what is asked for of blocks."""
+    """Collective: the requested measurements of blocks."""
     files = on_first(comm, lambda: blocks.frames(request))
     if files:
         on_first(comm, lambda: blocks.chosen(blocks.read(files[0], request), request))  # are there such groups?
@@ -237,7 +236,7 @@ def _blocks(comm: Comm, log: Any, request: Request, what: Sequence[str]) -> list
         work = lambda: _write_blocks(kind, request, files, parts)  # noqa: B023, E731
         paths, problem = on_first(comm, lambda: _tried(work, bool(request.what)))  # noqa: B023
         if problem is not None:
-            log.info(f"left out: {problem}")
+            log.info(f"skipped: {problem}")
         elif paths:
             log.info(f"{kind}: {', '.join(path.name for path in paths)}")
         written += paths
@@ -255,12 +254,12 @@ def _write_blocks(kind: str, request: Request, files: list[FrameFile], parts: li
         draw = lambda: block_figures.emitted(found)  # noqa: E731
     elif kind == "regions":
         if not any(part.regions for part in parts):
-            raise _NothingThere(f"regions: {request.folder} has no elements that are asked for")
+            raise _NothingThere(f"regions: {request.folder} has none of the requested elements")
         sheets = bodies.regions_sheets(parts)
         draw = lambda: block_figures.regions(parts)  # noqa: E731
     elif kind == "displacement":
         if not any(part.surface is not None and len(part.surface.node) for part in parts):
-            raise _NothingThere(f"displacement: {request.folder} has no elements that are asked for")
+            raise _NothingThere(f"displacement: {request.folder} has none of the requested elements")
         sheets = bodies.displacement_sheets(parts)
         draw = lambda: block_figures.displacement(parts)  # noqa: E731
     elif kind == "fluid":
@@ -317,7 +316,7 @@ def _refuse(kind: str, done: Done, plan: Plan) -> None:
     where = plan.request.folder
     some = [part for _, part in done if part is not None and (kind != "tracks" or len(part))]
     if kind == "faults" and not some:
-        names = "the sections in ss/data are of other frames; with --increment the frames themselves are compared"
+        names = "the sections in ss/data belong to other frames: use --increment to compare the frames"
         raise _NothingThere(f"faults: {names if plan.sections else f'{where} has only one frame, and no sections'}")
     if kind == "cracks" and not any(len(part.change.made) for part in some):
         raise _NothingThere(f"cracks: no frame in {where} has bonds")
@@ -326,7 +325,7 @@ def _refuse(kind: str, done: Done, plan: Plan) -> None:
 def _wallforce(request: Request) -> list[Path]:
     path = request.folder / "walls.csv"
     if not path.exists():
-        raise _NothingThere(f"wallforce: there is no {path}")
+        raise _NothingThere(f"wallforce: {path} not found")
     found = curves.read_walls(path, request.first, request.last)
     if not found:
         raise _NothingThere(f"wallforce: {path} has no rows of these steps")
@@ -351,7 +350,7 @@ def _wallforce(request: Request) -> list[Path]:
 
 
 def write_sheet(folder: Path, sheet: Sheet) -> Path:
-    """Write a table as CSV, complete or not at all; numbers with ten digits, nothing where there is none."""
+    """Write a table as CSV, complete or not at all; numbers with ten digits, empty where missing."""
     path = folder / f"{sheet.name}.csv"
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

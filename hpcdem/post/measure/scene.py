@@ -1,4 +1,4 @@
-"""What is asked for, what holds for all frames of a folder, and what is known of one frame."""
+"""The request, what holds for all frames of a folder, and what is known of one frame."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SOLID_KINDS = ("regions", "displacement", "cracks", "fragments", "emission", "fl
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked for. Lengths in m.
+    """The request. Lengths in m.
 
     what: of KINDS, all that the folder allows if empty; walls: ids, the first one is that which pushes; groups, colors:
     only particles of these; first, last: steps, by default from the
@@ -84,7 +84,7 @@ class Request:
         return self.color_names.get(int(number), str(number))
 
     def chosen(self, g: Grains) -> np.ndarray:
-        """(n,): which particles are of the groups and colours that are asked for."""
+        """(n,): which particles have the requested groups and colours."""
         keep = np.ones(len(g), bool)
         if self.groups:
             keep &= np.isin(g.group.astype(str), self.groups)
@@ -108,7 +108,7 @@ class Plan:
     followed: np.ndarray
 
     def shortening(self, g: Grains) -> float:
-        """How far the wall that pushes has come [m]; NaN where there is none."""
+        """Displacement of the pushing wall [m], else NaN."""
         return float("nan") if self.wall is None else self.forward * (float(middle(g.walls, self.wall)[0]) - self.start)
 
 
@@ -119,7 +119,7 @@ def make_plan(request: Request, what: Sequence[str]) -> tuple[Plan, Grains]:
         between = (f" from step {request.first}" if request.first else "") + (
             f" to step {request.last}" if request.last is not None else ""
         )
-        raise HpcdemError(f"{request.folder} holds no frames (all_<step>.vtkhdf or all_<step>.dat){between}")
+        raise HpcdemError(f"{request.folder} contains no frames (all_<step>.vtkhdf or all_<step>.dat){between}")
     wall = _wall(request, frames)
     if request.first is None and wall is not None:
         frames = frames[when_it_moves(frames, wall) :]
@@ -142,12 +142,12 @@ def _wall(request: Request, frames: Sequence[FrameFile]) -> int | None:
     wall = request.walls[0]
     if wall not in first:
         ids = ", ".join(map(str, sorted(first))) or "none"
-        raise UsageError(f"--wall {wall}: no such wall in {frames[0].path.name}; its walls: {ids}")
+        raise UsageError(f"--wall {wall}: unknown wall in {frames[0].path.name}; its walls: {ids}")
     return wall
 
 
 def _with_particles(request: Request, frames: Sequence[FrameFile]) -> Grains:
-    """The first of these frames that has particles that are asked for."""
+    """The first of these frames that has requested particles."""
     groups: set[str] = set()
     colors: set[int] = set()
     for file in frames:
@@ -159,13 +159,14 @@ def _with_particles(request: Request, frames: Sequence[FrameFile]) -> Grains:
     if not colors:
         raise HpcdemError(f"no frame in {request.folder} has particles")
     raise UsageError(
-        f"no particle in {request.folder} is of the groups and colours that are asked for; groups: "
-        f"{', '.join(sorted(filter(None, groups))) or 'none'}; colours: {', '.join(map(request.color, sorted(colors)))}"
+        f"no particle in {request.folder} has the requested groups and colours; groups: "
+        f"{', '.join(sorted(filter(None, groups))) or 'none'}; colours: "
+        f"{', '.join(map(request.color, sorted(colors)))}"
     )
 
 
 def look(file: FrameFile, request: Request, tables: tuple[str, ...] = ()) -> Grains:
-    """A frame, moved as asked for."""
+    """A frame, moved as requested."""
     return grains(file.path, file.ini, tables).moved(request.xmove, request.ymove)
 
 
@@ -188,7 +189,7 @@ def bed_of(g: Grains) -> Grains:
 
 @dataclass
 class Scene:
-    """One frame: all its particles, and those asked for; the frame before; its number and what holds for all."""
+    """One frame: all its particles, and the requested ones; the frame before; its number and what holds for all."""
 
     file: FrameFile
     number: int
@@ -198,12 +199,12 @@ class Scene:
 
     @cached_property
     def grains(self) -> Grains:
-        """The particles asked for."""
+        """The requested particles."""
         return self.all.take(self.plan.request.chosen(self.all))
 
     @cached_property
     def bed(self) -> Grains:
-        """Those asked for without flying bits and fixed ones."""
+        """The requested ones without detached pieces and fixed ones."""
         return bed_of(self.grains)
 
     @property

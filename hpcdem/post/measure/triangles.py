@@ -89,7 +89,7 @@ def strain(
     points = np.column_stack([x, y])
     corners = triangles(x, y, reach)
     if not len(corners):
-        raise ValueError("no grains are near one another")
+        raise ValueError("no grains are neighbours")
     p = points[corners]
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     double = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]

@@ -55,16 +55,16 @@ def read_walls(path: str | os.PathLike, first: int | None = None, last: int | No
     try:
         with open(path, encoding="utf-8") as file:
             if file.readline().strip() != HEADER:
-                raise HpcdemError(f"{os.fspath(path)} is no walls.csv of hpcdem: its first line is not '{HEADER}'")
+                raise HpcdemError(f"{os.fspath(path)} is not a walls.csv of hpcdem: its first line is not '{HEADER}'")
             lines = [line for line in file if line.strip()]
     except OSError as failure:
         raise HpcdemError(explain(path, failure, "read")) from None
     if lines and not lines[-1].endswith("\n"):
-        lines.pop()  # a run that still goes on, or was cut off, is writing it
+        lines.pop()  # a run is still writing it, or was interrupted
     try:
         rows = np.array([[float(word) for word in line.split(",")] for line in lines]).reshape(len(lines), 9)
     except ValueError:
-        raise HpcdemError(f"{os.fspath(path)}: a row does not consist of nine numbers") from None
+        raise HpcdemError(f"{os.fspath(path)}: expected nine numbers in each row") from None
     rows = rows[(rows[:, 0] >= (first or 0)) & (rows[:, 0] <= (np.inf if last is None else last))]
     curves = {}
     for wall in np.unique(rows[:, 2]):

@@ -20,7 +20,7 @@ ROUGH = 3.0
 deviation of the surface in front. The highest and the farthest point of a rough level surface lie anywhere, but part
 nothing."""
 LEAST_FRONT = 5
-"""Surface points from the toe on; where there are fewer, the fall from crest to toe is held against the roughness
+"""Surface points from the toe on; where there are fewer, the fall from crest to toe is compared with the roughness
 there."""
 
 
@@ -36,7 +36,7 @@ class Wedge:
 def wedge(xs: np.ndarray, ys: np.ndarray, trim: float = 0.2) -> Wedge:
     """Wedge of a surface by the rule in the head of this file.
 
-    Raises ValueError with the reason where there is none: nothing falls away from the crest, or by no more than the
+    Raises ValueError with the reason if it is missing: nothing falls away from the crest, or by no more than the
     surface is rough.
     """
     crest = int(np.argmax(ys))
@@ -111,7 +111,7 @@ def base(
     """(rise, height at x = 0) of the straight base under the stretch from `left` to `right`.
 
     The wall on which the grains lie there: one flatter than 45 degrees under the whole stretch, at most one column away
-    from their lowest points. Where there is none, the line fitted to the lowest points of the grains in each column.
+    from their lowest points. Otherwise the line fitted to the lowest points of the grains in each column.
     """
     some = (x >= left - cell) & (x <= right + cell)
     if not some.any():

@@ -35,7 +35,7 @@ DPI = 300
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked for. folder: of the frames, with ss/data in it; kinds: panels from top to bottom; colormap: a file,
+    """The request. folder: of the frames, with ss/data in it; kinds: panels from top to bottom; colormap: a file,
     or invar or invar2, for both strains, None: invar2 for the distortional one and invar in per cent for the volumetric
     one; sigma1: square [m] and scale of its bars; width [cm]; x, y: where the axes begin and end [m], None where the
     model does; maxstress [MPa]."""
@@ -144,10 +144,10 @@ def _of_this_run(folder: Path, log: Any) -> list[Path]:
     found = section_files(folder / "ss" / "data")
     files = [path for path in found if path.stem not in earlier]
     if len(files) < len(found):
-        log.warn(f"of {len(found)} sections {len(found) - len(files)} are left out: {left_out(folder)}")
+        log.warn(f"{len(found) - len(files)} of {len(found)} sections are ignored: {left_out(folder)}")
     old = [path.stem for path in files if _is_newer(folder, path)]
     if old:
-        log.warn(f"{len(old)} frames have been written again since `hpcdem -s`, {old[0]} first: run it again")
+        log.warn(f"{len(old)} frames are newer than their sections, first {old[0]}: run `hpcdem -s` again")
     if not files:
         raise HpcdemError(f"{folder / 'ss' / 'data'} holds sections of an earlier run only: run `hpcdem -s {folder}`")
     return files
@@ -160,7 +160,7 @@ def _is_newer(folder: Path, section: Path) -> bool:
 
 
 def section_files(folder: Path) -> list[Path]:
-    """The sections in a folder in the order of time, as `frames.list_frames`. Raises HpcdemError if there are none."""
+    """The sections in a folder in the order of time, as `frames.list_frames`. Raises HpcdemError without any."""
     try:
         names = os.listdir(folder)
     except FileNotFoundError:
@@ -256,12 +256,14 @@ def _name_changes(outlines: Sequence[survey.Outline], request: Request, log: Any
     """Say where particles came or went although the options do not tell of it."""
     for before, o in pairwise(outlines):
         if o.came and not request.addball:
-            log.warn(f"{o.came} particles were added between {before.name} and {o.name}: say --addball ON if meant")
+            log.warn(f"{o.came} particles were added between {before.name} and {o.name}: add --addball ON if intended")
         if o.went and not request.delball:
-            log.warn(f"{o.went} particles were removed between {before.name} and {o.name}: say --delball ON if meant")
+            log.warn(
+                f"{o.went} particles were removed between {before.name} and {o.name}: add --delball ON if intended"
+            )
 
 
 def refuse(request: Request) -> None:
     """UsageError for what cannot be drawn."""
     if request.sigma1 and all(kind.key != panels.DISTORTIONAL.key for kind in request.kinds):
-        raise UsageError("zdemss: --sigma1 ON draws over the distortional strain: it cannot go with --strainshear OFF")
+        raise UsageError("zdemss: --sigma1 ON needs the distortional strain: it cannot be used with --strainshear OFF")

@@ -84,8 +84,8 @@ def common_view(outlines: Sequence[Outline], x: Limits = (None, None), y: Limits
     for axis, low, high in (("x", left, right), ("y", bottom, top)):
         if not high > low:
             raise UsageError(
-                f"zdemss: nothing is left to draw between {axis} = {low / KM:g} km and {axis} = {high / KM:g} km: "
-                f"change --{axis}lim or --{axis}max"
+                f"zdemss: nothing to draw between {axis} = {low / KM:g} km and {axis} = {high / KM:g} km: change "
+                f"--{axis}lim or --{axis}max"
             )
     return View(left, right, bottom, top)
 

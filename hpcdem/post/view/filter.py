@@ -68,22 +68,22 @@ def amount(text: str, fields: Mapping[str, np.ndarray], said: str) -> Any:
 
 
 def _lines(text: str) -> list[str]:
-    """Lines `name = ...`, and the expression behind them, which may go on over lines. HpcdemError."""
+    """Lines `name = ...`, and the expression behind them, which may span lines. HpcdemError."""
     rest = [line for line in text.split("\n") if line.strip()]
     lines = []
     while len(rest) > 1 and _GIVEN.match(rest[0]):
         lines.append(rest.pop(0))
     if len(text) > LONGEST:
-        raise HpcdemError(f"filter: {len(text)} characters, at most {LONGEST} are read")
+        raise HpcdemError(f"filter: {len(text)} characters, at most {LONGEST} allowed")
     if any(map(_GIVEN.match, rest)):
-        raise refusal(text, "names come first, and a comparison such as r < 3 at the end")
+        raise refusal(text, "expected names first and a comparison such as r < 3 at the end")
     return [*lines, " ".join(rest)]
 
 
 def parsed(text: str) -> ast.expr:
     """The expression as a tree. HpcdemError for what is none, or too long."""
     if len(text) > LONGEST:
-        raise HpcdemError(f"filter: {len(text)} characters, at most {LONGEST} are read")
+        raise HpcdemError(f"filter: {len(text)} characters, at most {LONGEST} allowed")
     try:
         return ast.parse(_without_range(text.strip()), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -145,7 +145,7 @@ class _Range:
             advice = "; frames have no layers: element group 'name' range geometry-... first, and then group 'name'"
         known = "x, y, z, in-circle, not, id, group, set"
         raise refusal(
-            self.text, f"'{word[:30]}' is no word of a range that a frame can answer: {known}{advice}"
+            self.text, f"'{word[:30]}' is not a range word for frames; known: {known}{advice}"
         )  # fmt: skip
 
     def _circle(self) -> str:
@@ -154,7 +154,7 @@ class _Range:
             numbers.append(number)
         *centre, radius = numbers
         if len(numbers) > 4:
-            raise refusal(self.text, "in-circle takes a centre and a radius")
+            raise refusal(self.text, "in-circle needs a centre and a radius")
         square = " + ".join(f"(({axis}) - ({at})) * (({axis}) - ({at}))" for axis, at in zip("xyz", centre))
         return f"{square} <= ({radius}) * ({radius})"
 
@@ -173,7 +173,7 @@ class _Range:
 
 
 def refusal(text: str, why: str) -> HpcdemError:
-    """What is said about an expression."""
+    """The message about an expression."""
     return HpcdemError(f"filter '{text[:60]}': {why}")
 
 
@@ -184,7 +184,7 @@ class _Evaluation:
     def value(self, node: ast.expr, depth: int) -> Any:
         """A number, or an array of a value per object."""
         if depth > DEEPEST:
-            raise refusal(self.text, f"more than {DEEPEST} things within each other")
+            raise refusal(self.text, f"more than {DEEPEST} nested levels")
         deeper = depth + 1
         with np.errstate(all="ignore"):
             match node:
@@ -212,7 +212,7 @@ class _Evaluation:
                     return self._compared(left, ops, others, deeper)
                 case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                     return self._called(name, arguments, deeper)
-        raise refusal(self.text, f"'{ast.unparse(node)[:30]}' is nothing that a filter can be made of")
+        raise refusal(self.text, f"'{ast.unparse(node)[:30]}' is not allowed in a filter")
 
     def _number(self, number: float) -> float:
         try:
@@ -226,13 +226,13 @@ class _Evaluation:
     def _amount(self, node: ast.expr, depth: int) -> Any:
         found = self.value(node, depth)
         if np.asarray(found).dtype == bool:
-            raise refusal(self.text, f"'{ast.unparse(node)[:30]}' is true or false, a number was expected")
+            raise refusal(self.text, f"'{ast.unparse(node)[:30]}' is true or false, expected a number")
         return found
 
     def _truth(self, node: ast.expr, depth: int) -> Any:
         found = self.value(node, depth)
         if np.asarray(found).dtype != bool:
-            raise refusal(self.text, f"'{ast.unparse(node)[:30]}' is a number, a comparison was expected")
+            raise refusal(self.text, f"'{ast.unparse(node)[:30]}' is a number, expected a comparison")
         return found
 
     def _compared(self, left: ast.expr, ops: list[ast.cmpop], others: list[ast.expr], depth: int) -> Any:
@@ -251,13 +251,13 @@ class _Evaluation:
                 if isinstance(node, ast.Name) or (isinstance(node, ast.Constant) and isinstance(node.value, str))
             ]
             if len(words) != len(arguments) or len(words) not in (1, 2):
-                raise refusal(self.text, "group(NAME) or group(NAME, SET) takes names")
+                raise refusal(self.text, "expected names in group(NAME) or group(NAME, SET)")
             return self.groups(words[0], words[1] if len(words) == 2 else "")
         if name not in FUNCTIONS:
-            raise refusal(self.text, f"there is no function {name}; there is {', '.join([*FUNCTIONS, GROUP])}")
+            raise refusal(self.text, f"unknown function {name}; known: {', '.join([*FUNCTIONS, GROUP])}")
         count, function = FUNCTIONS[name]
         if len(arguments) != count:
-            raise refusal(self.text, f"{name} takes {count} value{'s' * (count > 1)}, not {len(arguments)}")
+            raise refusal(self.text, f"{name} needs {count} value{'s' * (count > 1)}, not {len(arguments)}")
         return function(*(self._amount(node, depth) for node in arguments))
 
     def _field(self, name: str) -> np.ndarray:
@@ -265,4 +265,4 @@ class _Evaluation:
             return self.fields[name]
         except KeyError:
             known = ", ".join(self.fields)
-            raise refusal(self.text, f"there is no field {name}; there is {known}") from None
+            raise refusal(self.text, f"unknown field {name}; known: {known}") from None

@@ -72,7 +72,7 @@ class Layer(_Table):
         if self.span is not None and not self.span[0] < self.span[1]:
             raise ValueError(f"limits: {self.span[0]:g} is not below {self.span[1]:g}")
         if self.log and self.span is not None and self.span[0] <= 0.0:
-            raise ValueError(f"limits: with log both are above 0, not {self.span[0]:g}")
+            raise ValueError(f"limits: with log both must be above 0, not {self.span[0]:g}")
         return self
 
 
@@ -95,7 +95,7 @@ class ModelView(_Table):
     @model_validator(mode="after")
     def _a_part(self) -> ModelView:
         if self.camera is not None and not (self.camera[0] < self.camera[1] and self.camera[2] < self.camera[3]):
-            raise ValueError("camera: expected left, right, bottom, top with left below right and bottom below top")
+            raise ValueError("camera: expected left, right, bottom, top with left < right and bottom < top")
         for word, read in (("eye", eye_of), ("section", section_of)):
             if word == "eye" or self.section:
                 try:
@@ -105,7 +105,7 @@ class ModelView(_Table):
         labels = [layer.label for layer in self.layers]
         for label in labels:
             if labels.count(label) > 1:
-                raise ValueError(f"layers: two are called '{label}': give one of them a name")
+                raise ValueError(f"layers: two have the name '{label}': rename one of them")
         return self
 
     def layer(self, label: str) -> Layer | None:
@@ -155,7 +155,7 @@ def _wrong(errors: Sequence[Mapping[str, Any]], given: Mapping[str, Any]) -> str
         return f"{where}{rule}"
     if first["type"] == "extra_forbidden":
         table = "layer" if known is Layer.model_fields else "view"
-        return f"{where.removesuffix(': ')} is no word of a {table}{hint(word, known)}"
+        return f"{where.removesuffix(': ')} is not a word of a {table}{hint(word, known)}"
     read = first["input"]
     if first["type"] == "too_long":
         return f"{where}{len(read)}, {validation.expected(first)}"
@@ -179,13 +179,13 @@ def read_view(path: str | os.PathLike) -> ModelView:
     except OSError as failure:
         raise HpcdemError(explain(Path(path), failure, "read")) from None
     except UnicodeDecodeError:
-        raise HpcdemError(f"{os.fspath(path)} is no view: it is not text") from None
+        raise HpcdemError(f"{os.fspath(path)} is not a view: it is not text") from None
     try:
         given = json.loads(text)
     except (ValueError, RecursionError) as problem:
-        raise HpcdemError(f"{os.fspath(path)} is no view: {problem}") from None
+        raise HpcdemError(f"{os.fspath(path)} is not a view: {problem}") from None
     if not isinstance(given, dict) or given.pop("view", None) != VERSION:
-        raise HpcdemError(f'{os.fspath(path)} is no view: expected "view": {VERSION} in a JSON object')
+        raise HpcdemError(f'{os.fspath(path)} is not a view: expected "view": {VERSION} in a JSON object')
     return view_of(given, os.fspath(path))
 
 

@@ -1,4 +1,4 @@
-"""What a frame holds, as kinds of objects with fields. Columns are read when they are asked for, and only these."""
+"""What a frame holds, as kinds of objects with fields. Columns are read when they are needed, and only these."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ OF_LENGTHS = ("flow_rate", "membrane", "transverse", "bending")
 KEPT = 40e6
 """Bytes of columns of a kind of object that are kept: those of the colours on show, and a few more."""
 CHUNK = 1 << 16
-"""Rows that are looked at at a time."""
+"""Rows processed at a time."""
 PARTS = {
     "x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "middle", "min", "mean", "mises", "largest",
     "smallest", "first", "last", "shear",
@@ -81,7 +81,7 @@ class Objects:
     """All objects of a kind. shape: discs (centres (n, 2), radii (n,)), polygons (points (k, 2), cells (n, 4), with -1
     in the fourth column of triangles), lines (ends (n, 2, 2)) or spots (places (n, 2)); in space tetrahedra (points
     (k, 3), cells (n, 4), the face (4 n,) that each of their faces lies on, or -1), faces (points (k, 3), cells (n, 4)
-    as polygons), rods (ends (n, 2, 3)) or balls (places (n, 3)), read when it is asked for; fields: (n,) by name;
+    as polygons), rods (ends (n, 2, 3)) or balls (places (n, 3)), read when it is needed; fields: (n,) by name;
     vectors: (n, 2), in space (n, 3), by name; names: of the values of an integer field; number: the field by which the
     program numbers them; slow: fields that take a pass over other tables."""
 
@@ -139,8 +139,8 @@ class Objects:
         return (stem, "xyz".index(axis)) if there else ("", 0)
 
     def lack(self, name: str, label: str) -> HpcdemError:
-        """What is said about a field that is not there."""
-        return HpcdemError(f"{label} have no field {name} in this frame; they have {', '.join(self.known())}")
+        """The message about a missing field."""
+        return HpcdemError(f"{label} have no field {name} in this frame; known: {', '.join(self.known())}")
 
     def has(self, name: str) -> bool:
         """Whether there is a field, a vector or a component of this name."""
@@ -163,7 +163,7 @@ class Objects:
         return [name for name in every if name not in self.fields]
 
     def waiting(self) -> set[str]:
-        """Slow fields that nobody has asked for yet."""
+        """Slow fields that were not used yet."""
         return {name for name in self.slow if isinstance(self.fields, Columns) and not self.fields.was_read(name)}
 
 
@@ -206,7 +206,7 @@ class Moment:
     def of(self, name: str) -> Objects:
         """The objects of a kind. HpcdemError that names what there is."""
         if name not in self.objects:
-            raise HpcdemError(f"this frame has no {name}; it has {', '.join(self.objects) or 'nothing'}")
+            raise HpcdemError(f"this frame has no {name}; it has {', '.join(self.objects) or 'no objects'}")
         return self.objects[name]
 
     def extent(
@@ -493,7 +493,7 @@ def neighbours(state: MeshState) -> np.ndarray:
     from hpcdem.post.blocks import BROKEN, FREE
 
     if "node" not in state.of_points:
-        raise HpcdemError("this frame does not tell which elements are neighbours")
+        raise HpcdemError("this frame does not record neighbouring elements")
     partner = tetrahedra.face_partners(state.of_points["node"][state.cells].astype(np.int64))
     if len(state.joints):
         now = state.of_joints["state"]

@@ -154,7 +154,7 @@ STILL = 1e-9
 
 def default_view(moment: Moment) -> ModelView:
     """Everything that the frame has, as it is usually shown: discs by their colours, elements by what has happened to
-    them (`telling`), channels by the pressure in them, joints by the way they broke; `HIDDEN` is there, and hidden.
+    them (`telling`), channels by the pressure in them, joints by mode; `HIDDEN` is there, and hidden.
     Rods and shells shine through the elements around them. Of many frames the last one says what is shown in all of
     them."""
     shells = moment.dim == 3 and "liners" in moment.objects
@@ -217,7 +217,7 @@ def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None
     if on is not None:
         objects = moment.of(on)
         if not any(layer.object == on for layer in view.layers):
-            raise HpcdemError(f"the view shows no {on}")
+            raise HpcdemError(f"the view does not show {on}")
         raise objects.lack(name, on)
     known = "; ".join(f"{kind}: {', '.join(objects.known())}" for kind, objects in moment.objects.items())
     near = hint(name, [word for objects in moment.objects.values() for word in objects.known()])
@@ -235,13 +235,13 @@ def adjusted(
         moment.of(on)
         labels = [layer.label for layer in view.layers if layer.object == on]
         if not labels:
-            raise HpcdemError(f"the view shows no {on}")
-        plain = {"field": ""} if looks.get("colour") else {}  # in the place of the field of the default view
+            raise HpcdemError(f"the view does not show {on}")
+        plain = {"field": ""} if looks.get("colour") else {}  # instead of the field of the default view
         for label in labels:
             view = view.with_layer(label, visible=True, **plain, **looks)
     elif looks:
         word = "range" if "limits" in looks else next(iter(looks))
-        raise UsageError(f"{word} goes with field or object, which say of what")
+        raise UsageError(f"{word} requires field or object")
     return view.changed(**more) if more else view
 
 
@@ -262,7 +262,7 @@ def turn_of(moment: Moment, view: ModelView) -> np.ndarray | None:
         return space.turn_of(eye_of(view.eye))
     for word in ("eye", "section"):
         if getattr(view, word) != ModelView.model_fields[word].default:
-            raise HpcdemError(f"{word} is for three dimensions; this frame has two")
+            raise HpcdemError(f"{word} requires three dimensions; this frame has two")
     return None
 
 
@@ -312,7 +312,7 @@ def chosen_rows(moment: Moment, layer: Layer, only: np.ndarray | None = None) ->
         mask &= chosen(layer.filter, objects.count, _Words(objects), lambda g, s: _members(objects, layer, g, s))
     if only is not None:
         if objects.number not in objects.fields:
-            raise HpcdemError(f"range: {layer.object} have no numbers by which they could be chosen")
+            raise HpcdemError(f"range: {layer.object} have no numbers to select by")
         mask &= np.isin(objects.fields[objects.number], only)
     return np.flatnonzero(mask)
 
@@ -346,7 +346,7 @@ class _Words(Mapping[str, np.ndarray]):
 def _members(objects: Objects, layer: Layer, group: str, set_name: str) -> np.ndarray:
     sets = {k.removeprefix("group_"): k for k in objects.names}
     if set_name and set_name not in sets:
-        raise refusal(layer.filter, f"there is no set {set_name}; there is {', '.join(sets) or 'none'}")
+        raise refusal(layer.filter, f"unknown set {set_name}; known: {', '.join(sets) or 'none'}")
     found = np.zeros(objects.count, bool)
     named = False
     for short, column in sets.items():
@@ -355,7 +355,7 @@ def _members(objects: Objects, layer: Layer, group: str, set_name: str) -> np.nd
             found |= np.asarray(objects.fields[column]) == objects.names[column].index(group)
     if not named:
         known = sorted({name for names in objects.names.values() for name in names})
-        raise refusal(layer.filter, f"there is no group {group}; there is {', '.join(known) or 'none'}")
+        raise refusal(layer.filter, f"unknown group {group}; known: {', '.join(known) or 'none'}")
     return found
 
 
@@ -561,8 +561,7 @@ def _one_colour(result: Painted, colour: str) -> None:
 
 
 def _as_usual(result: Painted, objects: Objects) -> None:
-    """Particles and walls in the manual's colours, clumps each in its own, elements by their group, joints by the way
-    they broke."""
+    """Particles and walls in the manual's colours, clumps each in its own, elements by their group, joints by mode."""
     name, rows = result.layer.object, result.rows
     if name in ("particles", "walls") and "color" in objects.fields:
         result.shades, result.kind = colours.RGB, colours.numbers(objects.fields["color"])[rows]
@@ -594,7 +593,7 @@ def _arrows(moment: Moment, objects: Objects, result: Painted, seen: View) -> tu
     layer, rows = result.layer, result.rows
     if layer.vectors not in objects.vectors:
         known = ", ".join(objects.vectors) or "none"
-        raise HpcdemError(f"{layer.object} have no vectors {layer.vectors} in this frame; there is {known}")
+        raise HpcdemError(f"{layer.object} have no vectors {layer.vectors} in this frame; known: {known}")
     if objects.dim == 3:
         from hpcdem.post.view import space
 

@@ -237,7 +237,7 @@ def _triangle(x0, y0, x1, y1, x2, y2, red, green, blue, which, colours, layer, r
 @njit(cache=True, nogil=True, error_model="numpy")
 def _facet(x, y, z, p, q, r, red, green, blue, which, tri, near, face, colours, layer, row, number, opacity):
     """Pixels whose middles lie in a triangle of the points p, q, r, where nothing is nearer: x, y [pixels], z towards
-    the eye. One that lets light through hides nothing, and is told of a pixel only where there is nothing else."""
+    the eye. One that lets light through hides nothing, and is reported for a pixel only where there is nothing else."""
     h, w = layer.shape
     x0, y0, z0, x1, y1, z1, x2, y2, z2 = x[p], y[p], z[p], x[q], y[q], z[q], x[r], y[r], z[r]
     low_x, high_x = min(x0, x1, x2), max(x0, x1, x2)
@@ -275,7 +275,7 @@ def _facet(x, y, z, p, q, r, red, green, blue, which, tri, near, face, colours, 
 @njit(cache=True, nogil=True, error_model="numpy")
 def faces(x, y, z, cells, order, kind, rows, shades, light, near, face, first, target, number, opacity):
     """Triangles and quads (m, 4) of points x, y [pixels], z towards the eye, in this order (m,); kind (m,) of shades
-    (c, 3), made darker by light (m,); rows (m,): what is told of them; near, face (h, w): depth and number, from
+    (c, 3), made darker by light (m,); rows (m,): what is reported of them; near, face (h, w): depth and number, from
     `first` on, of what each pixel shows."""
     colours, layer, row = target
     for n in range(len(order)):

@@ -162,7 +162,7 @@ class _Reader:
         for word in _keywords(self.path, self.files):
             self._take(word)
         if not any(scope.nodes for scope in (self.root, *self.parts.values(), *self.instances.values())):
-            raise HpcdemError(f"{self.path}: this is no Abaqus input file with points: nothing stands below *NODE")
+            raise HpcdemError(f"{self.path}: not an Abaqus input file with points: *NODE has no data")
         return self._whole()
 
     # ---- keyword by keyword ------------------------------------------------------------------------------------
@@ -171,12 +171,13 @@ class _Reader:
         name = word.name
         if name in REFUSED:
             raise HpcdemError(
-                f"{word.line.where}: *{name} {REFUSED[name]}, which is not read; write points and elements out"
+                f"{word.line.where}: *{name} {REFUSED[name]}, which is not supported: write points and elements "
+                "explicitly"
             )
         if name == "PART":
             part = word.get("NAME")
             if part.upper() in self.parts:
-                raise HpcdemError(f"{word.line.where}: part {part} is there already")
+                raise HpcdemError(f"{word.line.where}: part {part} is defined twice")
             self.scope = self.parts[part.upper()] = Scope(part)
         elif name == "ASSEMBLY":
             self.scope, self.assembled = self.root, True
@@ -198,13 +199,15 @@ class _Reader:
     def _instance(self, word: Keyword) -> None:
         name = word.get("NAME")
         if "LIBRARY" in word.parameters:
-            raise HpcdemError(f"{word.line.where}: instance {name} comes from a result (LIBRARY), which is not read")
+            raise HpcdemError(
+                f"{word.line.where}: instance {name} comes from a result (LIBRARY), which is not supported"
+            )
         part = word.get("PART")
         if part.upper() not in self.parts:
             raise HpcdemError(f"{word.line.where}: instance {name} is of part {part}, which is not defined above")
         self.used.add(part.upper())
         if name.upper() in self.instances:
-            raise HpcdemError(f"{word.line.where}: instance {name} is there already")
+            raise HpcdemError(f"{word.line.where}: instance {name} is defined twice")
         scope = self.instances[name.upper()] = self.scope = self.parts[part.upper()].copy(name)
         given = [line.floats() for line in word.data]
         if given:
@@ -212,21 +215,21 @@ class _Reader:
         if len(given) > 1:
             axis = np.array(given[1][3:6]) - given[1][:3] if len(given[1]) == 7 else np.zeros(3)
             if not axis @ axis > 0.0:
-                raise HpcdemError(f"{word.data[1].where}: a rotation is two points of its axis and an angle")
+                raise HpcdemError(f"{word.data[1].where}: expected a rotation as two points of its axis and an angle")
             scope.turn = _rotation(axis, given[1][6])
             # The axis stands where the translation has brought the part (Abaqus Keywords, *INSTANCE).
             scope.move = scope.turn @ (scope.move - given[1][:3]) + given[1][:3]
 
     def _nodes(self, word: Keyword) -> None:
         if word.parameters.get("SYSTEM", "R").upper() != "R":
-            raise HpcdemError(f"{word.line.where}: points in cylindrical or spherical coordinates are not read")
+            raise HpcdemError(f"{word.line.where}: cylindrical and spherical coordinates are not supported")
         nodes, here = self.scope.nodes, []
         for line in word.data:
             row = line.row()
             number = _whole(row[0], line)
             at = tuple([*(_number(text, line) if text else 0.0 for text in row[1:4]), 0.0, 0.0, 0.0][:3])
             if nodes.setdefault(number, at) != at:
-                raise HpcdemError(f"{line.where}: node {number} is there already, at another place")
+                raise HpcdemError(f"{line.where}: node {number} is defined twice, at different positions")
             here.append(number)
         if word.parameters.get(NODES):
             self.scope.add(NODES, word.parameters[NODES], word, [Entry(np.array(here, np.int64), word.line)])
@@ -241,7 +244,7 @@ class _Reader:
         for line in data:
             row, last = [text for text in line.row() if text], line
             while len(row) <= size if size else last.text.rstrip().endswith(","):
-                more = next(data, None)  # the next line goes on
+                more = next(data, None)  # the next line continues it
                 if more is None:
                     break
                 row, last = row + [text for text in more.row() if text], more
@@ -255,7 +258,7 @@ class _Reader:
             if len(points) != size:
                 raise HpcdemError(f"{line.where}: element {number} has {len(points)} points, {label} has {size}")
             if known.setdefault(number, points) != points:
-                raise HpcdemError(f"{line.where}: element {number} is there already, with other points")
+                raise HpcdemError(f"{line.where}: element {number} is defined twice, with different points")
             if known[number] is points:
                 rows[number] = points
         if rows:
@@ -325,7 +328,7 @@ class _Reader:
         made.points, made.point_ids = np.concatenate(points), np.concatenate(ids)
         if self.instances and self.assembled:
             unused = [p.name for key, p in self.parts.items() if p.blocks and key not in self.used]
-            self.notes += [f"the part {name}, of which there is no instance" for name in unused]
+            self.notes += [f"the part {name}, which has no instance" for name in unused]
         for kind, into in ((ELEMENTS, made.element_sets), (NODES, made.node_sets), (FACES, made.face_sets)):
             self._name_sets(scopes, kind, into)
         if len(self.instances) > 1:
@@ -462,7 +465,7 @@ class _Reader:
         for begins, what in (("CPS", "plane stress"), ("CAX", "rotational symmetry"), ("CGAX", "rotational symmetry")):
             labels = dict.fromkeys(block.label for block in self.made.blocks if block.label.startswith(begins))
             if labels and all(DIMENSIONS.get(block.kind) == 2 for block in self.made.blocks):
-                also = "unless model plane-stress is said" if begins == "CPS" else "or in plane stress"
+                also = "unless model plane-stress is set" if begins == "CPS" else "or in plane stress"
                 notes.append(f"the {what} of {', '.join(labels)}: blocks of the plane are in plane strain {also}")
         for label, numbers in self.kinds.items():
             notes.append(f"{len(numbers)} elements of type {label} ({listed(numbers)})")
@@ -529,7 +532,7 @@ def _with_files(word: Keyword, files: set[Path], depth: int) -> Iterator[Keyword
     """The keyword, with the lines of a file that it takes its data from; *INCLUDE: what is in the file."""
     where = word.line.where
     if depth == DEEPEST:
-        raise HpcdemError(f"{where}: files within files, deeper than {DEEPEST}")
+        raise HpcdemError(f"{where}: more than {DEEPEST} nested files")
     if word.name == "INCLUDE":
         file = word.line.file.parent / word.get("INPUT")
         if not file.is_file():
@@ -559,9 +562,9 @@ def _number(text: str, line: Line) -> float:
     try:
         value = float(text if "d" not in text and "D" not in text else text.upper().replace("D", "E"))
     except ValueError:
-        raise HpcdemError(f"{line.where}: a number was expected, not {text[:40]!r}") from None
+        raise HpcdemError(f"{line.where}: expected a number, not {text[:40]!r}") from None
     if not math.isfinite(value):
-        raise HpcdemError(f"{line.where}: a finite number was expected, not {text[:40]}")
+        raise HpcdemError(f"{line.where}: expected a finite number, not {text[:40]}")
     return value
 
 
@@ -570,7 +573,7 @@ def _whole(text: str, line: Line) -> int:
     if not abs(value) < LARGEST:
         raise HpcdemError(f"{line.where}: {text[:40]} is too large for the number of a node or an element")
     if value != int(value):
-        raise HpcdemError(f"{line.where}: a whole number was expected, not {text[:40]}")
+        raise HpcdemError(f"{line.where}: expected a whole number, not {text[:40]}")
     return int(value)
 
 

@@ -35,7 +35,7 @@ KINDS = (".step", ".stp", ".brep", ".stl", ".dxf")
 
 def read(path: Path, layer: str | None = None, scale: float | None = None, notes: list[str] | None = None) -> list[Any]:
     """The bodies of a file [m]; layer: only this one of a DXF file; scale: metres in a unit of the file (STEP and DXF
-    files name theirs); notes: what is to be told goes there. HpcdemError, with its name, for what it lacks."""
+    files name theirs); notes: receives messages. HpcdemError with the file name for what is missing."""
     notes = [] if notes is None else notes
     kind = path.suffix.lower()
     if not path.is_file():
@@ -43,10 +43,12 @@ def read(path: Path, layer: str | None = None, scale: float | None = None, notes
     if kind not in KINDS:
         raise CommandError(f"{path}: bodies are read from files {', '.join('*' + one for one in KINDS)}")
     if scale is not None and not 0.0 < scale < math.inf:
-        raise CommandError(f"a scale is above 0, got {scale:g}")
+        raise CommandError(f"scale must be above 0, got {scale:g}")
     if kind in (".step", ".stp"):
         if scale is not None:
-            raise CommandError(f"{path}: STEP files name their unit, and come in metres; scale is for other files")
+            raise CommandError(
+                f"{path}: STEP files define their unit and are converted to metres: scale applies to other files only"
+            )
         return _solids(path, 1.0)
     if kind == ".dxf":
         return [_shell(path, _faces(path, layer, scale, notes))]
@@ -60,13 +62,13 @@ def read(path: Path, layer: str | None = None, scale: float | None = None, notes
 
 def _shell(path: Path, triangles: np.ndarray) -> Shell:
     if not np.isfinite(triangles).all() or not len(triangles):
-        raise HpcdemError(f"{path}: there are no triangles, or corners that are not finite")
+        raise HpcdemError(f"{path}: no triangles, or corners that are not finite")
     if len(triangles) > MOST_TRIANGLES:
         raise HpcdemError(f"{path}: {len(triangles)} triangles, expected at most {MOST_TRIANGLES}: simplify the shell")
     corners = triangles.reshape(-1, 3)
     size = float(np.ptp(corners, axis=0).max())
     if size <= 0.0:
-        raise HpcdemError(f"{path}: all corners lie in one point")
+        raise HpcdemError(f"{path}: all corners coincide")
     of = spots(corners, SAME * size).reshape(-1, 3)
     kept = of[(of != np.roll(of, 1, axis=1)).all(axis=1)]  # slivers that merging has made lines of
     kept, pieces = outwards(kept, corners)
@@ -114,7 +116,7 @@ def outwards(of: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def _triangles(path: Path, notes: list[str]) -> np.ndarray:
-    """(k, 3, 3) of an STL file, text or binary; bytes after the last triangle are passed over, with a note."""
+    """(k, 3, 3) of an STL file, text or binary; bytes after the last triangle are ignored, with a note."""
     content = path.read_bytes()
     count = int.from_bytes(content[80:84], "little") if len(content) >= 84 else 0
     whole = 84 + 50 * count
@@ -129,18 +131,16 @@ def _triangles(path: Path, notes: list[str]) -> np.ndarray:
         except ValueError:
             ends, corners = False, np.empty((0, 3, 3))
         if not ends:
-            raise HpcdemError(
-                f"{path}: this is not an STL file that can be read: a facet is damaged, or the end is missing"
-            )
+            raise HpcdemError(f"{path}: not a readable STL file: a facet is damaged, or the end is missing")
         return corners
     if len(content) < whole or not count:
         held = max(len(content) - 84, 0) // 50
         raise HpcdemError(
-            f"{path}: this is not an STL file that can be read: it is no text with facets, and of the {count} "
-            f"triangles that its head names it has {held}"
+            f"{path}: not a readable STL file: neither text with facets nor binary (its header declares {count} "
+            f"triangles, it has {held})"
         )
     if len(content) > whole:
-        notes.append(f"{len(content) - whole} bytes after the last triangle are passed over")
+        notes.append(f"ignored {len(content) - whole} bytes after the last triangle")
     table = np.frombuffer(
         content, np.dtype([("normal", "<f4", (3,)), ("at", "<f4", (3, 3)), ("more", "<u2")]), count, 84
     )
@@ -175,7 +175,7 @@ def _solids(path: Path, scale: float) -> list[Brep]:
     with tempfile.TemporaryDirectory(prefix="hpcdem-") as folder:
         into = Path(folder) / "bodies.json"
         apart.run(
-            "hpcdem.pre.mesh.cad", str(path), str(into), repr(scale), failed=f"{path}: no solid can be read from it"
+            "hpcdem.pre.mesh.cad", str(path), str(into), repr(scale), failed=f"{path}: contains no readable solid"
         )
         given = json.loads(into.read_text(encoding="utf-8"))
     if any(len(one["text"]) > MOST_TEXT for one in given):

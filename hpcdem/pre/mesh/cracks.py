@@ -78,7 +78,7 @@ def with_layer(mesh: Mesh, name: str, pairs: np.ndarray) -> Mesh:
 
 def with_cracks(mesh: Mesh, pairs: np.ndarray, number: int) -> Mesh:
     """The mesh with cracks on these edges (k, 2), in space faces (k, 3), in the fracture set `number`; those at a
-    surface are passed over.
+    surface are skipped.
 
     An edge that has a crack already keeps its set.
     """
@@ -121,7 +121,7 @@ def between_sides(mesh: Mesh, surfaces: Sequence[Any]) -> np.ndarray:
     found = []
     for one in surfaces:
         if not one.surface:
-            raise CommandError("follow is for polygons, discs and planes, which have two sides")
+            raise CommandError("follow supports polygons, discs and planes only")
         (place, normal), rows = one.plane(), np.arange(len(inner))
         if isinstance(one, Disc):  # what lies farther than an element from it cannot be about it
             rows = np.array(sorted(tree.query_ball_point(place, one.radius + mesh.mean_edge() * 3.0)), np.int64)
@@ -191,8 +191,8 @@ class _Ways:
                     heapq.heappush(heap, (total, j))
         if goal not in done:
             raise CommandError(
-                f"no way along edges leads from ({start[0]:g}, {start[1]:g}) to ({end[0]:g}, {end[1]:g}): "
-                "the trace begins and ends in different bodies"
+                f"no path along edges leads from ({start[0]:g}, {start[1]:g}) to ({end[0]:g}, {end[1]:g}): the trace "
+                "begins and ends in different bodies"
             )
         path = [goal]
         while path[-1] != source:

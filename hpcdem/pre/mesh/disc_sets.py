@@ -37,7 +37,7 @@ class Poles:
     def check(self, name: str) -> None:
         """CommandError for what makes no sense."""
         if self.kind not in ("fixed", "fisher"):
-            raise CommandError(f"{name}: in three dimensions the orientation is fixed or fisher, not {self.kind}")
+            raise CommandError(f"{name}: in three dimensions the orientation must be fixed or fisher, not {self.kind}")
         if not all(map(math.isfinite, (self.dip, self.towards, self.kappa))) or self.kappa < 0.0:
             raise CommandError(f"{name}: angles must be finite, and the spread not negative")
         if self.kind == "fixed" and self.kappa:
@@ -92,10 +92,10 @@ class DiscSet:
         if not any(self.along):
             raise CommandError(f"{name}: the scan line needs a direction")
         if self.reached and self.measure == "p10":
-            raise CommandError(f"{name}: only p30 and p32 can be made until they are reached, p10 holds in the mean")
+            raise CommandError(f"{name}: only p30 and p32 can be reached exactly; p10 holds on average")
 
     def p30(self) -> float:
-        """Centres per volume [1/m3] that give the density asked for."""
+        """Centres per volume [1/m3] that give the requested density."""
         if self.measure == "p30":
             return self.density
         area = math.pi * self.radius.mean(2)
@@ -103,5 +103,5 @@ class DiscSet:
             return self.density / area
         cosine = self.poles.mean_cosine(self.along)
         if cosine < 1e-6:
-            raise CommandError("a scan line along the discs meets none of them: p10 says nothing")
+            raise CommandError("a scan line along the discs meets none of them, so p10 is undefined")
         return self.density / (area * cosine)

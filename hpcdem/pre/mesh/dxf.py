@@ -37,7 +37,7 @@ def opened(path: Path) -> Any:
     except FileNotFoundError:
         raise CommandError(f"{path}: there is no such file") from None
     except (OSError, ezdxf.DXFError, UnicodeError, ValueError, KeyError, IndexError) as error:
-        raise HpcdemError(f"{path}: this is not a DXF drawing that can be read ({error})") from None
+        raise HpcdemError(f"{path}: not a readable DXF drawing ({error})") from None
 
 
 def metres(document: Any, scale: float | None, notes: list[str]) -> float:
@@ -58,7 +58,7 @@ def write(path: Path, layers: Mapping[str, Sequence[Curve]]) -> None:
     space = document.modelspace()
     for name, curves in layers.items():
         if any(char in '<>/\\":;?*|=`,' for char in name):
-            raise CommandError(f"'{name}' can be no layer of a drawing: it has one of <>/\\\":;?*|=`,")
+            raise CommandError(f"'{name}' is not a valid layer name: it contains one of <>/\\\":;?*|=`,")
         if name not in document.layers:
             document.layers.add(name)
         for curve in curves:
@@ -97,7 +97,7 @@ def curves(document: Any, path: Path, only: set[str] | None = None) -> dict[str,
     missing = sorted((only or set()) - set(found))
     if missing:
         known = ", ".join(f"'{n}'" for n in found) or "none"
-        raise HpcdemError(f"{path}: nothing is drawn in layer '{missing[0]}' (layers read: {known})")
+        raise HpcdemError(f"{path}: layer '{missing[0]}' is empty or missing (layers read: {known})")
     if not found:
         raise HpcdemError(f"{path}: the drawing contains no line, arc, circle or point")
     return found
@@ -114,7 +114,7 @@ def flat(entities: Any, path: str, depth: int = 0, layer: str = "0") -> Iterator
         if kind != "INSERT":
             yield entity, own
         elif depth > 16:
-            raise HpcdemError(f"{path}: INSERT (handle {entity.dxf.handle}): blocks within blocks, deeper than 16")
+            raise HpcdemError(f"{path}: INSERT (handle {entity.dxf.handle}): more than 16 nested blocks")
         else:
             for one in entity.multi_insert() if entity.mcount > 1 else (entity,):  # rows and columns of a block
                 yield from flat(one.virtual_entities(), path, depth + 1, own)
@@ -123,13 +123,13 @@ def flat(entities: Any, path: str, depth: int = 0, layer: str = "0") -> Iterator
 def _curve(entity: Any, where: str) -> Curve:
     kind = entity.dxftype()
     if kind not in _READERS:
-        raise HpcdemError(f"{where}: this type cannot be read; known are {', '.join(_READERS)} and INSERT")
+        raise HpcdemError(f"{where}: this type is not supported; known: {', '.join(_READERS)} and INSERT")
     mirrored = False
     if entity.dxf.hasattr("extrusion") and kind not in ("LINE", "POINT", "SPLINE"):
         x, y, z = entity.dxf.extrusion
         if (round(x, 9), round(y, 9), abs(round(z, 9))) != (0.0, 0.0, 1.0):
             raise HpcdemError(
-                f"{where}: it is drawn in a plane of its own (extrusion {x:g}, {y:g}, {z:g}), only the x-y plane counts"
+                f"{where}: it has its own plane (extrusion {x:g}, {y:g}, {z:g}); only the x-y plane is supported"
             )
         mirrored = z < 0.0 and kind != "ELLIPSE"  # its points are those of the drawing already
     curve = _READERS[kind](entity, where)
@@ -147,7 +147,7 @@ def _level(points: Any, where: str) -> list[tuple[float, float]]:
     flat = [_xy(at) for at in points]
     low, high = min(heights), max(heights)
     if high - low > 1e-6 * max(math.dist(flat[0], at) for at in flat):
-        raise HpcdemError(f"{where}: it runs from z = {low:g} to {high:g}, only what lies in the x-y plane counts")
+        raise HpcdemError(f"{where}: it extends from z = {low:g} to {high:g}; only the x-y plane is supported")
     return flat
 
 
@@ -174,7 +174,7 @@ def _light_polyline(entity: Any, where: str) -> Curve:
 
 def _heavy_polyline(entity: Any, where: str) -> Curve:
     if not entity.is_2d_polyline:
-        raise HpcdemError(f"{where}: only two-dimensional polylines can be read, this is '{entity.get_mode()}'")
+        raise HpcdemError(f"{where}: only two-dimensional polylines are supported, this is '{entity.get_mode()}'")
     rows = [(*_xy(v.dxf.location), v.dxf.get("bulge", 0.0)) for v in entity.vertices]
     return _with_bulges(np.array(rows, np.float64).reshape(-1, 3), bool(entity.is_closed))
 

@@ -71,7 +71,9 @@ def filled(wishes: Wishes, group: str) -> Filled:
     not_too_many(float(np.prod((high - low) / wishes.size)) * 6.0 * np.sqrt(2.0), f"size {wishes.size:g}")
     for _, size, _ in wishes.refine:
         if size > wishes.size:
-            raise CommandError(f"refine-layer makes elements smaller: size {size:g} is above that of the rest")
+            raise CommandError(
+                f"refine-layer must make elements smaller, but size {size:g} is larger than that of the mesh"
+            )
     said = {
         "outline": state(list(wishes.outline)), "holes": state(list(wishes.holes)), "size": wishes.size,
         "regions": [state(list(of)) for _, of in wishes.regions], "middle": (0.5 * (low + high)).tolist(),
@@ -93,7 +95,7 @@ def filled(wishes: Wishes, group: str) -> Filled:
         if (region == k).any():
             groups.setdefault(name, []).append(np.flatnonzero(region == k))
         elif k:
-            raise CommandError(f"region '{name}' holds no element: it lies outside of the body, or is too small")
+            raise CommandError(f"region '{name}' contains no element: it lies outside the body, or is too small")
     on: dict[str, np.ndarray] = {}
     for k, (name, _) in enumerate(cut):
         on[name] = faces[of_layer == k]
@@ -154,7 +156,7 @@ def _main(into: str) -> None:
     cells, region = elements([(3, tag, mark) for tag, mark in sorted(number.items())], 4, 4)
     faces, of_layer = elements([(2, tag, mark) for tag, mark in sorted(cuts.items())], 2, 3)
     if not len(cells):
-        raise SystemExit("no elements came out; smaller ones may do")
+        raise SystemExit("Gmsh made no elements: use a smaller size")
     used, numbers = np.unique(cells, return_inverse=True)
     lost = ~np.isin(faces, used).all(axis=1)
     faces, of_layer = np.searchsorted(used, faces[~lost]), of_layer[~lost]

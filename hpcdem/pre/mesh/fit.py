@@ -1,4 +1,4 @@
-"""Whether the faces of a mesh fit together: free faces that lie on others, and why they do not hang together."""
+"""Whether the faces of a mesh fit together: free faces that lie on others, and why they are not connected."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ class Fit:
         ]
         if not found:
             return ""
-        return f"faces lie on each other and do not hang together: {'; '.join(found)}. mesh glue joins them"
+        return f"coincident faces are not connected: {'; '.join(found)}. Use mesh glue to join them"
 
 
 def fit(mesh: Mesh, since: int = 0) -> Fit:

@@ -32,13 +32,13 @@ def discs(one: DiscSet, bodies: Sequence[Any], seed: int, number: int = 0) -> li
     one.check("fractures")
     flat = [body for body in bodies if body.surface]
     if flat or not bodies:
-        raise CommandError("fractures lie inside of bodies, but the layer has none, or a surface")
+        raise CommandError("fractures need a layer with bodies; this layer has none, or a surface")
     bounds = np.array([body.bounds() for body in bodies])
     reach = one.radius.longest()
     low, high = bounds[:, 0].min(axis=0) - reach, bounds[:, 1].max(axis=0) + reach
     expected = one.p30() * float(np.prod(high - low))
     if not expected < 0.5 * MOST:
-        raise CommandError(f"fracture set {number}: {expected:.3g} discs are expected, more than {MOST // 2}")
+        raise CommandError(f"fracture set {number}: {expected:.3g} discs expected, at most {MOST // 2} allowed")
     stream = 2 * number
     n = poisson(expected, uniform(seed, stream + 1, 0))
     if one.reached:
@@ -80,7 +80,7 @@ def _touching(of: list[Disc], bodies: Sequence[Any]) -> list[Disc]:
 def _until_reached(
     one: DiscSet, bodies: Sequence[Any], box: tuple[np.ndarray, np.ndarray], seed: int, stream: int, batch: int
 ) -> list[Disc]:
-    """Discs one after the other until the density in the bodies is nearest to the one asked for."""
+    """Discs in sequence until the density in the bodies is nearest to the requested one."""
     goal = one.density * _volume(bodies)
     made: list[Disc] = []
     total, start = 0.0, 0

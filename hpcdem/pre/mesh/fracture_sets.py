@@ -80,7 +80,7 @@ class Length:
         if self.kind != "power" and self.value <= 0.0:
             raise CommandError(f"{name}: the length must be positive, not {self.value:g}")
         if not 0.0 <= self.least < self.greatest or math.isnan(self.greatest):
-            raise CommandError(f"{name}: lengths from {self.least:g} to {self.greatest:g} make no sense")
+            raise CommandError(f"{name}: lengths from {self.least:g} to {self.greatest:g} are not a valid range")
         if self.kind == "power" and not (self.least > 0.0 and math.isfinite(self.greatest)):
             raise CommandError(f"{name}: a power law needs a least length above 0 and a greatest one")
         if self.kind == "lognormal" and not (math.isfinite(self.spread) and self.spread > 0.0):
@@ -148,7 +148,7 @@ class FractureSet:
     stop: "random", the number is drawn from the Poisson distribution, so density is met in the mean; "reached", traces
     are made until p20 or p21 is met in the region itself, as nearly as whole traces can.
     ends_at: share of crossings with traces of earlier sets (and earlier traces of the same set) at which a trace, as it
-    grows from its centre, ends. Ended traces are shorter, so p21 is then lower than asked for.
+    grows from its centre, ends. Ended traces are shorter, so p21 is then lower than requested.
     """
 
     orientation: Orientation
@@ -169,14 +169,14 @@ class FractureSet:
         if not (math.isfinite(self.density) and self.density > 0.0):
             raise CommandError(f"{name}: the density must be positive, not {self.density:g}")
         if not 0.0 <= self.ends_at <= 1.0:
-            raise CommandError(f"{name}: the share of ended traces lies between 0 and 1, not {self.ends_at:g}")
+            raise CommandError(f"{name}: the fraction of ended traces must be from 0 to 1, not {self.ends_at:g}")
         if self.stop == "reached" and self.measure == "p10":
-            raise CommandError(f"{name}: only p20 and p21 can be made until they are reached, p10 holds in the mean")
+            raise CommandError(f"{name}: only p20 and p21 can be reached exactly; p10 holds on average")
         if self.stop == "reached" and self.ends_at > 0.0 and self.measure == "p21":
-            raise CommandError(f"{name}: p21 cannot be reached exactly by traces that end at others; take stop random")
+            raise CommandError(f"{name}: p21 cannot be reached exactly by traces that end at others: use stop random")
 
     def p20(self) -> float:
-        """Centres per area [1/m2] that give the density asked for."""
+        """Centres per area [1/m2] that give the requested density."""
         if self.measure == "p20":
             return self.density
         if self.measure == "p21":
@@ -184,7 +184,7 @@ class FractureSet:
         t = (np.arange(20_000) + 0.5) / 20_000
         sine = float(np.abs(np.sin(self.orientation.angles(t) - math.radians(self.scanline))).mean())
         if sine < 1e-6:
-            raise CommandError("a scan line along the fractures meets none of them: p10 says nothing")
+            raise CommandError("a scan line along the fractures meets none of them, so p10 is undefined")
         return self.density / (self.length.mean() * sine)
 
 

@@ -125,7 +125,7 @@ def _drawn(one: FractureSet, region: Any, seed: int, number: int) -> np.ndarray:
     x0, y0, x1, y1 = x0 - half, y0 - half, x1 + half, y1 + half
     expected = one.p20() * (x1 - x0) * (y1 - y0)
     if not expected < 0.5 * MOST:
-        raise CommandError(f"fracture set {number}: {expected:.3g} traces are expected, more than {MOST // 2}")
+        raise CommandError(f"fracture set {number}: {expected:.3g} traces expected, at most {MOST // 2} allowed")
     stream = 2 * number
     if one.stop == "random":
         n = poisson(expected, uniform(seed, stream + 1, 0))
@@ -136,7 +136,7 @@ def _drawn(one: FractureSet, region: Any, seed: int, number: int) -> np.ndarray:
 def _until_reached(
     one: FractureSet, region: Any, window: tuple[float, float, float, float], seed: int, number: int, expected: float
 ) -> np.ndarray:
-    """Traces one after the other until the density in the region is nearest to the one asked for."""
+    """Traces in sequence until the density in the region is nearest to the requested one."""
     goal = one.density * region.area
     batch = max(64, int(expected))
     parts: list[np.ndarray] = []

@@ -94,7 +94,7 @@ def segmented_circle(centre: Vector, radius: float, length: float) -> Curve:
     _positive(length, "circle: segment length")
     sides = max(3, round(2.0 * math.pi * radius / length))
     if sides > MOST_SIDES:
-        raise CommandError(f"circle: sides of {length:g} are {sides} of them, more than {MOST_SIDES}")
+        raise CommandError(f"circle: sides of {length:g} m require {sides} sides, at most {MOST_SIDES} allowed")
     turn = 360.0 / sides
     at = [_cos_sin(k * turn) for k in range(sides)]
     return _curve([(x + radius * c, y + radius * s) for c, s in at], closed=True, least=3, what="circle")
@@ -108,7 +108,7 @@ def arc(centre: Vector, radius: float, start: float, end: float) -> Curve:
         raise CommandError(f"arc: angles must be finite, not {start:g} and {end:g}")
     sweep = (end - start) % 360.0
     if sweep == 0.0:
-        raise CommandError(f"arc: angles {start:g} and {end:g} are the same; a whole circle is made with 'circle'")
+        raise CommandError(f"arc: angles {start:g} and {end:g} are equal: use 'circle' for a full circle")
     # Two halves: the bulge of a nearly full circle is not well defined.
     a = np.radians([start, start + 0.5 * sweep, start + sweep])
     xy = np.column_stack([x + radius * np.cos(a), y + radius * np.sin(a)])
@@ -123,7 +123,7 @@ def arc_between(centre: Vector, start: Vector, end: Vector) -> Curve:
     radius, far = float(np.hypot(*one)), float(np.hypot(*other))
     if abs(radius - far) > 1e-6 * max(radius, far):
         raise CommandError(
-            f"arc: its ends are {radius:g} and {far:g} m away from its centre; both lie on the same circle about it"
+            f"arc: its ends are {radius:g} and {far:g} m away from its centre; both distances must be equal"
         )
     found = arc(centre, radius, *(math.degrees(math.atan2(at[1], at[0])) for at in (one, other)))
     points = found.points.copy()
@@ -146,7 +146,7 @@ def transformed(
     if not (math.isfinite(sx) and math.isfinite(sy)) or sx == 0.0 or sy == 0.0:
         raise CommandError(f"transform: scale must be finite and not zero, not ({sx:g}, {sy:g})")
     if abs(sx) != abs(sy) and np.any(curve.bulges != 0.0):
-        raise CommandError(f"transform: scale ({sx:g}, {sy:g}) would make ellipses of arcs")
+        raise CommandError(f"transform: scale ({sx:g}, {sy:g}) would turn arcs into ellipses")
     if not math.isfinite(rotate):
         raise CommandError(f"transform: the angle must be finite, not {rotate:g}")
     centre, way = np.array(_pair(about, "transform about")), np.array(_pair(translate, "transform translate"))
@@ -309,7 +309,7 @@ def distance_to_segment(a: np.ndarray, b: np.ndarray, bulge: float, at: np.ndarr
     return np.where(turn <= abs(sweep), np.abs(np.hypot(*rel.T) - radius), ends)
 
 
-# --- what is asked of the numbers given --------------------------------------------------------------------------
+# --- checks of the given numbers --------------------------------------------------------------------------
 
 
 def _curve(points: Sequence[Vector], closed: bool, least: int, what: str) -> Curve:

@@ -48,8 +48,8 @@ def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray,
         return Glued(mesh, same, np.arange(len(mesh.cells)), Moved(same, {}, {}), 0, tolerance)
     if not len(pairs):
         raise CommandError(
-            f"no faces of different bodies lie on each other within {tolerance:g} m: there is nothing to glue; a "
-            "larger tolerance may help"
+            f"no faces of different bodies coincide within {tolerance:g} m, so there is nothing to glue. Check the "
+            "bodies, or use a larger tolerance"
         )
     one, number, quads = _merged(mesh, free, spot, pairs)
     flat = np.flatnonzero(one.areas() <= 0.0)
@@ -66,8 +66,8 @@ def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray,
     if len(lost):
         raise CommandError(
             f"faces of the elements {made.parent[rest.faces[lost[0]] // 4].tolist()} at "
-            f"{fit.places(rest.at[lost[:1, 0]].mean(axis=1))} cannot be glued: mesh both bodies with the same points "
-            "there"
+            f"{fit.places(rest.at[lost[:1, 0]].mean(axis=1))} cannot be glued: use the same points in the meshes of "
+            "both bodies"
         )
     moved = Moved(number, quads, made.pieces)
     whole = Mesh.of(
@@ -152,7 +152,7 @@ def _refuse_overlap(free: fit.Free, corners: np.ndarray, between: tuple[np.ndarr
         a, b = free.faces[pairs[wrong[0]]] // 4
         at = fit.places(free.at[i[wrong[:1]]].mean(axis=1))
         raise CommandError(
-            f"elements {a} and {b} lie on the same side of their common face at {at}: bodies overlap there"
+            f"elements {a} and {b} lie on the same side of their common face at {at}: the bodies overlap"
         )
 
 

@@ -1,7 +1,7 @@
 """Mesh files of Gmsh, formats 2.0 to 2.2 and 4.1, text and binary (Gmsh Reference Manual, MSH file format).
 
 An element that format 2 writes once for each of its physical groups is one element of several groups. Parameters of
-points on curves and surfaces are passed over.
+points on curves and surfaces are skipped.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _TYPES: dict[str, dict[int, int]] = {
     "vertex": {15: 1},
 }
 TYPES = {number: (kind, points) for kind, of in _TYPES.items() for number, points in of.items()}
-"""Kind and number of points by the number that Gmsh gives to a type of elements; corners come first."""
+"""Kind and number of points by the number that Gmsh gives to a type of elements; corners precede the others."""
 READ = {"MeshFormat", "PhysicalNames", "Nodes", "ParametricNodes", "Elements", "Entities", "PartitionedEntities"}
 PASSED_OVER = {"Comments"}
 LOOK = 4096
@@ -124,15 +124,16 @@ class _Reader:
         try:
             self.version, binary = float(head[0]), int(head[1])
         except (ValueError, IndexError):
-            raise HpcdemError(f"{self.path}: this is not a mesh file of Gmsh: it has no $MeshFormat") from None
+            raise HpcdemError(f"{self.path}: not a mesh file of Gmsh: $MeshFormat is missing") from None
         if not (2.0 <= self.version < 3.0 or 4.1 <= self.version < 5.0):
             raise HpcdemError(
-                f"{self.path}: format {self.version:g} of Gmsh is not read; save it as 4.1 or 2.2 (Mesh.MshFileVersion)"
+                f"{self.path}: format {self.version:g} of Gmsh is not supported: save it as 4.1 or 2.2 "
+                "(Mesh.MshFileVersion)"
             )
         little = sections["MeshFormat"].rstrip(b"\n\r")[-4:] == b"\x01\0\0\0"
         for name in ("Nodes", "Elements"):
             if name not in sections and not (name == "Nodes" and "ParametricNodes" in sections):
-                raise HpcdemError(f"{self.path}: the file has no ${name}, or ends within")
+                raise HpcdemError(f"{self.path}: ${name} is missing or incomplete")
         self._names(sections.get("PhysicalNames", b""))
         taken: tuple[tuple[str, Callable[[Any, int], None]], ...] = (
             ("Entities", self._entities),
@@ -145,7 +146,9 @@ class _Reader:
             if name not in sections:
                 continue
             if binary and name == "ParametricNodes":
-                raise HpcdemError(f"{self.path}: binary $ParametricNodes are not read; save as text, or as format 4.1")
+                raise HpcdemError(
+                    f"{self.path}: binary $ParametricNodes are not supported: save as text, or as format 4.1"
+                )
             section = sections[name]
             try:
                 if binary:
@@ -155,10 +158,10 @@ class _Reader:
                     text = _Text(section)
                     take(text, int(text.ints(1)[0]) if self.version < 3.0 else 0)
                     if text.at < len(text.values):
-                        raise HpcdemError(f"{self.path}: ${name} has more lines than its head says")
+                        raise HpcdemError(f"{self.path}: ${name} has more lines than its header declares")
             except (EOFError, ValueError, IndexError, MemoryError):
                 raise HpcdemError(
-                    f"{self.path}: ${name} ends too early, or holds something that is not a number of Gmsh's format"
+                    f"{self.path}: ${name} ends too early, or contains something that is not a number"
                 ) from None
         made = self._made()
         lost = [name for name in sections if name not in READ | PASSED_OVER]
@@ -295,7 +298,7 @@ class _Reader:
 
     def _type(self, kind: int) -> tuple[str, int]:
         if kind not in TYPES:
-            raise HpcdemError(f"{self.path}: elements of Gmsh's type {kind} are not read")
+            raise HpcdemError(f"{self.path}: elements of Gmsh's type {kind} are not supported")
         return TYPES[kind]
 
     def _block(self, kind: int, ids: np.ndarray | list, rows: np.ndarray | list) -> None:
@@ -310,7 +313,7 @@ class _Reader:
         order = np.argsort(ids, kind="stable")
         twice = np.flatnonzero(np.diff(ids[order]) == 0)
         if len(twice):
-            raise HpcdemError(f"{self.path}: point {ids[order[twice[0]]]} is there twice")
+            raise HpcdemError(f"{self.path}: point {ids[order[twice[0]]]} is defined twice")
         blocks = []
         for kind, label, numbers, named in self.blocks:
             at = np.minimum(np.searchsorted(ids[order], named), max(len(ids) - 1, 0))

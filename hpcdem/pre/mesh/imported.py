@@ -50,7 +50,7 @@ def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: i
 
 
 def read(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2) -> Imported:
-    """A mesh of triangles and quads in the x-y plane; dim 3: of tetrahedra and hexahedra (which come first).
+    """A mesh of triangles and quads in the x-y plane; dim 3: of tetrahedra and hexahedra (hexahedra precede).
 
     Physical groups (Gmsh) and sets (Abaqus) of elements and of points become groups of the set SET; one that overlaps
     an earlier one gets a set of its own, of the same name. Physical lines, in space surfaces, and surfaces of Abaqus
@@ -171,7 +171,7 @@ def _with_names(data: FileMesh, own: _Own, place: np.ndarray, between: np.ndarra
     at_nodes = {name: place[np.unique(np.concatenate(rows))] for name, rows in nodes.items()}
     for name, rows in at_nodes.items():
         if (rows < 0).any():
-            notes.append(f"{int((rows < 0).sum())} points of the set '{name}', which are of no element")
+            notes.append(f"{int((rows < 0).sum())} points of the set '{name}' that belong to no element")
     at_nodes = {name: np.unique(rows[rows >= 0]) for name, rows in at_nodes.items() if (rows >= 0).any()}
     groups = _in_sets(elements, len(mesh.cells))
     whole = {name: _parts(own, numbers[kinds[numbers] == dim]) for name, numbers in data.instances.items()}
@@ -257,19 +257,17 @@ def _by_meshio(path: Path) -> FileMesh:
     meshio = optional.meshio()
     known = sorted(meshio.extension_to_filetypes)
     if path.suffix.lower() not in known:
-        raise HpcdemError(f"{path}: files *{path.suffix} are not read; known are {', '.join(known)}")
+        raise HpcdemError(f"{path}: files *{path.suffix} are not supported; known: {', '.join(known)}")
     said = io.StringIO()
     try:
         # meshio prints what it cannot read and then ends the program.
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             found = meshio.read(path)
     except (Exception, SystemExit):
-        raise HpcdemError(
-            f"{path}: this is not a mesh that can be read: damaged, or not of the kind that *{path.suffix} says"
-        ) from None
+        raise HpcdemError(f"{path}: not a readable mesh: damaged, or not a *{path.suffix} file") from None
     points = np.asarray(found.points, np.float64)
     if points.ndim != 2 or points.shape[1] not in (2, 3) or not len(points):
-        raise HpcdemError(f"{path}: points with two or three coordinates were expected, found {points.shape}")
+        raise HpcdemError(f"{path}: expected points with two or three coordinates, found {points.shape}")
     start = 0 if path.suffix.lower() in FROM_0 else 1
     made = FileMesh(path, np.pad(points, ((0, 0), (0, 3 - points.shape[1]))), np.arange(len(points)) + start, [])
     count = 0
@@ -380,5 +378,5 @@ def _collapsed(data: FileMesh, rows: np.ndarray, file: np.ndarray, merge: float)
         return
     name = data.element(file[bad[0]])
     if merge > 0.0:
-        raise data.refuse(f"merging points nearer than {merge:g} m makes an edge of element {name} a point")
+        raise data.refuse(f"merging points nearer than {merge:g} m collapses an edge of element {name}")
     raise data.refuse(f"element {name} has the same point twice: {', '.join(data.point(p) for p in rows[bad[0]])}")

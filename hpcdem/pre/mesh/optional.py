@@ -44,7 +44,7 @@ def gmsh() -> ModuleType:
 
     module = _wanted("gmsh", "Meshing of arbitrary outlines", load)
     if not hasattr(getattr(module, "lib", None), "gmshInitialize"):
-        raise HpcdemError(f"the package gmsh is installed without its library libgmsh: install it again, {EXTRA}")
+        raise HpcdemError(f"the package gmsh lacks its library libgmsh: reinstall it, {EXTRA}")
     return module
 
 

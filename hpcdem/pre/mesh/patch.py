@@ -25,7 +25,7 @@ def wishes(
     curves of their shapes; group: (set, group)
     of the elements. CommandError for pieces that bound nothing or have no size."""
     if not any(piece.role == OUTLINE for piece, _ in pieces):
-        raise CommandError("no piece bounds the mesh")
+        raise CommandError("no piece is given as boundary of the mesh")
     sizes = [piece.size for piece, _ in pieces if piece.size is not None]
     if size is None and not sizes:
         raise CommandError("no mesh size is given")

@@ -40,7 +40,7 @@ class Plane:
         self.fixed: dict[tuple[int, int], None] = {}
         """Edges of outlines: they may be divided, but not moved."""
         self.pending: list[tuple[int, int, Labels, bool]] = []
-        """Edges taken out because a new point came too near; they are laid again, through it."""
+        """Edges removed because a new point is too near; they are rebuilt through it."""
         # Buckets between the smallest and the largest edge: neither holds many small nor spans many buckets.
         self.cell = math.sqrt(sizes.smallest * sizes.base)
         self.points_in: dict[tuple[int, int], list[int]] = {}
@@ -162,7 +162,7 @@ class Plane:
         return self.edges.pop(key)
 
     def _beside(self, a: int, b: int) -> int:
-        """The point nearest to the segment a-b that is too near to it; -1 if there is none.
+        """The point nearest to the segment a-b that is too near to it, else -1.
 
         Only points nearer to both ends than these to each other: pieces get shorter each time, so there is an end.
         """
@@ -211,7 +211,7 @@ class Plane:
             # A new point on the outline has taken the edge out of the way: look again.
 
     def _on_outline(self, x: float, y: float, edge: tuple[int, int]) -> int:
-        """The point of an outline that a crossing just beside it is to be moved to; -1 if there is none."""
+        """The point of an outline that a crossing just beside it is to be moved to, else -1."""
         if edge in self.fixed:
             return -1
         reach = self.ratio * float(self.sizes(np.array([[x, y]]))[0])

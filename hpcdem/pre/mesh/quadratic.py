@@ -15,9 +15,9 @@ def quadratic(mesh: Mesh) -> Remade:
     the elements 4 e to 4 e + 3, the point between the ends of edge k is that behind all others before, plus k; groups,
     layers and cracks stay where they are. CommandError for other elements."""
     if mesh.dim == 2 and len(mesh.macros):
-        raise CommandError("there are six-node triangles in the mesh already")
+        raise CommandError("the mesh already has six-node triangles")
     if mesh.dim == 3 or (mesh.cells[:, 3] >= 0).any():
-        raise CommandError("six-node triangles come from a mesh of triangles alone")
+        raise CommandError("six-node triangles need a mesh of triangles only")
     edges, n = mesh.edges(), len(mesh.points)
     between = np.zeros(4 * len(mesh.cells), np.int64)
     for side in range(2):

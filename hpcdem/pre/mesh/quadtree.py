@@ -23,15 +23,15 @@ def densified(mesh: Mesh, elements: np.ndarray, pattern: Sequence[int], most: Se
     directions of the pattern (x, y: 1, or 0: as they are). Of two neighbours one is at most twice as fine. The first
     piece of an element keeps its number, others come last. CommandError if there is nothing to do."""
     if mesh.dim == 3:
-        raise CommandError("densify is for quads, in two dimensions")
+        raise CommandError("densify supports quads in two dimensions only")
     if not any(pattern):
-        raise CommandError("pattern 0 0 halves nothing")
+        raise CommandError("pattern 0 0 has no effect")
     for wanted, size in zip(pattern, most):
         if wanted:
             positive(size, "maximum-length")
     quads = elements[mesh.cells[elements, 3] >= 0]
     if not len(quads):
-        raise CommandError("the range chooses no quad: densify halves quads")
+        raise CommandError("the range selects no quad: densify halves quads")
     _not_too_many(mesh, quads, pattern, most)
     tree = _Tree(mesh, pattern)
     for e in quads.tolist():

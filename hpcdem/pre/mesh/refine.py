@@ -128,9 +128,9 @@ class _Cut:
         off = ((free.at[j] - free.at[i].mean(axis=0)) @ free.normal[i]).tolist()
         if max(map(abs, off)) > self.tolerance:
             raise CommandError(
-                f"quads of the elements {free.faces[i] // 4} and {free.faces[j] // 4} at {fit.places(free.at[i][:1])} "
-                "are warped and cut along different diagonals: they cannot be glued; mesh both bodies with the same "
-                "triangles there"
+                f"quads of the elements {free.faces[i] // 4} and {free.faces[j] // 4} at "
+                f"{fit.places(free.at[i][:1])} are warped and cut along different diagonals: they cannot be glued. "
+                "Use the same triangles in the meshes of both bodies"
             )
         outline = [corner - height * free.normal[i] for corner, height in zip(free.at[j], off, strict=True)]
         outline.reverse()  # as the first face runs
@@ -147,7 +147,7 @@ class _Cut:
         found = np.concatenate([outline for _, _, outline in self.outlines])
         both = np.concatenate([mesh.points[known], found])
         number = np.concatenate([known, n + np.arange(len(found))])
-        spot = clusters.spots(both, self.tolerance)  # known points come first
+        spot = clusters.spots(both, self.tolerance)  # known points precede new ones
         lead = number[spot[len(known) :]]
         new, at = np.unique(lead[lead >= n], return_inverse=True)
         lead[lead >= n] = n + at
@@ -173,7 +173,7 @@ class _Cut:
             self._complete(rows[face], made)
 
     def _complete(self, row: int, made: list[Face]) -> None:
-        """Triangles of what these leave of a face, beside them. CommandError if there are none that fit."""
+        """Triangles of what these leave of a face, beside them. CommandError if none fit."""
         corners = self.free.at[row]
         whole, covered = _area(corners), sum(_area(self.points[list(one)]) for one in made)
         rim = np.sqrt(((np.roll(corners, -1, axis=0) - corners) ** 2).sum(axis=1)).sum()
@@ -183,9 +183,9 @@ class _Cut:
         rest = self._rest(row, made)
         if abs(covered + sum(_area(self.points[list(one)]) for one in rest) - whole) > slack:
             raise CommandError(
-                f"a face of element {self.free.faces[row] // 4} at {fit.places(corners.mean(axis=0)[None])} is covered "
-                f"in part only, by {covered / whole:.3g} of its area, and what is left cannot be cut into triangles; "
-                "mesh both bodies with the same points there, or with a line of points on the rim of the smaller one"
+                f"a face of element {self.free.faces[row] // 4} at {fit.places(corners.mean(axis=0)[None])} is "
+                f"covered in part only, by {covered / whole:.3g} of its area, and the rest cannot be cut into "
+                "triangles. Use the same points in both meshes, or a line of points on the rim of the smaller face"
             )
         made += rest
 
@@ -273,8 +273,8 @@ class _Cut:
             made = np.array(tets, np.int64)
             if not (volumes(points, made) > 0.0).all():
                 raise CommandError(
-                    f"element {rows[0]} at {fit.places(points[made[0, :1]])} cannot be cut where points of others lie "
-                    "on its sides: mesh both bodies with the same points there"
+                    f"element {rows[0]} at {fit.places(points[made[0, :1]])} cannot be cut at hanging nodes on its "
+                    "sides: use the same points in the meshes of both bodies"
                 )
             cells[0][rows] = made[: len(rows)]
             cells.append(made[len(rows) :])
@@ -360,7 +360,7 @@ def triangles(ring: Sequence[int], xy: np.ndarray, tolerance: float, place: str)
             ):
                 best, best_shape = k, shape
         if best < 0:
-            raise CommandError(f"faces at {place} have no piece in common that can be cut into triangles")
+            raise CommandError(f"faces at {place} have no common part that can be cut into triangles")
         a, b, c = (left[(best + m - 1) % len(left)] for m in range(3))
         out.append((ring[a], ring[b], ring[c]))
         left.remove(b)

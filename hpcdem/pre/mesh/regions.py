@@ -76,7 +76,7 @@ def faces(segments: np.ndarray, layer: str, size: float) -> list[Any]:
     if loose:
         (x, y), gap = _loose_end(segments, shapely.get_coordinates(loose[0]))
         raise CommandError(
-            f"layer '{layer}' cannot bound a region: a line that ends at ({x:g}, {y:g}) encloses nothing"
+            f"layer '{layer}' cannot bound a region: a line ends at ({x:g}, {y:g})"
             + (f"; the next end is {gap:g} away" if gap > 0.0 else "")
         )
     return list(shapely.get_parts(polygons))

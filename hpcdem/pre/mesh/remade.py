@@ -89,7 +89,7 @@ def without(mesh: Mesh, elements: np.ndarray) -> Remade:
         table = table[~lost]
     parent = np.flatnonzero(~gone)
     if not len(parent):
-        raise CommandError("no element would be left")
+        raise CommandError("this would remove all elements")
     used = np.zeros(len(mesh.points), bool)
     left = mesh.cells[parent]
     used[left[left >= 0]] = True

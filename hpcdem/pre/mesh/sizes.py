@@ -15,7 +15,7 @@ from hpcdem.pre.mesh import optional
 from hpcdem.pre.mesh.geometry import Curve, sampled
 
 GROWTH = 0.2
-"""Edges grow by this much of the distance from a refined layer, where nothing else is said: neighbours by a fifth."""
+"""Edges grow by this much of the distance from a refined layer, by default: neighbours by a fifth."""
 MOST_ELEMENTS = 20_000_000
 """More are refused before they are made."""
 FLAT = 1e-9
@@ -52,8 +52,8 @@ class SizeField:
             positive(wish.size, f"mesh size near layer '{wish.layer}'")
             if wish.size >= base:
                 raise CommandError(
-                    f"mesh size near layer '{wish.layer}' is {wish.size:g}, which refines nothing where the mesh size "
-                    f"is {base:g}"
+                    f"mesh size near layer '{wish.layer}' is {wish.size:g}, which does not refine the mesh size "
+                    f"{base:g}"
                 )
             growth = wish.growth
             if wish.distance is not None:
@@ -117,7 +117,7 @@ def positive(value: float, what: str) -> None:
 def not_too_many(elements: float, what: str) -> None:
     """CommandError if so many elements are more than can be made; what: makes them, in words."""
     if not elements <= MOST_ELEMENTS:
-        raise CommandError(f"{what} would make some {elements:.2g} elements, more than {MOST_ELEMENTS:.0g}")
+        raise CommandError(f"{what} would make about {elements:.2g} elements, at most {MOST_ELEMENTS:.0g} allowed")
 
 
 def spaced(start: float, end: float, n: int, ratio: float = 1.0) -> np.ndarray:

@@ -22,7 +22,7 @@ LEAST_ANGLE = 15.0
 NEAR = 0.25
 """Of an edge."""
 AROUND = 64
-"""Points of a rim that are looked at."""
+"""Points of a rim that are checked."""
 
 Named = tuple[str, Sequence[Any]]
 
@@ -49,9 +49,9 @@ def snapped(surfaces: Sequence[Named], bodies: Sequence[Any], size: float) -> tu
                 kept.append(one)
         out.append((name, kept))
     said = (
-        (turned, f"were turned: they crossed others at less than {LEAST_ANGLE:g} degrees"),
-        (shrunk, "were made smaller: they ended within a quarter of an edge of the surface"),
-        (lost, "were left out: they lie outside of the body, or are smaller than a quarter of an edge"),
+        (turned, f"were rotated: they crossed others at less than {LEAST_ANGLE:g} degrees"),
+        (shrunk, "were shortened: they ended within a quarter of an edge of the surface"),
+        (lost, "were omitted: they lie outside the body, or are smaller than a quarter of an edge"),
     )
     return out, [f"{count} discs {what}" for count, what in said if count]
 

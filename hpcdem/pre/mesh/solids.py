@@ -1,5 +1,5 @@
 """Bodies and surfaces in space: what geometry layers hold in three dimensions. Ranges ask how far a point is from
-them, Gmsh is told them as they are (occ.py).
+them, Gmsh receives them unchanged (occ.py).
 
 Bodies have an inside (distances are negative there); surfaces, `Polygon`, `Disc` and `Plane`, have none: meshes are cut
 along them, and faces lie on them. All are frozen, and go into checkpoints as JSON (`state`, `restored`).
@@ -42,7 +42,8 @@ class Body:
         raise NotImplementedError
 
     def parts(self, points: np.ndarray) -> list[np.ndarray]:
-        """Distance (n,) of points (n, 3) from each smooth part of the surface [m]; a part may go on beyond the body."""
+        """Distance (n,) of points (n, 3) from each smooth part of the surface [m]; a part may extend beyond the
+        body."""
         raise NotImplementedError
 
 
@@ -174,7 +175,7 @@ class Extruded(Body):
         Polygon(self.corners).check()
         _, normal = _plane(self.corners)
         if abs(normal @ np.array(self.way)) <= IN_PLANE * float(np.linalg.norm(self.way)):
-            raise CommandError("a polygon is extruded out of its plane: the way lies in it")
+            raise CommandError("the extrusion vector must not lie in the plane of the polygon")
 
     def bounds(self) -> np.ndarray:
         ends = np.concatenate([np.array(self.corners), np.array(self.corners) + self.way])
@@ -196,7 +197,7 @@ class Extruded(Body):
         return [*self._ends(points), *(_from_line(a, b, at) for a, b in _sides(corners))]
 
     def _beside(self, points: np.ndarray) -> np.ndarray:
-        """Distance from the mantle, which goes on without end, negative inside."""
+        """Distance from the infinite lateral surface, negative inside."""
         frame = _frame(_unit(self.way))
         return outline_distance(np.array(self.corners) @ frame.T, points @ frame.T)
 
@@ -219,15 +220,17 @@ class Revolved(Body):
     def check(self) -> None:
         Polygon(self.corners).check()
         if not any(self.axis) or not 0.0 < self.angle <= FULL:
-            raise CommandError("a polygon is revolved about an axis of some length, by an angle from 0 to 360 degrees")
+            raise CommandError(
+                "revolving a polygon needs an axis with a length above 0, and an angle from 0 to 360 degrees"
+            )
         flat, at = self._flat(), np.array(self.corners)
         size = float(np.ptp(at, axis=0).max())
         _, normal = _plane(self.corners)
         off = abs(normal @ _unit(self.axis)), abs(normal @ (np.array(self.about) - at[0])) / size
         if max(off) > IN_PLANE:
-            raise CommandError("the axis about which a polygon is revolved lies in its plane")
+            raise CommandError("the axis of revolution must lie in the plane of the polygon")
         if flat[:, 1].min() < -IN_PLANE * size:
-            raise CommandError("the axis about which a polygon is revolved does not cross it")
+            raise CommandError("the axis of revolution must not cross the polygon")
 
     def _flat(self) -> np.ndarray:
         """(k, 2) corners: along the axis, distance from it towards the polygon [m]; tiny ones are 0."""
@@ -421,7 +424,7 @@ class Polygon(Surface):
         if float(np.abs((at - middle) @ normal).max()) > IN_PLANE * size:
             raise CommandError("the corners of a polygon do not lie in one plane")
         if (at == np.roll(at, 1, axis=0)).all(axis=1).any():
-            raise CommandError("two corners of a polygon, one after the other, are the same")
+            raise CommandError("two successive corners of a polygon coincide")
 
     def plane(self) -> tuple[np.ndarray, np.ndarray]:
         return _plane(self.corners)
@@ -441,7 +444,7 @@ class Disc(Surface):
 
     def check(self) -> None:
         if not self.radius > 0.0 or not any(self.normal):
-            raise CommandError("a disc needs a normal of some length, and a radius above 0")
+            raise CommandError("a disc needs a normal and a radius above 0")
 
     def plane(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.centre), _unit(self.normal)
@@ -462,7 +465,7 @@ class Plane(Surface):
 
     def check(self) -> None:
         if not any(self.normal):
-            raise CommandError("a plane needs a normal of some length")
+            raise CommandError("a plane needs a normal")
 
     def plane(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.point), _unit(self.normal)
@@ -512,7 +515,9 @@ def transformed(
         )
     name = next(kind for kind, of in KINDS.items() if type(solid) is of)
     if name == "brep":
-        raise CommandError("a solid of a CAD file stays as the file has it: geometry import scale, or move it in there")
+        raise CommandError(
+            "a solid of a CAD file cannot be transformed: use geometry import scale, or change it in the CAD program"
+        )
     if isinstance(solid, (Sphere, _Round, Revolved, Disc)) and np.ptp(np.abs(factors)) > 0.0:
         raise CommandError(f"transform: factors ({', '.join(f'{f:g}' for f in factors)}) would make a {name} oval")
     turn = Rotation.from_rotvec(math.radians(rotate) * _unit(axis)).as_matrix()

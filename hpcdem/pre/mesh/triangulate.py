@@ -103,9 +103,9 @@ def triangulate(layers: Layers, wishes: Wishes) -> Meshed:
     if wishes.kind not in ("tri", "quad"):
         raise CommandError(f"a mesh consists of 'tri' or 'quad', not '{wishes.kind}'")
     if wishes.irregular and wishes.kind != "tri":
-        raise CommandError("irregular is for triangles")
+        raise CommandError("irregular supports triangles only")
     if wishes.smooth and wishes.kind != "tri":
-        raise CommandError("smooth is for triangles")
+        raise CommandError("smooth supports triangles only")
     if not wishes.regions:
         raise CommandError("a mesh needs at least one layer as outline")
     sizes = _size_field(layers, wishes)
@@ -127,8 +127,8 @@ def triangulate(layers: Layers, wishes: Wishes) -> Meshed:
     if found.angle_least < SHARP:
         x, y = found.angle_least_at
         notes.append(
-            f"the smallest angle is {found.angle_least:.1f} degrees, in element {found.angle_least_element} at ({x:g}, "
-            f"{y:g}): lines come close to each other there, which makes the time step small"
+            f"the smallest angle is {found.angle_least:.1f} degrees, in element {found.angle_least_element} at "
+            f"({x:g}, {y:g}): lines are close to each other, which makes the time step small"
         )
     return Meshed(mesh, notes)
 
@@ -147,8 +147,8 @@ def _size_field(layers: Layers, wishes: Wishes) -> SizeField:
     coarser = [r for r in wishes.regions if r.size is not None and r.size > wishes.size]
     if coarser:
         raise CommandError(
-            f"region '{coarser[0].layer}' has the mesh size {coarser[0].size:g}, greater than {wishes.size:g}: "
-            "give the greatest size as that of the mesh"
+            f"region '{coarser[0].layer}' has the mesh size {coarser[0].size:g}, larger than {wishes.size:g}: use "
+            "the largest size for the mesh"
         )
     return SizeField(wishes.size, [(r, layers[r.layer]) for r in [*wishes.refine, *own]])
 
@@ -179,7 +179,7 @@ def _outlines(plane: Plane, layers: Layers, wishes: Wishes) -> list[_Area]:
             groups = {r.set_name: r.group for r in regions if r.group is not None}
             areas.append(_Area(polygon, groups, next((r.size for r in reversed(regions) if r.size is not None), None)))
     if not areas:
-        raise CommandError("the holes leave nothing of the regions")
+        raise CommandError("the holes cover the regions completely")
     return areas
 
 
@@ -204,7 +204,7 @@ def _not_too_many(layers: Layers, wishes: Wishes, sizes: SizeField) -> None:
                 edges += length * float((1.0 / sizes(sampled(curve, length / 256.0))).mean())
     if edges > MOST_EDGES:
         raise CommandError(
-            f"mesh size {sizes.base:g} would cut lines into some {edges:.2g} edges, more than {MOST_EDGES:.0g}"
+            f"mesh size {sizes.base:g} would cut lines into about {edges:.2g} edges, at most {MOST_EDGES:.0g} allowed"
         )
     elements = 0.0
     for region in wishes.regions:
@@ -264,11 +264,11 @@ def _lines_inside(
         plane.add_line((ax, ay), (bx, by), labels[origin[i]] | {("trace", int(i))})
     outside = len(every) - len(np.unique(origin))
     if outside:
-        notes.append(f"{outside} of {len(every)} traces lie outside the regions and are left out")
+        notes.append(f"{outside} of {len(every)} traces lie outside the regions and are omitted")
     if short.any():
         notes.append(
-            f"{int(short.sum())} traces shorter than {plane.ratio:g} of the mesh size are left out "
-            f"(together {float(length[short].sum()):g} m)"
+            f"{int(short.sum())} traces shorter than {plane.ratio:g} of the mesh size are omitted (total length "
+            f"{float(length[short].sum()):g} m)"
         )
     return points, ends, notes
 
@@ -288,8 +288,8 @@ def _moved(plane: Plane, xy: np.ndarray, traces: np.ndarray) -> list[str]:
     i = int(far.argmax())
     h = float(plane.sizes(xy[point[i : i + 1]])[0])
     return [
-        f"lines that come close to each other were moved together, by {far[i]:g} m at most (near "
-        f"({xy[point[i], 0]:g}, {xy[point[i], 1]:g}), {far[i] / h:.2f} of the mesh size there)"
+        f"lines close to each other were merged, moved by at most {far[i]:g} m (near ({xy[point[i], 0]:g}, "
+        f"{xy[point[i], 1]:g}), {far[i] / h:.2f} of the mesh size there)"
     ]
 
 
@@ -517,7 +517,7 @@ def _taken_out(
         held[list(mine.values())] = True
         points, stayed = smoothed(points, triangles, held)
         if stayed:
-            notes.append(f"smooth leaves {stayed} points where they were: triangles would become sharp there")
+            notes.append(f"smooth did not move {stayed} points, because triangles would become sharp")
     return _compact(
         points,
         triangles,

@@ -87,7 +87,7 @@ class Request:
 
 @dataclass(frozen=True)
 class ClassRow:
-    """One size of the grading. size [mm]; target, by_number and by_area: per cent finer as asked for, from the whole
+    """One size of the grading. size [mm]; target, by_number and by_area: per cent finer as requested, from the whole
     grains of each class, and from their true areas; exact: grains before rounding; count: whole grains; needed: number
     of grains in all for one of this class (infinite if it has no share)."""
 
@@ -191,7 +191,7 @@ def make_specimen(request: Request) -> Specimen:
     unit, _ = _bodies(request, np.ones(1000))
     wanted = room / (circle * float(moments(unit)[0].mean()) / (0.25 * math.pi))
     if not 0.5 <= wanted <= MOST:
-        raise CommandError(f"a box {request.width:g} m wide holds {wanted:.3g} such grains, expected 1 to {MOST}")
+        raise CommandError(f"a box {request.width:g} m wide contains {wanted:.3g} such grains, expected 1 to {MOST}")
     return _made(request, curve, max(1, round(wanted)), request.width)
 
 
@@ -219,7 +219,7 @@ def _made(request: Request, curve: Grading, number: int, width: float | None) ->
     if widest > width or (request.placement == "dense" and widest > height):
         raise CommandError(
             f"the box is {width / MM:.4g} mm wide and {height / MM:.4g} mm high, the largest grain {widest / MM:.4g} "
-            "mm long: take more grains, or another slenderness"
+            "mm long: use more grains, or another slenderness"
         )
     if request.placement == "cells":
         x, y, tall = in_cells(reach, width, request.cell, request.seed)

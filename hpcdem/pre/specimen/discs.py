@@ -189,7 +189,7 @@ def _cover(x, y, theta, radius, cx, cy, first, gap):
             # Rounding must not push it out.
             r = min(r, _inside(discs[k, 0], discs[k, 1], x, y, theta, radius, cx, cy, first))
             discs[k, 2] = max(r, 0.0) * (1.0 - 1e-12)
-    # Points between the ones looked at are at most a quarter of the gap from one of them.
+    # Points between the checked ones are at most a quarter of the gap from one of them.
     near = 0.75 * gap
     far = np.full(n, np.inf)
     chosen = np.empty((n, 3))

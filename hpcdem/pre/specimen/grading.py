@@ -54,7 +54,7 @@ class Grading:
 def grading(sizes: Sequence[float], percents: Sequence[float]) -> Grading:
     """A grading from rows in falling or rising order. Raises CommandError."""
     if len(sizes) != len(percents):
-        raise CommandError(f"grading: {len(sizes)} sizes and {len(percents)} percentages, expected equally many")
+        raise CommandError(f"grading: {len(sizes)} sizes and {len(percents)} percentages, expected equal numbers")
     where, text = fault(sizes, percents)
     if text:
         raise CommandError(f"grading, row {where + 1}: {text}" if where >= 0 else f"grading: {text}")
@@ -95,9 +95,9 @@ def parse_grading(text: str, name: str = "grading") -> Grading:
 
 
 def fault(sizes: Sequence[float], percents: Sequence[float]) -> tuple[int, str]:
-    """The first row (-1: all of it) that cannot be in a grading, and why; an empty text if there is none."""
+    """The first row (-1: all of it) that cannot be in a grading, and why; an empty text without one."""
     if not len(sizes):
-        return -1, "holds no rows, expected sizes in mm and per cent finer"
+        return -1, "contains no rows, expected sizes in mm and per cent finer"
     if len(sizes) > MOST_SIZES:
         return -1, f"has {len(sizes)} rows, at most {MOST_SIZES}"
     for k, (size, percent) in enumerate(zip(sizes, percents)):

@@ -1,4 +1,4 @@
-"""Scripts that go on with a specimen: gravity deposition, and a biaxial test.
+"""Scripts that use a specimen: gravity deposition, and a biaxial test.
 
 The numbers in them follow from the specimen: a stiffness at which grains overlap little under the load there is, a time
 step a fraction of sqrt(m / k), times from falling and from the strain rate at which the test is quasi-static.

@@ -163,7 +163,7 @@ def test_scaled_and_moved(desk):
 
 HOSTILE = [
     ("element densify max-length 0.5 range x 9 9", "the range selects no element"),
-    ("element densify pattern 0 0 max-length 0.5", "halves nothing"),
+    ("element densify pattern 0 0 max-length 0.5", "has no effect"),
     ("element densify pattern 2 0 max-length 0.5", "0 or 1"),
     ("element densify max-length 0", "above 0"),
     ("element densify pattern 1 1", "lacks m{aximum}-l{ength}"),

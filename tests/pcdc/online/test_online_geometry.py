@@ -78,11 +78,11 @@ def test_several_layers_are_forgotten(desk):
 HOSTILE = [
     ("geometry create circle c (0,0)", "needs a centre and a radius"),
     ("geometry create circle (0,0) 1 c (1,1)", "each once"),
-    ("geometry create circle c (0,0) rad 1 s-l 1e-9", "more than 100000"),
+    ("geometry create circle c (0,0) rad 1 s-l 1e-9", "at most 100000"),
     ("geometry create circle c (0,0) rad 1 s-l 0", "above 0"),
     ("geometry create polyline-close (0,0) (1,1)", "at least 3 needed"),
     ("geometry scale (0,1)", "not zero"),
-    ("geometry scale (2,1)", "would make ellipses"),
+    ("geometry scale (2,1)", "into ellipses"),
     ("geometry scale (2,2) layer 'no'", "there is no geometry layer 'no'"),
     ("geometry translate (1,1) layer", "expected texts in quotes|texts in quotes"),
     ("geometry export 'ring'", "lacks f{ile}"),

@@ -168,7 +168,7 @@ HOSTILE = [
     ("element create geometry layer 'rim' m-s 1 circle center (0,0) m-s 1", "lacks r{adius}"),
     ("element create geometry layer 'rim' m-s 1 arc center (0,0) start-point (1,0) end-point (0,2)",
      "1 and 2 m away from its centre"),
-    ("element create geometry layer 'rim' m-s 1e-6", "more than"),
+    ("element create geometry layer 'rim' m-s 1e-6", "at most"),
     ("element create geometry-patch b-c-p m-s 1", "needs array, points, or layer"),
     ("element create geometry-patch c-polyline layer 'bed' m-s 1", "lacks b{oundary}-c{lose}-p{olyline}"),
     ("element create geometry-boundary boundary (0,0) (1,0) m-s 1", "2 points given, at least 3 needed"),
