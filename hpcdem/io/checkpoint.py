@@ -38,7 +38,7 @@ from hpcdem.io.h5 import reading, writing_to
 from hpcdem.io.parts import read_parts, share
 
 FORMAT = "hpcdem checkpoint"
-VERSION = 8
+VERSION = 9
 
 BLOCKS, BOTH = "blocks", "coupled"
 """`kind` in the state: a model of blocks, one of particles and blocks; particles alone have none."""

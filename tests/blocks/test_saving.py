@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import convergence, diagnostics, saved_state
+from hpcdem.physics.fdem import convergence, diagnostics, groups, saved_state
 from hpcdem.physics.fdem.properties import CONTACT_MOHR_COULOMB, Rows
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks import models
@@ -51,6 +51,15 @@ def test_a_run_with_all_kinds_of_stages_goes_on(at, tmp_path):
                 models.open_up(one)
             one.step()
     same(state(sim), state(again))
+
+
+@pytest.mark.parametrize(("key", "of"), [("groups", np.ndarray.tolist), ("group_runs", groups.runs)])
+def test_groups_of_the_mesh_are_read_by_element_too_as_version_8_has_them(key, of):
+    rows, mesh = np.array([0, 1, 2, 5]), rectangle(2, 2, 1.0, 1.0)
+    about = {key: {"s": {"a": of(rows), "none": of(rows[:0])}}, "layers": {}, "cracks": [], "crack_sets": []}
+    corners = {f"corner_{k}": mesh.cells[:, k] for k in range(4)}
+    found = saved_state._mesh(about, {"mesh_points": dict(zip("xy", mesh.points.T)), "mesh_cells": corners}).groups["s"]
+    assert found["a"].tolist() == rows.tolist() and found["none"].tolist() == []
 
 
 def test_looking_and_saving_change_nothing(tmp_path):
