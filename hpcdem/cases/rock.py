@@ -86,5 +86,5 @@ energy_error = pcdc.energies['relative']         # of the energy budget, part of
 
 
 def in_space(text: str) -> str:
-    """The same for three dimensions, in which charts have no model beside them."""
+    """The text for three dimensions, where charts have no model beside them."""
     return text.replace(".png' cracks\n", ".png'\n")

@@ -82,7 +82,7 @@ LOOKS = {
 def draw(**options: Any) -> None:
     """Draw frames of particles or of blocks: PNG, JPG, TIFF, and true vectors in PDF and SVG.
 
-    Of a folder all frames are drawn, at one place and with one range of colours. Under mpiexec or srun the ranks share
+    All frames of a folder are drawn with the same limits and range of colours. Under mpiexec or srun the ranks share
     them.
     """
 

@@ -104,7 +104,7 @@ class Selection:
         raise NotImplementedError
 
     def resolve(self, extents: Mapping[str, float]) -> Selection:
-        """The same selection with plain numbers in place of expressions; CommandError where one has no value."""
+        """This selection with numbers instead of expressions; CommandError where one has no value."""
         return replace(self, **{f.name: _resolved(getattr(self, f.name), extents) for f in fields(self)})  # type: ignore
 
     def __and__(self, other: Selection) -> Selection:

@@ -45,7 +45,7 @@ SYSTEMS = {
 }
 """By the names that scripts use. The mass is the one that makes the stress MPa: 1 t / (mm s2), 1 Mt / (km s2)."""
 CHOICES = {"si": "SI", "mm-mpa-s": "mm-MPa-s", "km-mpa-s": "km-MPa-s"}
-"""The same names as people write them."""
+"""Names of units as printed."""
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ NAP = 2e-5
 
 
 class MpiComm(Comm):
-    """The same operations over an mpi4py communicator. of: of which it is a part, with the same cores."""
+    """Operations of `SerialComm` over an mpi4py communicator. of: of which it is a part, with the same cores."""
 
     def __init__(self, mpi: Any, of: MpiComm | None = None) -> None:
         from mpi4py import MPI

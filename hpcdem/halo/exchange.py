@@ -75,7 +75,7 @@ class Halo:
         self.requests += self._persistent(rows, 0)
 
     def add_late_ghost_field(self, rows: np.ndarray) -> None:
-        """The same of a second array, renewed by `refresh_more`."""
+        """From now on `refresh_more` renews the ghost rows of this array."""
         self.more += self._persistent(rows, BACK)
 
     def storage(self, rows: np.ndarray) -> np.ndarray:

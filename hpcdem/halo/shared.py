@@ -72,7 +72,7 @@ class Nodes:
             self._making = False
 
     def _handed_out(self, head: bytes, large: list[Any]) -> Any:
-        """The same object on all ranks of the node."""
+        """An object shared by all ranks of the node."""
         host = self.host
         if host.size == 1:
             return pickle.loads(head, buffers=large)

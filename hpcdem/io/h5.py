@@ -280,8 +280,8 @@ def writing(path: str | os.PathLike, comm: Comm, later: Deliveries | None = None
 
 @contextmanager
 def writing_to(path: str | os.PathLike, comm: Comm, check: Callable[[str], None] | None = None) -> Iterator[Writer]:
-    """The same, at once. check: called on rank 0 with the finished file's temporary name; its HpcdemError keeps the
-    file from getting its name."""
+    """Collective: a Writer that finishes its file at the end of the block. check: called on rank 0 with the finished
+    file's temporary name; its HpcdemError keeps the file from getting its name."""
     with atomic_path(path, comm) as temporary:
         writer = Writer(path, temporary, comm, RootFile(path, temporary=temporary) if comm.rank == 0 else None)
         try:

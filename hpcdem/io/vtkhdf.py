@@ -209,7 +209,7 @@ def _of_particles(group: Any) -> dict[str, tuple[str, Any]]:
 
 
 def _of_links(group: Any, first: int, size: int, names: bytes) -> dict[str, tuple[str, Any]]:
-    """The same of contacts or bonds."""
+    """Dataset and rows of each column of contacts or bonds."""
     rows = slice(first, first + size)
     force = dict(zip(("fx", "fy"), (0, 1))) if "force" in group else {}
     return {

@@ -248,7 +248,7 @@ def file(wanted: dict[str, Any]) -> bytes:
 
 
 def _zipped(content: dict[str, bytes]) -> bytes:
-    """The same bytes for the same files: entries carry no time."""
+    """A ZIP archive of the files; equal files give equal bytes, because entries carry no time."""
     whole = io.BytesIO()
     with zipfile.ZipFile(whole, "w") as archive:
         for name, part in content.items():

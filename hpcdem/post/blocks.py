@@ -84,7 +84,7 @@ def view_of_flow(state: MeshState) -> View:
 
 
 def view_of_fluid(state: MeshState) -> View:
-    """The same where there are channels."""
+    """The part of the plane around channels."""
     return _around(state, fluid.ends(state))
 
 
@@ -395,7 +395,7 @@ def nice_levels(low: float, high: float) -> np.ndarray:
 
 
 def cornered(state: MeshState, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same of values (n,) of the corners of elements."""
+    """Triangles for contours of values (n,) at the corners of elements."""
     quads = state.cells[state.cells[:, 3] >= 0]
     triangles = np.concatenate([state.cells[:, :3], quads[:, [0, 2, 3]]])
     a, b, c = (state.points[triangles[:, k]] for k in range(3))

@@ -156,7 +156,8 @@ def _lettered(left: Any, right: Any) -> None:
 
 
 def _body_beside(model: MeshState, panel: str) -> tuple[Any, Any]:
-    """The same of a body in space, painted as `hpcdem draw` does: joints are seen through its elements."""
+    """Figure and axes beside a body in three dimensions, painted as by `hpcdem draw`: joints are visible through
+    elements."""
     from matplotlib.figure import Figure
 
     from hpcdem.post.view import paper

@@ -107,7 +107,7 @@ class ColourTable:
         return result
 
     def stretched(self, low: float, high: float) -> ColourTable:
-        """The same colours over another range."""
+        """This table scaled to another range."""
         a, b = self.breaks[[0, -1]]
 
         def moved(z: float) -> float:

@@ -1,4 +1,4 @@
-"""The same for Python programs."""
+"""Sweeps for Python programs."""
 
 from __future__ import annotations
 

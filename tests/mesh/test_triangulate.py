@@ -388,7 +388,7 @@ def test_slivers_of_the_outline_are_told():
         ({"o": BOX}, ROCK, {"refine": [Refinement("o", 0.7)]}, "does not refine"),
         ({"o": BOX}, ROCK, {"refine": [Refinement("o", 1e-9)]}, "too small for its length"),
         ({"o": BOX}, ROCK, {"refine": [Refinement("o", 0.1, growth=-1.0)]}, "growth .* must be positive"),
-        ({"o": BOX}, [Region("o", "a", size=3.0)], {}, "greater than 0.5"),
+        ({"o": BOX}, [Region("o", "a", size=3.0)], {}, "larger than 0.5"),
         ({"o": BOX, "e": []}, ROCK, {"cracks": [("e", 0)]}, "layer 'e' is empty"),
         ({"o": geometry.point((0, 0))}, ROCK, {}, "has no lines"),
         (

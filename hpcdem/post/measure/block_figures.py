@@ -40,7 +40,7 @@ def times(values: np.ndarray, timed: bool) -> tuple[np.ndarray, str]:
 
 
 def when(parts: Sequence[Part]) -> tuple[np.ndarray, str]:
-    """The same for frames."""
+    """Positions of frames on the axis of time, and its name."""
     time = np.array([one.time for one in parts])
     timed = bool(np.ptp(time) > 0.0)
     return times(time if timed else np.array([float(one.step) for one in parts]), timed)

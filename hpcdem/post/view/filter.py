@@ -91,7 +91,7 @@ def parsed(text: str) -> ast.expr:
 
 
 def _without_range(text: str) -> str:
-    """The same with the words of RANGE as an expression: all of them must hold."""
+    """The filter text with the words of RANGE as an expression: all of them must hold."""
     if not re.match(r"range\b", text, re.IGNORECASE):
         return text
     return _Range(text).expression()

@@ -113,11 +113,11 @@ class ModelView(_Table):
         return next((layer for layer in self.layers if layer.label == label), None)
 
     def changed(self, **values: Any) -> ModelView:
-        """The same view with other values. HpcdemError for those that cannot be."""
+        """This view with other values. HpcdemError for invalid ones."""
         return view_of({**self.model_dump(), **values}, "view")
 
     def with_layer(self, label: str, **values: Any) -> ModelView:
-        """The same view with other values of one layer. HpcdemError for those that cannot be."""
+        """This view with other values of one layer. HpcdemError for invalid ones."""
         layers = [
             {**layer.model_dump(), **(values if layer.label == label else {})} for layer in self.layers
         ]  # fmt: skip

@@ -384,7 +384,7 @@ STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress", "stress_deviator")
 
 
 def _unread(columns: Any) -> Any:
-    """The same, of which nothing stays that is read."""
+    """Columns that are read anew at each use, without a cache."""
     return Columns({name: partial(part, columns, name) for name in columns})
 
 

@@ -58,7 +58,7 @@ CATEGORIES = (
 )
 """Of groups: ten that the colour-blind tell apart (Tol 2021, with three more)."""
 PALE = ("#77aadd", "#eedd88", "#ee8866", "#44bb99", "#ffaabb", "#bbcc33", "#99ddff", "#aaaa00")
-"""The same of elements, on which joints and bolts are seen (Tol 2021, light)."""
+"""Colours of groups of elements, on which joints and bolts are visible (Tol 2021, light)."""
 CLASSES = 12
 """Integer fields with names have a legend of at most so many."""
 

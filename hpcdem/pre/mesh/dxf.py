@@ -83,7 +83,7 @@ def read_dxf(path: str | Path, only: set[str] | None = None) -> dict[str, list[C
 
 
 def curves(document: Any, path: Path, only: set[str] | None = None) -> dict[str, list[Curve]]:
-    """The same of an opened drawing."""
+    """Curves of an opened drawing by layer."""
     found: dict[str, list[Curve]] = {}
     for entity, layer in flat(document.modelspace(), str(path)):
         if only is not None and layer not in only:

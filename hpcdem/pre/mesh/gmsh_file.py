@@ -70,7 +70,7 @@ def _whole(values: np.ndarray) -> np.ndarray:
 
 
 class _Binary:
-    """The same of a binary section; order: of its bytes."""
+    """Reader of a binary section; order: of its bytes."""
 
     def __init__(self, section: bytes, order: Literal["<", ">"]) -> None:
         self.section, self.order, self.at = section, order, 0

@@ -49,7 +49,7 @@ def _not_too_many(nx: int, ny: int, kind: str, diagonal: str) -> None:
 def of_grid(
     grid: np.ndarray, kind: str = "quad", diagonal: str = "alternate", group: tuple[str, str] | None = None
 ) -> Mesh:
-    """The same between the points of a grid (ny + 1, nx + 1, 2), counter-clockwise; `left` is its first column,
+    """Elements between the points of a grid (ny + 1, nx + 1, 2), counter-clockwise; `left` is its first column,
     `bottom` its first row."""
     if kind not in ("quad", "tri"):
         raise CommandError(f"a structured mesh consists of 'quad' or 'tri', not '{kind}'")

@@ -34,7 +34,7 @@ def _grid(lines: Sequence[np.ndarray], split: int = 6) -> np.ndarray:
 
 
 def of_grid(grid: np.ndarray, split: int = 6, group: tuple[str, str] | None = None) -> Mesh:
-    """The same between the points of a grid (nz + 1, ny + 1, nx + 1, 3) with edges that are right-handed."""
+    """Tetrahedra between the points of a grid (nz + 1, ny + 1, nx + 1, 3) with right-handed edges."""
     if split not in SPLITS:
         raise CommandError(f"a box is split into {', '.join(map(str, SPLITS))} tetrahedra, not into {split}")
     n = np.array(grid.shape[2::-1]) - 1
@@ -78,7 +78,7 @@ def hexes(lines: Sequence[np.ndarray], group: tuple[str, str] | None = None) -> 
 
 
 def hexes_of_grid(grid: np.ndarray, group: tuple[str, str] | None = None) -> Mesh:
-    """The same between the points of a grid, see `of_grid`."""
+    """Hexahedra between the points of a grid, see `of_grid`."""
     made = of_grid(grid, 6)
     n = np.array(grid.shape[2::-1]) - 1
     number = np.arange(len(made.points)).reshape(*(n + 1)[::-1])
