@@ -154,7 +154,7 @@ load = peak = way = 0.0
 falling = False
 while way < most * elastic and (not falling or load > stop * peak):
     pcdc model solve time [0.5*period]
-    load = -pcdc.history('load')[-200 if falling else -25:, 2].mean()        # tail: over two swings
+    load = -pcdc.history('load')[-200 if falling else -25:, 2].mean()        # tail: over two periods
     peak, way = max(peak, load), -pcdc.history('way')[-1, 2]
     if not falling and load < 0.7 * peak:
         falling, now = True, pcdc.time

@@ -45,10 +45,10 @@ PAGE = 17.0
 @number("max_workers", None, "Number of drawing processes [one per core].", POSITIVE)
 @looks
 def movie(**options: Any) -> None:
-    """Make a film of all frames in DIR, of particles or of blocks, drawn at one view so that nothing jumps.
+    """Make a film of all frames in DIR, of particles or of blocks, drawn with the same limits.
 
     An animated GIF, and MP4 where ffmpeg is found (in the PATH, or of the package imageio-ffmpeg). --showlable=true
-    writes the step into each frame; in a text of your own, {step} and {time} (s) are filled in.
+    writes the step into each frame; in your own text, {step} and {time} (s) are replaced.
     """
 
 

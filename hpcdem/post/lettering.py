@@ -22,8 +22,8 @@ _told: set[str] = set()
 
 def lettered(figure: Any, kind: str = "png") -> str:
     """Give texts of a figure of matplotlib, that becomes a file of this kind, fonts that have their letters; what is to
-    be told of those that no font has, "" if all are there. It goes to standard error too, once in a process, and into
-    the figure, but for SVG, whose texts are written by who reads it."""
+    be reported about those that no font has, "" if all are available. It goes to standard error too, once in a
+    process, and into the figure, but for SVG, whose texts are written by who reads it."""
     from matplotlib.font_manager import findfont
     from matplotlib.patheffects import Normal
     from matplotlib.text import Text

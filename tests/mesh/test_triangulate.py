@@ -395,7 +395,7 @@ def test_slivers_of_the_outline_are_told():
             {"o": geometry.polyline([(0, 0), (9, 0), (9, 6), (0, 6), (0, 0.1)])},
             ROCK,
             {},
-            r"ends at \(0, 0\.1\) .* 0\.1 away",
+            r"ends at \(0, 0\.1\).* 0\.1 away",
         ),
         ({"o": [BOX, geometry.polyline([(1, 1), (2, 2)])]}, ROCK, {}, "cannot bound a region: a line ends at"),
         ({"o": BOX, "h": geometry.rectangle((-1, -1), (11, 7))}, ROCK, {"holes": ["h"]}, "cover the regions"),

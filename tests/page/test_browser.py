@@ -241,7 +241,7 @@ def test_rows_can_be_added_pasted_and_read_from_a_file(open_page, tmp_path):
     path.write_bytes(b"x" * 70000)
     page.tab.set_input_files("#file", path)
     page.tab.wait_for_selector("#error:not([hidden])")
-    assert "no grading file" in page.text("#error")
+    assert "not a grading file" in page.text("#error")
 
 
 def test_the_curve_has_target_and_reached_in_their_places(open_page):
@@ -537,7 +537,7 @@ def test_a_server_that_has_ended_is_told(open_page, serve_page, grading_file):
     served.process.wait(PATIENCE)
     page.fill("#seed", 2)
     page.tab.wait_for_selector("#error:not([hidden])")
-    assert page.text("#error").startswith("The server does not answer. Has hpcdem ended?")
+    assert page.text("#error").startswith("The server does not respond. Has hpcdem ended?")
     assert page.tab.is_visible("#stale") and differing(page.pixels(), picture) < ALIKE
 
 

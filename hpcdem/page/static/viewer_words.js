@@ -47,7 +47,7 @@ add({
     chart_stress_strain: "stress–strain", chart_load_way: "load–displacement",
     chart_text: "time, step, the name of a history in quotes, or an expression: strain [%] = 100 * ('top' - 'bottom') / 0.1. One curve per line",
     wait_compiling: "Compiling kernels, once on this machine ({who}).\nThe first frame follows.",
-    wait_first: "The run has begun; waiting for its first frame …", wait_empty: "There is no frame in {folder} yet.\nStart a run that writes there; its frames appear automatically.",
+    wait_first: "The run has started; waiting for its first frame …", wait_empty: "There is no frame in {folder} yet.\nStart a run that writes there; its frames appear automatically.",
     wait_desk: "Nothing to show yet.\nOpen a script below and press Run all, or type commands into the console.",
     wait_picture: "Drawing …", wait_drawing: "Compiling the drawing kernels, once on this machine …",
     not_copied_picture: "The browser does not allow pictures in the clipboard here; save the picture as PNG instead.",

@@ -1,4 +1,4 @@
-// What the page says, in two languages. A name stands in both; {x} is filled in.
+// What the page says, in two languages. Each name is in both; {x} is replaced.
 
 export const WORDS = {
   en: {
@@ -8,35 +8,35 @@ export const WORDS = {
     language: "中文", language_label: "切换到中文", language_code: "zh",
     theme_auto: "Theme: system", theme_light: "Theme: light", theme_dark: "Theme: dark",
     output: "Output", open: "Open file…", open_title: "A text file: size in mm and percent finer, one pair per line",
-    grading: "Grading", table_caption: "Grain sizes and percentages finer; grains and grading reached",
+    grading: "Grading", table_caption: "Grain sizes and percentages finer; numbers of grains and grading reached",
     colour: "Colour", size: "Size", finer: "Finer", reached: "Reached", grains: "Grains", remove: "Remove",
     add: "Add a row", reset: "Undo all changes",
     size_of: "Size of row {row} in mm", finer_of: "Percent finer of row {row}", remove_row: "Remove row {row}",
-    need: "from {n}", need_title: "One grain of this size needs {n} grains in all. Click to take as many.",
+    need: "from {n}", need_title: "A grain of this size requires {n} grains in total. Click to set this number.",
     specimen: "Specimen", shape: "Shape of the grains",
     circle: "Circle", ellipse: "Ellipse", triangle: "Triangle", quadrilateral: "Quadrilateral", pentagon: "Pentagon",
     number: "Number of grains", slenderness: "Slenderness", void_ratio: "Void ratio", l_over_d: "Axes",
     deviation: "Angle deviation", roundness: "Roundness", seed: "Seed",
     number_unit: "N", slenderness_unit: "H / W", void_ratio_unit: "e", l_over_d_unit: "L / D", deviation_unit: "degrees",
     roundness_unit: "0 straight edges, 1 circle", seed_unit: "random numbers",
-    exactly: "{name}, exact value", dice: "Another one",
+    exactly: "{name}, exact value", dice: "Another specimen",
     placement: "Placement", cells: "Loose column", dense: "Dense box",
     curve: "Grading curve", soil: "coarse to the left", target: "target", achieved: "reached",
     x_axis: "Grain size d [mm]", y_axis: "Percent finer by mass [%]",
     plot_label: "Grading curve: percent finer over grain size on a logarithmic axis, target and reached.",
     numbers: "Numbers",
     fact_number: "Grains", fact_of: "of {n}", fact_box: "Box W × H", fact_solid: "Area of the grains",
-    fact_void: "Void ratio", fact_void_target: "asked {e}", fact_cu: "Cu, reached", fact_cc: "Cc, reached",
+    fact_void: "Void ratio", fact_void_target: "target {e}", fact_cu: "Cu, reached", fact_cc: "Cc, reached",
     fact_asked: "target {v}", fact_height: "Height of the column", fact_classes: "Sizes with grains",
     fact_need: "N for every size", fact_time: "Time", fact_time_of: "{draw} drawing",
     packing: "Packing", view: "View", fit_box: "Box", fit_all: "All grains", nearer: "Zoom in", farther: "Zoom out",
-    keys: "Wheel, + and − zoom; drag or arrow keys move; 0 shows the box.",
+    keys: "Wheel, + −: zoom · drag, arrows: pan · 0: show the box",
     stale: "The last valid specimen", coarse: "Preview with {n} grains", picture: "{n} grains, {shape}, in a box of {w} × {h} mm",
     tip: "{d} mm · grain {n}",
-    row: "Row {row}: {text}", busy: "Computing…", first: "Computing… The first time kernels are compiled, which takes half a minute.", no_server: "The server does not answer. Has hpcdem ended? ({why})",
-    no_file: "This file cannot be read: {why}", bad_file: "{name}: more than 64 KiB is no grading file",
-    close: "Close", command: "The same from the command line", copy: "Copy", copied: "Copied",
-    not_copied: "The browser does not allow copying; mark the text instead.",
+    row: "Row {row}: {text}", busy: "Computing…", first: "Computing… Kernels are compiled on first use, which takes half a minute.", no_server: "The server does not respond. Has hpcdem ended? ({why})",
+    no_file: "This file cannot be read: {why}", bad_file: "{name}: not a grading file, larger than 64 KiB",
+    close: "Close", command: "On the command line", copy: "Copy", copied: "Copied",
+    not_copied: "The browser does not allow copying; select the text instead.",
     save: "Save", saving: "Making {name}…", saved: "{name}: {size} KiB", all_files: "All files",
     file_specimen: "PPDEM file, central angles (as the sample of its manual)",
     file_full: "PPDEM file with the roundness of each edge (as its manual lists the fields)",
@@ -45,7 +45,7 @@ export const WORDS = {
     file_curve: "Grading curve", file_packing: "Packing", file_histogram: "Histogram of sizes",
     file_plain: "PPDEM file, circles without the leading 1 (as its manual lists the fields)",
     file_deposit: "Script: deposition under gravity", file_biaxial: "Script: biaxial test",
-    file_summary: "What was asked for and what came of it", file_table: "The table as a grading file",
+    file_summary: "Request and result (JSON)", file_table: "The table as a grading file",
   },
   zh: {
     title: "hpcdem grade:由级配曲线生成试样",
@@ -65,7 +65,7 @@ export const WORDS = {
     deviation: "角度偏差", roundness: "浑圆度", seed: "随机数种子",
     number_unit: "N", slenderness_unit: "H / W", void_ratio_unit: "e", l_over_d_unit: "L / D", deviation_unit: "度",
     roundness_unit: "0 为直边,1 为圆", seed_unit: "随机数",
-    exactly: "{name},精确值", dice: "换一个",
+    exactly: "{name},精确值", dice: "另一个试样",
     placement: "排列方式", cells: "松散柱状", dense: "密实填充",
     curve: "级配曲线", soil: "粗粒在左", target: "目标", achieved: "实际",
     x_axis: "粒径 d [mm]", y_axis: "小于某粒径的质量百分数 [%]",
@@ -91,7 +91,7 @@ export const WORDS = {
     file_curve: "级配曲线", file_packing: "颗粒分布图", file_histogram: "粒径直方图",
     file_plain: "PPDEM 文件,圆形行首不写 1(与其手册字段表一致)",
     file_deposit: "脚本:重力沉积", file_biaxial: "脚本:双轴试验",
-    file_summary: "所求与所得汇总", file_table: "表格另存为级配文件",
+    file_summary: "目标与结果(JSON)", file_table: "表格另存为级配文件",
   },
 };
 
@@ -118,13 +118,13 @@ export function choose(code) {
   keep(KEPT, code);
 }
 
-/** The words of a name, with {x} filled in. */
+/** The words of a name, with {x} replaced. */
 export function say(name, values = {}) {
   const text = WORDS[language][name] ?? name;
   return text.replace(/\{(\w+)\}/g, (whole, key) => values[key] ?? whole);
 }
 
-/** Write the words into every element that asks for them. */
+/** Write the words into every element that refers to them. */
 export function translate(root = document) {
   document.documentElement.lang = language === "zh" ? "zh-Hans" : "en";
   document.title = say("title");

@@ -43,9 +43,9 @@ Groups = Callable[[str, str], np.ndarray]
 
 
 def chosen(text: str, count: int, fields: Mapping[str, np.ndarray], groups: Groups) -> np.ndarray:
-    """(count,) bool: which objects the expression holds for. fields: values (count,) by name, read when they are asked
-    for; groups: the members (count,) of a group, by its name and that of its set ("" any). HpcdemError with the text
-    for what is not understood."""
+    """(count,) bool: which objects the expression holds for. fields: values (count,) by name, read when they are
+    needed; groups: the members (count,) of a group, by its name and that of its set ("" any). HpcdemError with the
+    text for what is not understood."""
     *lines, last = _lines(text)
     own: dict[str, Any] = {}
     evaluation = _Evaluation(text, ChainMap(own, fields), groups)  # type: ignore[arg-type]

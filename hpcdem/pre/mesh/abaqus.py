@@ -1,8 +1,8 @@
 """Abaqus input files: points, elements, sets, surfaces, parts and their instances, by the numbers in the file.
 
 What is read: *NODE, *ELEMENT, *NSET, *ELSET, *SURFACE, *PART, *INSTANCE, *ASSEMBLY, *INCLUDE. What would make or move
-points in another way (*NGEN, *SYSTEM and others) is refused; all else is left out and named. Names of sets know no
-difference between small and capital letters; groups are spelled as the file first does.
+points in another way (*NGEN, *SYSTEM and others) is refused; all else is skipped and named. Names of sets are
+case-insensitive; groups are spelled as the file first does.
 """
 
 from __future__ import annotations
