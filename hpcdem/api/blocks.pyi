@@ -841,19 +841,18 @@ class Elements(Stressed):
         ----------
         conductivity : thermal conductivity [W/(m K)].
         capacity : specific heat [J/(kg K)].
-        transfer_coeficient : heat transfer at faces: to an environment that is prescribed on them without a
-            coefficient of its own, and to surfaces that they touch, with the harmonic mean of both [W/(m2 K)]
-            (default: 0).
+        transfer_coeficient : heat transfer at faces: to a prescribed environment without its own coefficient, and
+            between surfaces in contact, with the harmonic mean of both [W/(m2 K)] (default: 0).
         transfer_coefficient : as transfer-coeficient.
         transfer_coefficent : as transfer-coeficient.
         expansion_coeficient : linear thermal expansion [1/K] (default: 0).
         expansion_coefficient : as expansion-coeficient.
         conductivity_across : conductivity across the direction of conductivity-angle [W/(m K)] (default:
             conductivity).
-        conductivity_angle : direction of conductivity from x, counter-clockwise, in space the strike of the planes
-            along which it is; it turns with the element [degrees] (default: 0).
-        friction_heat : how much of its share of the work of friction an element takes as heat where its faces slide
-            on others (default: 0).
+        conductivity_angle : direction of conductivity from x, counter-clockwise, in space the strike of its planes;
+            it rotates with the element [degrees] (default: 0).
+        friction_heat : part of its half of the friction work that an element absorbs as heat when its faces slide
+            (default: 0).
         conductivity_dip : dip of these planes [degrees] (in three dimensions; default: 90).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -895,18 +894,18 @@ class Elements(Stressed):
         fluid_density : density of the fluid [kg/m3].
         fluid_bulk : bulk modulus of the fluid [Pa].
         viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
-        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
-            one, which stands for the permeability of the rock [m].
+        aperature_initial : hydraulic aperture of a closed joint; in intact joints a virtual aperture, which
+            represents the permeability of the rock [m].
         aperture_initial : as aperature-initial.
-        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minumum : smallest hydraulic aperture, of joints in compression [m].
         aperature_minimum : as aperature-minumum.
         aperture_minimum : as aperature-minumum.
         aperture_minumum : as aperature-minumum.
         aperature_maximum : largest hydraulic aperture [m] (default: no limit).
         aperture_maximum : as aperature-maximum.
-        leak_off : broken joints lose fluid to the rock after Carter.
-        matrix_pore_pressure : leak-off: pressure in the pores of the rock; negative: suction of rock that is not
-            saturated [Pa] (default: 0).
+        leak_off : broken joints lose fluid to the rock (Carter leak-off).
+        matrix_pore_pressure : leak-off: pore pressure of the rock; negative: suction of unsaturated rock [Pa]
+            (default: 0).
         matrix_permeability : leak-off: permeability of the rock [m2] (default: needed by leak-off).
         matrix_porosity_compressibility : leak-off: compressibility of the pores [1/Pa] (default: needed by
             leak-off).
@@ -914,10 +913,10 @@ class Elements(Stressed):
         matrix_porosity : leak-off: porosity of the rock (default: needed by leak-off).
         shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees]
             (default: 0).
-        shear_dilation_limit : what slip adds to the aperture at most [m] (default: no limit).
-        matrix_saturation : leak-off: part of the pores that was full before; below 1 a sharp front fills the rest
-            (default: 1).
-        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+        shear_dilation_limit : largest increase of the aperture by slip [m] (default: no limit).
+        matrix_saturation : leak-off: initial saturation of the pores; below 1 a sharp front fills the rest (default:
+            1).
+        turbulence : on: fast flow is turbulent, with friction of smooth walls after Blasius; off: laminar at any
             Reynolds number.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -967,18 +966,18 @@ class Elements(Stressed):
         fluid_density : density of the fluid [kg/m3].
         fluid_bulk : bulk modulus of the fluid [Pa].
         viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
-        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
-            one, which stands for the permeability of the rock [m].
+        aperature_initial : hydraulic aperture of a closed joint; in intact joints a virtual aperture, which
+            represents the permeability of the rock [m].
         aperture_initial : as aperature-initial.
-        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minumum : smallest hydraulic aperture, of joints in compression [m].
         aperature_minimum : as aperature-minumum.
         aperture_minimum : as aperature-minumum.
         aperture_minumum : as aperature-minumum.
         aperature_maximum : largest hydraulic aperture [m] (default: no limit).
         aperture_maximum : as aperature-maximum.
-        leak_off : broken joints lose fluid to the rock after Carter.
-        matrix_pore_pressure : leak-off: pressure in the pores of the rock; negative: suction of rock that is not
-            saturated [Pa] (default: 0).
+        leak_off : broken joints lose fluid to the rock (Carter leak-off).
+        matrix_pore_pressure : leak-off: pore pressure of the rock; negative: suction of unsaturated rock [Pa]
+            (default: 0).
         matrix_permeability : leak-off: permeability of the rock [m2] (default: needed by leak-off).
         matrix_porosity_compressibility : leak-off: compressibility of the pores [1/Pa] (default: needed by
             leak-off).
@@ -986,22 +985,23 @@ class Elements(Stressed):
         matrix_porosity : leak-off: porosity of the rock (default: needed by leak-off).
         shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees]
             (default: 0).
-        shear_dilation_limit : what slip adds to the aperture at most [m] (default: no limit).
-        matrix_saturation : leak-off: part of the pores that was full before; below 1 a sharp front fills the rest
-            (default: 1).
-        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+        shear_dilation_limit : largest increase of the aperture by slip [m] (default: no limit).
+        matrix_saturation : leak-off: initial saturation of the pores; below 1 a sharp front fills the rest (default:
+            1).
+        turbulence : on: fast flow is turbulent, with friction of smooth walls after Blasius; off: laminar at any
             Reynolds number.
         proppant_density : density of the grains [kg/m3].
         proppant_size : diameter of the grains [m].
-        proppant_size_factor : channels narrower than so many grains carry none: they bridge (default: 3).
-        aperature_factor : hydraulic aperture of a pack over that of the channel; 0: permeability of the pack after
-            Kozeny and Carman (default: 0).
+        proppant_size_factor : smallest aperture, in diameters of grains: grains bridge in narrower channels
+            (default: 3).
+        aperature_factor : hydraulic aperture of a pack over that of the channel; 0: Kozeny–Carman permeability of
+            the pack (default: 0).
         aperture_factor : as aperature-factor.
         proppant_concentration_limit : concentration of a pack.
-        proppant_modulus : modulus of a pack that is pressed together; 0: it bears nothing [Pa] (default: 0).
+        proppant_modulus : modulus of a pack in compression; 0: it carries no load [Pa] (default: 0).
         viscosity_power : beta of the slurry, whose viscosity is that of the fluid times (1 - C / limit)^beta
             (default: -2.5).
-        proppant_stokes : settling after Stokes; else after Schiller and Naumann, for any Reynolds number.
+        proppant_stokes : on: settling after Stokes; off: after Schiller and Naumann, for any Reynolds number.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     @overload
@@ -1056,11 +1056,11 @@ class Elements(Stressed):
         Parameters
         ----------
         diffusivity : diffusivity of moisture [m2/s].
-        shrinkage : linear shrinkage, strain over the moisture that is lost (default: 0).
-        evaporation : mass that leaves through faces, over the difference of moisture to the environment that is
-            prescribed on them without a coefficient of its own [kg/(m2 s)] (default: 0).
+        shrinkage : linear shrinkage, strain over loss of moisture (default: 0).
+        evaporation : mass flow through faces over the difference of moisture to a prescribed environment without its
+            own coefficient [kg/(m2 s)] (default: 0).
         moisture_saturated : moisture at which all pores are full (default: 0.4).
-        moisture_residual : moisture that no suction takes out (default: 0).
+        moisture_residual : residual moisture, which suction cannot remove (default: 0).
         air_entry : suction at which pores begin to drain, 1 / alpha of van Genuchten [Pa] (default: 10000).
         pore_index : exponent n of van Genuchten (default: 1.5).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
@@ -1144,24 +1144,23 @@ class Elements(Stressed):
         kelvin_strain_yz : strain yz of the Kelvin unit at that moment (in three dimensions).
         conductivity : thermal conductivity [W/(m K)].
         capacity : specific heat [J/(kg K)].
-        transfer_coeficient : heat transfer at faces: to an environment that is prescribed on them without a
-            coefficient of its own, and to surfaces that they touch, with the harmonic mean of both [W/(m2 K)].
+        transfer_coeficient : heat transfer at faces: to a prescribed environment without its own coefficient, and
+            between surfaces in contact, with the harmonic mean of both [W/(m2 K)].
         transfer_coefficient : as transfer_coeficient.
         transfer_coefficent : as transfer_coeficient.
         expansion_coeficient : linear thermal expansion [1/K].
         expansion_coefficient : as expansion_coeficient.
         conductivity_across : conductivity across the direction of conductivity_angle [W/(m K)].
-        conductivity_angle : direction of conductivity from x, counter-clockwise, in space the strike of the planes
-            along which it is; it turns with the element [degrees].
-        friction_heat : how much of its share of the work of friction an element takes as heat where its faces slide
-            on others.
+        conductivity_angle : direction of conductivity from x, counter-clockwise, in space the strike of its planes;
+            it rotates with the element [degrees].
+        friction_heat : part of its half of the friction work that an element absorbs as heat when its faces slide.
         conductivity_dip : dip of these planes [degrees] (in three dimensions).
         diffusivity : diffusivity of moisture [m2/s].
-        shrinkage : linear shrinkage, strain over the moisture that is lost.
-        evaporation : mass that leaves through faces, over the difference of moisture to the environment that is
-            prescribed on them without a coefficient of its own [kg/(m2 s)].
+        shrinkage : linear shrinkage, strain over loss of moisture.
+        evaporation : mass flow through faces over the difference of moisture to a prescribed environment without its
+            own coefficient [kg/(m2 s)].
         moisture_saturated : moisture at which all pores are full.
-        moisture_residual : moisture that no suction takes out.
+        moisture_residual : residual moisture, which suction cannot remove.
         air_entry : suction at which pores begin to drain, 1 / alpha of van Genuchten [Pa].
         pore_index : exponent n of van Genuchten.
         parameter : a property that the law declares, by its name, and its value.
@@ -1526,18 +1525,18 @@ class Joints(Objects):
         fluid_density : density of the fluid [kg/m3].
         fluid_bulk : bulk modulus of the fluid [Pa].
         viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
-        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
-            one, which stands for the permeability of the rock [m].
+        aperature_initial : hydraulic aperture of a closed joint; in intact joints a virtual aperture, which
+            represents the permeability of the rock [m].
         aperture_initial : as aperature-initial.
-        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minumum : smallest hydraulic aperture, of joints in compression [m].
         aperature_minimum : as aperature-minumum.
         aperture_minimum : as aperature-minumum.
         aperture_minumum : as aperature-minumum.
         aperature_maximum : largest hydraulic aperture [m] (default: no limit).
         aperture_maximum : as aperature-maximum.
-        leak_off : broken joints lose fluid to the rock after Carter.
-        matrix_pore_pressure : leak-off: pressure in the pores of the rock; negative: suction of rock that is not
-            saturated [Pa] (default: 0).
+        leak_off : broken joints lose fluid to the rock (Carter leak-off).
+        matrix_pore_pressure : leak-off: pore pressure of the rock; negative: suction of unsaturated rock [Pa]
+            (default: 0).
         matrix_permeability : leak-off: permeability of the rock [m2] (default: needed by leak-off).
         matrix_porosity_compressibility : leak-off: compressibility of the pores [1/Pa] (default: needed by
             leak-off).
@@ -1545,10 +1544,10 @@ class Joints(Objects):
         matrix_porosity : leak-off: porosity of the rock (default: needed by leak-off).
         shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees]
             (default: 0).
-        shear_dilation_limit : what slip adds to the aperture at most [m] (default: no limit).
-        matrix_saturation : leak-off: part of the pores that was full before; below 1 a sharp front fills the rest
-            (default: 1).
-        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+        shear_dilation_limit : largest increase of the aperture by slip [m] (default: no limit).
+        matrix_saturation : leak-off: initial saturation of the pores; below 1 a sharp front fills the rest (default:
+            1).
+        turbulence : on: fast flow is turbulent, with friction of smooth walls after Blasius; off: laminar at any
             Reynolds number.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -1598,18 +1597,18 @@ class Joints(Objects):
         fluid_density : density of the fluid [kg/m3].
         fluid_bulk : bulk modulus of the fluid [Pa].
         viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
-        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
-            one, which stands for the permeability of the rock [m].
+        aperature_initial : hydraulic aperture of a closed joint; in intact joints a virtual aperture, which
+            represents the permeability of the rock [m].
         aperture_initial : as aperature-initial.
-        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minumum : smallest hydraulic aperture, of joints in compression [m].
         aperature_minimum : as aperature-minumum.
         aperture_minimum : as aperature-minumum.
         aperture_minumum : as aperature-minumum.
         aperature_maximum : largest hydraulic aperture [m] (default: no limit).
         aperture_maximum : as aperature-maximum.
-        leak_off : broken joints lose fluid to the rock after Carter.
-        matrix_pore_pressure : leak-off: pressure in the pores of the rock; negative: suction of rock that is not
-            saturated [Pa] (default: 0).
+        leak_off : broken joints lose fluid to the rock (Carter leak-off).
+        matrix_pore_pressure : leak-off: pore pressure of the rock; negative: suction of unsaturated rock [Pa]
+            (default: 0).
         matrix_permeability : leak-off: permeability of the rock [m2] (default: needed by leak-off).
         matrix_porosity_compressibility : leak-off: compressibility of the pores [1/Pa] (default: needed by
             leak-off).
@@ -1617,22 +1616,23 @@ class Joints(Objects):
         matrix_porosity : leak-off: porosity of the rock (default: needed by leak-off).
         shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees]
             (default: 0).
-        shear_dilation_limit : what slip adds to the aperture at most [m] (default: no limit).
-        matrix_saturation : leak-off: part of the pores that was full before; below 1 a sharp front fills the rest
-            (default: 1).
-        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+        shear_dilation_limit : largest increase of the aperture by slip [m] (default: no limit).
+        matrix_saturation : leak-off: initial saturation of the pores; below 1 a sharp front fills the rest (default:
+            1).
+        turbulence : on: fast flow is turbulent, with friction of smooth walls after Blasius; off: laminar at any
             Reynolds number.
         proppant_density : density of the grains [kg/m3].
         proppant_size : diameter of the grains [m].
-        proppant_size_factor : channels narrower than so many grains carry none: they bridge (default: 3).
-        aperature_factor : hydraulic aperture of a pack over that of the channel; 0: permeability of the pack after
-            Kozeny and Carman (default: 0).
+        proppant_size_factor : smallest aperture, in diameters of grains: grains bridge in narrower channels
+            (default: 3).
+        aperature_factor : hydraulic aperture of a pack over that of the channel; 0: Kozeny–Carman permeability of
+            the pack (default: 0).
         aperture_factor : as aperature-factor.
         proppant_concentration_limit : concentration of a pack.
-        proppant_modulus : modulus of a pack that is pressed together; 0: it bears nothing [Pa] (default: 0).
+        proppant_modulus : modulus of a pack in compression; 0: it carries no load [Pa] (default: 0).
         viscosity_power : beta of the slurry, whose viscosity is that of the fluid times (1 - C / limit)^beta
             (default: -2.5).
-        proppant_stokes : settling after Stokes; else after Schiller and Naumann, for any Reynolds number.
+        proppant_stokes : on: settling after Stokes; off: after Schiller and Naumann, for any Reynolds number.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     @overload
@@ -1754,26 +1754,25 @@ class Joints(Objects):
         fluid_density : density of the fluid [kg/m3].
         fluid_bulk : bulk modulus of the fluid [Pa].
         viscosity : kinematic viscosity of the fluid: the dynamic one over the density [m2/s].
-        aperature_initial : hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual
-            one, which stands for the permeability of the rock [m].
+        aperature_initial : hydraulic aperture of a closed joint; in intact joints a virtual aperture, which
+            represents the permeability of the rock [m].
         aperture_initial : as aperature_initial.
-        aperature_minumum : smallest hydraulic aperture, of joints that are pressed together [m].
+        aperature_minumum : smallest hydraulic aperture, of joints in compression [m].
         aperature_minimum : as aperature_minumum.
         aperture_minimum : as aperature_minumum.
         aperture_minumum : as aperature_minumum.
         aperature_maximum : largest hydraulic aperture [m].
         aperture_maximum : as aperature_maximum.
-        leak_off : broken joints lose fluid to the rock after Carter.
-        matrix_pore_pressure : leak-False: pressure in the pores of the rock; negative: suction of rock that is not
-            saturated [Pa].
+        leak_off : broken joints lose fluid to the rock (Carter leak_off).
+        matrix_pore_pressure : leak-False: pore pressure of the rock; negative: suction of unsaturated rock [Pa].
         matrix_permeability : leak-False: permeability of the rock [m2].
         matrix_porosity_compressibility : leak-False: compressibility of the pores [1/Pa].
         matrix_porosity_compressiblity : as matrix_porosity_compressibility.
         matrix_porosity : leak-False: porosity of the rock.
         shear_dilation : the aperture grows by the tangent of this angle times the mean slip of the joint [degrees].
-        shear_dilation_limit : what slip adds to the aperture at most [m].
-        matrix_saturation : leak-False: part of the pores that was full before; below 1 a sharp front fills the rest.
-        turbulence : fast flow is turbulent, with the friction of smooth walls after Blasius; else laminar at any
+        shear_dilation_limit : largest increase of the aperture by slip [m].
+        matrix_saturation : leak-False: initial saturation of the pores; below 1 a sharp front fills the rest.
+        turbulence : True: fast flow is turbulent, with friction of smooth walls after Blasius; False: laminar at any
             Reynolds number.
         conductivity : thermal conductivity of the fluid [W/(m K)].
         capacity : specific heat of the fluid [J/(kg K)].
@@ -1785,14 +1784,14 @@ class Joints(Objects):
         second_order : advection of second order with a flux limiter: fronts stay sharper.
         proppant_density : density of the grains [kg/m3].
         proppant_size : diameter of the grains [m].
-        proppant_size_factor : channels narrower than so many grains carry none: they bridge.
-        aperature_factor : hydraulic aperture of a pack over that of the channel; 0: permeability of the pack after
-            Kozeny and Carman.
+        proppant_size_factor : smallest aperture, in diameters of grains: grains bridge in narrower channels.
+        aperature_factor : hydraulic aperture of a pack over that of the channel; 0: Kozeny–Carman permeability of
+            the pack.
         aperture_factor : as aperature_factor.
         proppant_concentration_limit : concentration of a pack.
-        proppant_modulus : modulus of a pack that is pressed together; 0: it bears nothing [Pa].
+        proppant_modulus : modulus of a pack in compression; 0: it carries no load [Pa].
         viscosity_power : beta of the slurry, whose viscosity is that of the fluid times (1 - C / limit)^beta.
-        proppant_stokes : settling after Stokes; else after Schiller and Naumann, for any Reynolds number.
+        proppant_stokes : True: settling after Stokes; False: after Schiller and Naumann, for any Reynolds number.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def tell(self, *, where: Where | None = None) -> None:
@@ -2276,9 +2275,9 @@ class Liners(Objects):
         ----------
         density : density [kg/m3].
         young : Young's modulus E [Pa].
-        poisson_ratio : Poisson's ratio: E / (1 - nu^2) counts in plane strain; 0 for steel sets (default: 0).
-        thickness : thickness of the shell; without area and inertia it gives both [m] (default: that of a rectangle
-            of this area and inertia).
+        poisson_ratio : Poisson's ratio: plane strain uses E / (1 - nu^2); 0 for steel sets (default: 0).
+        thickness : thickness of the shell; defines area and inertia if they are omitted [m] (default: that of a
+            rectangle of this area and inertia).
         area : area of the section over the spacing of steel sets [m2/m] (in the plane; default: the thickness).
         inertia : second moment of the section over the spacing of steel sets [m4/m] (in the plane; default:
             thickness^3 / 12).
@@ -2287,9 +2286,9 @@ class Liners(Objects):
         plastic_moment : largest moment at the axial force that allows most [N m/m] (default: that of a rectangle).
         normal_stiffness : stiffness of the bond across the face [Pa/m].
         shear_stiffness : stiffness of the bond along the face; 0: it slips freely [Pa/m].
-        bond_tensile_strength : tension at which the bond parts for good [Pa] (default: never).
-        bond_cohesion : cohesion of the bond, until it parts [Pa] (default: never slips).
-        bond_friction : friction angle of the bond, whether it has parted or not [degrees] (default: 0).
+        bond_tensile_strength : tension at which the bond breaks [Pa] (default: never).
+        bond_cohesion : cohesion of the bond, until it breaks [Pa] (default: never slips).
+        bond_friction : friction angle of the bond, intact or broken [degrees] (default: 0).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def delete(self, *, where: Where | None = None) -> None:

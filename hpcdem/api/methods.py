@@ -205,7 +205,7 @@ class Row:
             key = python(name)
             option = next(one.option for one in known.values() if one.option is not None and one.option.name == name)
             if key not in found and not (name == "group" and option.default != "none"):
-                raise TypeError(f"{_called(known.values(), name, words)} goes with {key}")
+                raise TypeError(f"{_called(known.values(), name, words)} needs {key}")
             found[key] = {"value": found.get(key, g.DEFAULT), **words}
         return found
 

@@ -49,14 +49,14 @@ def kind(source: bytes | str, file: str = "script") -> str:
     if _PYTHON_LINE.search(source):
         if trouble is not None:
             line = trouble.lineno or line
-            raise ScriptError(file, line, f"this looks like Python, but is not correct: {trouble.msg}")
-        raise ScriptError(file, line, "this is Python that imports nothing; a Python script must import hpcdem")
+            raise ScriptError(file, line, f"this is not correct Python: {trouble.msg}")
+        raise ScriptError(file, line, "this Python script imports nothing; it must import hpcdem")
     shown = "".join(char if char.isprintable() else "?" for char in word[:40])
     raise ScriptError(
         file,
         line,
-        f"'{shown}' begins no script that hpcdem knows: neither a ZDEM command{ZDEM.hint(word)}, "
-        "nor a pcdc command, nor Python",
+        f"'{shown}' is not the beginning of a script: neither a ZDEM command{ZDEM.hint(word)}, nor a pcdc command, nor "
+        "Python",
     )
 
 

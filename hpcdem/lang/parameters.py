@@ -71,8 +71,8 @@ class Adjustable:
             raise UsageError(f"{name}: {self.refused[name]}")
         known = ", ".join(self.parameters) or "none"
         raise UsageError(
-            f"{name}: {self.file} has no such parameter{hint(name, list(self.parameters))}; there are: {known}. A line "
-            f"{name} = NUMBER makes one"
+            f"{name}: {self.file} has no such parameter{hint(name, list(self.parameters))}; there are: {known}. Add a "
+            f"line {name} = NUMBER to create one"
         )
 
     def with_values(self, values: Mapping[str, Value]) -> bytes:
@@ -153,10 +153,10 @@ def _of_python(tree: ast.Module, file: str) -> tuple[dict[str, Parameter], dict[
             refused[name] = f"{file}:{target.lineno} does not set it to a number, a word, True or False"
         elif stored.count(name) > 1 or name in globals_:
             refused[name] = (
-                f"{file} sets it more than once, first in line {target.lineno}; so a value of it may not act"
+                f"{file} sets it more than once, first in line {target.lineno}, so a value may have no effect"
             )
         elif name not in loaded:
-            refused[name] = f"{file}:{target.lineno} sets it, but nothing reads it"
+            refused[name] = f"{file}:{target.lineno} sets it but never uses it"
         else:
             found[name] = Parameter(name, literal, value.lineno, value.col_offset, value.end_col_offset)
     return {name: one for name, one in found.items() if name not in refused}, refused

@@ -555,7 +555,7 @@ def test_refusals():
     ):
         with pytest.raises(CommandError, match=message):
             creep.switch(sim, True, **given)
-    with pytest.raises(CommandError, match="creep off takes no dt"):
+    with pytest.raises(CommandError, match="creep off does not accept dt"):
         creep.switch(sim, False, dt=1.0)
     with pytest.raises(CommandError, match="model creep on"):
         creep.check(sim, 1.0)

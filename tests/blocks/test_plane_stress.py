@@ -301,7 +301,7 @@ def test_what_comes_too_late_or_cannot_be():
     sim.initial_stress(None, xx=-1e6, yy=-2e6)
     sim.close_model()
     assert (diagnostics.values(sim, "stress_zz") == 0.0).all()
-    with pytest.raises(CommandError, match="model plane-strain comes before element initial"):
+    with pytest.raises(CommandError, match="model plane-strain must precede element initial"):
         sim.option(plane_stress=False)
     other = plate()
     other.step()

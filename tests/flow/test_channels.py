@@ -347,10 +347,10 @@ def test_each_property_of_leak_off_changes_it(name: str, value: float) -> None:
         ({"aperature_minumum": 1e-3, "aperature_maximum": 1e-4}, "must not be above aperature_maximum"),
         ({"fluid_bulk": 0.0}, "fluid_bulk must be > 0"), ({"fluid_bulk": math.inf}, "fluid_bulk must be finite"),
         ({"leak_off": 1.0}, "leak_off needs matrix_permeability"),
-        ({"matrix_permeability": 1e-15}, "matrix_permeability goes with leak_off"),
-        ({"matrix_saturation": 0.5}, "matrix_saturation goes with leak_off"),
+        ({"matrix_permeability": 1e-15}, "matrix_permeability needs leak_off"),
+        ({"matrix_saturation": 0.5}, "matrix_saturation needs leak_off"),
         ({"leak_off": 1.0, "matrix_permeability": 1e-15, "matrix_porosity": 0.2, "matrix_saturation": 0.5,
-          "matrix_porosity_compressibility": 1e-9}, "does not act where leak-off fills empty pores"),
+          "matrix_porosity_compressibility": 1e-9}, "has no effect if leak-off fills empty pores"),
         ({"leak_off": 1.0, "matrix_permeability": 1e-15, "matrix_porosity": 0.2}, "needs matrix_porosity_compress"),
         ({"viscosity": None}, "needs viscosity"), ({"colour": 1.0}, "has no property colour"),
     ],
@@ -373,7 +373,7 @@ def test_conditions_that_make_no_sense_are_refused() -> None:
     ):
         with pytest.raises(CommandError, match=text):
             flow.prescribe(nodes, does, value)
-    with pytest.raises(CommandError, match="there is one fluid in all channels, but viscosity"):
+    with pytest.raises(CommandError, match="all channels have the same fluid, but viscosity"):
         flow.assign(flow.network.channels[:1], {**WATER, "viscosity": 3e-6})
     with pytest.raises(CommandError, match="one of them"):
         flow.fill(None, pressure=1.0, saturation=1.0)

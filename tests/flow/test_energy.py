@@ -106,5 +106,5 @@ def test_a_checkpoint_keeps_it(tmp_path) -> None:
 def test_where_grains_bear_it_is_refused() -> None:
     flow = pumped(1)[1]
     flow.energy = None
-    with pytest.raises(CommandError, match="what their packs take is not known"):
+    with pytest.raises(CommandError, match="does not support packs of grains"):
         flow.energies()

@@ -699,7 +699,7 @@ def test_faces_that_slid_away_are_refused_by_name() -> None:
     way = np.zeros_like(moved.x)
     way[sim.mesh.centroids()[moved.lead // 4, 1] > 0.0] = 0.04, -2e-6
     equilibrium.settle(sim, moved, moved.x + way, np.zeros_like(way))
-    with pytest.raises(CommandError, match=r"surfaces touch.* use relaxation"), Coupled(sim, 1.0):
+    with pytest.raises(CommandError, match=r"surfaces are in contact.* Use relaxation"), Coupled(sim, 1.0):
         pass
 
 

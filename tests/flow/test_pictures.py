@@ -145,8 +145,8 @@ def test_a_diagram_beside_the_fluid_is_another_picture(tmp_path: Path) -> None:
     ("line", "said"),
     [
         ("chart add 'c' profile pressure values (0,0)", "either y, the name of a history, or values or profile"),
-        ("chart add 'c' profile pressure x 'a'", "x goes with histories, not with profile"),
-        ("chart add 'c' values (0,0) range x 0 1", "range goes with profile"),
+        ("chart add 'c' profile pressure x 'a'", "x applies to histories, not to profile"),
+        ("chart add 'c' values (0,0) range x 0 1", "range applies to profile"),
         ("chart add 'c' profile colour", "expected one of pressure, saturation, aperture"),
         ("chart export 'c' 'c.png' fluid colour", "expected one of pressure, saturation, aperture, velocity"),
     ],

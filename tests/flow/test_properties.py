@@ -56,7 +56,7 @@ def test_properties_of_channels_are_changed_by_name(tmp_path: Path) -> None:
 def test_the_fluid_is_changed_everywhere_or_not_at_all(tmp_path: Path) -> None:
     found = bench(tmp_path, "pcdc face-joint property viscosity 3e-6")
     assert Flow.of(found.project.blocks).viscosity == pytest.approx(3e-3)
-    with pytest.raises(HpcdemError, match="there is one fluid in all channels, but viscosity is 1e-06 and 3e-06"):
+    with pytest.raises(HpcdemError, match="all channels have the same fluid, but viscosity is 1e-06 and 3e-06"):
         bench(tmp_path, "pcdc face-joint property viscosity 3e-6 range x 0 2 y 1 1")
 
 
@@ -79,7 +79,7 @@ def test_leak_off_can_be_switched_on_later(tmp_path: Path) -> None:
     assert (flow.laws()[flow.row[flow.network.channels] - 1][:, kernels.LEAK] > 0.0).all()
     for more, said in (("leak-off on", "leak-off needs matrix-permeability"),
                        ("leak-off on matrix-permeability 1e-15", "leak-off needs matrix-porosity"),
-                       ("matrix-porosity 0.2", "matrix-porosity goes with leak-off, which is off")):  # fmt: skip
+                       ("matrix-porosity 0.2", "matrix-porosity needs leak-off, which is off")):  # fmt: skip
         with pytest.raises(HpcdemError, match=said):
             bench(tmp_path, f"pcdc face-joint property {more}")
 
@@ -131,7 +131,7 @@ def test_slip_opens_by_the_tangent_of_the_angle() -> None:
         ({"fluid_bulk": 0.0}, "fluid_bulk must be > 0"),
         ({"viscosity": 0.0}, "viscosity must be > 0"),
         ({"shear_dilation": 81.0}, "shear_dilation must be >= 0 and <= 80"),
-        ({"shear_dilation_limit": 1e-4}, "shear_dilation_limit goes with shear_dilation, which is 0"),
+        ({"shear_dilation_limit": 1e-4}, "shear_dilation_limit needs shear_dilation, which is 0"),
         ({"leak_off": 1.0, "matrix_permeability": 0.0, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 0.0},
          "leak_off needs matrix_permeability"),
     ],

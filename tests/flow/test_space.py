@@ -458,7 +458,7 @@ def test_implicit_steps_go_on_from_a_file(tmp_path) -> None:
     assert np.array_equal(*found) and Flow.of(other).values("flow-channel", "aperture").max() > 1.05e-4
     assert Flow.of(other).account()["relative"] < 1e-12
     other.option(dynamic=True)
-    with pytest.raises(CommandError, match="dynamic off comes first, or mechanical"):
+    with pytest.raises(CommandError, match="dynamic off first, or mechanical"):
         Coupled(other, 0.5)
 
 

@@ -76,7 +76,7 @@ def test_stages_follow_each_other() -> None:
 def test_a_stage_said_later_ends_one_without_end() -> None:
     sim, flow = pumping()
     flow.stage("w", RATE, 2e-5, math.inf, math.inf)
-    with pytest.raises(CommandError, match="stage 1 of well 'w' has no time, so that no other can follow"):
+    with pytest.raises(CommandError, match="stage 1 of well 'w' has no time, so no other stage can follow"):
         flow.stage("w", SHUT, 0.0, math.inf, math.inf)
     run(sim, 30)
     flow.stage("w", SHUT, 0.0, math.inf, math.inf)
@@ -208,11 +208,11 @@ def test_what_a_well_refuses() -> None:
     with pytest.raises(CommandError, match=rf"node {node[0]} belongs to well 'w', whose stages"):
         flow.prescribe(None, kernels.PRESSURE, 1.0)
     flow.prescribe(at(sim, 1.0, 0.0), kernels.PRESSURE, 1.0)
-    with pytest.raises(CommandError, match="has a condition: node boundary remove comes first"):
+    with pytest.raises(CommandError, match="has a condition: use node boundary remove first"):
         flow.drill("v", at(sim, 1.0, 0.0))
     for does, value, duration, limit, said in (
         (PRESSURE, -1.0, 1.0, math.inf, "must not be negative"), (RATE, math.nan, 1.0, math.inf, "must be finite"),
-        (RATE, 1.0, 0.0, math.inf, "takes some time"), (PRESSURE, 1.0, 1.0, 5.0, "goes with a rate"),
+        (RATE, 1.0, 0.0, math.inf, "must be positive"), (PRESSURE, 1.0, 1.0, 5.0, "needs a rate"),
         (RATE, 1.0, 1.0, -5.0, "not negative"), (RATE, "t", 1.0, math.inf, "there is no table 't'"),
     ):  # fmt: skip
         with pytest.raises(CommandError, match=said):
@@ -265,15 +265,15 @@ def test_a_script_with_wells(tmp_path: Path) -> None:
     [
         ("well stage 'w' rate 1 pressure 2", "one of rate, pressure and shut-in, not rate and pressure"),
         ("well stage 'w'", "one of rate, pressure and shut-in, not none"),
-        ("well stage 'w' pressure 2 limit 3", "limit, a pressure, goes with rate"),
+        ("well stage 'w' pressure 2 limit 3", "limit, a pressure, needs rate"),
         ("well stage 'w' rate 2 time 0", "time"),
         ("well stage 'x' rate 2", "there is no well 'x'; there is 'w'"),
         ("well stage 'w' rate table 'q'", "there is no table 'q'"),
         ("well create 'v' range y 0.25 0.25", "well 'v' has no flow node: no channel ends at node"),
-        ("history create 'h' well value pressure", "object well and well, its name, go together"),
-        ("history create 'h' model value time well 'w'", "object well and well, its name, go together"),
+        ("history create 'h' well value pressure", "object well and well, its name, are both required"),
+        ("history create 'h' model value time well 'w'", "object well and well, its name, are both required"),
         ("history create 'h' well value opening well 'w'", "a history of well can follow pressure, rate"),
-        ("history create 'h' well id 3 value rate well 'w'", "a history of a well takes no id"),
+        ("history create 'h' well id 3 value rate well 'w'", "a history of a well does not accept id"),
         ("history create 'h' well value rate well 'x'", "there is no well 'x'"),
     ],
 )

@@ -212,7 +212,7 @@ def test_nobody_says_that_it_is_wet() -> None:
     hold(flow, np.union1d(at(sim, x=0.0), at(sim, y=0.0)), P)
     sim.close_model()
     line = sim.log.lines[-1]
-    assert "water stands before 3 free faces" in line and "3 with water have a prescribed stress" in line
+    assert "loads 3 free faces" in line and "3 with water have a prescribed stress" in line
     assert "6 free faces between flow nodes are dry" in line
 
 

@@ -323,14 +323,14 @@ def test_what_makes_no_sense_is_refused() -> None:
         heat.prescribe(None, "no")
     with pytest.raises(CommandError, match="must be finite"):
         heat.prescribe(None, math.nan)
-    with pytest.raises(CommandError, match="goes with environment-temperature"):
+    with pytest.raises(CommandError, match="needs environment-temperature"):
         heat.expose(None, transfer=3.0)
     with pytest.raises(CommandError, match="needs a transfer coefficient: face 0"):
         heat.expose(None, environment=3.0)
     with pytest.raises(CommandError, match="must not be negative"):
         heat.expose(None, environment=3.0, transfer=-1.0)
     sim.option(dynamic=False)
-    with pytest.raises(CommandError, match="time of heat passes by model time-step thermal"):
+    with pytest.raises(CommandError, match="static runs need model time-step thermal"):
         sim.step()
     sim.parts(thermal=False)
     sim.step()

@@ -160,7 +160,7 @@ def test_without_contact_a_coefficient_is_refused() -> None:
     sim.option(collision=False)
     with pytest.raises(
         CommandError,
-        match=r"element 0 has a transfer-coeficient, but no face .* surfaces do not touch: model option collision on",
+        match=r"element 0 has a transfer-coeficient, but no face .* contact is off: use model option collision on",
     ):
         sim.step()
 

@@ -328,6 +328,6 @@ def test_what_cannot_be_is_refused() -> None:
     fluid.assign(some, WATER)
     with pytest.raises(CommandError, match="has no thermal model"):
         sim.step()
-    with pytest.raises(CommandError, match="there is one fluid in all channels, but capacity is 4000 and 4200"):
+    with pytest.raises(CommandError, match="all channels have the same fluid, but capacity is 4000 and 4200"):
         fluid.assign(flow.network.channels[2:], {**WATER, "capacity": 4000.0})
     fluid.assign(flow.network.channels[2:], {**WATER, "transfer_coeficient": 10.0})

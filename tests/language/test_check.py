@@ -268,10 +268,10 @@ def test_time():
     report = examined(*lines)
     assert (report.rate, report.measured, report.work) == (speed.DEFAULT, False, 3 * 10**8)
     assert report.seconds(1) == 30.0 and report.seconds(4) == 7.5
-    assert "30 s on 1" in printed(*lines) and "assumed: no run was measured here yet" in printed(*lines)
+    assert "30 s on 1" in printed(*lines) and "assumed, as no run was measured here yet" in printed(*lines)
     speed.remember(1e6, "linear")
     assert examined(*lines).seconds(1) == 300.0
-    assert "5 min on 1" in printed(*lines) and "as measured in the last run here" in printed(*lines)
+    assert "5 min on 1" in printed(*lines) and "measured in the last run here" in printed(*lines)
     speed.remember(2e6, "hertz")
     assert examined(*lines, "PROP hertz").seconds(1) == 150.0
     assert "time unknown" in printed("RES a.sav", "CYC 5")

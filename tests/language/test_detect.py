@@ -46,12 +46,12 @@ def test_kinds(source, expected):
     [
         (b"", 1, "there is no command in the script"),
         (b"# nothing but a title\n", 1, "there is no command in the script"),
-        (b"print('hello')\n", 1, "Python that imports nothing; a Python script must import hpcdem"),
-        (b"# a\nx = 3\ny = x + 1\n", 2, "Python that imports nothing"),
-        (b"import hpcdem\nsim = hpcdem.Simulation(\n", 2, "this looks like Python, but is not correct"),
-        (b"import hpcdem\nx ==== 3\n", 2, "this looks like Python, but is not correct: invalid syntax"),
-        (b"\nSTRAT\n", 2, "'strat' begins no script that hpcdem knows: neither a ZDEM command; did you mean 'START'?"),
-        (b"\x89PNG\r\n\x1a\n\x00\x00", 1, "begins no script that hpcdem knows"),
+        (b"print('hello')\n", 1, "this Python script imports nothing; it must import hpcdem"),
+        (b"# a\nx = 3\ny = x + 1\n", 2, "this Python script imports nothing"),
+        (b"import hpcdem\nsim = hpcdem.Simulation(\n", 2, "this is not correct Python"),
+        (b"import hpcdem\nx ==== 3\n", 2, "this is not correct Python: invalid syntax"),
+        (b"\nSTRAT\n", 2, "'strat' is not the beginning of a script: neither a ZDEM command; did you mean 'START'?"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", 1, "is not the beginning of a script"),
         (b"Lorem ipsum dolor\nsit amet\n", 1, "nor a pcdc command, nor Python"),
     ],
 )

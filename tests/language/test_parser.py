@@ -199,9 +199,9 @@ def test_bytes_and_text_are_read_alike():
 
 def test_load_or_restore_may_follow_start_at_once():
     assert len(parse_text("START\nLOAD a.dat", "s.py").statements) == 2
-    assert "only be the first" in error_of("START\nSET DT 1\nLOAD a.dat")
-    assert "only be the first" in error_of("START\nSTART")
-    assert "only be the first" in error_of("LOAD a.dat\nRES a.sav")
+    assert "must be the first" in error_of("START\nSET DT 1\nLOAD a.dat")
+    assert "must be the first" in error_of("START\nSTART")
+    assert "must be the first" in error_of("LOAD a.dat\nRES a.sav")
 
 
 def test_scripts_travel_between_ranks():

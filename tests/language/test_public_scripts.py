@@ -162,12 +162,12 @@ def test_words_of_public_scripts(play, tmp_path):
     )  # fmt: skip
     assert (sim.settings.gy, sim.clock.step) == (-9.8, 20)
     assert sim.drawing == (100, ("bfill", "bondc", "wall"))
-    assert "script.py:4: SET: 'GRAVTIY' is taken for gravity, which begins like it" in log
-    assert "script.py:7: PROP: 'damping' is taken for damp" in log
+    assert "script.py:4: SET: 'GRAVTIY' is interpreted as gravity, which begins like it" in log
+    assert "script.py:7: PROP: 'damping' is interpreted as damp" in log
     assert "PAUSE: runs are not interactive" in log and "LOG: the log goes to standard output" in log
     assert log.count("warning:") <= 3
     script = parse_text("START\nSET DT 1 gravtiy (0 1)\nCYC 1\n", "a.py")
-    assert "note: line 2: SET: 'gravtiy' is taken for gravity" in check.summary(script)
+    assert "note: line 2: SET: 'gravtiy' is interpreted as gravity" in check.summary(script)
 
 
 @pytest.mark.parametrize("blank", [" ", "\t", "   \t "])
@@ -205,7 +205,7 @@ def test_sides_of_box_can_be_changed_and_moved_by_their_ids(play):
     ("lines", "message"),
     [
         (["BOX left 0 right 10 bottom 0 height 5", "WALL id 101 nodes (0 0) (1 1)"], "wall 101 is a side of BOX"),
-        (["WALL id 102 nodes (0 0) (1 1)", "BOX left 0 right 10 bottom 0 height 5"], "there is a wall 102"),
+        (["WALL id 102 nodes (0 0) (1 1)", "BOX left 0 right 10 bottom 0 height 5"], "wall 102 exists already"),
     ],
 )
 def test_ids_of_box_are_its_own(lines, message):
@@ -454,8 +454,8 @@ def test_particles_without_any_law_may_fly(play):
     ("lines", "message"),
     [
         (["GEN num 5 rad discrete 0.5 x (0 10) y (0 10), COLOR gb", "GROUP sed"],
-         "read 'GROUP' at column 1, expected a command; it looks like the rest of line 2"),
-        (["DEL", "RANGE y 0 1"], "RANGE is no command.*; it looks like the rest of line 2"),
+         "read 'GROUP' at column 1, expected a command; it may be the rest of line 2"),
+        (["DEL", "RANGE y 0 1"], "RANGE is not a command.*; it may be the rest of line 2"),
         (["GEN num 5 rad discrete 0.5", "x (0 10) y (0 10)"], "x, y missing"),
         (["GEN num 5 rad discrete 0.5 x (0 10) y (0 10) GROUP", "sed"], "a group name is expected; a command is one"),
     ],
@@ -467,7 +467,7 @@ def test_lines_that_a_pdf_broke(lines, message):
 
 def test_two_bounds_that_may_be_an_expression_with_a_blank_are_told(play):
     _, log = play("BALL id 0 x 0 y 0 rad 1", "PROP color red RANGE y {top} -1000.0")
-    assert "'{top}' and '-1000.0' are taken for two bounds of y; blanks are not allowed" in log
+    assert "'{top}' and '-1000.0' are interpreted as two bounds of y; blanks are not allowed" in log
     _, log = play(
         "BALL id 0 x 0 y 0 rad 1", "PROP color red RANGE y -1000.0 {top}", "PROP color red RANGE y {top}-9 {top}"
     )

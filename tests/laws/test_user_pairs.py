@@ -122,7 +122,7 @@ def test_what_discs_of_two_laws_do(tmp_path):
         properties.prop(sim, of, law=STICKY, parameter={"pull": 500.0}, folder=HERE)
     for of in (Ids(2, 3), Ids(5, 6)):
         properties.prop(sim, of, law="own.py:sticky", parameter={"pull": 300.0, "stiffening": 3.0}, folder=tmp_path)
-    with pytest.raises(CommandError, match=r"have several laws, pairs\.py:sticky, own\.py:sticky; RANGE chooses"):
+    with pytest.raises(CommandError, match=r"have several laws, pairs\.py:sticky, own\.py:sticky; select the"):
         properties.prop(sim, Ids(0, 5), parameter={"pull": 2.0})
     properties.fix(sim, ("x", "y", "spin"))
     with pytest.raises(CommandError, match=r"4 and 5 are in contact, .* the law pairs.py:sticky and the other own.py"):

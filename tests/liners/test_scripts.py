@@ -102,7 +102,7 @@ def test_frames_hold_a_table_and_figures_show_it(bench: Bench, tmp_path: Path) -
     ("line", "message"),
     [
         (f"liner c-model beam property {CONCRETE}", "no liners yet: use liner create first"),
-        ("liner create", r"face 1 is not free, an element lies beside it"),
+        ("liner create", r"face 1 is not free"),
         ("history create 'h' liner-node value gap id 0", "a history of liner-node can follow"),
         ("liner delete", "no liners yet"),
         ("liner c-model beam property density 1 young 1 n-s 1 s-s 0", "needs its thickness"),

@@ -241,7 +241,7 @@ def test_saving(desk: Desk, tmp_path: Path):
         ("pcdc model new\nfor\n", "a.sc", "pcdc", 2, "not correct Python"),
         ("START\nBOX left 0 right 1 bottom 0 height 1\nCYX 5\n", "a.py", "zdem", 3, "did you mean 'CYC'"),
         ("import hpcdem\n", "a.py", "python", None, ""),
-        ("hello\n", "a.py", None, 1, "begins no script"),
+        ("hello\n", "a.py", None, 1, "is not the beginning of a script"),
     ],
 )
 def test_checks(text: str, name: str, language: str | None, line: int | None, words: str):

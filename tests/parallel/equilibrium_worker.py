@@ -30,8 +30,8 @@ from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import QUANTITIES, RATE, SHUT
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.proppant.assignments import CONCENTRATION
 from hpcdem.physics.proppant.model import Proppant
-from hpcdem.physics.proppant.said import CONCENTRATION
 from tests.blocks.support import JOINT, ROCK, near, rectangle, shaken
 from tests.flow.support import WATER
 from tests.heat.support import GRANITE

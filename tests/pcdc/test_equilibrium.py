@@ -105,9 +105,9 @@ def test_a_body_that_is_soon_too_fast_is_no_wrong_time_step(tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "told"),
-    [("cycles 5 window 3", "window goes with a ratio"), ("elastic limit 3", "limit goes with a ratio"),
+    [("cycles 5 window 3", "window needs a run by steps"), ("elastic limit 3", "limit needs a run by steps"),
      ("ratio 1e-4 cycles 5 limit 3", "limit and cycles cannot be combined"), ("on-failure wait", "stop, continue"),
-     ("time 1 on-failure stop", "on-failure goes with a ratio"), ("limit -1", "not negative")],
+     ("time 1 on-failure stop", "on-failure needs a run by steps"), ("limit -1", "not negative")],
 )  # fmt: skip
 def test_words_that_do_not_go_together(bench, words, told):
     with pytest.raises(HpcdemError, match=rf"script.sc:1: .*{told}"):

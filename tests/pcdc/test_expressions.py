@@ -179,11 +179,11 @@ def test_names_of_tables_too(name):
     [("history create 'h' [v] value [w] id 1", ("node", "damage"), "a history of node can follow displacement"),
      ("history create 'h' [v] value [w]", ("element", "stress-xx"), "needs one of id, nearest and range"),
      ("history create 'h' [v] value [w] range x 0 1 sum", ("node", "position-x"), "read 'sum'"),
-     ("history create 'h' [v] value [w] max", ("model", "time"), "a history of the model takes no maximum"),
+     ("history create 'h' [v] value [w] max", ("model", "time"), "a history of the model does not accept maximum"),
      ("history create 'h' [v] value [w] max", ("cell", "time"), "expected one of node, element, joint, bolt-node"),
      ("model new dim [v]", (4,), "expected 2 or 3"),
      ("model time-step auto [v] value 1e-6", (True,), "value and auto on cannot be combined"),
-     ("node boundary mech-m-b-c type [v] range id 1", (0.5,), "read 0.5 from '[v]', expected 0 free, 1 held or 2")],
+     ("node boundary mech-m-b-c type [v] range id 1", (0.5,), "read 0.5 from '[v]', expected 0 free, 1 fixed or 2")],
 )  # fmt: skip
 def test_what_expressions_give_is_held_to_the_same_rules(words, values, message):
     with pytest.raises(ScriptError) as caught:

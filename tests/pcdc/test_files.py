@@ -126,7 +126,7 @@ DEEP = 100_000
      ("x = []\nfor i in range(100000):\n    x = [x]\n\npcdc model gravity [x]\n", 5, "RecursionError"),
      ("x = 1\ny = " + "-" * DEEP + "1\nz = 2\n", 2, "this is nested too deeply for Python"),
      ("x = 1\n\ny = x" + ".a" * DEEP + "\nz = 2\n", 3, "this is nested too deeply for Python"),
-     ("x = 1\npcdc model gravity (0,[" + "-" * DEEP + "1])\n", 2, "is no expression of Python")],
+     ("x = 1\npcdc model gravity (0,[" + "-" * DEEP + "1])\n", 2, "is not an expression of Python")],
     ids=["function", "commands", "value", "signs", "attributes", "expression"],
 )  # fmt: skip
 def test_what_is_nested_too_deeply_has_a_line(bench, text, line, message):

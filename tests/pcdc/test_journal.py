@@ -100,7 +100,7 @@ def test_a_script_that_takes_another_way_is_told(bench, tmp_path, old, new, line
     assert old in LOOP
     with pytest.raises(HpcdemError) as caught:
         again(Bench(tmp_path), LOOP.replace(old, new), past)
-    assert line in str(caught.value) and "takes another way" in str(caught.value)
+    assert line in str(caught.value) and "its path depends on" in str(caught.value)
 
 
 def test_lines_that_were_not_carried_out_may_be_changed(bench, tmp_path):

@@ -84,8 +84,8 @@ def test_functions_keep_their_commands_and_defaults(bench):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("m_f = lambda x: x\n", "m_f cannot be saved: it is no function that a def of the script made"),
-        ("def f(x):\n    return x\nm_f = f\n", "m_f cannot be saved: it is another name of the function f"),
+        ("m_f = lambda x: x\n", "m_f cannot be saved: it is not a function defined by a def of the script"),
+        ("def f(x):\n    return x\nm_f = f\n", "m_f cannot be saved: it is an alias of the function f"),
         ("def make(a):\n    def m_f(x):\n        return a + x\n    return m_f\nm_f = make(1)\n",
          "m_f cannot be saved: it uses a of the function around it"),
         ("import functools\n@functools.cache\ndef m_f(x):\n    return x\nm_f = m_f.__wrapped__\n", "has a decorator"),
@@ -114,10 +114,10 @@ HOSTILE = [
     ("functions", {"m_f": "class m_f:\n    open('hacked', 'w')"}, "m_f is not a plain def"),
     ("functions", {"m_f": "pcdc model new"}, "m_f is not a plain def"),
     ("functions", {"m_f": "def m_f(:"}, "this is not correct Python"),
-    ("functions", {"m_f": 7}, "is no text of a function"),
+    ("functions", {"m_f": 7}, "is not the text of a function"),
     ("functions", {"print": "def print(): pass"}, "is no name that can be restored"),
     ("functions", {"m_f); open('hacked', 'w'); (": "def m_f(): pass"}, "is no name that can be restored"),
-    ("functions", [], "its functions are no table"),
+    ("functions", [], "its functions are not a table"),
     ("variables", {"__builtins__": ["int", "1"]}, "is no name that can be restored"),
     ("variables", {"m_x": ["eval", "open('hacked', 'w')"]}, "variable m_x"),
     ("variables", {"m_x": ["int", "1 + 1"]}, "variable m_x"),

@@ -103,7 +103,7 @@ def test_the_time_step_follows_its_table(tmp_path):
     assert rock.blocks.clock.dt == 2e-5
     for words, why in (
         ("table 'none'", "there is no table 'none'"), ("table 'bad'", "table 'bad' has a value that is not above 0"),
-        ("update-frequency 5", "update-frequency goes with auto on"), ("1e-5 auto", "value and auto on exclude"),
+        ("update-frequency 5", "update-frequency needs auto on"), ("1e-5 auto", "value and auto on cannot be combined"),
     ):  # fmt: skip
         with pytest.raises(HpcdemError, match=why):
             rock(f"pcdc table 'bad' data 0 1e-5 1 0\npcdc model time-step {words}\n")
@@ -138,7 +138,7 @@ def test_run_time_and_whatever_comes_first(tmp_path):
     assert rock.blocks.clock.step == 123
     rock("pcdc model run-time 1\npcdc model dynamic off\npcdc model solve cycle 2\n")
     assert rock.blocks.clock.step == 125 and any("cannot end a static run" in line for line in rock.blocks.log.lines)
-    for words, why in (("run-time 1", "run-time: in static runs"), ("elastic run-time 1", "goes with a run by steps")):
+    for words, why in (("run-time 1", "run-time: in static runs"), ("elastic run-time 1", "needs a run by steps")):
         with pytest.raises(HpcdemError, match=why):
             rock(f"pcdc model solve {words}\n")
 
@@ -243,7 +243,7 @@ def test_code_is_refused_with_what_to_do(bench):
     for line, why in (
         ("boundary-model create s-b-c name 'a' code 'x'", "C# code is not supported.*Python function"),
         ("b-m create stress-b-c n 'a' v k 'b' t 'c'", "function 'file.py:name'"),
-        ("model collision ecda off", "ecda off: faces of a joint that is whole are no contacts"),
+        ("model collision ecda off", "faces of an intact joint are not contacts"),
     ):
         with pytest.raises(HpcdemError, match=why):
             bench(f"pcdc {line}\n")

@@ -205,7 +205,7 @@ def test_one_number_not_and_in_circle(bench):
         assert by_words(bench, g.NODE, words) == near and len(near) == 5
     assert by_words(bench, g.NODE, "not in-circle (1,1) 1") == sorted(set(range(len(at))) - set(near))
     for wrong, why in (
-        ("x 0 2 not", "not stands before"), ("not not x 0 2", "not stands before"), ("in-circle (1,1)", "a radius"),
+        ("x 0 2 not", "not must precede"), ("not not x 0 2", "not must precede"), ("in-circle (1,1)", "a radius"),
         ("in-circle rad 1", "a centre and a radius"),
     ):  # fmt: skip
         with pytest.raises(CommandError, match=why):

@@ -88,7 +88,7 @@ def test_a_changed_script_is_refused_and_a_damaged_checkpoint_passed_over(reside
     text = script.read_text()
     script.write_text(text.replace("model step 150", "model step 140"))
     done = resident(1, "loop.sc", "--resume", cwd=folder)
-    assert done.returncode == 2 and "loop.sc:19: pcdc model step 140: this line is not what was" in done.stderr
+    assert done.returncode == 2 and "loop.sc:19: pcdc model step 140: another line, or other values" in done.stderr
     script.unlink()
     done = resident(1, "resume", "data", cwd=folder)
     assert done.returncode == 2 and "PCDC scripts are never executed from a checkpoint" in done.stderr

@@ -64,7 +64,7 @@ def test_equilibrium_at_once(bench):
 @pytest.mark.parametrize(
     "words, told",
     [("elastic time 1", "elastic with time is for static runs"),
-     ("ratio 1e-3 solver petsc", "solver goes with elastic"), ("ratio 1e-3 steps 3", "steps goes with elastic"),
+     ("ratio 1e-3 solver petsc", "solver needs elastic"), ("ratio 1e-3 steps 3", "steps needs elastic"),
      ("elastic steps 0", "steps"),
      ("elastic solver cg", "auto, direct, petsc"), ("elastic cycles 0", "cycles")],
 )  # fmt: skip

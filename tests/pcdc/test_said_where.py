@@ -88,6 +88,6 @@ def test_heat_in_a_part_of_the_elements(tmp_path: Path, run):
     if "solve" in run:
         desk("pcdc model option dynamic off\n")
     with pytest.raises(
-        HpcdemError, match=r"element \d+ at \(2.*\) has no thermal model \(\d+ in all\), but others have"
+        HpcdemError, match=r"element \d+ at \(2.*\) has no thermal model \(\d+ in all\), but other elements have one"
     ):
         desk(f"pcdc {run}\n")

@@ -61,10 +61,10 @@ def test_quotes_and_comments_in_python_do_not_hide_commands():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("pcdc = 3\n", "a.sc:1: pcdc = 3: 'pcdc' is reserved, no name for a variable"),
+        ("pcdc = 3\n", "a.sc:1: pcdc = 3: 'pcdc' is reserved and cannot name a variable"),
         ("x = 1\nif x\n    pcdc model new\n", "a.sc:2: if x: this is not correct Python: expected ':'"),
         ("if x:\npcdc model new\n", "a.sc:2: pcdc model new: this is not correct Python: expected an indented block"),
-        ("if True: pcdc model new\n", "a.sc:1: if True: pcdc model new: a command must stand on a line of its own"),
+        ("if True: pcdc model new\n", "a.sc:1: if True: pcdc model new: a command needs its own line"),
         ("print 'x'\n", "Missing parentheses in call to 'print'"),
         ("x = (1,\n", "a.sc:1: x = (1,: this is not correct Python: '(' was never closed"),
         ("pcdc model step [n] (\n", "a.sc:1: pcdc model step [n] (: "),

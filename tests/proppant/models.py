@@ -9,8 +9,8 @@ import numpy as np
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.proppant.assignments import CONCENTRATION, RATE
 from hpcdem.physics.proppant.model import Proppant
-from hpcdem.physics.proppant.said import CONCENTRATION, RATE
 from tests.flow.models import bursting, it_tears, more_in_space, move, pumped, seeping, tearing, water_bursts
 from tests.flow.models import more as burst_on
 from tests.flow.models import result as of_fluid

@@ -10,10 +10,10 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant import kernels as own
+from hpcdem.physics.proppant.assignments import CONCENTRATION, RATE
 from hpcdem.physics.proppant.model import Proppant
 from hpcdem.physics.proppant.properties import PROPPANT
 from hpcdem.physics.proppant.reference import sub_step
-from hpcdem.physics.proppant.said import CONCENTRATION, RATE
 from tests.flow.support import at, hold, over, until
 from tests.proppant.support import OIL, SAND, nodes_up, profile, slot
 
@@ -236,7 +236,7 @@ def test_what_makes_no_sense_is_refused() -> None:
         (lambda: proppant.adjust({"proppant_concentration_limit": 0.8}), "proppant_concentration_limit"),
         (lambda: proppant.adjust({"proppant_size": 0.0}), "proppant_size"),
         (lambda: proppant.adjust({"proppant_concentration_limit": 0.05}), "thicker than a pack, 0.05"),
-        (lambda: proppant.assign(None, {**SAND, "proppant_size": 1e-3}), "there is one proppant"),
+        (lambda: proppant.assign(None, {**SAND, "proppant_size": 1e-3}), "all channels have the same proppant"),
     ):  # fmt: skip
         with pytest.raises(CommandError, match=message):
             act()

@@ -15,8 +15,8 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant import kernels as own
+from hpcdem.physics.proppant.assignments import CONCENTRATION, RATE
 from hpcdem.physics.proppant.model import Proppant
-from hpcdem.physics.proppant.said import CONCENTRATION, RATE
 from tests.flow.space import on_plane, points_at, standing
 from tests.flow.support import over
 from tests.pcdc.fake import Bench, Noted
@@ -229,4 +229,4 @@ def test_long_steps_of_flow_are_named(tmp_path: Path) -> None:
         sim.log = Noted()
         Bench(tmp_path, blocks=sim)(SCRIPT.replace("time 40 dt 2", f"time {dt} dt {dt}"))
         said.append("\n".join(sim.log.lines))
-    assert "currents that their weight drives follow them in steps of" in said[0] and "currents" not in said[1]
+    assert "currents driven by their weight need steps of at most" in said[0] and "currents" not in said[1]

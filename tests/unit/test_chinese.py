@@ -44,7 +44,7 @@ MEANT = {
     "读到 '-1'(第 11 列),此处需要:a number not below 0",
     "hpcdem: a.sc:1: pcdc model neww: read 'neww' after 'model', expected one of new, save; did you mean 'new'?":
     "'neww' 不能识别;是否想写 'new'?",
-    "hpcdem: a.py:2: CYC: there is no time step yet; SET DT or SET frac gives one": "还没有时间步:请先用 SET DT 或 SET frac",
+    "hpcdem: a.py:2: CYC: there is no time step yet; use SET DT or SET frac": "还没有时间步:请先用 SET DT 或 SET frac",
     "hpcdem: 40 ranks are too many for this model: its width ... is 23, so at most 23 ranks fit": "进程数 40 太多:此模型最多用 23 个进程",
     "No such option '--nope'. (Did you mean one of: '--xmove'?)": "没有选项 --nope",
 }  # fmt: skip

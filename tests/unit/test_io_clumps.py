@@ -139,4 +139,4 @@ def test_check_tells_of_the_file(resident: Resident, tmp_path):
     assert done.returncode == 0 and "CLUMP file a.clumps x 3" in done.stdout
     assert any(row.split()[-1] == "3" for row in done.stdout.splitlines() if "CLUMP file" in row)
     done = resident(1, "--check", script(tmp_path, "CLUMP file b.clumps"), cwd=tmp_path)
-    assert "line 3: there is no file b.clumps beside the script" in done.stdout
+    assert "line 3: file b.clumps not found in the folder of the script" in done.stdout

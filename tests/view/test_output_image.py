@@ -83,7 +83,7 @@ def test_cracks_of_a_mesh_are_seen_with_it(tmp_path: Path) -> None:
         ("object elements filter 'nix > 1'", "filter 'nix > 1': unknown field nix"),
         ("object elements filter '__import__(1) > 1'", "unknown function __import__"),
         ("view 'none.mv'", "none.mv"), ("object elements opacity 3", "opacity"),
-        ("field 'stress-yy' range x 0 1", "range goes with object, one of elements, joints, channels"),
+        ("field 'stress-yy' range x 0 1", "range needs object, one of elements, joints, channels"),
         ("edges", "edges requires field or object"), ("object walls", "this frame has no walls"),
         ("field 'aperture'", "this frame has no field aperture"), ("object spheres", "expected one of elements"),
         ("camera (1,0) (0,1)", "left < right"),

@@ -20,9 +20,9 @@ from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.properties import POROUS
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.heat.properties import FLUID_HEAT
+from hpcdem.physics.proppant.assignments import CONCENTRATION, RATE, checked
 from hpcdem.physics.proppant.model import Proppant
 from hpcdem.physics.proppant.properties import PROPPANT, split
-from hpcdem.physics.proppant.said import CONCENTRATION, RATE, checked
 
 _DOES = {"pressure": kernels.PRESSURE, "flow_surface": kernels.SURFACE, "flow_rate": kernels.RATE}
 

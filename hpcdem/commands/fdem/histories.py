@@ -57,11 +57,11 @@ def create(
     if value in ENERGIES and project.blocks.budget is None:
         raise CommandError("no energy budget yet: use model option energy on first")
     if (value == LAW_STATE) != bool(variable):
-        raise CommandError("value law-state and variable, the name of a state variable, go together")
+        raise CommandError("value law-state and variable, the name of a state variable, are both required")
     if variable:
         value = user_laws.quantity(project.ready(), variable)
     if (kind == WELL) != bool(well):
-        raise CommandError("object well and well, its name, go together")
+        raise CommandError("object well and well, its name, are both required")
     if well:
         needed(project, Flow).well(well)
     numbers = [] if kind in (MODEL, WELL) else _followed(project, kind, id, nearest, where).tolist()

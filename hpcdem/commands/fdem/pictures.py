@@ -44,7 +44,7 @@ def image(
     suffix = Path(file).suffix.lower()
     stem = file[: -len(suffix)] if suffix in FIGURES else file
     if where is not None and object not in SHOWN:
-        raise CommandError(f"range goes with object, one of {', '.join(SHOWN)}")
+        raise CommandError(f"range needs object, one of {', '.join(SHOWN)}")
     project.ready(use=False)
     only = {} if where is None else {object: np.asarray(everything(project, SHOWN[object], where))}
     if project.hidden.any():

@@ -157,7 +157,7 @@ def by_name(call: Call) -> None:
 def _refuse_functions(given: Mapping[str, Any]) -> None:
     for name, value in given.items():
         if isinstance(value, FunctionName):
-            raise CommandError(f"{name} is a number or a table of time, no function of place")
+            raise CommandError(f"{name} must be a number or a table of time, not a function of position")
 
 
 # ---- ranges ----------------------------------------------------------------------------------------------------------
@@ -349,7 +349,9 @@ def stage(call: Call) -> None:
     """Tables, and no functions of place."""
     for name, value in call.arguments.items():
         if isinstance(value, FunctionName):
-            raise CommandError(f"{name} of a stage is a number or a table over the time of flow, no function of place")
+            raise CommandError(
+                f"{name} of a stage must be a number or a table over the time of flow, not a function of position"
+            )
     fdem.flow.stage(call.project, **call.given())
 
 
@@ -379,8 +381,8 @@ def option(call: Call) -> None:
     """Creep is a command of its own."""
     if call.get("ecda") is False:
         raise CommandError(
-            "ecda off: faces of a joint that is whole are no contacts besides here, its penalty-overlay holds them "
-            "apart; leave ecda on"
+            "ecda off is not available: the faces of an intact joint are not contacts, its penalty-overlay separates "
+            "them. Use ecda on"
         )
     bare = ["collision"] if call.get("collision") == () else []  # the word before ecda
     if given := call.given("creep", "ecda", *bare):
@@ -395,7 +397,7 @@ def table(call: Call) -> None:
     given = call.given()
     numbers, said = given.get("data"), given.get("type", {})
     if numbers is not None and len(numbers) % 2:
-        raise CommandError(f"data are pairs of numbers, time and value; there are {len(numbers)} numbers")
+        raise CommandError(f"data are pairs of numbers, time and value; got {len(numbers)} numbers")
     if "type" in given and len(said) != 1:
         raise CommandError("type is relative-time or absolute-time")
     pairs = None if numbers is None else list(zip(numbers[::2], numbers[1::2]))

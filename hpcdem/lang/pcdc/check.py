@@ -98,7 +98,7 @@ def summary(text: str, file: str) -> str:
     """What hpcdem --check says: how many commands of which kind, and names that are used but made nowhere."""
     script = read(text, file)
     counts = Counter(statement.command.name for statement in script.statements)
-    lines = [f"{file}: {len(script.statements)} commands read, nothing was run"]
+    lines = [f"{file}: {len(script.statements)} commands read, nothing was executed"]
     lines += [f"  {number:4d} {name}" for name, number in sorted(counts.items())]
     lines += [f"warning: {text}" for text in _loose_names(script)]
     lines += [f"warning: line {one.line}: {what}" for one, what, _ in _not_of_six_nodes(script)]
@@ -131,7 +131,7 @@ def memory(text: str, file: str, ranks: int, free: float | None) -> str:
         return said
     if one.node > free:
         raise HpcdemError(
-            f"{said}. It does not fit: {free * mega:.0f} MB are free here. Fewer elements, or more nodes with "
+            f"{said}. It does not fit: {free * mega:.0f} MB are free here. Use fewer elements, or more nodes with "
             "fewer ranks each"
         )
     return f"{said}, of {free * mega:.0f} MB that are free"

@@ -261,8 +261,8 @@ class Interpreter:
         if self.project.log is not None:
             self.project.log.warn_once(
                 "journal",
-                f"the script has looked at more than {MOST >> 20} MiB of values: from here on --resume cannot find the "
-                "way back to a checkpoint; restart files can still be read with pcdc model restore",
+                f"the script has read more than {MOST >> 20} MiB of values, so --resume no longer works beyond this "
+                "point. Checkpoints can still be loaded with pcdc model restore",
             )
 
     @property
@@ -363,7 +363,7 @@ class Interpreter:
         else:
             shown = _difference(everyone[0][1], everyone[other][1])
             why = f"its values differ between rank 0 and rank {other}: {shown}"
-        raise statement.error(f"{why}; all ranks must come to the same commands with the same values")
+        raise statement.error(f"{why}; all ranks must execute the same commands with the same values")
 
     def _place(self, index: int) -> str:
         if index >= len(self.statements):

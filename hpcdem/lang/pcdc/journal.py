@@ -78,7 +78,7 @@ class Journal:
         if self.replays:
             self._fail_again()
             if self._past[self._at][0] != LOOK:
-                raise self._other_way("the script asks what the model is like, which it did not do there before")
+                raise self._other_way("the script reads values of the model that it did not read there before")
             return decoded(self._next()[1])
         try:
             value = make()
@@ -145,7 +145,7 @@ class Journal:
         if not self.replays:
             self.note(DONE)
         elif self._next()[0] != DONE:
-            raise self._other_way("a function that is called at some steps does less than before")
+            raise self._other_way("a function that is called at some steps executes less than before")
         return value
 
     def call_again(self) -> None:
@@ -153,7 +153,7 @@ class Journal:
         while self.replays and self._past[self._at][0] == CALL:
             number = self._past[self._at][1]
             if number >= len(self.functions):
-                raise self._other_way("a function is not there that was called here before")
+                raise self._other_way("a function that was called here before is missing")
             self.call(number)
 
     # ---- bringing it back ----------------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ class Journal:
         be passed over; functions that were called in it are called. UsageError if it is another one; the error that it
         met is raised again."""
         if self._past[self._at] != [COMMAND, checksum]:
-            raise self._other_way("this line is not what was carried out there before, or its values are others")
+            raise self._other_way("another line, or other values, were executed there before")
         self._next()
         self.call_again()
         if not self.replays:
@@ -207,13 +207,13 @@ class Journal:
 
     def _other_way(self, why: str) -> UsageError:
         self.failure = UsageError(
-            f"{why}: the script was changed, or takes another way each time it runs (the clock, files that others "
-            "write). Begin again, or go on with a script of your own that begins with pcdc model restore"
+            f"{why}: the script was changed, or its path depends on the clock or on changed files. Start again, or "
+            "start another script with pcdc model restore"
         )
         return self.failure
 
 
-_NO_CALL = "this call is not what was done there before, or its values are others"
+_NO_CALL = "another call, or other values, were executed there before"
 
 
 def described(value: Any) -> str:

@@ -230,7 +230,7 @@ TABLED_STEP = Kind(
 COUNT = Kind("<i>", "a whole number above 0", whole(1), python="int")
 ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0), python="int")
 POINTS = Kind("3", "3, the points of a joint,", whole(3, 3), python="int")
-FREEDOM = Kind("0|1|2", "0 free, 1 held or 2 along a vector (3 is for 3-D)", whole(0, 2), python="int")
+FREEDOM = Kind("0|1|2", "0 free, 1 fixed or 2 along a vector (3 is for three dimensions)", whole(0, 2), python="int")
 DIMENSIONS = Kind("2|3", "2 or 3", whole(2, 3), python="int")
 SPLIT = Kind("5|6|12", "5, 6 or 12", _one_of(5, 6, 12), python="int")
 FIRST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True, python="int")
@@ -257,7 +257,7 @@ SECTION = Kind("<s>", "a plane, 'x=1.5', 'x<1.5', 'x>1.5', or a point and a norm
                _read_by(section_of), python="str")  # fmt: skip
 THIRD_COUNT, THIRD_POSITIVE = (replace(kind, dims=(3,)) for kind in (COUNT, POSITIVE))
 """One more in three dimensions."""
-_FREEDOM = replace(FREEDOM, meaning="0 free, 1 held, 2 along a vector or 3 across it", check=whole(0, 3))
+_FREEDOM = replace(FREEDOM, meaning="0 free, 1 fixed, 2 along a vector or 3 across it", check=whole(0, 3))
 LEVEL = Kind(
     "<f>|<v>|table <s>",
     "a number, a vector (x,y) or table 'name'",
@@ -390,7 +390,9 @@ def _pending(escape: Escape, expressions: Expressions) -> Pending:
         try:
             return -values[index]
         except TypeError:
-            raise ValueError(f"read {_shown(values[index])} from {escape}, which has no negative") from None
+            raise ValueError(
+                f"read {_shown(values[index])} from {escape}, expected values that are not negative"
+            ) from None
 
     return Pending(negative)
 

@@ -115,7 +115,7 @@ def _listed(line: str, token: Token, at: int) -> tuple[Token, int]:
     while line[at : at + 1] == ",":
         after = _skip_blanks(line, at + 1)
         if after >= len(line) or line[after] in ",#":
-            raise LexicalError(f"read ',' after {items[-1]}, expected one more value behind it")
+            raise LexicalError(f"read ',' after {items[-1]}, expected one more value after it")
         if not isinstance(token, (Number, Escape)):
             return token, at + 1
         item, end = _token(line, after)
@@ -173,7 +173,7 @@ def _vector(line: str, at: int) -> tuple[Vector, int]:
         item, at = _token(line, at)
         if not isinstance(item, (Number, Escape)):
             raise LexicalError(
-                f"read {item} in a vector, expected a number; variables and expressions of Python stand in [ ]"
+                f"read {item} in a vector, expected a number; put variables and expressions of Python in [ ]"
             )
         items.append(item)
         at = _skip_blanks(line, at)
@@ -203,7 +203,7 @@ def _text(line: str, at: int) -> tuple[Text, int]:
             try:
                 code, at = expression(line, at)
             except LexicalError as error:
-                raise LexicalError(f"{error}; in a text [[ stands for the bracket itself") from None
+                raise LexicalError(f"{error}; in a text write [[ for a bracket") from None
             parts.append(Escape(code))
         else:
             plain = _PLAIN[quote].match(line, at)
@@ -233,7 +233,7 @@ def expression(line: str, at: int) -> tuple[str, int]:
         ast.parse(f"({code})", mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         why = getattr(error, "msg", None) or str(error) or type(error).__name__
-        raise LexicalError(f"'[{code[:60]}]' is no expression of Python: {why}") from None
+        raise LexicalError(f"'[{code[:60]}]' is not an expression of Python: {why}") from None
     return code, end + 1
 
 
@@ -286,7 +286,7 @@ def _fail(text: str) -> NoReturn:
         if char in _FULL_WIDTH:
             raise LexicalError(f"read '{shown}': '{char}' is a full-width sign, expected '{_FULL_WIDTH[char]}'")
     if "_" in text or re.search(r"[A-Za-z0-9.)\]][-+*/%][A-Za-z0-9.(\[]|\*\*|[=<>]", text) or "." in text:
-        raise LexicalError(f"read '{shown}'; variables and expressions of Python stand in square brackets: [{shown}]")
+        raise LexicalError(f"read '{shown}'; put variables and expressions of Python in square brackets: [{shown}]")
     raise LexicalError(
         f"read '{shown}', expected a keyword, a number, a text in quotes, a vector (x,y) or [expression]"
     )
@@ -296,6 +296,6 @@ def _fail_after(line: str, at: int, token: Token) -> NoReturn:
     rest = line[at : at + 20].split()[0]
     if isinstance(token, Escape) or rest[:1] in "[*/+-":
         raise LexicalError(
-            f"read '{rest}' right after {token}; the whole expression stands in the brackets, or a blank is missing"
+            f"read '{rest}' directly after {token}: put the whole expression in brackets, or insert a blank"
         )
-    raise LexicalError(f"read '{rest}' right after {token}; a blank is missing")
+    raise LexicalError(f"read '{rest}' directly after {token}: insert a blank")

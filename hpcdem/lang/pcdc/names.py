@@ -80,14 +80,14 @@ def _text(name: str, function: FunctionType, sources: Mapping[str, Source]) -> s
                 lines = source.lines[node.lineno - 1 : node.end_lineno]
                 text = textwrap.dedent("\n".join(lines))
                 if node.name != name:
-                    raise CommandError(f"{name} cannot be saved: it is another name of the function {node.name}")
+                    raise CommandError(f"{name} cannot be saved: it is an alias of the function {node.name}")
                 if code.co_freevars:
                     raise CommandError(
                         f"{name} cannot be saved: it uses {code.co_freevars[0]} of the function around it"
                     )
                 checked(name, node)
                 return text
-    raise CommandError(f"{name} cannot be saved: it is no function that a def of the script made")
+    raise CommandError(f"{name} cannot be saved: it is not a function defined by a def of the script")
 
 
 def _decorators(node: ast.FunctionDef) -> list[int]:
@@ -135,7 +135,7 @@ def restored_functions(names: Mapping[str, Any]) -> dict[str, str]:
     found: dict[str, str] = {}
     for name, text in _items(names, "functions"):
         if not isinstance(text, str) or len(text) > LONGEST:
-            raise CommandError(f"the file is damaged: {name} is no text of a function")
+            raise CommandError(f"the file is damaged: {name} is not the text of a function")
         found[name] = text
     return found
 
@@ -151,7 +151,7 @@ def plain_def(name: str, source: Source) -> None:
 def _items(names: Mapping[str, Any], what: str) -> Iterator[tuple[str, Any]]:
     given = names.get(what, {})
     if not isinstance(given, dict):
-        raise CommandError(f"the file is damaged: its {what} are no table")
+        raise CommandError(f"the file is damaged: its {what} are not a table")
     for name, value in given.items():
         if not (isinstance(name, str) and name.startswith(PREFIX) and name.isidentifier()):
             raise CommandError(f"the file is damaged: {name!r:.60} is no name that can be restored")

@@ -75,7 +75,7 @@ class _Line:
     def next(self, expected: str) -> Token:
         token = self.peek()
         if token is None:
-            raise ValueError(f"the line ends where {expected} is expected; a line that goes on ends with \\")
+            raise ValueError(f"the line ends where {expected} is expected; end a continued line with \\")
         self.at += 1
         return token
 
@@ -95,7 +95,7 @@ class _Line:
         self.at += 1
         self.trail.append(found[0].keyword.name)
         if refused := getattr(found[0], "refused", ""):
-            raise Refused(f"{token} is refused after '{self.context}': {refused}")
+            raise Refused(f"{token} is rejected after '{self.context}': {refused}")
         return found[0]
 
     def unknown(self, token: Token, rows: Sequence[Row]) -> NoReturn:
@@ -230,7 +230,7 @@ class _Line:
 
     def _no_keyword(self, token: Token, command: Command, options: Sequence[Option]) -> NoReturn:
         if isinstance(token, Word) and matching(token.text, [RANGE]) and not command.ranged:
-            raise ValueError(f"'{self.context}' takes no range")
+            raise ValueError(f"'{self.context}' does not accept a range")
         self.unknown(token, [*options, RANGE] if command.ranged else options)
 
     def require(self, options: Sequence[Option], given: dict[str, Any]) -> None:

@@ -16,9 +16,9 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
     """ValueError if the words of a line do not go together."""
     for k, (name, value) in enumerate(terms or ()):
         if name == "not" and (k + 1 == len(terms or ()) or (terms or ())[k + 1][0] in ("not", "present", "use-hidden")):
-            raise ValueError("not stands before the term of a range that does not hold, such as x, group or geometry")
+            raise ValueError("not must precede a term of a range, such as x, group or geometry")
         if name == "in-circle" and (len(value["value"]), len(value)) not in ((2, 1), (0, 3)):
-            raise ValueError("in-circle takes a centre and a radius")
+            raise ValueError("in-circle needs a centre and a radius")
     rule = _RULES.get(command.name)
     if rule is not None:
         rule(arguments, terms)
@@ -31,19 +31,23 @@ def _history(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | No
         raise ValueError(f"a history needs one of id, nearest and range, not {' and '.join(given)}")
     how = [word for word in ("sum", "mean", "minimum", "maximum") if word in arguments]
     if len(how) > 1 or (how and given not in ([], ["range"])):
-        raise ValueError(f"{how[-1]} goes with range or stands for all, and only one of sum, mean, minimum and maximum")
+        raise ValueError(
+            f"{how[-1]} needs a range or applies to all objects; give only one of sum, mean, minimum and maximum"
+        )
     if terms is not None and not how:
         raise ValueError("a history of several objects needs sum, mean, minimum or maximum")
     if not isinstance(value, Pending) and (value == "law-state") != ("variable" in arguments):
-        raise ValueError("value law-state and variable, the name of a state variable, go together")
+        raise ValueError("value law-state and variable, the name of a state variable, are both required")
     if isinstance(kind, Pending):
         return
     if (kind == "well") != ("well" in arguments):
-        raise ValueError("object well and well, its name, go together")
+        raise ValueError("object well and well, its name, are both required")
     if not isinstance(value, Pending) and value not in RECORDED[kind]:
         raise ValueError(f"a history of {kind} can follow {', '.join(RECORDED[kind])}, not {value}")
     if kind in ("model", "well") and (given or how):
-        raise ValueError(f"a history of {'the model' if kind == 'model' else 'a well'} takes no {(given or how)[0]}")
+        raise ValueError(
+            f"a history of {'the model' if kind == 'model' else 'a well'} does not accept {(given or how)[0]}"
+        )
     if kind not in ("model", "well") and not (given or how):
         raise ValueError(
             f"a history of {kind} needs one of id, nearest and range, or it is sum, mean, minimum or maximum of all"
@@ -58,7 +62,7 @@ def _structured(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] |
     if kind not in there:
         raise ValueError(f"type {kind}: in {('two', 'three')[len(first) - 2]} dimensions it is {' or '.join(there)}")
     if kind == "hex" and "split" in arguments:
-        raise ValueError("split is for tetrahedra: hexahedra are not split")
+        raise ValueError("split is for tetrahedra only")
 
 
 def _bolt(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -68,7 +72,7 @@ def _bolt(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None)
 
 def _fluid(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if "pressure" in arguments and "saturation" in arguments:
-        raise ValueError("pressure and saturation cannot be combined: below full saturation there is no pressure")
+        raise ValueError("pressure and saturation cannot be combined: the pressure is 0 below full saturation")
 
 
 def _stage(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -76,7 +80,7 @@ def _stage(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
     if len(given) != 1:
         raise ValueError(f"a stage of a well is one of rate, pressure and shut-in, not {' and '.join(given) or 'none'}")
     if "limit" in arguments and given != ["rate"]:
-        raise ValueError("limit, a pressure, goes with rate")
+        raise ValueError("limit, a pressure, needs rate")
 
 
 def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -87,11 +91,11 @@ def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         )
     (word,) = given
     if word == "values" and (wrong := [w for w in ("x", "scale-x", "scale-y") if w in arguments]):
-        raise ValueError(f"{wrong[0]} goes with histories, not with values")
+        raise ValueError(f"{wrong[0]} applies to histories, not to values")
     if word == "profile" and "x" in arguments:
-        raise ValueError("x goes with histories, not with profile")
+        raise ValueError("x applies to histories, not to profile")
     if terms is not None and word != "profile":
-        raise ValueError("range goes with profile: it says along which joints")
+        raise ValueError("range applies to profile, whose joints it selects")
 
 
 def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -100,7 +104,7 @@ def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | 
         arguments = {**arguments, "auto": True}
     auto = arguments.get("auto")
     if "update-frequency" in arguments and auto is not True and not isinstance(auto, Pending):
-        raise ValueError("update-frequency goes with auto on")
+        raise ValueError("update-frequency needs auto on")
     said = [told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)]
     if len(said) > 1:
         raise ValueError(f"{said[0]} and {said[1]} cannot be combined: both set the time step")
@@ -121,13 +125,13 @@ def _option(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | Non
 
 def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if {"elastic", "run-time"} <= arguments.keys():
-        raise ValueError("run-time goes with a run by steps")
+        raise ValueError("run-time needs a run by steps")
     if {"elastic", "time", "cycles"} <= arguments.keys():
-        raise ValueError("elastic takes time or cycles: a creep step is found at once")
+        raise ValueError("elastic accepts time or cycles: it solves a creep step directly")
     watched = [word for word in ("window", "limit", "on-failure") if word in arguments]
     by_ratio = "ratio" in arguments or not ({"cycles", "time"} & set(arguments))
     if watched and ("elastic" in arguments or not by_ratio):
-        raise ValueError(f"{watched[0]} goes with a ratio that steps lead to")
+        raise ValueError(f"{watched[0]} needs a run by steps towards a ratio")
     if "limit" in watched and "cycles" in arguments:
         raise ValueError("limit and cycles cannot be combined: a run that reaches its cycles has not failed")
     for part in ("hydraulic", "thermal"):
@@ -135,43 +139,43 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
             _implicit(arguments, part)
             return
     if "auto" in arguments:
-        raise ValueError("auto goes with hydraulic")
+        raise ValueError("auto needs hydraulic")
     for word in ("dt", "steady"):
         if word in arguments:
-            raise ValueError(f"{word} goes with hydraulic or thermal")
+            raise ValueError(f"{word} needs hydraulic or thermal")
     for word in ("solver", "steps"):
         if word in arguments and "elastic" not in arguments:
-            raise ValueError(f"{word} goes with elastic; a run by steps needs none")
+            raise ValueError(f"{word} needs elastic")
 
 
 def _implicit(arguments: Mapping[str, Any], part: str) -> None:
     """Of model solve, by implicit steps of fluid or heat."""
     others = arguments.keys() - {part, "time", "dt", "steady", "solver", *(["auto"] if part == "hydraulic" else [])}
     if others:
-        raise ValueError(f"{part} takes no {min(others)}")
+        raise ValueError(f"{part} does not accept {min(others)}")
     if ("steady" in arguments) == ("time" in arguments):
-        raise ValueError(f"{part} takes time or steady, one of them")
+        raise ValueError(f"{part} needs either time or steady")
     if "auto" in arguments and "steady" in arguments:
-        raise ValueError("auto goes with time: steady flow is found by implicit steps")
+        raise ValueError("auto needs time: steady flow is found by implicit steps")
     if part == "thermal" and {"steady", "dt"} <= arguments.keys():
-        raise ValueError("dt goes with time: the steady state of heat is found at once")
+        raise ValueError("dt needs time: the steady state of heat is found directly")
 
 
 def _creep(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     others = [word for word in ("dt", "change", "least", "greatest") if word in arguments]
     if arguments["on"] is False and others:
-        raise ValueError(f"off takes no {others[0]}")
+        raise ValueError(f"off does not accept {others[0]}")
     for word, with_ in (("change", "dt"), ("least", "change"), ("greatest", "change")):
         if word in arguments and with_ not in arguments:
-            raise ValueError(f"{word} goes with {with_}")
+            raise ValueError(f"{word} needs {with_}")
 
 
 def _rayleigh(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     others = [word for word in ("frequency", "part") if word in arguments]
     if arguments["ratio"] == 0.0 and others:
-        raise ValueError(f"ratio 0 takes no {others[0]}")
+        raise ValueError(f"ratio 0 does not accept {others[0]}")
     if arguments["ratio"] != 0.0 and not isinstance(arguments["ratio"], Pending) and "frequency" not in arguments:
-        raise ValueError("a ratio goes with frequency, at which the damping has it")
+        raise ValueError("a ratio needs its frequency")
 
 
 def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -185,9 +189,9 @@ LOOKS = ("limits", "full", "log", "colours", "opacity", "edges", "size", "vector
 def _image(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     shown = arguments.get("object")
     if terms is not None and shown not in SHOWN and not isinstance(shown, Pending):
-        raise ValueError(f"range goes with object, one of {', '.join(SHOWN)}: it says which of them are shown")
+        raise ValueError(f"range needs object, one of {', '.join(SHOWN)}")
     if "full" in arguments and "limits" in arguments:
-        raise ValueError("limits and full are two ways to say which value has which colour; take one of them")
+        raise ValueError("limits and full cannot be combined: both set the range of colours")
     if "field" not in arguments and "object" not in arguments:
         for word in LOOKS:
             if word in arguments:
@@ -204,7 +208,7 @@ def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
 
 def _glue(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if terms is not None and "between" in arguments:
-        raise ValueError("between and range cannot be combined: both say which faces are glued")
+        raise ValueError("between and range cannot be combined: both select the faces to glue")
 
 
 _RULES: dict[str, Callable[[Mapping[str, Any], Sequence[tuple[str, Any]] | None], None]] = {

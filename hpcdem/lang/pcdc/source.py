@@ -60,7 +60,9 @@ def decode(source: bytes, file: str) -> str:
     else:
         raise ScriptError(file, line, "the file is neither UTF-8 text nor GB 18030; save it as UTF-8")
     if "\0" in text:
-        raise ScriptError(file, text.count("\n", 0, text.index("\0")) + 1, "there is a zero byte; this is no text")
+        raise ScriptError(
+            file, text.count("\n", 0, text.index("\0")) + 1, "there is a zero byte; this is not a text file"
+        )
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -84,7 +86,9 @@ def read(text: str, file: str = "script", first: int = 0, table: Table = PCDC, d
         last, words = _logical(lines, number, match[2])
         shown = " ".join(f"pcdc{words}".split())
         if words.lstrip().startswith("="):
-            raise ScriptError(file, number + 1, f"{lines[number].strip()}: 'pcdc' is reserved, no name for a variable")
+            raise ScriptError(
+                file, number + 1, f"{lines[number].strip()}: 'pcdc' is reserved and cannot name a variable"
+            )
         statement = parser.parse(words, file, number + 1, shown, table, last + 1, dim)
         dim = _dimensions(statement, dim)
         index = first + len(found.statements)
@@ -228,5 +232,5 @@ def too_deep(source: Source, reads: Callable[[str], object] = ast.parse) -> Scri
 
 def _python_error(error: SyntaxError, text: str) -> str:
     if re.search(r"[:;]\s*pcdc\s", text):
-        return "a command must stand on a line of its own, with 'pcdc' as its first word"
+        return "a command needs its own line, with 'pcdc' as its first word"
     return f"this is not correct Python: {error.msg}"

@@ -158,7 +158,7 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
             if f"velocity-{axis}" in arguments and f"acceleration-{axis}" in arguments:
                 raise CommandError(f"velocity-{axis} and acceleration-{axis} cannot be combined")
     elif name in (FLOW_CONDITION.keyword.name, PROPPANT_CONDITION.keyword.name) and len(arguments) > 1:
-        raise CommandError(f"{' and '.join(arguments)} cannot be combined: a flow node has one of them")
+        raise CommandError(f"{' and '.join(arguments)} cannot be combined at a flow node")
 
 
 def _changes(model: properties.Model, given: dict[str, Any]) -> None:
@@ -233,12 +233,12 @@ def pieces(arguments: Mapping[str, Any]) -> list[Piece]:
         for one in (given if isinstance(given, list) else [given])
     ]
     if "radius" in arguments and not arguments["inner-radius"]["value"] < arguments["radius"]["value"]:
-        raise CommandError("inner-radius is below radius: between them is the ring")
+        raise CommandError("inner-radius is below radius: the ring lies between them")
     if not any(piece.role == OUTLINE for piece in found):
         first = next((k for k, piece in enumerate(found) if piece.what != "arc"), 0)
         found[first] = replace(found[first], role=OUTLINE)
     if all(piece.size is None for piece in found) and "global-mesh-size" not in arguments:
-        raise CommandError("mesh-size is missing: of one of the pieces at least")
+        raise CommandError("mesh-size is missing: give it for at least one piece")
     return found
 
 

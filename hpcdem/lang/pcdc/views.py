@@ -153,7 +153,7 @@ class View:
 
     def __init__(self, model: Model, kind: str, number: int) -> None:
         if isinstance(number, bool) or not isinstance(number, (int, np.integer)):
-            raise CommandError(f"pcdc.{kind}({number!r}): the number of the {kind} is a whole number")
+            raise CommandError(f"pcdc.{kind}({number!r}): the number of the {kind} must be a whole number")
         self._model, self._kind, self._number = model, kind, int(number)
 
     def __getattr__(self, name: str) -> Any:
@@ -171,7 +171,7 @@ class View:
 
 def _kind(kind: str) -> str:
     if kind not in KINDS:
-        raise CommandError(f"'{kind}' is none of {', '.join(KINDS)}")
+        raise CommandError(f"'{kind}' is not one of {', '.join(KINDS)}")
     return KINDS[kind]
 
 
@@ -203,7 +203,7 @@ def _range(where: dict[str, Any]) -> g.Range | None:
             terms += [g.OnBoundary() if word == "boundary" else g.OnCrack()] * bool(value)
         else:
             raise CommandError(
-                f"'{word}' is none of group, face_of, between, set, geometry, id, element, x, y, z, boundary, crack "
+                f"'{word}' is not one of group, face_of, between, set, geometry, id, element, x, y, z, boundary, crack "
                 "and present"
             )
     if set_name is not None and not where.keys() & {"group", "face_of", "between"}:

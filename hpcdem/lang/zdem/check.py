@@ -161,18 +161,18 @@ def _notes(script: Script, runs: Sequence[Run], restored: bool, outdir: Path | N
             continue
         if find(script.directory, statement.get("file")) is None:
             notes.append(
-                f"line {statement.line}: there is no file {statement.get('file')} beside the script, nor in data"
+                f"line {statement.line}: file {statement.get('file')} not found in the folder of the script or in data"
             )
         elif statement.command == "RESTORE" and not restored:
             notes.append(f"line {statement.line}: {statement.get('file')} cannot be read")
     try:
         refuse_lost_files(script, outdir)
     except ScriptError as error:
-        notes.append(f"line {error.line}: {error.message}; the script would be refused")
+        notes.append(f"line {error.line}: {error.message}; the script would be rejected")
     if any(run.steps is None for run in runs):
-        notes.append("steps of IMPLE are known when both SET DT and the velocity of the wall stand in the script")
+        notes.append("the script must contain SET DT and the velocity of the wall to estimate the steps of IMPLE")
     if script.statements[-1].command != "STOP":
-        notes.append("there is no STOP; the script ends with its last line")
+        notes.append("no STOP found; the script ends with its last line")
     return notes
 
 
@@ -227,7 +227,7 @@ def print_report(report: Report, console: Any = None) -> None:
     for note in report.notes:
         console.print(escape(f"note: {note}"))
     for line, word in report.unexecuted:
-        console.print(escape(f"line {line}: {word} is not carried out yet; the script would be refused"))
+        console.print(escape(f"line {line}: {word} is not carried out yet; the script would be rejected"))
 
 
 def _time(report: Report) -> str:
@@ -239,7 +239,7 @@ def _time(report: Report) -> str:
     text = f"about {_spoken(one)} on 1 core" if cores == 1 else (
         f"about {_spoken(all_of_them)} on {cores} cores, {_spoken(one)} on 1"
     )  # fmt: skip
-    source = "as measured in the last run here" if report.measured else "assumed: no run was measured here yet"
+    source = "measured in the last run here" if report.measured else "assumed, as no run was measured here yet"
     return f"{text} (at {rate(report.rate)} particle-steps/s per core, {source})"
 
 

@@ -101,9 +101,7 @@ def _refuse(char: str, file: str, number: int, column: int) -> None:
             raise ScriptError(file, number, f"read {char} at column {column}; names are written without quotes")
         return
     if char in LINE_BREAK_MARKS:
-        raise ScriptError(
-            file, number, f"read '{char}' at column {column}, the mark of a line that a PDF broke in two; {JOIN}"
-        )
+        raise ScriptError(file, number, f"read '{char}' at column {column}, the mark of a line broken by a PDF; {JOIN}")
     plain = unicodedata.normalize("NFKC", char)
     if "\uff01" <= char <= "\uff5e" or char == "\u2212":
         plain = "-" if char == "\u2212" else plain

@@ -109,7 +109,7 @@ class _LineParser:
         """The row a word stands for; where it is only guessed by its first letters, with a warning."""
         row, guessed = t.find(token.word, rows)
         if row is not None and guessed:
-            self.warnings.append(f"{self.context}: '{token.text}' is taken for {row.name}, which begins like it")
+            self.warnings.append(f"{self.context}: '{token.text}' is interpreted as {row.name}, which begins like it")
         return row
 
     def note(self, row: t.Row, what: str) -> None:
@@ -140,7 +140,7 @@ class _LineParser:
             self.note(command, command.name)
             return command
         if self.table.range_row.accepts(token.word):
-            self.fail(f"RANGE is no command; it stands at the end of the line of another command{self.rest(token)}")
+            self.fail(f"RANGE is not a command; put it at the end of the line of another command{self.rest(token)}")
         if lexer.number(token) is not None:
             self.fail(f"read {token}, expected a command; every line begins with a command{self.rest(token)}")
         if not token.text.isascii():
@@ -160,7 +160,7 @@ class _LineParser:
             return ""
         rows = [*command.options, *((self.table.range_row, *self.table.range_terms) if command.ranged else ())]
         goes_on = lexer.number(token) is not None or any(row.accepts(token.word) for row in rows)
-        return f"; it looks like the rest of line {self.before.line}: {lexer.JOIN}" if goes_on else ""
+        return f"; it may be the rest of line {self.before.line}: {lexer.JOIN}" if goes_on else ""
 
     def leading(self, command: t.Command, arguments: dict[str, Any]) -> None:
         """Fixed words and values that follow the command itself. Words are left out of the arguments."""
@@ -182,7 +182,7 @@ class _LineParser:
             self.at += 1
             if t.find(token.word, command.options)[0] is None and self.table.range_row.accepts(token.word):
                 if not command.ranged:
-                    self.unexpected(token, f"a keyword: {command.name} takes no RANGE")
+                    self.unexpected(token, f"a keyword: {command.name} does not accept RANGE")
                 return self.selection()
             option = self.row(token, command.options) or self.switched_off(token, command)
             if option is None:
@@ -275,7 +275,7 @@ class _LineParser:
 
     def plain_number(self, token: Token, expected: str) -> float:
         if lexer.is_expression(token):
-            self.unexpected(token, f"{expected}; variables may stand in RANGE and in x and y of GEN only")
+            self.unexpected(token, f"{expected}; use variables in RANGE and in x and y of GEN only")
         value = lexer.number(token)
         if value is None:
             self.unexpected(token, expected)
@@ -315,7 +315,7 @@ class _LineParser:
         high = self.variable(f"the upper bound of {name}")
         if isinstance(low, sel.Expression) and signed is not None and signed.text[0] in "+-":
             self.warnings.append(
-                f"{self.context}: {low} and '{signed.text}' are taken for two bounds of {name}{lexer.BLANKS}"
+                f"{self.context}: {low} and '{signed.text}' are interpreted as two bounds of {name}{lexer.BLANKS}"
             )
         if not sel.has_expressions((low, high)) and low > high:  # type: ignore[operator]
             self.fail(f"{self.context}: the lower bound of {name}, {low}, is above the upper bound, {high}")

@@ -146,7 +146,7 @@ def _no_energy_with_pressure(statement: Statement, known: _Known) -> None:
 def _box(statement: Statement, known: _Known) -> None:
     taken = [] if known.boxed else [i for i in BOX_IDS.values() if i in known.walls]
     if taken:
-        raise statement.error(f"the sides of BOX are walls 100 to 103, and there is a wall {taken[0]}; renumber it")
+        raise statement.error(f"the sides of BOX are walls 100 to 103, and wall {taken[0]} exists already; renumber it")
     known.boxed = True
     known.walls.update(dict.fromkeys(BOX_IDS.values(), (0.0, 0.0)))
 
@@ -166,7 +166,7 @@ def _wall(statement: Statement, known: _Known) -> None:
 def _plot(statement: Statement, known: _Known) -> None:
     for axis in ("x", "y"):
         if known.complete and statement.get(axis) not in known.histories:
-            raise statement.error(f"there is no history {statement.get(axis)}; HIST makes one")
+            raise statement.error(f"no history {statement.get(axis)} yet; create it with HIST")
 
 
 def _run(index: int, statement: Statement, known: _Known) -> Run:
@@ -175,7 +175,7 @@ def _run(index: int, statement: Statement, known: _Known) -> Run:
     else:
         run = _imple(index, statement, known)
     if not known.has_step_rule:
-        raise statement.error("there is no time step yet; SET DT or SET frac gives one")
+        raise statement.error("there is no time step yet; use SET DT or SET frac")
     return run
 
 

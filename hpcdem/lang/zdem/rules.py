@@ -41,7 +41,7 @@ def check_place(statement: Statement, before: Sequence[Statement]) -> None:
     # START followed at once by LOAD or RESTORE loses nothing; anything else would throw a model away unnoticed.
     after_start = len(before) == 1 and before[0].command == "START" and statement.command != "START"
     if before and begins and not after_start:
-        raise statement.error("begins a new calculation, so it can only be the first command of a script")
+        raise statement.error("begins a new calculation and must be the first command of a script")
 
 
 def _wall(s: Statement) -> None:
@@ -85,11 +85,11 @@ def _gline(s: Statement) -> None:
 def _clump(s: Statement) -> None:
     placing = [name for name in ("x", "y", "angle", "scale") if name in s.arguments]
     if "file" in s.arguments and s.selection is not None:
-        raise s.error("RANGE chooses particles that are there, a file brings new ones; give one of them")
+        raise s.error("RANGE selects existing particles, a file adds new ones; give one of them")
     if "file" not in s.arguments and placing:
         raise s.error(f"{placing[0]} belongs to CLUMP file")
     if "file" not in s.arguments and s.selection is None:
-        raise s.error("give a file, or RANGE and the particles that are to be one clump")
+        raise s.error("give a file, or select the particles of one clump by RANGE")
 
 
 def _prop(s: Statement) -> None:
@@ -99,7 +99,7 @@ def _prop(s: Statement) -> None:
         strange = [key for key in s.arguments if key not in ("law", "between", "parameter")]
         if "law" not in s.arguments or strange or s.selection:
             raise s.error(
-                "between says the law of all pairs of discs with these two laws; only law and parameter go with it"
+                "between assigns the law of all pairs of discs with these two laws; it accepts only law and parameter"
                 + (f", not {strange[0]}" if strange else ", no RANGE" if s.selection else "")
             )
     first = [key for key in BOND_MODEL_1 if key in s.arguments]
@@ -113,12 +113,12 @@ def _prop(s: Statement) -> None:
 
 def _degrees(s: Statement) -> None:
     if not s.arguments:
-        raise s.error("say which of x, y, spin")
+        raise s.error("give one or more of x, y, spin")
 
 
 def _set(s: Statement) -> None:
     if not s.arguments:
-        raise s.error("say what to set: " + t.joined(option.name for option in _SET.options))
+        raise s.error("give what to set: " + t.joined(option.name for option in _SET.options))
     if "outdir" in s.arguments and _is_script(s, s.get("outdir")):
         raise s.error(f"outdir {s.get('outdir')} is the script itself")
 
@@ -130,17 +130,17 @@ def _imple(s: Statement) -> None:
 
 def _hist(s: Statement) -> None:
     if sum(name in s.arguments for name in RECORDED) != 1:
-        raise s.error(f"say what to record: {', '.join(RECORDED[:-1])} or {RECORDED[-1]}")
+        raise s.error(f"give what to record: {', '.join(RECORDED[:-1])} or {RECORDED[-1]}")
     stresses = [name for name in ("xstress", "ystress") if name in s.arguments]
     if "wall" in s.arguments and not stresses:
-        raise s.error("wall belongs to xstress and ystress; strains take two walls: ystrain wall 0|3")
+        raise s.error("wall applies to xstress and ystress; strains need two walls: ystrain wall 0|3")
     for stress in stresses:
         if len((*s.get("wall", ()), *s.get(stress))) != 1:
-            raise s.error(f"say once of which wall: wall id 3 {stress}")
+            raise s.error(f"give the wall once: wall id 3 {stress}")
     for strain in ("gstrain", "xstrain", "ystrain"):
         both = s.get(strain)
         if both is not None and both[0] == both[1]:
-            raise s.error(f"{strain} is between two, both are {both[0]}")
+            raise s.error(f"{strain} needs two different ones, both are {both[0]}")
 
 
 def recorded(s: Statement) -> str:

@@ -50,7 +50,7 @@ def switch(
     given = {"dt": dt, "change": change, "least": least, "greatest": greatest}
     numbers = {name: float(finite(name, [value])[0]) for name, value in given.items() if value is not None}
     if not on and numbers:
-        raise CommandError(f"creep off takes no {next(iter(numbers))}")
+        raise CommandError(f"creep off does not accept {next(iter(numbers))}")
     for name, value in numbers.items():
         if value <= 0.0:
             raise CommandError(f"{name} of creep must be positive, got {value:g}")

@@ -190,14 +190,14 @@ class Conditions(Assigned, Field):
         for row in np.unique(exposed.row[at]).tolist():
             wanted = replace(exposed.conditions[row], **changes)
             if wanted.transfer is not None and wanted.environment is None:
-                raise CommandError(f"a transfer coefficient of faces goes with environment-{self.quantity}")
+                raise CommandError(f"a transfer coefficient of faces needs environment-{self.quantity}")
             if wanted.environment is not None and wanted.transfer is None:
                 mine = at[exposed.row[at] == row]
                 h = self._transfers[mine // 4]
                 if (h == 0.0).any():
                     raise CommandError(
-                        f"environment-{self.quantity} needs a transfer coefficient: face {mine[h == 0.0][0]} has none, "
-                        "nor has its element"
+                        f"environment-{self.quantity} needs a transfer coefficient: face {mine[h == 0.0][0]} and its "
+                        "element have none"
                     )
         with self.changing():
             change_rows(exposed.conditions, exposed.row, at, changes)
@@ -208,7 +208,7 @@ class Conditions(Assigned, Field):
 
     def _need_model(self) -> None:
         if not self.rows:
-            raise CommandError(f"there is no {self.name} yet: {self.command} comes first")
+            raise CommandError(f"no {self.name} yet: assign {self.command} first")
 
     @property
     def command(self) -> str:

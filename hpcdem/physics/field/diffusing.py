@@ -184,8 +184,8 @@ class Diffusing(Conditions):
         if against:
             blocks.log.warn_once(
                 f"obtuse {self.name}",
-                f"along {against} of {edges} edges {self.name} is conducted from the {self.low_to_high} end, as angles "
-                f"are obtuse (in {obtuse}): near steep fronts {self.several} may leave the range of those around them",
+                f"{against} of {edges} edges have negative conductance for {self.name}, as angles of {obtuse} are "
+                f"obtuse: near steep fronts {self.several} may leave the range of their neighbours",
             )
 
     def _make_nodes(self) -> None:
@@ -253,7 +253,9 @@ class Diffusing(Conditions):
             return
         limit, period, (steps, dt) = SAFETY * self._limit, self._cycle_time(), self._given_clock()
         if dt == period == 0.0 and not math.isfinite(limit) and not o.mechanical:
-            raise CommandError(f"no {self.name} can flow: all nodes are held; {self.set_step} gives it a clock")
+            raise CommandError(
+                f"{self.name} cannot flow: all nodes are prescribed. Use {self.set_step} to give it a clock"
+            )
         instead = f"a cycle of {period:.3g} s; {self.set_step} gives it a clock of its own"
         self._divide(steps, dt, period, limit, limit, instead)
         self._tell_step()
@@ -271,7 +273,7 @@ class Diffusing(Conditions):
             log.warn_once(
                 f"{self.name} step",
                 f"the {self.word} time step {self.dt:g} s is {self.dt / self._limit:.2f} of the stability limit "
-                f"{self._limit:.4g} s; a run that blows up should be repeated with a smaller one{self.otherwise}",
+                f"{self._limit:.4g} s. Reduce it if the run becomes unstable{self.otherwise}",
             )
 
     def check_complete(self) -> None:
@@ -280,8 +282,8 @@ class Diffusing(Conditions):
         if len(bare):
             at = ", ".join(f"{c:g}" for c in blocks.the_mesh().centroids(bare[:1])[0])
             raise CommandError(
-                f"element {bare[0]} at ({at}) has no {self.kind_of_model} model ({len(bare)} in all), but others have: "
-                f"{self.command} for all"
+                f"element {bare[0]} at ({at}) has no {self.kind_of_model} model ({len(bare)} in all), but other "
+                f"elements have one: assign {self.command} to all"
             )
 
     def check_elements(self) -> None:
@@ -290,8 +292,8 @@ class Diffusing(Conditions):
         blocks = self.blocks
         if blocks.dim == 2 and self.expands and user_laws.in_use(blocks):
             raise CommandError(
-                f"{user_laws.some(blocks)} has a law of the user, which in two dimensions knows no strain e33 of "
-                f"{self.name}: {self.expansion.replace('_', '-')} must be 0 with it"
+                f"{user_laws.some(blocks)} has a user law, which does not support the out-of-plane strain of "
+                f"{self.name}: set {self.expansion.replace('_', '-')} to 0"
             )
 
     def check_start(self) -> None:
@@ -301,8 +303,8 @@ class Diffusing(Conditions):
         o = self.blocks.options
         if self.on and o.mechanical and not o.dynamic and self._given_clock()[1] == 0.0 == self._cycle_time():
             raise CommandError(
-                f"in static runs time of {self.name} passes by {self.set_step}, which comes first; or "
-                f"{self.switch_off} leaves {self.several} as they are"
+                f"static runs need {self.set_step} for the time of {self.name}; or use {self.switch_off} to keep "
+                f"{self.several} constant"
             )
         self._checked = True
 

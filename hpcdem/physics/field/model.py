@@ -37,7 +37,7 @@ class Assigned:
     kind_of_model: ClassVar[str]
     """As messages call it."""
     alike: ClassVar[tuple[str, ...]] = ()
-    why_alike: ClassVar[str] = "there is one fluid in all channels"
+    why_alike: ClassVar[str] = "all channels have the same fluid"
     """Properties that all objects have alike."""
     stiffens: ClassVar[bool] = False
     """What is assigned changes masses or time steps of the blocks."""

@@ -63,7 +63,7 @@ class Nodes:
         if lost >= 0:
             raise PhysicsError(
                 f"step {blocks.clock.step}: the node of {name} at corner {lost} spans more than a column of "
-                f"{blocks.rebuild_state.side:g} m: joints that are not broken have opened too far"
+                f"{blocks.rebuild_state.side:g} m: intact joints have opened too far"
             )
         self.corner = corner // 8 * width + corner % 8 // 2
         self.ids = self.number[first]

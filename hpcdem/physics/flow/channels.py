@@ -17,8 +17,8 @@ from hpcdem.core.account import closed
 from hpcdem.core.errors import PhysicsError
 from hpcdem.physics.field.model import Travelling
 from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow.assignments import Said
 from hpcdem.physics.flow.network import LINKS, TRIANGLE, at_nodes, links_of
-from hpcdem.physics.flow.said import Said
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
@@ -178,7 +178,7 @@ class Channels(Travelling, Said):
         if first >= 0:
             raise PhysicsError(
                 f"step {blocks.clock.step}: the channel on face {first} spans more than a column of "
-                f"{blocks.rebuild_state.side:g} m: its sides have parted too far"
+                f"{blocks.rebuild_state.side:g} m: its sides have moved too far apart"
             )
         corners = blocks.the_mesh().face_corners
         self.sides = self._begins(corners(faces)), self._begins(corners(other))

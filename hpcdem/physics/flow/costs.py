@@ -47,15 +47,15 @@ def explicit(flow: Flow, time: float) -> Cost | str:
     ones); or why that cannot be. Of a closed model; collective."""
     o, blocks = flow.blocks.options, flow.blocks
     if not o.mechanical and not o.dynamic:
-        return "without mechanics time passes by steps of flow in dynamic runs only"
+        return "without mechanics the time of flow advances in dynamic runs only"
     if o.mechanical and not o.dynamic:
         if o.flow_dt == 0.0:
-            return "in static runs model time-step hydraulic says how long a sub-step is, and was not said"
+            return "static runs need model time-step hydraulic, which is not set"
         stable = 2.0 * flow.limit()
         if o.flow_dt > time:
             return f"sub-steps of {o.flow_dt:.3g} s are longer than the time"
         if o.flow_dt > stable:
-            return f"model time-step hydraulic says {o.flow_dt:.3g} s, more than the {stable:.3g} s that are stable"
+            return f"model time-step hydraulic is {o.flow_dt:.3g} s, above the stability limit {stable:.3g} s"
         steps, dt = cycles(flow, time) * max(1, o.flow_steps) / o.flow_every, o.flow_dt
         of_blocks = float(cycles(flow, time))
     else:

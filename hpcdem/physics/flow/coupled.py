@@ -67,7 +67,7 @@ class Coupled(System):
             raise CommandError(
                 f"face-joint {slides[0]} ({len(slides)} in all) has the model "
                 f"{sim.joint_rows.name(sim.joint_row[slides[0]]).replace('_', '-')}: implicit steps of blocks with "
-                "fluid do not follow joints that slide; explicit steps do (model step, model solve time)"
+                "fluid do not support sliding joints; use explicit steps (model step, model solve time)"
             )
         self.front = 1
         """Joints that may pass their peak in one step: in space about those along the rim of a fracture in so many."""
@@ -80,24 +80,24 @@ class Coupled(System):
         sim = self.sim
         for load in sim.surface_loads:
             if load.name not in ("fluid", "proppant") and self.moves:
-                raise CommandError(
-                    f"implicit steps of flow know no {load.name}: model step and model solve step blocks with them"
-                )
+                raise CommandError(f"implicit steps of flow do not support {load.name}: use model step or model solve")
         if not sim.options.hydraulic:
-            raise CommandError("the hydraulic part is switched off: model option hydraulic on comes first")
+            raise CommandError("the hydraulic part is switched off: use model option hydraulic on first")
         if not self.moves:
             return
         if sim.options.dynamic:
             raise CommandError(
-                "implicit steps keep blocks in static equilibrium: model option dynamic off comes first, or mechanical "
+                "implicit steps keep blocks in static equilibrium: use model option dynamic off first, or mechanical "
                 "off for flow alone"
             )
         if laws := user_laws.in_use(sim):
             raise CommandError(
-                f"{user_laws.some(sim)} has the law {laws[0].title}: implicit steps have no tangent of it"
+                f"{user_laws.some(sim)} has the law {laws[0].title}, whose tangent is not known to implicit steps"
             )
         if sim.yielding().any():
-            raise CommandError("implicit steps of flow take elastic elements: elements that yield are stepped")
+            raise CommandError(
+                "implicit steps of flow support elastic elements only: use explicit steps for yielding elements"
+            )
 
     def __enter__(self) -> Coupled:
         sim, flow = self.sim, self.flow
@@ -160,9 +160,9 @@ class Coupled(System):
             if pairs and sim.log is not None:
                 one, other = pairs[0]
                 sim.log.warn(
-                    f"{len(pairs)} pairs of surfaces touch that are no faces of one joint, or have slid by more than "
-                    f"{pressed.APART:g} of its length, the first of elements {one} and {other}: steps go on from here, "
-                    "further implicit ones do not"
+                    f"{len(pairs)} pairs of surfaces are in contact outside a joint or have slipped by more than "
+                    f"{pressed.APART:g} of its length, first elements {one} and {other}. Explicit steps can continue; "
+                    "implicit steps cannot"
                 )
         self.solver.close()
 
@@ -218,9 +218,9 @@ class Coupled(System):
         """Flow alone until as much comes as goes; flow time does not pass."""
         flow = self.flow
         if self.moves:
-            raise CommandError("steady flow is that in blocks that stand still: model option mechanical off first")
+            raise CommandError("steady flow needs fixed blocks: use model option mechanical off")
         if bool(np.isfinite(flow.since).any()):
-            raise CommandError("leak-off goes on for ever: there is no steady flow with it")
+            raise CommandError("steady flow does not exist with leak-off")
         time, dt, growth, quiet = flow.time, self.longest, 10.0, 0
         for _ in range(MOST_STEADY):
             found = self._tried(dt, passes=False)
@@ -237,7 +237,7 @@ class Coupled(System):
                 return
             dt, growth = growth * dt, min(1.5 * growth, 10.0)
         raise CommandError(
-            "steady flow was not found: some node needs a pressure or a level, or rates must add up to zero"
+            "no steady flow found: prescribe a pressure or a level at some node, or rates with a sum of 0"
         )
 
     def _tried(self, dt: float, passes: bool = True) -> Found:

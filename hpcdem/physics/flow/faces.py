@@ -102,12 +102,12 @@ class Faces(Channels):
         wet, total, dry = blocks.comm.sum_into(np.array([kind.sum() for kind in kinds], np.int64)).tolist()
         told = []
         if wet:
-            told.append(f"water stands before {wet} free faces, as conditions and wells say, and pushes on them")
+            told.append(f"water of conditions and wells loads {wet} free faces")
         if total:
-            told.append(f"{total} with water have a prescribed stress, which is all that acts there")
+            told.append(f"{total} with water have a prescribed stress, which replaces the water pressure")
         if dry:
             told.append(
-                f"{dry} free faces between flow nodes are dry: no condition says that water stands before them (node "
+                f"{dry} free faces between flow nodes are dry: no condition applies water pressure to them (node "
                 "boundary hydraulic-constant-flow-boundary pressure, flow-surface, or well create, with a range that "
                 "holds their nodes)"
             )

@@ -1,6 +1,6 @@
 """Fluid in fractures as a load on blocks: its clock, its step and what is saved.
 
-What is said of it (said.py) is known to all ranks, what moves is shared out (channels.py), and pushes on faces
+All ranks know the assignments (assignments.py), the state is distributed (channels.py), and pressure loads faces
 (faces.py); values.py says what can be asked of it.
 """
 
@@ -19,7 +19,7 @@ from hpcdem.core.units import counted, with_prefix
 from hpcdem.physics.field import assigned
 from hpcdem.physics.field.model import LOOK
 from hpcdem.physics.flow import account, kernels
-from hpcdem.physics.flow.said import Condition
+from hpcdem.physics.flow.assignments import Condition
 from hpcdem.physics.flow.values import Values
 from hpcdem.physics.flow.wells import Well
 
@@ -68,18 +68,18 @@ class Flow(Values):
         """The energy of the fluid and the blocks in implicit steps [J/m], in space [J]: `account.ENTRIES`, what does
         not add up (closing), over the largest (relative). CommandError where packs of grains took some."""
         if self.energy is None:
-            raise CommandError("no account of energy is kept where grains bear: what their packs take is not known")
+            raise CommandError("the energy budget does not support packs of grains that carry load")
         return account.closed(self.energy)
 
     def fill(self, nodes: np.ndarray | None, pressure: float | None = None, saturation: float | None = None) -> None:
         """Flow nodes among these points (None: all) hold fluid of this pressure [Pa], or fill this part of their
         room."""
         if (pressure is None) == (saturation is None):
-            raise CommandError("flow nodes begin with a pressure or with a saturation: one of them")
+            raise CommandError("give either a pressure or a saturation")
         given = pressure if saturation is None else saturation
         assert given is not None
         if not math.isfinite(given) or given < 0.0 or (saturation is not None and saturation > 1.0):
-            what = "the pressure must not be negative" if saturation is None else "the saturation lies between 0 and 1"
+            what = "the pressure must not be negative" if saturation is None else "saturation must be in [0, 1]"
             raise CommandError(f"{what}, got {given:g}")
         at = self.flow_nodes(nodes)
         self.blocks.close_model()
@@ -139,8 +139,8 @@ class Flow(Values):
         self._found_for, self._checked = self._given(), False
         period = 0.0 if not o.mechanical or not o.dynamic else o.flow_every * blocks.clock.dt
         instead = (
-            f"{o.flow_every} mechanical steps; model time-step hydraulic gives it a clock of its own, model solve "
-            "hydraulic takes implicit steps"
+            f"{o.flow_every} mechanical steps; model time-step hydraulic gives it its own clock, model solve hydraulic "
+            "uses implicit steps"
         )
         self._divide(o.flow_steps, o.flow_dt, period, limit, SAFETY * limit, instead)
         self._tell_step(limit)
@@ -166,7 +166,7 @@ class Flow(Values):
             log.warn_once(
                 f"flow step {self.dt > 2.0 * limit}",
                 f"the hydraulic time step {self.dt:g} s is {self.dt / (2.0 * limit):.2f} of the stability limit "
-                f"{2.0 * limit:.4g} s; a run that blows up should be repeated with a smaller one",
+                f"{2.0 * limit:.4g} s. Reduce it if the run becomes unstable",
             )
 
     def check_start(self) -> None:
@@ -174,10 +174,10 @@ class Flow(Values):
         if not self._on:
             return
         if o.mechanical and not o.dynamic and o.flow_dt == 0.0:
-            raise CommandError("in static runs time of flow passes by model time-step hydraulic, which comes first")
+            raise CommandError("static runs need model time-step hydraulic for the time of flow")
         surface = [row for row in np.unique(self.condition).tolist() if conditions[row].does == kernels.SURFACE]
         if surface and not any(self._gravity()):
-            raise CommandError("flow-surface needs gravity: model gravity comes first")
+            raise CommandError("flow-surface needs gravity: set model gravity first")
         self.check_wells()
         if not self._checked and (o.flow_dt > 0.0 or o.flow_steps > 0):
             self._refuse_far()
@@ -202,8 +202,8 @@ class Flow(Values):
             first = self._lowest(self.number[stable == least])
             raise CommandError(
                 f"model {said_by} hydraulic: sub-steps of {self.dt:.4g} s are {self.dt / least:.3g} times what is "
-                f"stable at flow node {first}, {least:.4g} s, and the flow would blow up: make them shorter, or use "
-                "model solve hydraulic, which takes implicit steps"
+                f"stable at flow node {first}, {least:.4g} s, so the flow would become unstable. Reduce them, or use "
+                "model solve hydraulic, which uses implicit steps"
             )
 
     # ---- the step ----------------------------------------------------------------------------------------------------

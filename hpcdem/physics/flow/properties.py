@@ -28,41 +28,43 @@ def _apertures(values: dict[str, Any]) -> None:
     on = np.asarray(values["leak_off"]) > 0.0
     front = np.asarray(values["matrix_saturation"]) < 1.0
     if np.any(front & ~on):
-        raise CommandError("matrix_saturation goes with leak_off, which is off")
+        raise CommandError("matrix_saturation needs leak_off, which is off")
     if np.any(front & (np.asarray(values.get(COMPRESSED, 0.0)) != 0.0)):
-        raise CommandError(f"{COMPRESSED} does not act where leak-off fills empty pores: 0, or matrix_saturation 1")
+        raise CommandError(
+            f"{COMPRESSED} has no effect if leak-off fills empty pores: set it to 0, or matrix_saturation to 1"
+        )
     if np.all(front):
         values.setdefault(COMPRESSED, np.zeros_like(front, dtype=np.float64))
     for name in (*MATRIX, "matrix_pore_pressure"):
         there = np.asarray(values.get(name, 0.0)) != 0.0
         if np.any(there & ~on):
-            raise CommandError(f"{name} goes with leak_off, which is off")
+            raise CommandError(f"{name} needs leak_off, which is off")
         if np.any(on) and ((name in MATRIX and name not in values) or (name in NEEDED and np.any(on & ~there))):
             raise CommandError(f"leak_off needs {name}")
         values.setdefault(name, np.zeros_like(least, dtype=np.float64))
     limited = np.isfinite(values["shear_dilation_limit"])
     if np.any(limited & (np.asarray(values["shear_dilation"]) == 0.0)):
-        raise CommandError("shear_dilation_limit goes with shear_dilation, which is 0")
+        raise CommandError("shear_dilation_limit needs shear_dilation, which is 0")
 
 
 POROUS = Model(
     "hydraulic_porous_medium",
     JOINT,
-    "channel of a fluid between two plates, of an aperture that follows the opening of the joint",
+    "channel of a fluid between two plates, whose aperture follows the opening of the joint",
     (
         Property("fluid_density", "kg/m3", "density of the fluid", low_itself=False),
         Property("fluid_bulk", "Pa", "bulk modulus of the fluid", low_itself=False),
         Property("viscosity", "m2/s", "kinematic viscosity of the fluid: the dynamic one over the density",
                  low_itself=False),
-        Property("aperature_initial", "m", "hydraulic aperture of a joint that is not opened; of joints that are not "
-                 "broken a virtual one, which stands for the permeability of the rock"),
-        Property("aperature_minumum", "m", "smallest hydraulic aperture, of joints that are pressed together",
+        Property("aperature_initial", "m", "hydraulic aperture of a closed joint; in intact joints a virtual aperture, "
+                 "which represents the permeability of the rock"),
+        Property("aperature_minumum", "m", "smallest hydraulic aperture, of joints in compression",
                  low_itself=False),
         Property("aperature_maximum", "m", "largest hydraulic aperture", math.inf, low_itself=False,
                  otherwise="no limit"),
-        Property("leak_off", "1", "broken joints lose fluid to the rock after Carter", 0.0, high=1.0),
-        Property("matrix_pore_pressure", "Pa", "leak-off: pressure in the pores of the rock; negative: suction of rock "
-                 "that is not saturated", low=-math.inf, optional=True, otherwise="0"),
+        Property("leak_off", "1", "broken joints lose fluid to the rock (Carter leak-off)", 0.0, high=1.0),
+        Property("matrix_pore_pressure", "Pa", "leak-off: pore pressure of the rock; negative: suction of unsaturated "
+                 "rock", low=-math.inf, optional=True, otherwise="0"),
         Property("matrix_permeability", "m2", "leak-off: permeability of the rock", optional=True,
                  otherwise="needed by leak-off"),
         Property("matrix_porosity_compressibility", "1/Pa", "leak-off: compressibility of the pores", optional=True,
@@ -71,11 +73,11 @@ POROUS = Model(
                  otherwise="needed by leak-off"),
         Property("shear_dilation", "degrees", "the aperture grows by the tangent of this angle times the mean slip of "
                  "the joint", 0.0, high=80.0),
-        Property("shear_dilation_limit", "m", "what slip adds to the aperture at most", math.inf, low_itself=False,
+        Property("shear_dilation_limit", "m", "largest increase of the aperture by slip", math.inf, low_itself=False,
                  otherwise="no limit"),
-        Property("matrix_saturation", "1", "leak-off: part of the pores that was full before; below 1 a sharp front "
-                 "fills the rest", 1.0, high=1.0),
-        Property("turbulence", "1", "fast flow is turbulent, with the friction of smooth walls after Blasius; else "
+        Property("matrix_saturation", "1", "leak-off: initial saturation of the pores; below 1 a sharp front fills the "
+                 "rest", 1.0, high=1.0),
+        Property("turbulence", "1", "on: fast flow is turbulent, with friction of smooth walls after Blasius; off: "
                  "laminar at any Reynolds number", 0.0, high=1.0),
     ),
     _apertures,

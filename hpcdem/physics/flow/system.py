@@ -87,7 +87,9 @@ class System:
             )  # fmt: skip
         found = equilibrium.unknowns_of(sim, self.nodes, 1)
         if found.given.any():
-            raise CommandError("implicit steps of flow hold nodes or leave them free: other velocities are for steps")
+            raise CommandError(
+                "implicit steps of flow support fixed and free nodes only: use explicit steps for other velocities"
+            )
         return found
 
     def _of_fluid(self) -> int:
@@ -183,8 +185,8 @@ class System:
         self.count.iterations += iterations
         if not error and lack > ENOUGH:
             error = (
-                f"flow and equilibrium do not converge: what is lacking, over what contributes, is {lack:.3g} after "
-                f"{iterations} iterations, {ENOUGH:g} is asked for"
+                f"flow and equilibrium did not converge: relative residual {lack:.3g} after {iterations} iterations, "
+                f"required {ENOUGH:g}"
             )
         if self.moves:
             equilibrium.place_corners(self.sim, x)

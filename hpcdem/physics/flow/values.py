@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 
 NODE_QUANTITIES: dict[str, tuple[str, str]] = {
     "pressure": ("Pa", "pressure of the fluid"),
-    "saturation": ("1", "part of the room that is filled"),
-    "fluid": ("m2", "volume of the fluid at its density without pressure"),
-    "volume": ("m2", "room for fluid: half of each channel"),
-    "inflow": ("m2/s", "fluid that a condition brings, in the last sub-step"),
+    "saturation": ("1", "saturation: filled part of the volume"),
+    "fluid": ("m2", "volume of the fluid at its density at zero pressure"),
+    "volume": ("m2", "volume for fluid: half of each channel"),
+    "inflow": ("m2/s", "inflow by conditions in the last sub-step"),
     "temperature": ("K", "temperature of the fluid; NaN without a thermal model of it"),
     "concentration": ("1", "volume of proppant over that of the slurry; NaN without proppant"),
     "proppant": ("m2", "volume of proppant; NaN without it"),
-    "pack_pressure": ("Pa", "what a pack of proppant presses its walls apart with; NaN without proppant"),
+    "pack_pressure": ("Pa", "pressure of a pack of proppant on its walls; NaN without proppant"),
 }
 CHANNEL_QUANTITIES: dict[str, tuple[str, str]] = {
     "pressure": ("Pa", "mean pressure of its ends"),
     "saturation": ("1", "mean saturation of its ends"),
     "aperture": ("m", "hydraulic aperture"),
     "flow_rate": ("m2/s", "volume that flows along the lower face of the joint, from its first corner on"),
-    "velocity": ("m/s", "that over the aperture"),
+    "velocity": ("m/s", "mean velocity: flow rate over the aperture"),
     "temperature": ("K", "mean temperature of the fluid at its ends; NaN without a thermal model of it"),
     "concentration": ("1", "mean concentration of proppant at its ends; NaN without it"),
     "pack_pressure": ("Pa", "mean pressure of packs at its ends; NaN without proppant"),

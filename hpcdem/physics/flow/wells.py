@@ -20,9 +20,9 @@ from hpcdem.physics.field.assigned import Number
 SHUT, RATE, PRESSURE = "shut_in", "rate", "pressure"
 QUANTITIES = {
     "pressure": ("Pa", "pressure at its highest node"),
-    "rate": ("m2/s", "fluid that came in during the last sub-step"),
-    "injected": ("m2", "volume that came in, at the density without pressure"),
-    "stage": ("1", "number of the stage that is on, from 1; 0: none yet, or none any more"),
+    "rate": ("m2/s", "inflow in the last sub-step"),
+    "injected": ("m2", "accumulated inflow, at the density at zero pressure"),
+    "stage": ("1", "number of the active stage, from 1; 0: none yet, or all are over"),
 }
 """What can be asked of a well: unit and meaning."""
 
@@ -70,8 +70,8 @@ class Well:
             last = self.stages[-1]
             if last.begin >= now:
                 raise CommandError(
-                    f"stage {len(self.stages)} of well '{self.name}' has no time, so that no other can follow it; time "
-                    "gives it an end"
+                    f"stage {len(self.stages)} of well '{self.name}' has no time, so no other stage can follow: give "
+                    "its time"
                 )
             self.stages[-1], begin = replace(last, end=now), now
         self.stages.append(replace(stage, begin=begin, end=begin + stage.end))

@@ -119,8 +119,8 @@ class FluidHeat(Assigned, Travelling):
         bare = channels[self.row[channels] == 0]
         if self.rows and len(bare):
             raise CommandError(
-                f"channel {bare[0]} has no thermal model ({len(bare)} in all), but others have: face-joint c-model "
-                "thermal-fluid for all"
+                f"channel {bare[0]} has no thermal model ({len(bare)} in all), but other channels have one: assign "
+                "face-joint c-model thermal-fluid to all"
             )
 
     # ---- what is asked -------------------------------------------------------------------------------------------
@@ -170,8 +170,8 @@ class FluidHeat(Assigned, Travelling):
         if against:
             log.warn_once(
                 "obtuse channels",
-                f"along {against} of {len(total)} edges fluid conducts heat from the colder to the warmer end, as "
-                "angles of triangles are obtuse: where little flows, temperatures may leave the range of those around",
+                f"{against} of {len(total)} edges have negative conductance in the fluid, as angles of triangles are "
+                "obtuse: at low flow, temperatures may leave the range of their neighbours",
             )
 
     def _book_gone(self, gone: np.ndarray) -> None:
@@ -311,8 +311,8 @@ class FluidHeat(Assigned, Travelling):
         count = max(1, math.ceil(dt * self.rate / SAFETY * (1.0 - 1e-12)))
         if count > MANY:
             raise CommandError(
-                f"heat in the fluid would need {count} sub-steps in one of the rock of {dt:.3g} s: model "
-                "time-step thermal makes those shorter, model solve thermal takes implicit steps"
+                f"heat in the fluid would need {count} sub-steps in one of the rock of {dt:.3g} s. Reduce these by "
+                "model time-step thermal, or use implicit steps (model solve thermal)"
             )
         self.sub_steps = count
         w1 = self.flow.nodes[:, flowing.W]

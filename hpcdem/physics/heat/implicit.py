@@ -41,19 +41,17 @@ class Implicit:
         if solver not in equilibrium.SOLVERS:
             raise CommandError(f"solver is one of {', '.join(equilibrium.SOLVERS)}, got {solver}")
         if not sim.options.thermal:
-            raise CommandError("the thermal part is switched off: model option thermal on comes first")
+            raise CommandError("the thermal part is switched off: use model option thermal on first")
         self.sim, self.heat, self.wanted = sim, heat, solver
         self.moves = bool(sim.options.mechanical)
         if self.moves and sim.options.dynamic:
             raise CommandError(
-                "implicit steps of heat keep blocks in static equilibrium: model option dynamic off comes first, or "
+                "implicit steps of heat keep blocks in static equilibrium: use model option dynamic off first, or "
                 "mechanical off for heat alone"
             )
         for load in sim.surface_loads:
             if self.moves and not load.stays:
-                raise CommandError(
-                    f"implicit steps of heat know no {load.name}: model step and model solve step blocks with them"
-                )
+                raise CommandError(f"implicit steps of heat do not support {load.name}: use model step or model solve")
         sim.close_model()
         if self.moves:
             equilibrium.refuse_changing_tables(sim, "implicit steps of heat")
@@ -90,8 +88,8 @@ class Implicit:
                 equilibrium.solve_elastic(sim, solver=self.wanted, softening=joints, before=before)
             except CommandError as error:
                 raise CommandError(
-                    f"heat time {self.heat.time:.6g} s: {error}; temperatures are those of that time, blocks lie where "
-                    "they did before"
+                    f"heat time {self.heat.time:.6g} s: {error}; temperatures are those of that time, positions of "
+                    "blocks those before the step"
                 ) from None
         else:
             sim.clock.step += 1
@@ -144,7 +142,7 @@ class Implicit:
         else:
             self._spread(old)
             raise CommandError(
-                f"heat time {heat.time:.6g} s: advection of second order finds no balance in {MOST} turns: a "
+                f"heat time {heat.time:.6g} s: advection of second order did not converge in {MOST} iterations. Use a "
                 "shorter dt, or second-order off"
             )
         self._spread(new)

@@ -90,7 +90,7 @@ class Heat(Diffusing):
     def prescribe_fluid(self, nodes: np.ndarray | None, temperature: Number) -> None:
         """The same of the fluid at flow nodes among these."""
         if (fluid := self.flowing) is None:
-            raise CommandError("the fluid has no heat yet: face-joint c-model thermal-fluid comes first")
+            raise CommandError("the fluid has no thermal model: assign face-joint c-model thermal-fluid first")
         fluid.prescribe(nodes, self._row_of(temperature))
 
     def remove_conditions(self, nodes: np.ndarray | None, rock: bool = True, fluid: bool = True) -> None:
@@ -263,8 +263,8 @@ class Heat(Diffusing):
             and all(one.environment is None for one in self.exposed.conditions)
         ):
             raise CommandError(
-                f"element {passes[0]} has a transfer-coeficient, but no face ever had an environment-temperature, and "
-                "surfaces do not touch: model option collision on"
+                f"element {passes[0]} has a transfer-coeficient, but no face has an environment-temperature and "
+                "contact is off: use model option collision on"
             )
         if self.fluid is not None:
             self.fluid.check()
@@ -278,15 +278,15 @@ class Heat(Diffusing):
         if len(warm) and self.on and o.mechanical and not (o.dynamic and o.collision):
             raise CommandError(
                 f"element {warm[0]} has friction-heat, but "
-                + ("surfaces do not touch: model option collision on" if o.dynamic else
-                   "nothing slides in time in static runs: model option thermal off, or dynamic on")
+                + ("contact is off: use model option collision on" if o.dynamic else
+                   "static runs have no sliding velocity: use model option thermal off, or dynamic on")
             )  # fmt: skip
 
     def check_start(self) -> None:
         if self.on and not self._checked and self.blocks.options.heat_dt > 0.0 and self._of_fluid() > 0.0:
             raise CommandError(
-                "heat in fluid goes with the time of flow: model time-step thermal 0, or model option hydraulic off "
-                "for water that flows on as it does now"
+                "heat in fluid needs the clock of flow: use model time-step thermal 0, or model option hydraulic off "
+                "to keep the present flow"
             )
         super().check_start()
 

@@ -14,16 +14,15 @@ ISO_HEAT = Model(
     (
         Property("conductivity", "W/(m K)", "thermal conductivity", low_itself=False),
         Property("capacity", "J/(kg K)", "specific heat", low_itself=False),
-        Property("transfer_coeficient", "W/(m2 K)", "heat transfer at faces: to an environment that is prescribed on "
-                 "them without a coefficient of its own, and to surfaces that they touch, with the harmonic mean of "
-                 "both", 0.0),
+        Property("transfer_coeficient", "W/(m2 K)", "heat transfer at faces: to a prescribed environment without its "
+                 "own coefficient, and between surfaces in contact, with the harmonic mean of both", 0.0),
         Property("expansion_coeficient", "1/K", "linear thermal expansion", 0.0, low=-math.inf),
         Property("conductivity_across", "W/(m K)", "conductivity across the direction of conductivity-angle",
                  optional=True, follows="conductivity", otherwise="conductivity", low_itself=False),
         Property("conductivity_angle", "degrees", "direction of conductivity from x, counter-clockwise, in space the "
-                 "strike of the planes along which it is; it turns with the element", 0.0, low=-math.inf),
-        Property("friction_heat", "1", "how much of its share of the work of friction an element takes as heat where "
-                 "its faces slide on others", 0.0, high=1.0),
+                 "strike of its planes; it rotates with the element", 0.0, low=-math.inf),
+        Property("friction_heat", "1", "part of its half of the friction work that an element absorbs as heat when its "
+                 "faces slide", 0.0, high=1.0),
         Property("conductivity_dip", "degrees", "dip of these planes", 90.0, low=-math.inf, dims=(3,)),
     ),
 )  # fmt: skip

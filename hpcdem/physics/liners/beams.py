@@ -38,17 +38,17 @@ class Beams(Elements):
     quantities: ClassVar[Mapping[str, Mapping[str, tuple[str, str]]]] = {
         LINER_NODE: {
             **of_places("xy", "N/m"),
-            "rotation": ("rad", "rotation since it was installed"),
+            "rotation": ("rad", "rotation since its installation"),
             "spin": ("rad/s", "rate of rotation"),
-            "reaction_moment": ("N m/m", "moment by which conditions act"),
+            "reaction_moment": ("N m/m", "moment of conditions"),
             "distance": ("m", "distance along the liner from its first node, as installed"),
         },
         LINER_ELEMENT: {
             "axial_force": ("N/m", "axial force, tension positive"),
             "shear_force": ("N/m", "change of the moment along the element"),
             "moment_first": ("N m/m", "moment at its first node, positive with tension on the side away from the rock"),
-            "moment_last": ("N m/m", "the same at its last node"),
-            "axial_strain": ("1", "lengthening since it was installed, over its length"),
+            "moment_last": ("N m/m", "moment at its last node, positive with tension on the side away from the rock"),
+            "axial_strain": ("1", "elongation since its installation, over its length"),
             "plastic_strain": ("1", "plastic part of it, in space its size"),
             "plastic_rotation": ("rad", "larger plastic rotation of its ends, without sign"),
             **BOND,

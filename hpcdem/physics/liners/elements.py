@@ -109,13 +109,13 @@ class Elements(ABC):
 
 
 BOND: Mapping[str, tuple[str, str]] = {
-    "liner_state": ("1", "yields in tension 1, in compression 2, in bending 4; has yielded 8; deleted 32"),
+    "liner_state": ("1", "yielding in tension 1, in compression 2, in bending 4; has yielded 8; deleted 32"),
     "bond_pressure": ("Pa", "pressure between rock and liner, tension negative"),
     "bond_shear": ("Pa", "shear stress of the bond on the liner, along it; in space its size"),
-    "gap": ("m", "opening between rock and liner, the largest of its nodes; below 0: pressed together"),
+    "gap": ("m", "opening between rock and liner, the largest of its nodes; below 0: in compression"),
     "slip": ("m", "slip of the liner on the rock, the largest of its nodes; in space its size"),
-    "bond_state": ("1", "of one of its nodes: slips 1, has slipped 2, has parted 4, is open 8"),
-    "host": ("1", "element that it is bound to, -1: none"),
+    "bond_state": ("1", "state of a node: slipping 1, has slipped 2, bond broken 4, open 8"),
+    "host": ("1", "element of its bond, -1: none"),
 }
 """Quantities of elements of any kind: unit and meaning."""
 
@@ -147,7 +147,7 @@ def of_places(axes: str, force: str) -> dict[str, tuple[str, str]]:
     found = {}
     for stem, unit, doc in (
         ("position", "m", "position in {}"), ("displacement", "m", "displacement in {} since it was installed"),
-        ("velocity", "m/s", "velocity in {}"), ("reaction", force, "force in {} by which conditions act"),
+        ("velocity", "m/s", "velocity in {}"), ("reaction", force, "force of conditions in {}"),
     ):  # fmt: skip
         found.update({f"{stem}_{axis}": (unit, doc.format(axis)) for axis in axes})
     return found

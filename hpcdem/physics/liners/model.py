@@ -126,8 +126,8 @@ class Liners(Structure):
         blocks.changed()
         if blocks.log is not None and laid.parted:
             blocks.log.info(
-                f"{laid.parted} {self.kind.parted_at} of the mesh part the liner: the rock is open there, or more than "
-                "two faces meet"
+                f"{laid.parted} {self.kind.parted_at} of the mesh divide the liner: the rock is open there, or more "
+                "than two faces meet"
             )
         return numbers
 
@@ -138,8 +138,8 @@ class Liners(Structure):
         beside = (partner >= 0) & blocks.alive[partner // 4]
         if beside.any():
             raise CommandError(
-                f"face {faces[beside][0]} is not free, an element lies beside it ({int(beside.sum())} in all): a liner "
-                "goes on free faces, range boundary chooses them"
+                f"face {faces[beside][0]} is not free ({int(beside.sum())} in all): liners need free faces, select "
+                "them with range boundary"
             )
         taken = np.isin(faces, self.elements["face"][self.alive(LINER_ELEMENT) & (self.elements["host"] >= 0)])
         if taken.any():
@@ -150,7 +150,7 @@ class Liners(Structure):
         blocks, beams = self.blocks, self.elements
         for name in given:
             if LINER.has(name) and blocks.dim not in LINER.property(name).dims:
-                raise CommandError(f"in space a liner is a shell of a thickness: it has no {name}")
+                raise CommandError(f"in space a liner is a shell with a thickness: it has no {name}")
         values = LINER.complete(given)
         blocks.before_change()
         stored = self._stored() if self._account is not None else 0.0
@@ -424,7 +424,7 @@ class Liners(Structure):
         if self._account is not None:
             self.commands += self._stored() - stored
         if self.blocks.log is not None:
-            self.blocks.log.info(f"{int(lost.sum())} elements of liners are free of the rock: it was taken out")
+            self.blocks.log.info(f"{int(lost.sum())} liner elements lost their rock, which was removed")
 
     def _unbind(self, elements: np.ndarray) -> None:
         """No rock holds these elements any more."""

@@ -23,28 +23,29 @@ def _section(values: dict[str, Any]) -> None:
     tension, pressure = values["tensile_strength"], values["compressive_strength"]
     if math.isinf(tension) != math.isinf(pressure):
         raise CommandError(
-            "tensile_strength and compressive_strength of a liner go together: its moment depends on both"
+            "tensile_strength and compressive_strength of a liner are both required: its moment depends on both"
         )
     if tension == 0.0 and pressure == 0.0:
         raise CommandError("tensile_strength and compressive_strength of a liner are both 0: it would carry nothing")
     if "plastic_moment" in values and math.isinf(tension):
-        raise CommandError("plastic_moment goes with tensile_strength and compressive_strength, which limit the force")
+        raise CommandError("plastic_moment needs tensile_strength and compressive_strength, which limit the force")
     whole = "area" in values and thick is not None and values["area"] == thick
     if "plastic_moment" not in values and math.isfinite(tension) and not whole:
-        raise CommandError("the strengths of a section of area and inertia need its plastic_moment besides")
+        raise CommandError("the strengths of a section with area and inertia need its plastic_moment")
     values.setdefault("plastic_moment", (tension + pressure) * values["thickness"] ** 2 / 8.0)
 
 
 LINER = Model(
     "beam",
     LINER_ELEMENT,
-    "beam, in space flat shell, elastic and perfectly plastic in force and moment, on springs that part and slip",
+    "beam, in space flat shell, elastic and perfectly plastic in force and moment, on a bond that breaks and slips",
     (
         Property("density", "kg/m3", "density", low_itself=False),
         Property("young", "Pa", "Young's modulus E", low_itself=False),
-        Property("poisson_ratio", "1", "Poisson's ratio: E / (1 - nu^2) counts in plane strain; 0 for steel sets", 0.0,
+        Property("poisson_ratio", "1", "Poisson's ratio: plane strain uses E / (1 - nu^2); 0 for steel sets", 0.0,
                  high=0.4999),
-        Property("thickness", "m", "thickness of the shell; without area and inertia it gives both", optional=True,
+        Property("thickness", "m", "thickness of the shell; defines area and inertia if they are "
+                                   "omitted", optional=True,
                  otherwise="that of a rectangle of this area and inertia", low_itself=False),
         Property("area", "m2/m", "area of the section over the spacing of steel sets", optional=True,
                  otherwise="the thickness", low_itself=False, dims=(2,)),
@@ -58,10 +59,10 @@ LINER = Model(
                  otherwise="that of a rectangle", low_itself=False),
         Property("normal_stiffness", "Pa/m", "stiffness of the bond across the face", low_itself=False),
         Property("shear_stiffness", "Pa/m", "stiffness of the bond along the face; 0: it slips freely"),
-        Property("bond_tensile_strength", "Pa", "tension at which the bond parts for good", math.inf,
+        Property("bond_tensile_strength", "Pa", "tension at which the bond breaks", math.inf,
                  otherwise="never"),
-        Property("bond_cohesion", "Pa", "cohesion of the bond, until it parts", math.inf, otherwise="never slips"),
-        Property("bond_friction", "degrees", "friction angle of the bond, whether it has parted or not", 0.0,
+        Property("bond_cohesion", "Pa", "cohesion of the bond, until it breaks", math.inf, otherwise="never slips"),
+        Property("bond_friction", "degrees", "friction angle of the bond, intact or broken", 0.0,
                  high=89.0),
     ),
     _section,

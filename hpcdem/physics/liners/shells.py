@@ -151,7 +151,7 @@ class Shells(Elements):
             **of_places("xyz", "N/m"),
             **{f"rotation_{axis}": ("rad", f"rotation vector since it was installed, in {axis}") for axis in "xyz"},
             **{f"spin_{axis}": ("rad/s", f"rate of rotation about {axis}") for axis in "xyz"},
-            **{f"reaction_moment_{axis}": ("N m/m", f"moment about {axis} by which conditions act") for axis in "xyz"},
+            **{f"reaction_moment_{axis}": ("N m/m", f"moment about {axis} of conditions") for axis in "xyz"},
         },
         LINER_ELEMENT: {
             **{

@@ -20,14 +20,14 @@ def _order(values: dict[str, Any]) -> None:
 DIFFUSION = Model(
     "moisture_diffusion",
     ELEMENT,
-    "moisture that goes from wet to dry: its flow of mass is that of its gradient",
+    "diffusion of moisture from wet to dry: mass flow is proportional to its gradient",
     (
         Property("diffusivity", "m2/s", "diffusivity of moisture", low_itself=False),
-        Property("shrinkage", "1", "linear shrinkage, strain over the moisture that is lost", 0.0),
-        Property("evaporation", "kg/(m2 s)", "mass that leaves through faces, over the difference of moisture to the "
-                 "environment that is prescribed on them without a coefficient of its own", 0.0),
+        Property("shrinkage", "1", "linear shrinkage, strain over loss of moisture", 0.0),
+        Property("evaporation", "kg/(m2 s)", "mass flow through faces over the difference of moisture to a prescribed "
+                 "environment without its own coefficient", 0.0),
         Property("moisture_saturated", "1", "moisture at which all pores are full", 0.4, low_itself=False),
-        Property("moisture_residual", "1", "moisture that no suction takes out", 0.0),
+        Property("moisture_residual", "1", "residual moisture, which suction cannot remove", 0.0),
         Property("air_entry", "Pa", "suction at which pores begin to drain, 1 / alpha of van Genuchten", 1e4,
                  low_itself=False),
         Property("pore_index", "1", "exponent n of van Genuchten", 1.5, low=1.0, low_itself=False),

@@ -23,8 +23,8 @@ from hpcdem.physics.flow import kernels as flowing
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.network import LINKS
 from hpcdem.physics.proppant import kernels, settling
+from hpcdem.physics.proppant.assignments import RATE, Said
 from hpcdem.physics.proppant.properties import NAMES
-from hpcdem.physics.proppant.said import RATE, Said
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
@@ -82,14 +82,14 @@ class Proppant(Said):
         limit = self.values["proppant_concentration_limit"]
         if not 0.0 <= concentration <= limit:
             raise CommandError(
-                f"the concentration of proppant lies between 0 and that of a pack, {limit:g}, got {concentration:g}"
+                f"the concentration of proppant must lie between 0 and that of a pack, {limit:g}, got {concentration:g}"
             )
         at = self._nodes(nodes)
         self.blocks.close_model()
         self.take_rooms()
         mine = np.isin(self.number, at)
         if concentration > 0.0 and not self.blocks.comm.any(bool((self.nodes[mine, kernels.ROOM] > 0.0).any())):
-            raise CommandError("these flow nodes are dry: flow-node initial pressure or saturation comes first")
+            raise CommandError("these flow nodes are dry: set flow-node initial pressure or saturation first")
         new = concentration * self.nodes[mine, kernels.ROOM]
         self.nodes[mine, kernels.CAME] += new - self.nodes[mine, kernels.N]
         self.nodes[mine, kernels.N] = new
@@ -240,7 +240,7 @@ class Proppant(Said):
         if not self.on:
             return
         if not self.carries[channels].any():
-            raise CommandError("no channel carries proppant any more: model option proppant off, or assign it again")
+            raise CommandError("no channel carries proppant: use model option proppant off, or assign it again")
         v, flow = self.speed(), self.flow
         size, density = self.values["proppant_size"], flow.fluid("fluid_density")
         found = settling.reynolds(v, size, density, flow.viscosity)
@@ -331,7 +331,7 @@ class Proppant(Said):
             log.warn_once(
                 "proppant stale",
                 f"a step of flow of {dt:.3g} s is {dt / least:.3g} times as long as grains need from node to node: "
-                f"currents that their weight drives follow them in steps of {STALE * least:.3g} s at most",
+                f"currents driven by their weight need steps of at most {STALE * least:.3g} s",
             )
 
     def _find_falls(self) -> None:
@@ -361,7 +361,7 @@ class Proppant(Said):
             self._refused = 0.0
             if total > 0.0 and log is not None:
                 log.warn_once(
-                    "proppant refused", f"nodes where proppant comes in are packed: {total:.3g} m2 of it found no room"
+                    "proppant refused", f"inflow nodes of proppant are packed: {total:.3g} m2 of it could not enter"
                 )
 
     # ---- forces --------------------------------------------------------------------------------------------------

@@ -20,18 +20,19 @@ def _limits(values: dict[str, Any]) -> None:
 PROPPANT = Model(
     "hydraulic_porous_proppant_medium",
     JOINT,
-    "grains in the fluid of channels, one kind in all of them",
+    "grains in the fluid of channels, the same in all channels",
     (
         Property("proppant_density", "kg/m3", "density of the grains", low_itself=False),
         Property("proppant_size", "m", "diameter of the grains", low_itself=False),
-        Property("proppant_size_factor", "1", "channels narrower than so many grains carry none: they bridge", 3.0),
-        Property("aperature_factor", "1", "hydraulic aperture of a pack over that of the channel; 0: permeability of "
-                 "the pack after Kozeny and Carman", 0.0, high=1.0),
+        Property("proppant_size_factor", "1", "smallest aperture, in diameters of grains: grains bridge in narrower "
+                                              "channels", 3.0),
+        Property("aperature_factor", "1", "hydraulic aperture of a pack over that of the channel; 0: Kozeny–Carman "
+                 "permeability of the pack", 0.0, high=1.0),
         Property("proppant_concentration_limit", "1", "concentration of a pack", low_itself=False, high=0.74),
-        Property("proppant_modulus", "Pa", "modulus of a pack that is pressed together; 0: it bears nothing", 0.0),
+        Property("proppant_modulus", "Pa", "modulus of a pack in compression; 0: it carries no load", 0.0),
         Property("viscosity_power", "1", "beta of the slurry, whose viscosity is that of the fluid times "
                  "(1 - C / limit)^beta", -2.5, low=-3.0),
-        Property("proppant_stokes", "1", "settling after Stokes; else after Schiller and Naumann, for any Reynolds "
+        Property("proppant_stokes", "1", "on: settling after Stokes; off: after Schiller and Naumann, for any Reynolds "
                  "number", 0.0, high=1.0),
     ),
     _limits,

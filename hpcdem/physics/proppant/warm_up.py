@@ -10,8 +10,8 @@ from hpcdem.physics.fdem.warm_up import ROCK
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.warm_up import WATER
+from hpcdem.physics.proppant.assignments import CONCENTRATION
 from hpcdem.physics.proppant.model import Proppant
-from hpcdem.physics.proppant.said import CONCENTRATION
 
 SAND = {
     "proppant_density": 2650.0, "proppant_size": 1e-5, "proppant_concentration_limit": 0.6, "proppant_modulus": 1e6,

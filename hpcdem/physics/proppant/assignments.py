@@ -25,7 +25,7 @@ def checked(given: Mapping[str, Any]) -> dict[str, float]:
     """These properties, with defaults for others."""
     for name, value in given.items():
         if not isinstance(value, (int, float)):
-            raise CommandError(f"there is one proppant in all channels: {name} must be a number")
+            raise CommandError(f"all channels have the same proppant: {name} must be a number")
     return PROPPANT.complete(given)
 
 
@@ -83,12 +83,14 @@ class Said(Travelling, Field):
         for name in before:
             if before[name] != values[name]:
                 raise CommandError(
-                    f"there is one proppant in all channels, but {name} is {before[name]:g} and {values[name]:g}"
+                    f"all channels have the same proppant, but {name} is {before[name]:g} and {values[name]:g}"
                 )
         limit = values["proppant_concentration_limit"]
         for kind, value in assigned.in_use(self.conditions, self.condition):
             if kind == CONCENTRATION and assigned.checked(self.blocks.tables, value, kind).max() > limit:
-                raise CommandError(f"slurry that comes in would be thicker than a pack, {limit:g}: change it first")
+                raise CommandError(
+                    f"the inflow of slurry would exceed the concentration of a pack, {limit:g}: change the inflow first"
+                )
         self.values = values
 
     def prescribe(self, nodes: np.ndarray | None, kind: str, value: Number) -> None:

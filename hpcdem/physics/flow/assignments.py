@@ -70,7 +70,7 @@ class Said(Assigned, Field):
         is dry."""
         at = self._numbers(joints)
         if not len(at):
-            raise CommandError("there is no joint here that could be a channel")
+            raise CommandError("no joint here can be a channel")
         super().assign(at, given)
 
     def _have_it(self) -> np.ndarray:
@@ -107,8 +107,8 @@ class Said(Assigned, Field):
             raise CommandError(f"no channel ends at node {asked[0]}" + " nor at the others" * (len(asked) > 1))
         if len(found) < len(asked) and self.blocks.log is not None:
             self.blocks.log.info(
-                f"no channel ends at {len(asked) - len(found)} of the {len(asked)} nodes: what is said of them counts "
-                "for free faces alone"
+                f"{len(asked) - len(found)} of {len(asked)} nodes are not flow nodes: their conditions apply to free "
+                "faces only"
             )
         return found
 
@@ -147,7 +147,7 @@ class Said(Assigned, Field):
         for well in self.wells:
             both = np.intersect1d(well.points, at)
             if len(both):
-                raise CommandError(f"node {both[0]} belongs to well '{well.name}', whose stages say what holds there")
+                raise CommandError(f"node {both[0]} belongs to well '{well.name}', whose stages control it")
         values = assigned.checked(self.blocks.tables, value, "a condition of a flow node")
         if does == kernels.PRESSURE and values.min() < 0.0:
             raise CommandError(f"the pressure of a fluid must not be negative, got {values.min():g} Pa")
@@ -213,7 +213,7 @@ class Said(Assigned, Field):
                 raise CommandError(f"node {both[0]} belongs to well '{well.name}' already")
         held = at[self.condition[at] > 0]
         if len(held):
-            raise CommandError(f"node {held[0]} of well '{name}' has a condition: node boundary remove comes first")
+            raise CommandError(f"node {held[0]} of well '{name}' has a condition: use node boundary remove first")
         self.blocks.before_change()
         wall = at[:0]
         if nodes is not None:
@@ -239,9 +239,9 @@ class Said(Assigned, Field):
         if does == HELD and values.min() < 0.0:
             raise CommandError(f"the pressure of a well must not be negative, got {values.min():g} Pa")
         if not duration > 0.0:
-            raise CommandError(f"a stage of a well takes some time, got {duration:g} s")
+            raise CommandError(f"the time of a stage of a well must be positive, got {duration:g} s")
         if not limit >= 0.0 or (math.isfinite(limit) and does != RATE):
-            raise CommandError("limit, a pressure that is not negative, goes with a rate")
+            raise CommandError("limit, a pressure that is not negative, needs a rate")
         self.blocks.before_change()
         well.add(Stage(does, value, 0.0, duration, limit), self.time)
         self.blocks.changed(stiffness=False)
@@ -257,13 +257,13 @@ class Said(Assigned, Field):
         """CommandError for one that would pump into nothing."""
         for well in self.wells:
             if well.will_act(self.time) and not self.network.there[well.points].any():
-                raise CommandError(f"well '{well.name}' has no flow node any more: what was around it is taken out")
+                raise CommandError(f"well '{well.name}' has no flow nodes left: the surrounding elements were removed")
 
     def tell_stage(self, well: Well, before: float, after: float) -> None:
         """A word in the log if another stage of a well is on than before."""
         stage, log = well.number(after), self.blocks.log
         if log is not None and stage != well.number(before):
-            does = well.stages[stage - 1].does.replace("_", "-") if stage else "no stage any more"
+            does = well.stages[stage - 1].does.replace("_", "-") if stage else "no stage left"
             log.info(f"well '{well.name}': {f'stage {stage}, ' * bool(stage)}{does}, at {after:.6g} s of flow")
 
     def asked_of(self, well: Well, time: float, dt: float, passes: bool) -> Asked:
