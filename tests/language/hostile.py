@@ -343,7 +343,7 @@ SCRIPTS = [
         "there is no wall 2 (walls so far: 1)",
     ),
     (b"START\nWALL id 1 nodes 0 0 1 1 xv 1\nIMPLE wall id 1 xmove 1", 3, "there is no time step yet"),
-    (b"START\nPLOT 1 2", 2, "there is no history 1"),
+    (b"START\nPLOT 1 2", 2, "no history 1 yet"),
     (b"START " * 100_000, 1, "expected the end of the line"),
     (b"START\nDEL RANGE" + b" x 0 1 and" * 50_000, 2, "the line ends"),
     (b"START\n" + b"(" * 100_000 + b"\nCYC\n", 3, "the line ends"),
