@@ -171,7 +171,9 @@ def run_pcdc(session: Session, options: Options, source: bytes) -> None:
     text = decode(source, name)
     if options.check:
         log.info(check.summary(text, name))
-        if memory := check.memory(text, name, session.comm.size, free_memory(Path("/"))):
+        nodes = session.comm.allgather((session.comm.here, free_memory(Path("/"))))
+        free = min((left for _, left in nodes if left is not None), default=None)
+        if memory := check.memory(text, name, session.comm.size, max(here for here, _ in nodes), free):
             log.info(f"  {memory}")
         return
     read = check.read(text, name)

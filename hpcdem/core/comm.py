@@ -27,6 +27,8 @@ class Comm(Protocol):
     """The communicator of mpi4py, None without MPI."""
     crowded: bool
     """More ranks than cores on some host."""
+    here: int
+    """Ranks on this node of the machine."""
 
     def barrier(self) -> None:
         """Wait for all ranks."""
@@ -135,6 +137,7 @@ class SerialComm(Comm):
     size = 1
     mpi: Any = None
     crowded = False
+    here = 1
 
     def barrier(self) -> None:
         return None

@@ -19,20 +19,28 @@ BOX = "pcdc model new dim 3\npcdc mesh structured (0,0,0) (1,1,1) cells 100 100 
     ("model new dim 3\npcdc mesh structured (0,0,0) (1,1,1) cells 3 2 4 type hex", 144),
 ])  # fmt: skip
 def test_elements_are_counted(line: str, elements: int):
-    assert f" {elements} elements on 1 rank take" in check.memory(f"pcdc {line}\n", "a.py", 1, None)
+    assert f" {elements} elements on 1 rank take" in check.memory(f"pcdc {line}\n", "a.py", 1, 1, None)
 
 
 def test_a_model_that_cannot_fit_is_refused_with_what_it_takes():
-    one = footprint.expected(6_000_000, 3, 8)
-    said = check.memory(BOX, "a.py", 8, one.node)
+    one = footprint.expected(6_000_000, 3, 8, 8)
+    said = check.memory(BOX, "a.py", 8, 8, one.node)
     assert f"{one.rank * 1e-6:.0f} MB per rank" in said and f"{one.shared * 1e-6:.0f} MB shared" in said
     with pytest.raises(HpcdemError, match=r"does not fit: \d+ MB are free here"):
-        check.memory(BOX, "a.py", 8, 0.99 * one.node)
+        check.memory(BOX, "a.py", 8, 8, 0.99 * one.node)
+
+
+def test_models_one_after_another_and_ranks_of_other_nodes_take_no_memory_here():
+    one = footprint.expected(6_000_000, 3, 8, 8)
+    assert check.memory(BOX + BOX, "a.py", 8, 8, one.node) == check.memory(BOX, "a.py", 8, 8, one.node)
+    assert "of 20000 MB" in check.memory(BOX, "a.py", 64, 8, 20e9)
+    with pytest.raises(HpcdemError, match="does not fit"):
+        check.memory(BOX, "a.py", 64, 64, 20e9)
 
 
 def test_of_meshes_of_unknown_size_nothing_is_foretold():
     unknown = "pcdc geometry create rectangle (0,0) (1,1) as-layer 'o'\npcdc mesh create from-layer 'o' size 0.1\n"
-    assert check.memory("n = 3\npcdc mesh structured (0,0) (1,1) cells [n] [n]\n", "a.py", 1, 1.0) == ""
-    assert check.memory(unknown, "a.py", 1, 1.0) == ""
-    both = check.memory(f"{unknown}pcdc mesh structured (2,0) (3,1) cells 30 20\n", "a.py", 1, None)
+    assert check.memory("n = 3\npcdc mesh structured (0,0) (1,1) cells [n] [n]\n", "a.py", 1, 1, 1.0) == ""
+    assert check.memory(unknown, "a.py", 1, 1, 1.0) == ""
+    both = check.memory(f"{unknown}pcdc mesh structured (2,0) (3,1) cells 30 20\n", "a.py", 1, 1, None)
     assert "without the mesh of line 2" in both

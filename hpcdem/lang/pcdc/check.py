@@ -107,19 +107,23 @@ def summary(text: str, file: str) -> str:
     return "\n".join(lines)
 
 
-def memory(text: str, file: str, ranks: int, free: float | None) -> str:
-    """A line about the memory that the meshes of a script will take on these ranks of one node, as far as it tells
-    their sizes; "" if it tells none. free [B]: of this machine, None: not known. HpcdemError if the model cannot fit.
-    """
-    count, dim, other = 0, 2, 0
+def memory(text: str, file: str, ranks: int, here: int, free: float | None) -> str:
+    """A line about the memory that the largest model of a script will take on these ranks, as far as it tells the sizes
+    of its meshes; "" if it tells none. here: ranks per node; free [B]: of a node, None: not known. HpcdemError if the
+    model cannot fit."""
+    models, other = [(0, 2)], 0
     for statement in read(text, file).statements:
+        if statement.command.name == "model new":
+            models.append((0, 2))
         elements = _elements(statement)
-        count, other = count + max(elements, 0), other or statement.line * (elements < 0)
-        cells = statement.arguments.get("cells", statement.arguments.get("n"))
-        dim = len(cells) if elements > 0 and cells is not None else dim
+        other = other or statement.line * (elements < 0)
+        if elements > 0:
+            cells = statement.arguments.get("cells", statement.arguments.get("n"))
+            models[-1] = models[-1][0] + elements, len(cells)
+    count, dim = max(models)
     if not count:
         return ""
-    one, mega = footprint.expected(count, dim, ranks), 1e-6
+    one, mega = footprint.expected(count, dim, ranks, here), 1e-6
     said = (
         f"memory: {count} elements on {ranks} rank{'s' * (ranks > 1)} take about {one.rank * mega:.0f} MB per rank, at "
         f"most {one.most * mega:.0f} MB, and {one.shared * mega:.0f} MB shared by the ranks of a node: on one node "

@@ -25,8 +25,8 @@ class Footprint(NamedTuple):
     node: float
 
 
-def expected(elements: int, dim: int, ranks: int) -> Footprint:
-    """Of a model of so many elements, evenly distributed over so many ranks of one node."""
+def expected(elements: int, dim: int, ranks: int, here: int) -> Footprint:
+    """Of a model of so many elements, evenly distributed over so many ranks, `here` of them on a node."""
     own, shared = elements * OWN[dim] / ranks, elements * NODE[dim]
-    most = max(ranks * REBUILDING * own, elements * MAKING)
-    return Footprint(EMPTY + own, EMPTY + REBUILDING * own, shared, ranks * EMPTY + shared + most)
+    most = max(here * REBUILDING * own, elements * MAKING)
+    return Footprint(EMPTY + own, EMPTY + REBUILDING * own, shared, here * EMPTY + shared + most)
