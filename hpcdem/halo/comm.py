@@ -40,13 +40,13 @@ class MpiComm(Comm):
         self.rank = mpi.Get_rank()
         self.size = mpi.Get_size()
         self._exchanges = 0
-        self.crowded = False
+        self.crowded, self.here = False, 1
         if of is not None:
             self.crowded, self.here = of.crowded, of.here
             return
         host = mpi.Split_type(MPI.COMM_TYPE_SHARED, self.rank)
         self.crowded = _more_ranks_than_cores(mpi, host)
-        self.here: int = host.Get_size()
+        self.here = host.Get_size()
         leads = mpi.Split(MPI.UNDEFINED if host.Get_rank() else 0, self.rank)
         self.nodes = Nodes(MpiComm(host, self), None if leads == MPI.COMM_NULL else MpiComm(leads, self))
 
