@@ -350,8 +350,8 @@ assert salt.min() == 0.1 < salt.max() < 0.2, salt
         [
             (
                 "physics/fdem/local.py",
-                "WHOLES = {SIX_NODE_TRIANGLE.name: SixNodes}",
-                "=from hpcdem.physics.fdem.pliant.elements import Pliant\n\nWHOLES = {SIX_NODE_TRIANGLE.name: Pliant}",
+                "from hpcdem.physics.fdem.six.elements import SixNodes",
+                "=from hpcdem.physics.fdem.pliant.elements import Pliant as SixNodes",
             )
         ],
         """

@@ -105,12 +105,17 @@ def surface_of(frame) -> np.ndarray:
 def test_the_surface_lies_on_the_discs_and_not_on_what_flies() -> None:
     frame = make_frame(1200)
     c = frame.tables["particles"].columns
+    c["fix"][:] = 0  # fixed ones would stand for walls
     line = surface_of(frame)
     top = (c["y"] + c["radius"]).max()
     assert (np.interp(c["x"], *line.T) >= c["y"] + c["radius"] - 0.02 * c["radius"]).all()
     assert line[:, 1].max() == pytest.approx(top, abs=1.0) and line[:, 1].min() > top - 4.0 * c["radius"].max()
     c["y"][600] += 6000.0  # one particle thrown up
     assert surface_of(frame)[:, 1].max() < top + 1.0
+    c["y"][600] -= 6000.0
+    high = c["y"] > top - 500.0
+    c["fix"][high] = 3  # a row that stands for a wall
+    assert surface_of(frame)[:, 1].max() < top - 300.0
 
 
 def test_every_layer_is_known_to_the_style() -> None:

@@ -33,6 +33,7 @@ PROCESSES = frozenset(f"subprocess.{name}" for name in ("run", "Popen", "call", 
 KNOWN = {
     # Ranks of one job tell each other Python objects; no file has a part in it.
     ("halo/comm.py", "import pickle"),
+    ("halo/shared.py", "import pickle"),
     # The user's own program, `hpcdem study.py`.
     ("cli/run.py", "exec"),
     ("cli/run.py", "compile"),
@@ -49,6 +50,7 @@ KNOWN = {
     ("page/desk.py", "subprocess.Popen"),
     # Modules of this package, by names from its own tables.
     ("__init__.py", "importlib.import_module"),
+    ("lang/pcdc/bindings.py", "importlib.import_module"),
     ("cases/__init__.py", "importlib.import_module"),
     ("cli/__init__.py", "importlib.import_module"),
     ("commands/dem/__init__.py", "importlib.import_module"),

@@ -17,7 +17,6 @@ from hpcdem.lang.pcdc.source import Source
 from hpcdem.lang.pcdc.statement import Statement
 from hpcdem.lang.pcdc.trial import HEAT, MODELS, OF_FIELDS
 from hpcdem.physics.fdem import footprint
-from hpcdem.physics.fdem.elements.kind import SIX_NODE_TRIANGLE
 from hpcdem.physics.fdem.tables import TEMPERATURE, Drawn, Over
 
 
@@ -56,6 +55,8 @@ def _not_of_six_nodes(script: Source) -> Iterator[tuple[Statement, str, bool]]:
                 follow = [
                     name for name, value in given.items() if isinstance(value, Over) and value.axis >= TEMPERATURE
                 ]
+                from hpcdem.physics.fdem.elements.kind import SIX_NODE_TRIANGLE  # with numba: a second
+
                 only = SIX_NODE_TRIANGLE.only(law, follow)
                 if only:
                     at_the_margin = all(not script.lines[one.line - 1][:1].isspace() for one in (made, statement))
