@@ -262,5 +262,5 @@ def test_help():
     from bench.cli import ABOUT, bench
 
     assert all(name in ABOUT for name in workloads())
-    assert set(bench.commands) == {"block-memory", "blocks", "coupled", "fracture", "push", "start", "memory", "strain-stress",
-                                   "scaling", "view"}  # fmt: skip
+    assert set(bench.commands) == {"block-memory", "blocks", "coupled", "fracture", "push", "start", "memory",
+                                   "strain-stress", "scaling", "view"}  # fmt: skip
