@@ -461,6 +461,17 @@ def test_sets_become_groups_of_the_model(tmp_path):
     ]
 
 
+def test_sets_of_a_file_follow_elements_that_were_added_one_by_one(tmp_path):
+    (tmp_path / "m.inp").write_text(STRIP + QUADS.format(", ELSET=A", ", ELSET=B") + "*SURFACE, NAME=END\nB, S2\n")
+    project = Project(FakeBlocks(), tmp_path, tmp_path / "data")
+    meshes.add_nodes(project, [(9.0, 0.0), (10.0, 0.0), (9.0, 1.0)])
+    meshes.add_element(project, (0, 1, 2))
+    meshes.import_file(project, "m.inp", group="second", set_name="file")
+    sets = {kind: names(groups.sets) for kind, groups in project.groups.items() if groups.sets}
+    assert sets["node"] == {"ALL": [3, 4, 5, 6, 7, 8]} and sets["element-face"] == {"END": [9]}
+    assert sets["element"]["second"] == [1, 2]
+
+
 def test_what_is_left_out_of_a_deck_is_named(read):
     text = QUADS.format(", ELSET=A", "") + (
         "*ELEMENT, TYPE=T2D2, ELSET=BARS\n1, 10, 20\n2, 20, 30\n*ELSET, ELSET=A\n900\n*NSET, NSET=A\n900\n"

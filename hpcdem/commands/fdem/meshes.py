@@ -242,6 +242,7 @@ def import_file(
     found = project.comm.per_node(lambda: imported.read(path, merge, scale, project.dim), once=True)
     for included in found.files:
         project.to_read(str(included.absolute()))
+    project.take_added()  # the file's come after them
     cells, points = (0, 0) if project.mesh is None else (len(project.mesh.cells), len(project.mesh.points))
     mesh = _add(project, lambda: found.mesh)
     for kind, sets, first in ((NODE, found.nodes, points), (FACE, found.faces, 4 * cells)):

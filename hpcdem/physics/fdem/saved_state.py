@@ -85,9 +85,8 @@ def tables(sim: Blocks) -> dict[str, Table]:
         tables[kind] = _whole({name: getattr(sim, name) for name in names}, root, np.int64)
     if sim.stress0 is not None:
         stress0 = {f"s{k}": sim.stress0[:, k] for k in range(sim.stress0.shape[1])}
-        tables["stress0"] = _whole(
-            {**stress0, "row": sim.stress0_row.astype(np.int64) if root else sim.stress0_row}, root
-        )
+        row = sim.stress0_row if root else sim.stress0_row[:0]
+        tables["stress0"] = _whole({**stress0, "row": row.astype(np.int64)}, root)
     if len(sim.born):
         born_at = sim.birthplace.reshape(len(sim.born), -1)
         tables["born"] = _whole({"number": sim.born, **{f"p{k}": of for k, of in enumerate(born_at.T)}}, root)
