@@ -106,7 +106,7 @@ def test_the_first_commands_in_a_terminal(terminal: Terminal, tmp_path: Path) ->
     terminal.waits("unbalanced force .* of the mean")
     terminal.keys("C-c")
     said = terminal.end(85)
-    assert shown(r"stopped at step \d+ by Ctrl-C; checkpoint .*\.sav written, go on with --resume", said), said
+    assert shown(r"stopped at step \d+ by Ctrl-C; checkpoint .*\.sav written, resume with --resume", said), said
     script = (tmp_path / "push.py").read_text()
     assert script == LONG
     terminal.types("hpcdem push.py --resume")

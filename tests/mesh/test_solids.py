@@ -225,7 +225,7 @@ def test_solids_of_a_cad_file_hang_together_and_are_groups(tmp_path: Path, gmsh:
     edges = mesh.edges()
     between = np.isin(edges.faces[edges.inner] // 4, found.groups["one"]).sum(axis=1) == 1
     assert mesh.face_sizes(edges.faces[edges.inner, 0][between]).sum() == pytest.approx(0.16 * math.pi, rel=0.1)
-    with pytest.raises(HpcdemError, match=r"flat\.brep: no solid can be read from it: it has surfaces or lines"):
+    with pytest.raises(HpcdemError, match=r"flat\.brep: contains no readable solid: it has surfaces or lines"):
         cad.read(tmp_path / "flat.brep")
 
 

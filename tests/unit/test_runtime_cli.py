@@ -155,7 +155,7 @@ def test_examples_are_listed_and_copied(tmp_path):
     again = program("main", "examples", "specimens", "--into", str(tmp_path))
     assert again.returncode == 2 and "exists and is not overwritten" in again.stderr
     far = program("main", "examples", "../x")
-    assert far.returncode == 2 and "../x: no such example. There are angle_of_repose, " in far.stderr
+    assert far.returncode == 2 and "../x: unknown example. Known: angle_of_repose, " in far.stderr
     wrong = program("main", "examples", "puhs")
     assert wrong.returncode == 2 and "did you mean 'push'?" in wrong.stderr
 

@@ -397,7 +397,7 @@ def test_who_waits_says_for_whom(base, kernels):
     lock = filelock.FileLock(holder.with_suffix(".lock"), is_singleton=False)
     lock.acquire()
     kernels_.prepare_kernels(SerialComm(), Log(stream=Stream()), {"": kernels()})
-    assert "waiting for process 4711 of here, which compiles kernels" in out.getvalue()
+    assert "waiting for process 4711 of here, which is compiling kernels" in out.getvalue()
     assert kernels.calls == [42] and not holder.exists()
 
 

@@ -327,7 +327,7 @@ def test_a_colour_file_is_searched_here_then_in_the_folder_then_at_home(
     assert colours.find_palette("./my.txt", folder).resolve() == here / "my.txt"
     assert colours.find_palette(str(home / "my.txt"), folder) == home / "my.txt"
     (here / "my.txt").unlink()
-    with pytest.raises(HpcdemError, match=r"\./my\.txt: there is no such file"):
+    with pytest.raises(HpcdemError, match=r"\./my\.txt: file not found"):
         colours.find_palette("./my.txt", folder)
     with pytest.raises(HpcdemError, match=r"neither here, nor in .*data, nor in .*home"):
         colours.find_palette("other.txt", folder)
@@ -343,7 +343,7 @@ def test_the_colours_of_a_file_are_drawn(folder: Path) -> None:
     ("text", "line", "message"),
     [
         ("0 0 0\n0 0\n", 2, "expected three numbers"),
-        ("0 0 0\n\n# x\n0 red 0\n", 4, "expected, not '0 red 0'"),
+        ("0 0 0\n\n# x\n0 red 0\n", 4, "green and blue, not '0 red 0'"),
         ("255 0 0\n", 1, "from 0 to 1"),
         ("0 0 nan\n", 1, "from 0 to 1"),
         ("0 0 0\n" * 9, 9, "expected 10 colours, the file ends after 9"),

@@ -264,7 +264,7 @@ def test_what_cannot_be_is_refused_by_name(tmp_path: Path, words: tuple[str, ...
 
 @pytest.mark.parametrize("word", ["--eye=-y", "--section=x=1"])
 def test_words_of_space_are_refused_in_the_plane(tmp_path: Path, word: str):
-    with pytest.raises(HpcdemError, match="is for three dimensions; this frame has two"):
+    with pytest.raises(HpcdemError, match="requires three dimensions; this frame has two"):
         run(frames.write_blocks(tmp_path), word)
 
 
