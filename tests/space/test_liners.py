@@ -85,19 +85,23 @@ def test_hosts_let_go_elements_are_deleted_and_put_back() -> None:
 
 
 def test_the_account_of_energy_closes() -> None:
-    """Drawn off with yield, slip and parting, in motion, under gravity."""
+    """Drawn off with yield, slip and parting, in motion, under gravity. With small strains forces of the rock are
+    exactly those of its energy, with large ones to the order of the strain (4e-5 here, docs/blocks.md)."""
     sim, liners = slab(True, 5e9, tensile_strength=0.3e6, compressive_strength=1e6, bond_tensile_strength=1e5,
                        bond_cohesion=5e4)  # fmt: skip
+    sim.option(large_strain=False)
     sim.gravity(0.0, 0.0, -9.81)
     liners.condition(np.array([0]), does_z=VELOCITY, at_z=0.6, does_x=VELOCITY, at_x=0.5)
     liners.condition(np.array([8]), force_z=-3e4, moment_y=200.0)
-    diagnostics.account_energy(sim)
-    convergence.advance(sim, 600)
-    found, rock = liners.energies(), diagnostics.energies(sim)
+    convergence.advance(sim, 20)
+    diagnostics.account_energy(sim)  # in motion
+    for steps in (40, 540):
+        convergence.advance(sim, steps)
+        found, rock = liners.energies(), diagnostics.energies(sim)
+        assert found["work_of_conditions"] > 1.0 and found["relative"] < 1e-4
+        assert rock["work_liners"] == found["work_on_rock"] != 0.0 and rock["relative"] < 1e-9
     assert min(found["lost_in_beams"], found["lost_in_bond"]) > 0.01
     assert (liners.elements["bond_state"] & kernels.PARTED).any()
-    assert found["work_of_conditions"] > 1.0 and found["relative"] < 2e-3
-    assert rock["work_liners"] == found["work_on_rock"] != 0.0 and rock["relative"] < 1e-4
 
 
 @pytest.mark.parametrize("at", [0, 60, 200])

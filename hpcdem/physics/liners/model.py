@@ -225,7 +225,7 @@ class Liners(Structure):
         """Energy of the liners [J/m] since the account began: stored in beams and bond and as motion, and at_start;
         lost in beams (yield) and in the bond (slip, parting), work_on_rock, work_of_conditions, work_of_gravity,
         commands; closing: what does not add up, relative: that over the largest. Not collective."""
-        work = self.work.tolist()
+        work = (self.work + self._half_step()).tolist()
         found = {
             "stored": self._stored(), "at_start": self._stored_at_start, "lost_in_beams": work[kernels.IN_BEAMS],
             "lost_in_bond": work[kernels.IN_BOND], "work_on_rock": work[kernels.ON_ROCK],
@@ -235,6 +235,19 @@ class Liners(Structure):
         given = found["work_of_conditions"] + found["work_of_gravity"] + self.commands
         taken = found["work_on_rock"] + found["lost_in_beams"] + found["lost_in_bond"]
         return closed(found, found["stored"] - self._stored_at_start + taken - given)
+
+    def _half_step(self) -> np.ndarray:
+        """Work (5,) of conditions and gravity in the half step before this moment: a step books all of what the forces
+        at its beginning do around it, and this moment has no step yet (energy.py)."""
+        out, dim, nodes, time = np.zeros(kernels.WORK), self.blocks.dim, self.nodes, self.blocks.time_now()
+        if self._dynamic:
+            force = self._conditions_at(time, time)[:, kernels.FORCE + self.kind.parts]
+            force = np.where(self._led(), force - self._total, force)
+            way = 0.5 * self.blocks.clock.dt * np.column_stack([nodes["v"], nodes["spin"]])
+            weight = self._node_table[:, kernels.WEIGHT : kernels.WEIGHT + dim]
+            out[kernels.BY_CONDITIONS] = math.fsum((force * way).reshape(-1).tolist())
+            out[kernels.BY_GRAVITY] = math.fsum((weight * way[:, :dim]).reshape(-1).tolist())
+        return out
 
     def _stored(self) -> float:
         parts = [self.kind.stored()]
@@ -338,6 +351,12 @@ class Liners(Structure):
 
     # ---- called by the blocks ----------------------------------------------------------------------------------------
 
+    def storage_rebuilt(self) -> None:
+        begins = self._account is not self.blocks.budget
+        super().storage_rebuilt()
+        if begins and self._account is not None:
+            self.work -= self._half_step()
+
     def corners(self, blocks: Any) -> np.ndarray:
         """(n_own, 4) bool: corners of the owned elements that a liner is bound to."""
         out = np.zeros((blocks.n_own, 4), bool)
@@ -368,6 +387,8 @@ class Liners(Structure):
     def follow(self) -> None:
         """The rock has moved: move the nodes over the same step, and find the new forces."""
         blocks, nodes, beams = self.blocks, self.nodes, self.elements
+        if not len(self):
+            return
         clock = blocks.clock
         with blocks.timers("force"):
             self._set_masses()
