@@ -72,7 +72,7 @@ def _there(word: str, dims: tuple[int, ...], dim: int) -> None:
 
 
 def _known(given: dict[str, Any]) -> dict[str, Any]:
-    """Without arrays, whose values were looked at one by one."""
+    """Without arrays, whose values were checked one by one."""
     return {name: value for name, value in given.items() if not isinstance(value, np.ndarray)}
 
 

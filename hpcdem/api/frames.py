@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 NARROWEST = 100
 """Pixels along a picture, at least."""
 MAIN = ("particles", "elements")
-"""Kinds of objects of which a frame is asked for if none is named."""
+"""Kinds of objects of which a frame is requested if none is named."""
 
 
 class Looks(TypedDict, total=False):
@@ -141,7 +141,7 @@ class Frame:
 
 
 class Frames(Sequence[Frame]):
-    """The frames of a run in the order of their steps, read when they are asked for."""
+    """The frames of a run in the order of their steps, read when they are requested."""
 
     def __init__(self, files: Sequence[FrameFile]) -> None:
         self.files = list(files)
@@ -194,7 +194,7 @@ class Frames(Sequence[Frame]):
 
 def frames(path: str | Path = "data", name: str | None = None) -> Frames:
     """The frames of a folder, or the one of a file. name: of blocks, frames NAME_<step>.vtkhdf; needed where a folder
-    has several kinds. HpcdemError where there are none."""
+    has several kinds. HpcdemError if there are no such objects."""
     from hpcdem.io.frames import FrameFile, list_frames, mesh_frames_by_name
     from hpcdem.post.view.moment import read_moment
 

@@ -36,7 +36,7 @@ LOOKED_AT = {
     "box": "BOX", "wall": "WALL", "ball": "BALL", "gen": "GEN", "gen_grid": "GEN", "gline": "GLINE", "prop": "PROP",
     "bond": "PROP", "set": "SET",
 }  # fmt: skip
-"""Methods whose values are held against declared units, and the commands whose units they have."""
+"""Methods whose values are checked against declared units, and the commands whose units they have."""
 Method = TypeVar("Method", bound=Callable[..., Any])
 Kind = TypeVar("Kind", bound=type)
 

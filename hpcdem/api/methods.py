@@ -106,7 +106,7 @@ class Row:
     condition whose properties they are; where: the objects that `where` chooses, if it is not of the class; only,
     without: options by their words; names: of arguments that are not those of the language, by the word, or by
     ``option.word`` for one that follows its values; types: of arguments whose kinds say too little; doc: in place of
-    the text of the command; loose: other keywords go on to the table, which says what is wrong with them.
+    the text of the command; loose: other keywords continue to the table, which says what is wrong with them.
     """
 
     command: str

@@ -88,7 +88,7 @@ class Objects(Words):
         return fdem.queries.numbers(self._do.project(), self.kind, chosen_by(where, self.kind))
 
     def values(self, name: str, where: Where = None) -> np.ndarray:
-        """A quantity by name, in the order of `numbers`; NaN where there is none. Collective."""
+        """A quantity by name, in the order of `numbers`; NaN where missing. Collective."""
         chosen = chosen_by(where, self.kind)
         return fdem.queries.values(self._do.project(), self.kind, _quantity(name), chosen)
 
@@ -279,7 +279,7 @@ class Recorded(Words):
         """Follow a value of a "node", "element", "joint", a part of bolts or liners ("bolt-node", "liner-element"), a
         "flow-node", a "flow-channel", a "well" (well: its name) or of the "model": of one (id, or nearest to a point),
         or of those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many steps. variable:
-        with the value "law-state", which state variable of laws of the user."""
+        with the value "law-state", which state variable of user laws."""
         words = value.replace("_", "-") if isinstance(value, str) else value
         given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,
                  "variable": variable, "well": well}  # fmt: skip

@@ -82,7 +82,7 @@ class ParticleCommands:
 
         Scripts ask for far more than fit: it gives up after FAILURES attempts in a row that found no room, or after
         SET
-        gentry attempts per particle asked for, if that is set.
+        gentry attempts per particle requested, if that is set.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""How mistakes of a user's program are told."""
+"""How mistakes of a user's program are reported."""
 
 from __future__ import annotations
 

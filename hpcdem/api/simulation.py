@@ -321,8 +321,8 @@ class Simulation(ParticleCommands, BlockCommands):
     @_command
     def resume(self, before: float | None = None) -> bool:
         """Take up the newest whole checkpoint of `outdir`, or the last one at or before this time of the model [s]
-        (UsageError if there is none), and finish the command in which it was written, `cycle`,
-        `imple`, `step` or `solve`; False if there is none. Functions of `every` must have been given before. Particles
+        (UsageError if missing), and finish the command in which it was written, `cycle`,
+        `imple`, `step` or `solve`; False if missing. Functions of `every` must have been given before. Particles
         that were coupled to blocks made before them come with these: `coupling` is there then."""
         self._refuse_coupled("resume")
         latest = math.inf if before is None else before
@@ -356,13 +356,13 @@ class Simulation(ParticleCommands, BlockCommands):
         return True
 
     def _newest(self, folder: Path, before: float = math.inf) -> str | None:
-        """The newest checkpoint of a folder; looked for by rank 0."""
+        """The newest checkpoint of a folder; searched for by rank 0."""
         comm = self._session.comm
         found = newest_first([folder], before)[0] if comm.rank == 0 else []
         return comm.bcast(str(found[0]) if found else None)
 
     def _kind(self, path: str) -> str:
-        """Of a checkpoint: "" of particles, or what is none; looked at by rank 0."""
+        """Of a checkpoint: "" of particles, or what is none; checked by rank 0."""
         comm, kind = self._session.comm, ""
         if comm.rank == 0:
             try:
@@ -624,8 +624,8 @@ class Simulation(ParticleCommands, BlockCommands):
 
     def _asked(self, told: tuple[Any, ...], make: Callable[[], Any], again: bool = False) -> Any:
         """What `make` returns. In a PCDC script its journal keeps it, with a checksum of what was `told`, so that a run
-        that goes on from a checkpoint finds the way back: particles that come out of the checkpoint do nothing until
-        then, and are told the same as before. again: done in any case."""
+        that resumes from a checkpoint finds the way back: particles that come out of the checkpoint do nothing until
+        then, and receive the same values as before. again: done in any case."""
         running = self._session.interpreter
         if running is None:
             return make()
@@ -670,7 +670,7 @@ class Simulation(ParticleCommands, BlockCommands):
         return value
 
     def _warn_of_answers(self) -> None:
-        """Once: this script asked for what --resume may not be able to answer."""
+        """Once: this script requested what --resume may not be able to answer."""
         running, log = self._session.interpreter, self.engine.log
         if self._seen_alone and self.ranks > 1 and log is not None and running.keeps and not running.replays:
             log.warn_once(
@@ -775,7 +775,7 @@ class Simulation(ParticleCommands, BlockCommands):
         self.engine.close_model()
 
     def _existing(self, file: str | Path) -> str:
-        """A file to read: in `directory`, then in data below it; looked for by rank 0."""
+        """A file to read: in `directory`, then in data below it; searched for by rank 0."""
         comm = self._session.comm
         found = comm.bcast(find(self.directory, str(file)) if comm.rank == 0 else None)
         if found is None:
@@ -883,11 +883,11 @@ class Walls(Group, Mapping[int, Wall]):
         return len(self._sim._walls())
 
     def items(self) -> ItemsView[int, Wall]:
-        """Ids and walls, looked at once."""
+        """Ids and walls, checked once."""
         return self._sim._walls().items()
 
     def values(self) -> ValuesView[Wall]:
-        """The walls, looked at once."""
+        """The walls, checked once."""
         return self._sim._walls().values()
 
     def __repr__(self) -> str:
@@ -919,7 +919,7 @@ class Coupling:
         return self._asked("energies", self.engine.energies)
 
     def end(self) -> None:
-        """Part them: each may go on alone."""
+        """Decouple them: each may continue alone."""
         from hpcdem.commands.fdem import coupling
 
         if self._project.continues is not None:

@@ -21,7 +21,7 @@ from hpcdem.runtime import run_folder
 
 
 def particles(sim: Simulation) -> Path | None:
-    """`now/all_<step>.vtkhdf` of particles; None if there are none. Collective, for one rank."""
+    """`now/all_<step>.vtkhdf` of particles; None if missing. Collective, for one rank."""
     if not len(sim.particles.hot[sim.particles.owned]):
         return None
     sim.close_model()

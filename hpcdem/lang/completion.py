@@ -11,15 +11,15 @@ from typing import Any
 def completion(
     words: Callable[[str], list[str] | None], names: dict[str, Any] | None = None
 ) -> Iterator[None]:  # fmt: skip
-    """Let Tab complete, where there is a terminal that can. words: those that a begun line may go on with, None if it
-    is Python, of which names are known."""
+    """Let Tab complete, where there is a terminal that can. words: those that a begun line may continue with, None if
+    it is Python, of which names are known."""
     try:
         import readline
         import rlcompleter
     except ImportError:
         yield
         return
-    python = rlcompleter.Completer(names)  # the mapping itself: names come while the conversation goes on
+    python = rlcompleter.Completer(names)  # the mapping itself: names come while the conversation continues
     found: list[str] = []
 
     def complete(text: str, state: int) -> str | None:

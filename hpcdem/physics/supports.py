@@ -23,7 +23,7 @@ def class_of(kind: str) -> type[Structure]:
 
 
 def of(blocks: Any, kind: str) -> Structure:
-    """Those of a model that have the objects of this kind. CommandError if there are none."""
+    """Those of a model that have the objects of this kind. CommandError if missing."""
     support = class_of(kind)
     found = support.there(blocks)
     if found is None:

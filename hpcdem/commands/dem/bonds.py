@@ -124,7 +124,7 @@ def _law_of(elastic: Sequence[float | None], contact: Sequence[float | None]) ->
 
 
 def _reach(sim: Simulation, gap: float, scale: float) -> tuple[float, float]:
-    """Largest radius, and the distance of surfaces within which pairs are looked for [m]. Collective."""
+    """Largest radius, and the distance of surfaces within which pairs are searched for [m]. Collective."""
     if scale <= 0.0:
         raise CommandError(f"rext must be positive, got {scale:g}")
     largest = float(sim.comm.max_into(np.array([sim.particles["radius"].max() if len(sim.particles) else 0.0]))[0])

@@ -14,7 +14,7 @@ def save(sim: Simulation, file: Path | str) -> None:
 
 
 def restore(sim: Simulation, file: Path | str) -> None:
-    """RES: go on from a file written by SAV; the place in the present script stays."""
+    """RES: resume from a file written by SAV; the place in the present script stays."""
     saved_state.restore(sim, file)
     sim.restored = Path(file), sim.clock.step
     if sim.energy is not None and sim.energy.running:

@@ -162,7 +162,7 @@ def _described(sim: Simulation, which: np.ndarray, what: str) -> str:
 
 
 def _check_laws(sim: Simulation) -> None:
-    """Pairs in the list of which the particles have different laws have none, unless one is said for the two."""
+    """Pairs in the list of which the particles have different laws have none, unless one is given for the two."""
     if not np.isnan(sim.pair_laws[:, MODEL]).any():
         return
     _, iout = diagnostics.contact_rows(sim)
@@ -297,7 +297,7 @@ def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
     dt, said = sim.clock.dt, partial(with_prefix, unit="s")
     near = dt > NEAR * critical or (math.isinf(critical) and sim.bonds_left() > 0)
     highest = diagnostics.highest_frequency(sim) if near else 0.0
-    sim.step_limit = 0.0 if 0.5 * dt * highest > 1.0 else critical  # 0: the worst is said
+    sim.step_limit = 0.0 if 0.5 * dt * highest > 1.0 else critical  # 0: the worst is reported
     if sim.log is None:
         return
     if highest > 0.0:
@@ -456,7 +456,7 @@ def _run(sim: Simulation) -> None:
 
 
 def _calls(sim: Simulation) -> list[Task]:
-    """The moments at which watchers are called; asked for again each time, as they may come and go."""
+    """The moments at which watchers are called; requested again each time, as they may come and go."""
     return [Task(watcher.every, 0, watcher.call) for watcher in sim.watchers]
 
 

@@ -2,7 +2,7 @@
 
 Taken over are particles with ids, velocities, properties, fixed directions, colours and groups; walls; shear forces of
 contacts; bonds; stored forces; time step, gravity, mass rule, step and time. A text has fewer digits than a checkpoint,
-and says nothing of clumps, histories and the script: the run goes on near the old one, not with its bits.
+and says nothing of clumps, histories and the script: the run continues near the old one, not with its bits.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ def _links(sim: Simulation, frame: Frame, discs: _Discs) -> tuple[dict[str, np.n
     both = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     _, *columns = sim.comm.to_ranks(holders(sim.comm, discs.gid, both["gid"]), *both.values())
     both = dict(zip(both, columns))
-    # A bonded pair that touches stands in both tables: bonds come first, and the first one counts.
+    # A bonded pair that touches stands in both tables: bonds precede, and the first one counts.
     order = np.lexsort((both["id1"], both["table"], both["partner"], both["gid"]))
     gid, partner = both["gid"][order], both["partner"][order]
     first = np.ones(len(order), bool)

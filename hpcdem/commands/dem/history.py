@@ -45,7 +45,7 @@ def draw(sim: Simulation, interval: int | None, what: list[str], off: Sequence[s
     what: bfill bline ball wall bondc cforce bang bid mesh, by default filled particles and walls; off: words of these
     that are not wanted.
 
-    Scripts draw far more often than pictures are looked at, so without --draw it is noted in the log only.
+    Scripts draw far more often than pictures are viewed, so without --draw it is noted in the log only.
     """
     if interval is not None and interval <= 0:
         raise CommandError(f"DRAW INTERVAL must be positive, got {interval}")

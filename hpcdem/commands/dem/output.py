@@ -56,7 +56,7 @@ class Snapshot:
 
     @property
     def frame(self) -> Frame:
-        """The frame, made when first asked for; what was under way is settled then."""
+        """The frame, made when first requested; what was under way is settled then."""
         if self._frame is None:
             settle(self.sim)
             self._frame = diagnostics.frame(self.sim)
@@ -194,7 +194,7 @@ def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> Non
     """Append (step, time, value) to `hist_<id>.csv`, and (step, value) to `hist_id_<id>.dat`.
 
     The layout of the latter is that of which public readers of ZDEM's histories take the numbers: a line with the word
-    hist, two lines of headings, rows, and a last line that is passed over (written by `finish`).
+    hist, two lines of headings, rows, and a last line that is skipped (written by `finish`).
     """
     what = sim.history_wishes[ident][1]
     step, time = sim.clock.step, sim.clock.time
@@ -356,7 +356,7 @@ def close_histories(sim: Simulation) -> None:
 
 
 def finish(sim: Simulation) -> None:
-    """At STOP: the last line of histories, and the curves asked for by PLOT, `hist_<y>_vs_<x>.txt` and `.png`."""
+    """At STOP: the last line of histories, and the curves requested by PLOT, `hist_<y>_vs_<x>.txt` and `.png`."""
     close_histories(sim)
     for y, x in sim.plots:
         missing = [i for i in (y, x) if i not in sim.history_wishes]

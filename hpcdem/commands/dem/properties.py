@@ -20,7 +20,7 @@ from hpcdem.physics.dem.user_laws import LINEAR, PairLaw
 
 def chosen(sim: Simulation, where: Selection | None) -> np.ndarray:
     """Flags (n_own,) of the owned particles in a selection; None is all. Clumps are chosen as a whole: by the place of
-    their centre, or if a member's id or group is asked for. Collective."""
+    their centre, or if a member's id or group is requested. Collective."""
     p = sim.particles
     if where is None:
         return np.ones(len(p), bool)
@@ -122,7 +122,7 @@ def load_law(sim: Simulation, law: str, folder: Path) -> PairLaw:
 def _of_law(
     sim: Simulation, where: Selection | None, law: str | None, parameter: Mapping[str, float], folder: Path
 ) -> dict[str, float]:
-    """What a law of the user, and its properties, are among those of particles. Collective."""
+    """Rows of a user law and its properties among those of particles. Collective."""
     if law is None and not parameter:
         return {}
     if law == LINEAR:
@@ -146,7 +146,7 @@ def _of_law(
 
 
 def _added(sim: Simulation, law: str, parameter: Mapping[str, float], folder: Path) -> tuple[int, dict[str, float]]:
-    """The number of a law of the user that the model has from now on, and its properties. Collective."""
+    """The number of a user law that the model has from now on, and its properties. Collective."""
     new = load_law(sim, law, folder)
     if sim.bonds_left():
         raise CommandError("a user law does not support bonds: remove them with BOND break")

@@ -28,7 +28,7 @@ Number = float | str
 
 
 def group(project: Project, kind: str, group: str, set_name: str = DEFAULT, where: Range | None = None) -> None:
-    """Put objects of a kind (model.blocks.groups) into a group, also of elements that were taken out: these may come
+    """Put objects of a kind (model.blocks.groups) into a group, also of elements that were removed: these may come
     back. They leave the one of the set that they were in."""
     found = everything(project, kind, where, null_too=True)
     project.groups[kind] = project.comm.per_node(lambda: _grouped(project, kind, group, set_name, found))
@@ -51,7 +51,7 @@ def _grouped(project: Project, kind: str, name: str, set_name: str, found: np.nd
 
 def element_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """A constitutive model of elements, with its properties (model.blocks.properties). Elements in the range that were
-    taken out come back, free of stress where their place is now; without a range these stay away."""
+    removed come back, free of stress where their place is now; without a range these stay away."""
     blocks = project.ready()
     elements = chosen(project, ELEMENT, where, null_too=True)
     if elements is not None and "heat" in blocks.surface_loads and not blocks.alive[elements].all():
@@ -78,7 +78,7 @@ def load_function(project: Project, function: str) -> str:
 
 
 def user_model(project: Project, law: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Elements get a law of the user, with its properties. Collective."""
+    """Elements get a user law, with its properties. Collective."""
     project.ready()
     element_model(project, load_law(project, law).name, properties, where)
 
@@ -155,7 +155,7 @@ def initial_stress(
     where: Range | None = None,
 ) -> None:
     """Stress [Pa] by component xx, yy, xy, zz, in space xz and yz too; gradient: by component, per metre. In the plane
-    zz, if nothing is said of it, is that of plane strain."""
+    zz, if nothing is assigned to it, is that of plane strain."""
     project.ready().initial_stress(chosen(project, ELEMENT, where), **stress, gradient=gradient or None)
 
 
@@ -200,7 +200,7 @@ def force(
 
 
 def damp(project: Project, local: float, where: Range | None = None) -> None:
-    """Local damping of nodes, from 0 to 1, in the place of that of the model."""
+    """Local damping of nodes, from 0 to 1, instead of that of the model."""
     blocks = project.ready()
     if local > 0.0 and blocks.budget is not None:
         raise CommandError("the energy budget does not support local damping of nodes: use model option energy off")

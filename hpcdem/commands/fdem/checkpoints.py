@@ -45,7 +45,7 @@ def write_checkpoint(project: Project, automatic: bool = False) -> Path:
     path = project.folder() / run_folder.checkpoint_name(project.step, automatic)
     try:
         names = project.names()
-    except CommandError as error:  # nobody asked for it here, so it must not end the run
+    except CommandError as error:  # nobody requested it here, so it must not end the run
         names = {}
         if project.log is not None:
             project.log.warn_once("names", f"{error}; checkpoints of this run contain no m_ names")
@@ -68,7 +68,7 @@ def _write(project: Project, path: Path, more: dict[str, Any]) -> None:
 
 
 def found(project: Project, path: str) -> str:
-    """The name of a file that is there: as it is said, or with the ending that `save` gives. Collective."""
+    """The name of a file that is there: as it is given, or with the ending that `save` gives. Collective."""
     there = project.comm.bcast(project.path(path).exists() if project.comm.rank == 0 else None)
     return path if there else named(path)
 
@@ -90,7 +90,7 @@ def restore(project: Project, path: str) -> dict[str, Any]:
 def take_up(project: Project, before: float = math.inf) -> list[Any] | None:
     """Take the state of the newest whole checkpoint in the folder of the results, which a run of the same script wrote;
     returns its journal (lang.pcdc.journal), None if there is no checkpoint. before: that of this time of the model [s]
-    or the last one before it, UsageError if there is none. Collective. A damaged file is named in the
+    or the last one before it, UsageError if missing. Collective. A damaged file is named in the
     log and the one before it is tried. UsageError if the script cannot be brought back to where it was written."""
     found = _newest(project, before)
     if found is None:

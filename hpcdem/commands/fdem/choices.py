@@ -27,7 +27,7 @@ NEAR = 1e-9
 
 def chosen(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray | None:
     """Ascending numbers of the objects of this kind that a range chooses among those that are there; None stands for
-    all. null_too: also among elements that were taken out, and what belonged to them. CommandError if it chooses
+    all. null_too: also among elements that were removed, and what belonged to them. CommandError if it chooses
     nothing."""
     if where is None:
         return None
@@ -73,7 +73,7 @@ def places(project: Project, kind: str) -> np.ndarray:
 
 
 def _why(objects: _Objects, where: g.Range) -> str:
-    """What it chose was taken out, or which of several terms is fulfilled by nothing at all."""
+    """What it chose was removed, or which of several terms is fulfilled by nothing at all."""
     if not objects.null_too and objects.kind not in g.SUPPORTS and not objects.project.alive.all():
         gone = int(_Objects(objects.project, objects.kind, True).all_of(where).sum())
         if gone:
@@ -93,14 +93,15 @@ _NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
 _NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer, g.Along, g.Near, g.Crossed, g.Sized)
 _BY_PLACE = (g.Span, g.OnLayer, g.InCircle, g.Near, g.Crossed, g.Along)
 ASIDE = 1e-4
-"""Over the size of a face: how far aside a surface is looked for, and so how well the cosine of its angle is known."""
+"""Over the size of a face: how far aside a surface is searched for, and so how well the cosine of its angle is
+known."""
 STRAIGHT = 1e-6
 """Degrees by which an angle that is 0 may be off: coordinates of meshes are rounded."""
 
 
 class _Objects:
     """All objects of a kind that are there: numbers (n,), ends (n, 2), in space (n, 3), point numbers of faces and
-    joints, sides (n, 2) of joints. An element is there unless it was taken out, a node or face if one of its elements
+    joints, sides (n, 2) of joints. An element is there unless it was removed, a node or face if one of its elements
     is, a joint if both are. null_too: those that are not there as well."""
 
     def __init__(self, project: Project, kind: str, null_too: bool = False) -> None:
@@ -437,7 +438,7 @@ class _Objects:
         return self.project.layers[layer]
 
     def _boundary(self) -> np.ndarray:
-        """Beside nothing, or beside an element that was taken out."""
+        """Beside nothing, or beside an element that was removed."""
         alive, edges = self.project.alive, self.project.edges()
         there = np.append(alive, False)[np.where(edges.faces >= 0, edges.faces // 4, len(alive))]
         rim = there[:, 0] != there[:, 1]
@@ -503,7 +504,7 @@ def _crossings(curves: list[geometry.Curve], points: np.ndarray, direction: tupl
 
 
 SIDES = 1440
-"""Arcs of an outline stand for so many sides per closed curve when it is asked what lies inside."""
+"""Arcs of an outline stand for so many sides per closed curve in queries of what lies inside."""
 
 
 def _inside(curves: list[geometry.Curve], points: np.ndarray, layer: str) -> np.ndarray:

@@ -83,7 +83,7 @@ def _by_frac(both: Coupled) -> float:
 
 
 def _warn(both: Coupled) -> None:
-    """Once each: what is said for one of the two and may be meant for both."""
+    """Once each: what is given for one of the two and may be meant for both."""
     sim, options = both.particles, both.blocks.options
     if sim.log is None:
         return
@@ -135,7 +135,7 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
     sim = both.particles
     both.heed_time_step(partial(_by_frac, both))
     both.prepare()
-    if sim.progress is None:  # else the command goes on from a checkpoint
+    if sim.progress is None:  # else the command resumes from a checkpoint
         intervals = {kind: int(getattr(sim.settings, kind)) for kind in OUTPUTS}
         cycles.start(sim, f"model {name}", steps, 0, intervals, initial_frame=sim.edited)
         sim.edited = False
@@ -172,7 +172,7 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
 
 
 def advance(project: Project, steps: int) -> int:
-    """Up to `steps` steps of the blocks, and of the particles with them; what the outside asked for. What is due of the
+    """Up to `steps` steps of the blocks, and of the particles with them; what the outside requested. What is due of the
     particles on the way is written; if one of their functions wants the command to end, project.progress["done"] says
     so. Collective."""
     both, due = project.coupled, project.due
@@ -218,7 +218,7 @@ def refuse(project: Project, what: str) -> None:
 
 
 def take_up(project: Project) -> None:
-    """A run that goes on from a checkpoint: both as they were when it was written, in the middle of a command."""
+    """A run that resumes from a checkpoint: both as they were when it was written, in the middle of a command."""
     both = project.coupled
     if both is not None and project.continues is not None:
         from hpcdem.physics.coupling import saved_state

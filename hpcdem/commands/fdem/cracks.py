@@ -38,7 +38,7 @@ def flush(project: Project) -> None:
 
 
 def _write(project: Project, cracks: Sequence[Crack]) -> None:
-    """A model that begins, or goes on from a checkpoint, begins a new file with all that has broken. What a checkpoint
+    """A model that begins, or resumes from a checkpoint, begins a new file with all that has broken. What a checkpoint
     has filed may not be known as an event yet."""
     done = project.cracks_filed
     if (done is not None and done >= len(cracks)) or (not cracks and not project.blocks.joint_row.any()):

@@ -74,11 +74,11 @@ def _contacts(blocks: Blocks) -> Columns | None:
 
 def _places(blocks: Blocks, numbers: np.ndarray, lead: np.ndarray | None = None) -> Columns:
     """Where points are now [m], on all ranks; NaN of those without an element. lead (n,): the corner where a side of it
-    is asked for, else -1. Collective."""
+    is requested, else -1. Collective."""
     names = [f"position_{axis}" for axis in "xyz"[: blocks.dim]]
     columns = {name: np.empty(len(numbers)) for name in names}
     sided = numbers if lead is None else np.where(lead >= 0, sides.SIDE + lead, numbers)
-    again = np.arange(len(numbers)) - np.searchsorted(numbers, numbers)  # a point is asked for once at a time
+    again = np.arange(len(numbers)) - np.searchsorted(numbers, numbers)  # a point is requested once at a time
     for k in range(int(again.max(initial=-1)) + 1):
         for name in names:
             columns[name][again == k] = diagnostics.values(blocks, name, sided[again == k])

@@ -97,7 +97,7 @@ def _write(project: Project, name: str, later: Deliveries | None = None, sound: 
 
 
 def _kept(moment: MeshFrame) -> MeshFrame:
-    """The same with arrays of its own: the model goes on."""
+    """The same with arrays of its own: the model continues."""
 
     def own(table: Table) -> Table:
         return Table({name: np.array(values) for name, values in table.columns.items()}, table.offset, table.total)
@@ -122,7 +122,7 @@ _OF_FIELDS = {f"mean_{name}": name for name in diagnostics.DIFFUSING} | {
 def _names(blocks: Blocks, kind: str) -> list[str]:
     """What is written of elements and joints: neither where they are, which the points say, nor single points of
     joints; of properties those that a table or a field has made different from object to object; of plastic flow and
-    creep only where elements can yield or creep; all state variables of laws of the user."""
+    creep only where elements can yield or creep; all state variables of user laws."""
     yields = "plastic" in blocks.cold or bool(blocks.yielding().any())
     creeps = "creep" in blocks.cold or bool(blocks.creeping().any())
     varied = {name for on, name in blocks.varied if on == {"joint": JOINT}.get(kind, kind)}
@@ -173,7 +173,7 @@ OF_OTHERS = {
 
 
 def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Joints with the fluid in them, NaN where there is none; and the channels between elements that hang together
+    """Joints with the fluid in them, NaN where missing; and the channels between elements that are connected
     without a cohesive model, of state 1."""
     flow = Flow.there(blocks)
     if flow is None or not len(flow.network.channels):

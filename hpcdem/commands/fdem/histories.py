@@ -48,7 +48,7 @@ def create(
 ) -> None:
     """Record a number every so many steps: of one object (by number, or the one nearest to a point [m]) or of those of
     a range or of all (how: sum, mean, minimum, maximum), of a well, by its name, or of the model. variable: with the
-    value law_state, a state variable of laws of the user that elements have."""
+    value law_state, a state variable of user laws that elements have."""
     history_name(name)
     if name in project.histories:
         raise CommandError(f"there is a history '{name}' already")
@@ -150,7 +150,7 @@ def delete(project: Project, name: str) -> None:
 
 
 def find(project: Project, name: str) -> History:
-    """A history by its name. CommandError if there is none."""
+    """A history by its name. CommandError if missing."""
     if name not in project.histories:
         raise CommandError(f"there is no history '{name}'; there is {quoted(project.histories)}")
     return project.histories[name]

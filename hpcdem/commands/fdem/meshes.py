@@ -312,7 +312,7 @@ def glue(
     set_name: str = DEFAULT,
     where: Range | None = None,
 ) -> None:
-    """Bodies that were meshed separately hang together where their faces lie on each other: these become joints, as
+    """Bodies that were meshed separately are connected where their faces lie on each other: these become joints, as
     inside of a body; where the faces differ, elements are cut. tolerance [m]: points nearer than this are one; between:
     only faces between the elements of two groups; where: only faces of elements of a range, with any. Collective."""
     mesh = project.whole_mesh()
@@ -347,7 +347,7 @@ def glue(
 
 def delete(project: Project, where: Range | None = None) -> None:
     """Elements are gone: before the first model or condition the mesh is without them, numbers of others close up;
-    later they are taken out. Collective."""
+    later they are removed. Collective."""
     elements = everything(project, ELEMENT, where)
     if project.in_use:
         assignments.null(project, where=where)

@@ -31,7 +31,7 @@ def needed(project: Project, physics: type[_P], use: bool = True) -> _P:
 
 @contextmanager
 def begun(project: Project, physics: type[_P]) -> Iterator[_P]:
-    """That of the model, or a new one, which is taken out again if what follows is refused."""
+    """That of the model, or a new one, which is removed again if what follows is refused."""
     blocks = project.ready()
     known, found = physics.there(blocks), physics.of(blocks)
     try:

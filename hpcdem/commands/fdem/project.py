@@ -45,11 +45,11 @@ class Project:
     solved: how the last `model solve` ended, reason, ratio and steps; line:
     of the script, for the log; names: gives what a checkpoint shall hold of the script's own variables, place: and of
     the way to where the script is; progress: of the command that steps at this moment, see running.py; resumed: this
-    run goes on from a checkpoint of the folder; restored: the checkpoint that the script named, and its step; told:
+    run resumes from a checkpoint of the folder; restored: the checkpoint that the script named, and its step; told:
     when the log spoke last of a line of the script that steps; coupled: the particles that are stepped with the
-    blocks; continues: the checkpoint from which they go on, asleep: the number of these particles, which are empty
-    until then; due: what is due of the particles in the command that steps; calls_lost: that checkpoint knows nothing
-    of methods of particles; stepping: the name of that command, "" if there is none; inputs: files that the script
+    blocks; continues: the checkpoint from which they continue, asleep: the number of these particles, which are empty
+    until then; due: what is due of the particles in the command that steps; calls_lost: that checkpoint
+    ignores methods of particles; stepping: the name of that command, "" if missing; inputs: files that the script
     reads, by their real paths, in words; made: files that were written by name; resume_advice: what takes up a
     checkpoint of a run without a script, "": model restore.
     """
@@ -174,7 +174,7 @@ class Project:
 
     def refit(self, made: Remade) -> None:
         """The mesh after bodies were glued, or elements cut or deleted: groups and histories of what was merged, cut or
-        renumbered go on. Of points that were in several groups of a set the lowest counts."""
+        renumbered continue. Of points that were in several groups of a set the lowest counts."""
         before, mesh, number = self.whole_mesh(), made.mesh, made.points
         self.replace_mesh(mesh)
         self.alive, self.hidden = self.alive[made.parent], self.hidden[made.parent]
@@ -264,7 +264,7 @@ class Project:
         self.groups[ELEMENT].assign(range(len(mesh.cells) - count, len(mesh.cells)), DEFAULT)
 
     def whole_mesh(self) -> Mesh:
-        """The mesh. CommandError if there is none."""
+        """The mesh. CommandError if missing."""
         self.take_added()
         if self.mesh is None:
             raise CommandError("no mesh yet: use mesh create, mesh structured or mesh import first")
@@ -285,7 +285,7 @@ class Project:
         return self.blocks
 
     def positions(self) -> np.ndarray:
-        """(np, dim) where the nodes are now [m]; NaN where there is none any more."""
+        """(np, dim) where the nodes are now [m]; NaN where removed."""
         mesh = self.whole_mesh()
         if not self.taken or self.step == 0:
             return mesh.points
@@ -293,7 +293,7 @@ class Project:
         return np.column_stack([diagnostics.values(self.blocks, f"position_{axis}") for axis in axes])
 
     def corner_positions(self) -> np.ndarray:
-        """(4 ne, dim) where each corner (element * 4 + k) is now [m]; NaN where there is none. Collective."""
+        """(4 ne, dim) where each corner (element * 4 + k) is now [m]; NaN where missing. Collective."""
         mesh = self.whole_mesh()
         if not self.taken or self.step == 0:
             return np.where((mesh.cells >= 0)[:, :, None], mesh.points[mesh.cells], np.nan).reshape(-1, mesh.dim)

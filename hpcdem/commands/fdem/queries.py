@@ -26,7 +26,7 @@ def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarr
 
 def values(project: Project, kind: str, name: str, where: Range | None = None) -> np.ndarray:
     """A quantity of these objects, in the order of their numbers (`numbers`), of nodes on the side that the range
-    means; NaN where there is none. Collective."""
+    means; NaN where missing. Collective."""
     if kind in SUPPORTS:
         return _of_supports(project, kind, name, where)
     if kind in FLOW:
@@ -44,12 +44,12 @@ def total(project: Project, kind: str, name: str, where: Range | None = None) ->
 
 
 def _of_supports(project: Project, kind: str, name: str, where: Range | None) -> np.ndarray:
-    numbers = everything(project, kind, where)  # refuses where there are none
+    numbers = everything(project, kind, where)  # refuses if there are no such objects
     return supports.of(project.ready(use=False), kind).values(kind, name, numbers)
 
 
 def _of_flow(project: Project, kind: str, name: str, where: Range | None) -> np.ndarray:
-    numbers = everything(project, kind, where)  # refuses where there is none
+    numbers = everything(project, kind, where)  # refuses if missing
     return Flow.of(project.ready(use=False)).values(kind, name, numbers)
 
 

@@ -7,7 +7,7 @@ from hpcdem.physics.fields import kinds
 
 MODEL, WELL = "model", "well"
 LAW_STATE = "law_state"
-"""A state variable of laws of the user, see user_laws.py; a history has its name as quantity."""
+"""A state variable of user laws, see user_laws.py; a history has its name as quantity."""
 UNITS: dict[str, dict[str, str]] = {
     g.NODE: {
         "displacement": "m", "velocity": "m/s",

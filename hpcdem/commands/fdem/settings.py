@@ -150,7 +150,7 @@ def hide(project: Project, hidden: bool = True, where: Range | None = None) -> N
 
 
 def collision(project: Project, on: bool, where: Range | None = None) -> None:
-    """Contact of these elements with others is looked for, or not."""
+    """Contact of these elements with others is searched for, or not."""
     blocks = project.ready()
     elements = everything(project, ELEMENT, where, null_too=True)
     blocks.before_change()

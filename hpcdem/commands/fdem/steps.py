@@ -40,7 +40,7 @@ STRIDE = 100
 CONTINUE = "continue"
 """What a script may do when a run towards a ratio has failed; else it stops."""
 FAILED = ("no progress", "limit")
-"""Reasons of `blocks.Watch`; "runaway": a body moved too fast to go on."""
+"""Reasons of `blocks.Watch`; "runaway": a body moved too fast to continue."""
 STEADY_STEP = 1.0
 """First step towards steady flow [s]."""
 QUIET_SECONDS = 10.0
@@ -75,7 +75,7 @@ def solve(
     on_failure: str = "stop",
     run_time: float | None = None,
 ) -> None:
-    """Steps until the unbalanced forces are so small, so many are done, or so much time [s] has passed: whatever comes
+    """Steps until the unbalanced forces are so small, so many are done, or so much time [s] has passed: whichever is
     first. run_time: as `clocks.run_time`, for this call. Without any of them: until the ratio is RATIO, and if nobody
     watches (window, limit, on_failure) CYCLES at most.
 
@@ -145,7 +145,7 @@ def _time_passes(project: Project) -> bool:
 
 
 def _left(project: Project, run: float) -> float:
-    """Time [s] until the end of a run-time, of the parts that were given a start the one that comes first."""
+    """Time [s] until the end of a run-time, of the parts that were given a start the one that is first."""
     return min((begin + run - clocks_of.time(project, part) for part, begin in project.began.items()), default=run)
 
 
@@ -285,7 +285,7 @@ def solve_thermal(
 
 
 def _heat_on(project: Project, run: Implicit, progress: dict[str, Any]) -> None:
-    """An implicit step of heat, and what is due then; a checkpoint, if one is asked for."""
+    """An implicit step of heat, and what is due then; a checkpoint, if one is requested."""
     run.advance(progress["dt"])
     progress["left"] -= 1
     _write_due(project)
@@ -295,7 +295,7 @@ def _heat_on(project: Project, run: Implicit, progress: dict[str, Any]) -> None:
 
 def _explicit_is_cheaper(project: Project, flow: Flow, time: float, dt: float | None, solver: str) -> bool:
     """Whether so much flow time [s] is to pass by explicit steps: they cost less, or implicit ones are refused; said in
-    the log. A command that goes on from a checkpoint does what it did before. Collective."""
+    the log. A command that resumes from a checkpoint does what it did before. Collective."""
     if project.progress is not None:
         return bool(project.progress["command"][0] != "solve hydraulic")
     blocks, refused = project.blocks, None
@@ -349,7 +349,7 @@ def _tell_of_thin(project: Project, steps: int | None, time: float | None) -> No
 
 
 def _flow_on(project: Project, run: Coupled, flow: Flow, end: float) -> None:
-    """Implicit steps to this flow time [s]. Checkpoints that are asked for are written between two of them, inside of
+    """Implicit steps to this flow time [s]. Checkpoints that are requested are written between two of them, inside of
     the run: nothing is different after one."""
     told, last = clocks.monotonic(), end * (1.0 - 1e-12)
     if flow.time >= last:
@@ -464,7 +464,7 @@ def _run(
     window: int | None = None, limit: int | None = None, command: tuple[str, dict[str, Any]] | None = None,
 ) -> tuple[str, float, Watch]:  # fmt: skip
     """Step, and write what is due. Returns why it ended, "ratio", "cycles", "time", "function" (one of the particles
-    wanted it to) or one of FAILED, the last ratio that was looked at (NaN: none), and who looked. command: what
+    wanted it to) or one of FAILED, the last ratio that was checked (NaN: none), and who looked. command: what
     `resume` is to call to finish it."""
     project.refuse_inside(f"model {name}")
     coupling.take_up(project)
@@ -486,7 +486,7 @@ def _run(
             ends = steps is not None or time is not None
             notices.warn_of_flow(project.blocks)
             project.progress["watch"] = asdict(convergence.watch(project.blocks, window, limit, ends))
-    first, end = project.progress["first"], project.progress["end"]  # from before a checkpoint, if it goes on from one
+    first, end = project.progress["first"], project.progress["end"]  # from before a checkpoint, if it resumes from one
     alone = steps if ratio is None and time is None else None  # the number of steps, if it is known
     try:
         with coupling.stepping(project, name, alone):
@@ -506,7 +506,7 @@ def _run(
 def _advance(
     project: Project, name: str, first: int, last: float, end: float, ratio: float | None
 ) -> tuple[str, float, Watch]:
-    """To step `last` or model time `end` [s], whatever comes first; see `_run`."""
+    """To step `last` or model time `end` [s], whichever is first; see `_run`."""
     blocks, clock, progress = project.blocks, project.blocks.clock, project.progress
     assert progress is not None
     # A checkpoint of a version that did not watch has none.
@@ -566,7 +566,7 @@ def _to(project: Project, steps: int) -> int:
 
 
 def _no_equilibrium(project: Project, watch: Watch, reason: str, ratio: float, found: float) -> str:
-    """What is said of a run that has failed, with the body that slides away. Collective."""
+    """What is reported of a failed run, with the body that slides away. Collective."""
     step = project.step
     why = {
         "limit": f"after {step - watch.began} steps, the limit",
@@ -619,20 +619,20 @@ def _intervals(project: Project) -> list[int]:
 
 
 def stop_here(project: Project, request: int) -> None:
-    """A command is about to be carried out, and none that steps has answered a signal or the time limit that asked for
+    """A command is about to be carried out, and none that steps has answered a signal or the time limit that requested
     the end: between two commands is a good place. Collective; the request is the same on all ranks."""
     if request >= STOP:
         _answer(project, request)
 
 
 def _answer_requests(project: Project) -> None:
-    """Between two implicit steps: what was asked for from outside, a checkpoint, perhaps the end. Collective."""
+    """Between two implicit steps: what was requested from outside, a checkpoint, perhaps the end. Collective."""
     if (stop := project.blocks.stop) is not None:
         _answer(project, int(project.comm.max_into(np.array([stop.local_request()], np.int64))[0]))
 
 
 def _answer(project: Project, request: int) -> None:
-    """A signal or the time limit asked for a checkpoint, perhaps for the end."""
+    """A signal or the time limit requested a checkpoint, perhaps for the end."""
 
     def save(automatic: bool) -> Path:
         histories.flush(project)

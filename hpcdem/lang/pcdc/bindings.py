@@ -113,7 +113,7 @@ def _in_order(option: Option, given: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 def with_parameters(given: dict[str, Any]) -> dict[str, Any]:
-    """Properties, with those that a law of the user declares under their names. CommandError if one is given twice."""
+    """Properties, with those that a user law declares under their names. CommandError if one is given twice."""
     found = {name: value for name, value in given.items() if name != "parameter"}
     for name, value in given.get("parameter", ()):
         if name in found:
@@ -415,7 +415,7 @@ def solve(call: Call) -> None:
 
 
 def carry_out(call: Call) -> None:
-    """The function of a command, then a look at its values in the units declared. What has no effect is said once."""
+    """Call the function of a command, then check its values against the declared units. Report once what has no effect."""
     command = call.command
     if command.idle:
         if call.project.log is not None:

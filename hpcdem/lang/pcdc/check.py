@@ -1,4 +1,4 @@
-"""What can be said of a script without running it."""
+"""What is known of a script without running it."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def packages(script: Source) -> None:
 
 
 def missing_packages(script: Source) -> dict[str, Statement]:
-    """What is said of each package that is not here, with the first statement that needs it."""
+    """What is reported of each missing package, with the first statement that needs it."""
     missing: dict[str, Statement] = {}
     for statement in script.statements:
         needs, file = NEEDED.get(statement.command.name), statement.arguments.get("file")
@@ -161,7 +161,7 @@ def _elements(statement: Statement) -> int:
 
 def _loose_names(script: Source) -> list[str]:
     """Geometry layers, tables and fields that are named but made nowhere. Where names are expressions nothing is
-    said."""
+    reported."""
     made: dict[str, set[str]] = {"geometry layer": set(), "table": set(), "field": set()}
     used: list[tuple[int, str, str]] = []
     for statement in script.statements:
@@ -219,8 +219,8 @@ def _groups_of(statement: Statement) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _loose_groups(script: Source) -> list[tuple[int, str]]:
-    """Groups and sets that a range names and no line makes, with the line. Nothing is said of a kind of which groups
-    have names that are expressions, or come from the bodies or regions of a mesh."""
+    """Groups and sets that a range names and no line makes, with the line. Nothing is reported of a kind of which
+    groups have names that are expressions, or come from the bodies or regions of a mesh."""
     made: dict[str, set[tuple[str, str]]] = {kind: set() for kind in _GROUPED}
     unknown: set[str] = set()
     for kind, name, set_name in (group for statement in script.statements for group in _groups_of(statement)):

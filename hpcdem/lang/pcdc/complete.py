@@ -1,4 +1,4 @@
-"""The words that a begun line may go on with."""
+"""The words that a begun line may continue with."""
 
 from __future__ import annotations
 

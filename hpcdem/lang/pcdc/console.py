@@ -35,7 +35,7 @@ class Console:
         self.count = 0
 
     def run(self) -> None:
-        """Until the end of input or exit(). What goes wrong is told, and the conversation goes on."""
+        """Until the end of input or exit(). What goes wrong is reported, and the conversation continues."""
         self.say(WELCOME)
         with completion(_words, self.interpreter.namespace):
             while True:
@@ -90,7 +90,7 @@ class Console:
 
 
 def is_whole(text: str) -> bool:
-    """Whether a text can be carried out, or lacks its end: a block goes on until an empty line."""
+    """Whether a text can be carried out, or lacks its end: a block continues until an empty line."""
     last = text.split("\n")[-1].rstrip()
     if last.lstrip().startswith("pcdc") and last.endswith("\\"):
         return False
@@ -99,7 +99,7 @@ def is_whole(text: str) -> bool:
     except ScriptError:
         return _broken_is_whole(text)
     try:
-        # A block that could go on ends with an empty line, as in Python's own console.
+        # A block that could continue ends with an empty line, as in Python's own console.
         return codeop.compile_command(python, "console", "single") is not None
     except (SyntaxError, ValueError, OverflowError):
         return True
@@ -126,5 +126,5 @@ def _statements(python: str) -> int:
 
 
 def _words(line: str) -> list[str] | None:
-    """What a command that was begun may go on with; None for Python."""
+    """What a command that was begun may continue with; None for Python."""
     return candidates(line) if line.lstrip().startswith("pcdc ") else None

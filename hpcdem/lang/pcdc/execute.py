@@ -80,7 +80,7 @@ class Interpreter:
         Python around it.
 
         past: the journal of a checkpoint that the project was restored from; the script is brought back to the command
-        in which it was written, and goes on there. UsageError if that is not possible.
+        in which it was written, and resumes there. UsageError if that is not possible.
         """
         self.journal = Journal(self._warn_of_lost_journal)
         self.journal.keeps_calls = not (past and getattr(self.project, "calls_lost", False))
@@ -93,7 +93,7 @@ class Interpreter:
         self._execute(script, "exec")
 
     def load_laws(self, script: Source) -> None:
-        """Read, check and compile the laws and functions that commands of a script name, before it runs or goes on.
+        """Read, check and compile the laws and functions that commands of a script name, before it runs or continues.
         ScriptError."""
         for statement in script.statements:
             given = statement.arguments
@@ -151,7 +151,7 @@ class Interpreter:
             if isinstance(error, HpcdemError) and not isinstance(error, CommandError):
                 raise
             if not isinstance(error, (HpcdemError, RecursionError, MemoryError)) and self._in_a_command(error):
-                raise  # not the script's fault: the whole traceback is told
+                raise  # not the script's fault: the whole traceback is reported
             raise self._explained(error, script) from None
         if self.journal is not None and self.journal.failure is not None:
             raise self.journal.failure
@@ -233,7 +233,7 @@ class Interpreter:
             return HpcdemError(str(self._on_the_way(statement.error(str(error)))))
         return error
 
-    # ---- going on from a checkpoint ------------------------------------------------------------------------------
+    # ---- continuing from a checkpoint ------------------------------------------------------------------------------
 
     def _passed_over(self, statement: Statement, arguments: Mapping[str, Any], told: str) -> bool:
         """Note a command, or, on the way back to a checkpoint, pass over it if it was done before that was written."""
@@ -333,7 +333,7 @@ class Interpreter:
         return error
 
     def _place_in_script(self) -> dict[str, Any] | None:
-        """What a checkpoint shall hold so that `run` can go on from it; None in a conversation."""
+        """What a checkpoint shall hold so that `run` can resume from it; None in a conversation."""
         if self.journal is None:
             return None
         source = next(iter(self.sources.values()))
@@ -344,8 +344,8 @@ class Interpreter:
         }  # fmt: skip
 
     def _agree(self, index: int, told: str) -> int:
-        """Collective: all ranks are at this command with these values, or all raise ScriptError. Returns what was asked
-        from outside a while ago (runtime.stop_requests), the same on all ranks."""
+        """Collective: all ranks are at this command with these values, or all raise ScriptError. Returns what was
+        requested from outside a while ago (runtime.stop_requests), the same on all ranks."""
         comm, stop = self.project.comm, self.project.blocks.stop
         asked = stop.overdue_request() if stop is not None else 0
         if comm.size == 1:

@@ -1,7 +1,7 @@
-"""What a running script was told, so that it can be brought back to where it was.
+"""Values that a running script received, so that it can be brought back to where it was.
 
-A script is Python, and where Python is cannot be saved. So a run that goes on from a checkpoint runs its script again,
-up to the command in which the checkpoint was written: commands are passed over, and what the script looks at is
+A script is Python, and where Python is cannot be saved. So a run that resumes from a checkpoint runs its script again,
+up to the command in which the checkpoint was written: commands are skipped, and what the script looks at is
 answered with what it saw the first time, so that its loops and decisions are the same. The journal is the list of
 these commands and answers; it is part of every numbered checkpoint.
 """
@@ -22,7 +22,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, PhysicsError, ScriptError, UsageError
 
 MOST = 64 << 20
-"""Bytes of answers that are kept; of a script that looked at more no run can go on from a checkpoint."""
+"""Bytes of answers that are kept; of a script that looked at more no run can resume from a checkpoint."""
 ENTRY = 32
 """Bytes that an entry counts for at least."""
 
@@ -67,7 +67,7 @@ class Journal:
             self.entries.append(list(entry))
 
     def note_error(self, error: HpcdemError) -> None:
-        """A command or look failed; the script may catch it and go on."""
+        """A command or look failed; the script may catch it and continue."""
         if isinstance(error, ScriptError):
             self.note(ERROR, "ScriptError", error.file, error.line, error.message)
         elif type(error).__name__ in _ERRORS:
@@ -178,9 +178,9 @@ class Journal:
         return self._at < len(self._past)
 
     def meet(self, checksum: int) -> bool:
-        """The script comes to a command that it came to before. True if it is the one to go on with, False if it is to
-        be passed over; functions that were called in it are called. UsageError if it is another one; the error that it
-        met is raised again."""
+        """The script comes to a command that it came to before. True if it is the one to continue with, False if it is
+        to be passed over; functions that were called in it are called. UsageError if it is another one; the error that
+        it met is raised again."""
         if self._past[self._at] != [COMMAND, checksum]:
             raise self._other_way("another line, or other values, were executed there before")
         self._next()

@@ -29,14 +29,14 @@ class Pending:
 
 @dataclass(frozen=True)
 class TableName:
-    """``table 'name'`` in the place of a number: a function of time."""
+    """``table 'name'`` instead of a number: a function of time."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class FunctionName:
-    """``function 'file.py:name'`` in the place of a number: a function of place and time."""
+    """``function 'file.py:name'`` instead of a number: a function of place and time."""
 
     name: str
 

@@ -222,7 +222,7 @@ def _joined(parts: list[str | Escape]) -> tuple[str | Escape, ...]:
 
 
 def expression(line: str, at: int) -> tuple[str, int]:
-    """The Python expression between the bracket at `at` and the one that closes it, and where the line goes on."""
+    """The Python expression between the bracket at `at` and the one that closes it, and where the line continues."""
     end = closing(line, at)
     if end is None:
         raise LexicalError(f"'{line[at:].strip()[:40]}' does not end: ']' is missing")
@@ -238,8 +238,8 @@ def expression(line: str, at: int) -> tuple[str, int]:
 
 
 def closing(line: str, at: int) -> int | None:
-    """Place of the bracket that closes the one at `at`; brackets in Python texts do not count. None if there is
-    none."""
+    """Place of the bracket that closes the one at `at`; brackets in Python texts do not count. None if
+    missing."""
     open_ones: list[str] = []
     while at < len(line):
         char = line[at]

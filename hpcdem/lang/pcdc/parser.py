@@ -162,7 +162,7 @@ class _Line:
                 return self._allowed(ways[0])
 
     def _is_unknown(self, command: Command) -> bool:
-        """Is the next word none that this command may go on with, where its last word is left out?"""
+        """Is the next word none that this command may continue with, where its last word is left out?"""
         token = self.peek()
         rows: tuple[Any, ...] = (*command.options, *command.models)
         return token is None or (isinstance(token, Word) and not matching(token.text, rows))
@@ -332,7 +332,7 @@ class _Line:
         return kinds.read_value(kind, token, what, self.expressions)
 
     def _varied(self, token: Word, kind: kinds.Kind) -> Any:
-        """What follows ``table`` or ``field`` in the place of a property."""
+        """What follows ``table`` or ``field`` instead of a property."""
         if matching(token.text, [_FIELD]):
             return _later(Drawn, self.one(kinds.STRING, _FIELD))
         name = self.one(kinds.STRING, _TABLE)

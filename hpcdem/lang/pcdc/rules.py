@@ -1,5 +1,5 @@
-"""Rules that tie several words of a line together. They are asked when a line is read, where nothing is said of values
-that are expressions (`Pending`), and once more when these are known."""
+"""Rules that tie several words of a line together. They are checked when a line is read, except for
+values that are expressions (`Pending`), and once more when these are known."""
 
 from __future__ import annotations
 

@@ -113,8 +113,8 @@ def _dimensions(statement: Statement, before: int | None) -> int | None:
 
 
 def _logical(lines: list[str], number: int, words: str) -> tuple[int, str]:
-    """The words of a command and the number of its last line: a backslash, or three dots, at the end of a line goes on
-    with the next."""
+    """The words of a command and the number of its last line: a backslash, or three dots, at the end of a line
+    continues with the next."""
     while (end := _goes_on(words)) is not None and number + 1 < len(lines):
         number += 1
         words = words[:end] + " " + lines[number]
@@ -169,7 +169,7 @@ class _PythonText:
                     continue
                 end = lexer.end_of_string(line, at)
                 if end is None:
-                    # A text that goes on after a backslash, or an error that Python will report.
+                    # A text that continues after a backslash, or an error that Python will report.
                     self._goes_on = line.endswith("\\")
                     return
                 at = end

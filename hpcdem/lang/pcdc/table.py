@@ -115,7 +115,7 @@ class Option:
 @dataclass(frozen=True)
 class Model:
     """A constitutive model or boundary condition with its properties. number: of the manual's table; leading: values
-    that come first; one_of: sets of properties of which one must be complete; any_of: at least one property must be
+    that precede; one_of: sets of properties of which one must be complete; any_of: at least one property must be
     given; of: the model of the simulation; dims: dimensions of space in which it is there; does, fixed: as of commands;
     by_time: tables of time may stand for numbers, and no functions of place; ranged: the objects that it belongs to, if
     they are not those of the command; of_field: the field (physics/fields.py) whose it is."""
@@ -143,13 +143,13 @@ class Model:
 
 @dataclass(frozen=True)
 class Command:
-    """notation: its words; leading: values (and words in the place of values) that come first; models: one of them is
+    """notation: its words; leading: values (and words instead of values) that precede; models: one of them is
     named after the words; ranged: the objects that RANGE chooses among, "" if it takes none; needs_option: at least one
     option must be given; properties: the word ``property`` may stand before the options; manual: printed there; dims:
     as of models; also: other words for all of the notation, of the online help; idle: why it has no effect here;
     refused: why it is, and what to write instead; does: its function, as "module.name" of `hpcdem.commands.fdem`, which
     has arguments of the names of its options, or the name of a converter in bindings.py; of commands with models that
-    is said by the model; fixed: more arguments of the function."""
+    is given by the model; fixed: more arguments of the function."""
 
     notation: str
     doc: str
@@ -185,7 +185,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Level:
-    """A word that a command may go on with."""
+    """A word that a command may continue with."""
 
     keyword: Keyword
 

@@ -36,7 +36,7 @@ class Outputs:
 
 @dataclass(frozen=True)
 class Report:
-    """What can be said beforehand; None stands for unknown.
+    """What is known beforehand; None stands for unknown.
 
     runs: the CYC and IMPLE commands; made: particles that each statement makes, by index; rough: indices of `made` that
     are estimates; particles: most at once; work: particle-steps; certain: neither is an estimate; folder: of the

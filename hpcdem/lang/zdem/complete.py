@@ -1,4 +1,4 @@
-"""The words that a begun ZDEM line may go on with."""
+"""The words that a begun ZDEM line may continue with."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ SETTLED = {"hertz": 0.95, "linear": 0.90}
 """Area of the disks over the area of a bed settled under its weight. Hertz particles overlap by much: published bed of
 the ZDEM manual, 0.943 to 0.956; linear: a bed of 250 000 disks of 0.1 to 0.3 mm."""
 FAILURES = 1000
-"""Attempts without room in a row after which GEN gives up, unless SET gentry gives a number per particle asked for."""
+"""Attempts without room in a row after which GEN gives up, unless SET gentry gives a number per particle requested."""
 
 MAKERS = ("RESTORE", "LOAD", "BALL", "GLINE", "GEN", "CLUMP")
 
@@ -264,7 +264,7 @@ class _Follower:
 
 
 def insertion(num: int, gentry: float, radii: Sequence[float], free: float, rectangle: float) -> tuple[float, float]:
-    """Particles that GEN makes and the area of their disks [m2], of `num` asked for; free: area [m2] without particles
+    """Particles that GEN makes and the area of their disks [m2], of `num` requested; free: area [m2] without particles
     in the rectangle (area [m2]). gentry: attempts per particle; 0: until FAILURES in a row are to be expected.
 
     An attempt finds room with probability (1-x)^3 (1 + 0.812 x + 0.4258 x^2 + 0.0716 x^3), x = cover / JAMMED (Schaaf

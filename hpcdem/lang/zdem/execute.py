@@ -1,6 +1,6 @@
 """Carries out a script: hands every statement to a function of `hpcdem.commands`.
 
-The commands know nothing of lines and files; an error of theirs leaves here with the file and line of the statement.
+The commands ignore lines and files; an error of theirs leaves here with the file and line of the statement.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _files_read(script: Script) -> dict[str, str]:
 
 def refuse_escapes(script: Script, folder: Path) -> None:
     """ScriptError at the first file name that leads out of the folder of the script and that of the results. For
-    scripts that came with a checkpoint: whoever goes on with a run of others did not write them."""
+    scripts that came with a checkpoint: whoever continues with a run of others did not write them."""
     allowed = [path.resolve() for path in (script.directory, folder)]
     for statement in script.statements:
         if statement.get("law"):
@@ -112,7 +112,7 @@ class Interpreter:
         self.script = script
 
     def run(self, sim: Any, start_at: int = 0, resume: int | None = None, saved_script: str = "") -> None:
-        """Carry out the statements from index `start_at` to the end, or go on after a checkpoint.
+        """Carry out the statements from index `start_at` to the end, or continue after a checkpoint.
 
         resume: ``position`` of the checkpoint that `sim` was restored from. A CYC or IMPLE at that place is taken
         up where it was interrupted; anything else there was done before the checkpoint was written.
@@ -134,7 +134,7 @@ class Interpreter:
             dem.cycles.stop(sim)
 
     def load_laws(self, sim: Any) -> None:
-        """Read, check and compile the laws of the user that lines name, before the first one is carried out."""
+        """Read, check and compile the user laws that lines name, before the first one is carried out."""
         for statement in self.script.statements:
             law = statement.get("law")
             if law and law != dem.properties.LINEAR:
@@ -290,7 +290,7 @@ def _prop(call: _Call) -> None:
 
 
 def _set_properties(call: _Call, properties: dict[str, Any]) -> None:
-    """Laws of the user lie beside the script."""
+    """User laws lie beside the script."""
     if "law" in properties:
         properties = {**properties, "folder": call.directory}
     dem.properties.prop(call.sim, call.where, **properties)

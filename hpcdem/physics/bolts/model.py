@@ -73,7 +73,7 @@ _ELEMENTS: Columns = {
     "plastic": (np.float64, 0),
 }  # fmt: skip
 """Columns of the elements. row: of the properties, 0: none yet; length: as installed [m]; force: axial [N/m]; plastic:
-lengthening [m]."""
+elongation [m]."""
 
 
 class Bolts(Structure):
@@ -100,7 +100,7 @@ class Bolts(Structure):
     def node_columns(cls, dim: int) -> Columns:
         return {**cls.of_nodes, **{name: (np.float64, dim) for name in _VECTORS}}
 
-    # ---- what is said --------------------------------------------------------------------------------------------
+    # ---- what is given --------------------------------------------------------------------------------------------
 
     def create(
         self,
@@ -201,7 +201,7 @@ class Bolts(Structure):
                 f"and fixed, got {spacing:g}"
             )
 
-    # ---- what is asked -------------------------------------------------------------------------------------------
+    # ---- what is queried -------------------------------------------------------------------------------------------
 
     def _value(self, kind: str, name: str) -> np.ndarray:
         return self._node_value(name) if kind == BOLT_NODE else self._element_value(name)

@@ -4,8 +4,8 @@ Both simulations stay what they are, each with its strips, lists and clock; `Cou
 After both have moved, the contacts between them are computed where the discs are owned (links.py,
 physics/coupling/kernels/disc_faces.py) and added to the forces on both sides, with which both move in the next step.
 
-A step after which a command changed one of the models begins with the forces that there were: contacts that touched go
-on as they were, new ones begin at its end, as contacts of new particles do.
+A step after which a command changed one of the models begins with the forces that there were: contacts that touched
+continue as they were, new ones begin at its end, as contacts of new particles do.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Coupled(SurfaceLoad):
         return request
 
     def _step(self) -> int:
-        """Advance both by one dt. Returns what the outside asked for (0: nothing), agreed by all ranks."""
+        """Advance both by one dt. Returns what the outside requested (0: nothing), agreed by all ranks."""
         particles, blocks = self.particles, self.blocks
         self._close()
         work = self._work if self.accounted else None
@@ -288,7 +288,7 @@ class Coupled(SurfaceLoad):
     # ---- time step ---------------------------------------------------------------------------------------------------
 
     def settle_time_step(self, dt: float = 0.0) -> float:
-        """Give both the same time step and return it [s]: `dt`; else what was said for one of them or for both alike
+        """Give both the same time step and return it [s]: `dt`; else what was set for one of them or for both alike
         (SET dt, model time-step); else `stable_time_step`. CommandError if they were told different ones."""
         particles, blocks = self.particles, self.blocks
         self._check_options()
@@ -428,7 +428,7 @@ class Coupled(SurfaceLoad):
         self._settled = self._said()
 
     def release(self) -> None:
-        """Part the two again; both may go on alone. Not collective."""
+        """Decouple the two; both may continue alone. Not collective."""
         self.mesh_replaced()
         self.blocks.surface_loads.remove(self)
         self.particles.coupled = False

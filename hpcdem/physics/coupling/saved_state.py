@@ -22,7 +22,7 @@ KIND, PREFIX, CONTACTS = checkpoint.BOTH, checkpoint.OF_PARTICLES, checkpoint.LI
 
 
 def save(both: Coupled, path: Path | str, extra: Mapping[str, Any]) -> None:
-    """Write the state, and `extra` (JSON values) with it. Reads only: a run that saves goes on exactly like one that
+    """Write the state, and `extra` (JSON values) with it. Reads only: a run that saves resumes exactly like one that
     does not. Collective."""
     engine.save(both.blocks, path, lambda: _contents(both, extra))
 

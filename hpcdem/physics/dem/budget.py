@@ -67,7 +67,7 @@ work done by blocks that touch the particles."""
 
 
 class Budget(engine.Budget[Simulation, int]):
-    """The account of one simulation. running: a CYC or IMPLE goes on."""
+    """The account of one simulation. running: a CYC or IMPLE continues."""
 
     def __init__(self) -> None:
         super().__init__(STORED, FLOWS, 0)
@@ -239,7 +239,7 @@ def _stored_bins(sim: Simulation, whole_step: bool = True) -> np.ndarray:
 
 
 def _own_pairs(sim: Simulation) -> tuple[Any, ...]:
-    """Pairs and laws of the user, for their sums of energy."""
+    """Pairs and user laws, for their sums of energy."""
     lists, p = sim.lists, sim.particles
     return (
         lists.n_blocks, p.hot, p.ihot, *lists.blocks, lists.ptr, lists.partner, lists.fs, sim.pair_laws,

@@ -3,7 +3,7 @@ are rebuilt.
 
 Lists hold all pairs that can meet while nobody goes farther than half the skin (a fast particle: its reach). Where one
 has gone farther, most often nothing has happened: a pair is missed only if both went towards each other. If one was,
-the run stops, as forces are missing in it. What is asked depends on places alone: the answer is the same on any
+the run stops, as forces are missing in it. What is queried depends on places alone: the answer is the same on any
 ranks.
 """
 

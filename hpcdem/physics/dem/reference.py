@@ -85,7 +85,7 @@ def wall_forces(
     """Contacts with walls: forces (n, 3) [N, N, N m], and shear forces (m,) [N] and sides (m,) of all slots after the
     step. walls (w, 7): walls.py; slots (m, 2): row of the particle, of the wall; wall_laws (w, materials, 4)."""
     force, fs, new_side = np.zeros((len(hot), 3)), fs.copy(), np.zeros(len(slots))
-    goes_on = np.full(len(slots), -1)  # the slot of another wall that the disc meets and that goes on from this end
+    goes_on = np.full(len(slots), -1)  # the slot of another wall that the disc meets and that continues from this end
     for k, (i, w) in enumerate(slots):
         x, r = hot[i, [X, Y]], hot[i, RADIUS]
         q, p1, e = wall_contact(walls[w], x, r, side[k])[-1], walls[w, P1X : P1X + 2], walls[w, P2X : P2Y + 1]

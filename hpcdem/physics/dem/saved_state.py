@@ -53,7 +53,7 @@ from hpcdem.physics.user_files import UnknownLaw
 
 
 def save(sim: Simulation, path: Path | str) -> None:
-    """SAV: write the state. Reads only: a run that saves goes on exactly like one that does not. Collective."""
+    """SAV: write the state. Reads only: a run that saves resumes exactly like one that does not. Collective."""
     engine.save(sim, path, lambda: (state_of(sim), tables_of(sim)))
 
 
@@ -144,7 +144,7 @@ def add_physics(sim: Simulation, name: str, parameters: dict[str, Any]) -> None:
 
 
 MEMORY = "memory"
-"""Of the table of pairs: its columns of what contacts remember of a law of the user begin so."""
+"""Of the table of pairs: its columns of what contacts remember of a user law begin so."""
 CLUMP_STATE = {
     "x": CLUMP_X, "y": CLUMP_Y, "vx": CLUMP_VX, "vy": CLUMP_VY, "spin": CLUMP_SPIN, "angle": CLUMP_ANGLE, "area": AREA,
     "inertia": MOMENT,
@@ -196,8 +196,8 @@ def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
 
 
 def restore_newest(sim: Simulation, folders: list[Path], before: float = math.inf) -> dict[str, Any] | None:
-    """Take the newest whole checkpoint among the .sav files of some folders; None if there is none. before: that of
-    this time of the model [s] or the last one before it, UsageError if there is none. Collective.
+    """Take the newest whole checkpoint among the .sav files of some folders; None if missing. before: that of
+    this time of the model [s] or the last one before it, UsageError if missing. Collective.
 
     The newest is the one that is farthest in the script, then that of the latest step: clocks may go wrong. What an
     earlier run left in a folder does not count. Returns what `restore` returns, and "path". A damaged file is named in
@@ -212,8 +212,8 @@ def restore_newest(sim: Simulation, folders: list[Path], before: float = math.in
 
 
 def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Tables) -> None:
-    """Take a state that was read; tables: this rank's slabs, which are let go of. UnknownLaw if it has a law of the
-    user that was not named. Collective."""
+    """Take a state that was read; tables: this rank's slabs, which are let go of. UnknownLaw if it has a user
+    law that was not named. Collective."""
     laws = user_laws.ModelLaws.restored(state, sim)
     sim.clear()
     sim.own_laws, sim.stamp = laws, state.get("stamp", 1)
@@ -273,7 +273,7 @@ def histories(
 ) -> Histories:
     """What the particles of this rank remember, gid (n,) i8: ascending over all ranks. Collective.
 
-    pairs: each pair once, on any rank: gid < partner, fs, extra, bond, memory of a law of the user; walls: gid, wall,
+    pairs: each pair once, on any rank: gid < partner, fs, extra, bond, memory of a user law; walls: gid, wall,
     fs, extra (see `Histories`).
     """
     columns = sum(name.startswith(MEMORY) for name in pairs)

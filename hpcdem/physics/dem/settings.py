@@ -8,7 +8,7 @@ from dataclasses import dataclass
 @dataclass
 class Settings:
     """SI units. Intervals are in steps, 0 is off. `dt` and `frac`: the one given last counts, the other is 0. gentry:
-    attempts of GEN per particle asked for, 0 while not set. thickness: of the model, for pressures and stresses.
+    attempts of GEN per particle requested, 0 while not set. thickness: of the model, for pressures and stresses.
     units: that the user says to work in (core.units.SYSTEMS), "" none. restitution: 1 without dashpots."""
 
     dt: float = 0.0

@@ -79,7 +79,7 @@ class ParticlePhysics(Protocol):
 class Simulation(Model):
     """One model of particles on one communicator, see `Model`.
 
-    watchers: see `Watcher`; resume_advice: what the user is told to use after a stop with a checkpoint;
+    watchers: see `Watcher`; resume_advice: what the user is advised to use after a stop with a checkpoint;
     draws: DRAW makes pictures; lost: particles that left the BOX so far; rows: first id of each row of GLINE and the
     one after its last; physics: on the particles, beside their motion, in the order in which they act; fast: particles
     with a reach of their own in the lists (physics/dem/kernels/fast.py); energy: the account of SET energy
@@ -114,7 +114,7 @@ class Simulation(Model):
         super().__init__(comm, threads, outdir, log, stop, balance_on)
         self.folder_made = False
         self.job: Any = None  # runtime.run_folder.Job: what was started
-        self.resumed = False  # goes on from a checkpoint that lies where it writes
+        self.resumed = False  # resumes from a checkpoint that lies where it writes
         self.restored: tuple[Path, int] | None = None  # the checkpoint that the script named, and its step
         self.keep = Retention()
         self.watchers: list[Watcher] = []
@@ -145,9 +145,9 @@ class Simulation(Model):
         self.breaks = np.zeros(2, np.int64)
         self.bonds = 0
         self.bonds_looked_at: tuple[float, ...] = ()  # state of the last look for bonds of two shear stiffnesses
-        self.step_limit = math.inf  # the lowest estimate of the critical time step that was told
+        self.step_limit = math.inf  # the lowest estimate of the critical time step that was reported
         self.told_share = 0.0  # the largest part of the stability limit that the log told of
-        self.next_watch = 0  # the step from which on it is looked at again
+        self.next_watch = 0  # the step from which on it is checked again
         self.lost = 0
         self.rows: list[tuple[int, int]] = []
         self._named: set[int] = set()
@@ -362,7 +362,7 @@ class Simulation(Model):
             least=self.rebuild_state.columns, left=lambda leave, to: self.trail.note(p["gid"][leave], to),
         )  # fmt: skip
         p.set_owned(hot, cold, rigid[0] if rigid else None, more)
-        if self.pace is not None and self.own_laws.loops is None:  # laws of users are compiled for one number
+        if self.pace is not None and self.own_laws.loops is None:  # user laws are compiled for one number
             self.threads = self.pace.choose(p.n_own, self.timers, self.clock.step)
         return cell, p["gid"]
 

@@ -41,7 +41,7 @@ class Walls:
         return int(at[0]) if len(at) else None
 
     def row(self, wall_id: int) -> int:
-        """Row of the wall with this id; CommandError if there is none."""
+        """Row of the wall with this id; CommandError if missing."""
         at = self.find(wall_id)
         if at is None:
             known = ", ".join(map(str, self.id[self.side == 0])) or "none"

@@ -66,7 +66,7 @@ class Assignments(Settings):
         self.face_row = sparse_zeros(4 * elements, np.int32)
         self.stress0 = None
         self.stress0_row = sparse_zeros(elements, np.int32)
-        """Row of the element models for whose moduli it was said; 0: the element had no model yet."""
+        """Row of the element models for whose moduli it was set; 0: the element had no model yet."""
 
     def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a model (model.blocks.properties) with all its properties to elements."""
@@ -132,7 +132,7 @@ class Assignments(Settings):
 
     def _note_moduli(self, at: np.ndarray) -> None:
         """Initial stresses of elements that had no model belong to the moduli of the one that they have now; where
-        nothing was said of the stress across the plane, it is that of plane strain, in plane stress 0."""
+        nothing was assigned to the stress across the plane, it is that of plane strain, in plane stress 0."""
 
         def note() -> tuple[np.ndarray, np.ndarray | None]:
             new = at[self.stress0_row[at] == 0]

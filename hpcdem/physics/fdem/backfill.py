@@ -1,4 +1,4 @@
-"""Where elements lie that come back after they were taken out: pure functions of arrays.
+"""Where elements lie that come back after they were removed: pure functions of arrays.
 
 Points that they share with elements that stayed are where these are now. The others follow by the harmonic extension of
 their displacement (Laplace's equation on the elements that come back, linear triangles or tetrahedra): a field that is
@@ -87,7 +87,7 @@ def deepest(
     cells: np.ndarray, places: np.ndarray, new: np.ndarray, old: np.ndarray, allowed: float
 ) -> tuple[int, int, float] | None:
     """The first new element into which an old one reaches by more than `allowed` [m], that one, and how far; None if
-    there is none. places (ne, 4, dim) [m] of all corners; new, old: element numbers."""
+    missing. places (ne, 4, dim) [m] of all corners; new, old: element numbers."""
     if not len(old):
         return None
     middle, far, there = np.zeros((len(cells), places.shape[2])), np.zeros(len(cells)), np.concatenate([new, old])

@@ -4,7 +4,7 @@ elements by the mean of their corners, of joints by that of their two ends (whic
 A row of properties holds the largest value of such a table, and by it go masses, time steps and contact: they hold for
 all temperatures. Kernels read what is made of it here, each time temperatures have changed. Young's modulus is carried
 by both Lame constants alike (Poisson's ratio stays); stress is that of the strain by the present modulus, also the part
-that was said as initial stress, at the temperature at which the element is free of thermal stress.
+that was set as initial stress, at the temperature at which the element is free of thermal stress.
 """
 
 from __future__ import annotations

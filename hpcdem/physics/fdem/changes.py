@@ -21,7 +21,7 @@ from hpcdem.physics.fdem.user_laws import MARK
 VECTORS = "position", "displacement", "velocity"
 TORN = 0.1
 """Where the corners that meet in a point are farther apart than this much of the mean edge, the body is torn there:
-elements that come back do not hang together with it. Others may reach into them by as much."""
+elements that come back are not connected with it. Others may reach into them by as much."""
 
 
 def crack(sim: Blocks, joints: Numbers) -> None:
@@ -74,7 +74,7 @@ def null(sim: Blocks, elements: Numbers, relax: float = 0.0) -> None:
 
 def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str, Value]) -> None:
     """Assign a model (model.blocks.properties) with all its properties to elements; None: to all that are there.
-    Elements among these numbers that were taken out come back (see `_bring_back`)."""
+    Elements among these numbers that were removed come back (see `_bring_back`)."""
     asked = np.flatnonzero(sim.alive)
     if elements is not None:
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
@@ -94,8 +94,8 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
 
 
 def _bring_back(sim: Blocks, back: np.ndarray) -> None:
-    """Elements (n,) that were taken out are there again, of new material: free of strain and initial stress where
-    the void is now (backfill.py), moving with it. Faces between them, and to elements around them, hang together
+    """Elements (n,) that were removed are there again, of new material: free of strain and initial stress where
+    the void is now (backfill.py), moving with it. Faces between them, and to elements around them, are connected
     without joints and loads, unless they are cracks of the mesh or the body is torn there."""
     mesh, allowed = sim.the_mesh(), TORN * sim.mean_edge
     cells, n_points = mesh.cells, len(mesh.points)
@@ -225,7 +225,7 @@ def _forces_left_behind(sim: Blocks, dying: np.ndarray) -> tuple[np.ndarray, np.
     seen = sim.evaluate()
     local, dim = sim.local, sim.dim
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    # Common nodes: the forces of the dying corners fall to the lowest corner that stays. Every node is looked at by
+    # Common nodes: the forces of the dying corners fall to the lowest corner that stays. Every node is checked by
     # the owner of that corner.
     begin, corner_at = local.nodes.pulled
     if len(corner_at):
@@ -295,7 +295,7 @@ def reset_displacement(sim: Blocks, nodes: Numbers = None) -> None:
 
 def reset_state(sim: Blocks, elements: Numbers = None) -> None:
     """That elements have yielded is forgotten: their state bits, and plastic strain is counted from here on. Stresses
-    stay, and so does the plastic strain that they depend on. State variables of laws of the user take their initial
+    stay, and so does the plastic strain that they depend on. State variables of user laws take their initial
     values. Where no element has a model that remembers something the log says that nothing was changed."""
     at = sim.numbers_of_elements(elements)
     if "plastic" in sim.cold:
@@ -371,7 +371,7 @@ def repeat(sim: Blocks, rows: np.ndarray) -> None:
 
 
 def _weighted(values: np.ndarray, weight: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
-    """Weighted means (n, c) of values (m, c) by place `at` (m,), added in their order; zero where there is none."""
+    """Weighted means (n, c) of values (m, c) by place `at` (m,), added in their order; zero where missing."""
     total, out = np.bincount(at, weight, minlength=n), np.zeros((n, values.shape[1]))
     np.add.at(out, at, values * weight[:, None])
     return np.divide(out, total[:, None], out=out, where=total[:, None] > 0.0)

@@ -48,7 +48,7 @@ class Traction:
 
 @dataclass(frozen=True)
 class Relaxation:
-    """Forces that elements which were taken out leave behind: corners (element * 4 + k), forces (n, 2) [N/m], from
+    """Forces that elements which were removed leave behind: corners (element * 4 + k), forces (n, 2) [N/m], from
     when on and for how long they die down (model time, or steps in static mode)."""
 
     corner: np.ndarray
@@ -68,7 +68,7 @@ class Conditions(InitialStress):
         self.loads: list[Traction] = [Traction()]
         self.relaxations: list[Relaxation] = []
         self.sided = False
-        """Conditions were said of single sides of points: corners of one node may have different rows."""
+        """Conditions were assigned to single sides of points: corners of one node may have different rows."""
         self._acting: list[NodeCondition] | None = None
         self._make_conditions(0)
 
@@ -228,7 +228,7 @@ class Conditions(InitialStress):
         return 1 + most[cells[at]]
 
     def _make_older(self, others: np.ndarray, changes: dict[str, Any]) -> None:
-        """What was said before of other corners of these nodes gives way, as long as they are one node."""
+        """What was assigned before to other corners of these nodes gives way, as long as they are one node."""
         for row in np.unique(self.corner_row[others]).tolist():
             one, older = self.conditions[row], 0
             for k, axis in enumerate("xyz"):
@@ -463,14 +463,14 @@ class Conditions(InitialStress):
 
 
 def change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
-    """Give objects `at` rows with these changes, which are added where there is none."""
+    """Give objects `at` rows with these changes, which are added where missing."""
     old = column[at]
     for row in np.unique(old).tolist():
         column[at[old == row]] = _row_of(rows, replace(rows[row], **changes))
 
 
 def _row_of(rows: list, wanted: Any) -> int:
-    """The row of this one, a new one if there is none."""
+    """The row of this one, a new one if missing."""
     if wanted not in rows:
         rows.append(wanted)
     return rows.index(wanted)

@@ -14,7 +14,7 @@ from hpcdem.physics.fdem.kernels import joint_law
 from hpcdem.physics.fdem.simulation import Blocks
 
 RATIO = 1e-5
-"""Balance at which a model counts as being at rest, if nothing else is asked for."""
+"""Balance at which a model counts as being at rest, if nothing else is requested."""
 EVERY = 50
 """Steps between two looks at the balance."""
 WINDOW = 20_000
@@ -26,7 +26,7 @@ BETTER = 0.9
 SLIDES = 0.2
 """Every corner of a body that slides has this part of its mean velocity at least; held ones do not move."""
 LIMIT_STATIC, LIMIT_DYNAMIC = 1_000_000, 10_000_000
-"""Steps after which a run towards a ratio has failed, if nothing else is said."""
+"""Steps after which a run towards a ratio has failed, if nothing else is given."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,10 @@ class Solved:
 class Watch:
     """Whether a run towards a ratio gets anywhere. It goes by global numbers, so it says the same on all ranks.
 
-    window: steps in which the least ratio must fall by a tenth, 0: any number. Since what came slowly so far may go on
-    slowly, it is never shorter than the way from the beginning to the last progress. When a joint breaks that begins
-    again. limit: steps in all, 0: any number. began, changed, progress: steps at which the run began, the last joint
-    broke, the ratio was last better; least: the ratio then; broken: joints then.
+    window: steps in which the least ratio must fall by a tenth, 0: any number. Since what came slowly so far may
+    continue slowly, it is never shorter than the way from the beginning to the last progress. When a joint breaks that
+    begins again. limit: steps in all, 0: any number. began, changed, progress: steps at which the run began, the last
+    joint broke, the ratio was last better; least: the ratio then; broken: joints then.
     """
 
     window: int
@@ -74,7 +74,7 @@ class Watch:
 
 @dataclass(frozen=True)
 class Moving:
-    """A body (elements that hang together) that moves: number of elements, the lowest of them, its middle [m], its
+    """A body (elements that are connected) that moves: number of elements, the lowest of them, its middle [m], its
     velocity [m/s; in static mode m per step]."""
 
     elements: int
@@ -108,7 +108,7 @@ def solve(
     limit: int | None = None,
 ) -> Solved:
     """Step until the sum of unbalanced over the sum of contributing nodal forces falls below `ratio` (1e-5 if none
-    of the three is given), or after so many steps, or so much model time [s], whatever comes first.
+    of the three is given), or after so many steps, or so much model time [s], whichever is first.
 
     every: steps between two looks at the ratio. window, limit: see `watch`; they end the run without equilibrium.
     """

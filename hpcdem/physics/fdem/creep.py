@@ -2,7 +2,7 @@
 
 A creep step: the stress of the present positions is what it begins with (`begin`); the model is brought into balance,
 by relaxation or at once, with elements that creep for dt at their new positions (kernels/creep.py); then they remember
-it (`finish`). It ends at the balance that is asked for, so the stress at its end is as good as that.
+it (`finish`). It ends at the balance that is requested, so the stress at its end is as good as that.
 """
 
 from __future__ import annotations

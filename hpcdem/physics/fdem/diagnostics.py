@@ -29,7 +29,7 @@ from hpcdem.physics.fields import FIELDS, kinds
 
 @dataclass(frozen=True)
 class Quantity:
-    """One quantity that can be asked for by number: what it belongs to (element, node, joint), unit, meaning; framed:
+    """One quantity that can be requested by number: what it belongs to (element, node, joint), unit, meaning; framed:
     it stands in frames; dims: dimensions of space in which it is there. Units are those of the plane, see `unit_of`."""
 
     on: str
@@ -192,7 +192,7 @@ _AT_POINTS = tuple(f"{name}_stress_{point}" for name in ("normal", "shear") for 
 
 
 def probe(sim: Blocks, name: str, numbers: Numbers = None) -> Probe:
-    """A quantity of these elements, nodes or joints (None: all), to be asked for again and again. CommandError if
+    """A quantity of these elements, nodes or joints (None: all), to be requested again and again. CommandError if
     there is no such quantity or number. Collective."""
     on = quantity(sim, name).on
     some = numbers_on(sim, on, numbers)
@@ -217,7 +217,7 @@ def total(sim: Blocks, name: str, numbers: Numbers = None) -> float:
 
 
 def quantity(sim: Blocks, name: str) -> Quantity:
-    """The quantity of this name. CommandError if there is none. Not collective."""
+    """The quantity of this name. CommandError if missing. Not collective."""
     if name not in QUANTITIES and name in user_laws.quantities(sim):
         return Quantity("element", user_laws.unit(name), "state variable of a user law")
     there = [one for one, about in QUANTITIES.items() if sim.dim in about.dims]
@@ -261,7 +261,7 @@ def owned_values(sim: Blocks, on: str, names: Sequence[str]) -> dict[str, np.nda
 
 def columns_of(sim: Blocks, on: str, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
     """Columns of some of this rank's elements (at: the how-manieth of the owned ones), nodes (points) or joints
-    (lower faces); at None: of all. With their "number", and perhaps more than was asked for. Collective, but for
+    (lower faces); at None: of all. With their "number", and perhaps more than was requested. Collective, but for
     single nodes and elements."""
     made = {"element": _element_columns, "node": _node_columns, "joint": _joint_columns}
     return made[on](sim, names, at)
@@ -438,7 +438,7 @@ def corners_of_field(sim: Blocks, name: str) -> np.ndarray:
 
 def corner_values(sim: Blocks, name: str, corners: np.ndarray | None = None) -> np.ndarray:
     """(4 ne, 2), in space (4 ne, 3), position [m], displacement [m] or velocity [m/s] of every corner (element * 4 +
-    k), on all ranks; NaN where there is none. corners: only these, NaN for the others. Collective."""
+    k), on all ranks; NaN where missing. corners: only these, NaN for the others. Collective."""
     names = [f"{name}_{axis}" for axis in "xyz"[: sim.dim]]
     columns = owned_values(sim, "corner", names)
     rows = np.column_stack([columns["number"].astype(float), *(columns[one] for one in names)])
@@ -503,7 +503,7 @@ def _joint_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = No
 
 
 def _gaps(sim: Blocks, lower: np.ndarray) -> np.ndarray:
-    """Mean opening and slip (n, 2) [m] of edges of which the faces do not hang together, as joints have them
+    """Mean opening and slip (n, 2) [m] of edges of which the faces are not connected, as joints have them
     (`joints.openings`, in space `joints_space.faces_now`): between the corners of one point. Collective."""
     mesh, flat = sim.the_mesh(), sim.the_mesh().cells.reshape(-1)
     mine, over = mesh.face_corners(lower), mesh.face_corners(sim.partner[lower])
@@ -667,7 +667,7 @@ def joint_counts(sim: Blocks) -> tuple[int, int, int]:
 
 
 def unbalanced_ratio(sim: Blocks) -> float:
-    """Sum of |unbalanced| over sum of |contributing| forces at the nodes, of the present positions; 0 if there are none
+    """Sum of |unbalanced| over sum of |contributing| forces at the nodes, of the present positions; 0 if missing
     but by rounding, see floors.py. Collective."""
     seen, local, own = sim.evaluate(), sim.local, sim.owned
     felt, outside = seen.felt[local.nodes.mine], seen.outside[local.nodes.mine]

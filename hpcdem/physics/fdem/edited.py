@@ -24,7 +24,7 @@ class Edited(State):
 
     local: Local
     _state_given = False
-    """A stress, or what must bear it, was said before anything moved, and is still to be looked at."""
+    """A stress, or what must carry it, was set before anything moved, and is still to be checked."""
 
     @abstractmethod
     def open_model(self) -> None:
@@ -137,7 +137,7 @@ class Edited(State):
         it; "relax": a static stage moves them apart; "keep": they start as they are. deep_overlap ("warn"): of bodies
         that come to overlap by more than a tenth of an altitude: say where; "stop": end the run. potential
         ("distance"): of contact in space, see `settings.POTENTIAL`. plane_stress (off): a model of the plane is a
-        plate whose faces bear nothing; off: in plane strain. Said before stress and steps are."""
+        plate whose faces are stress-free; off: in plane strain. Said before stress and steps are."""
         before = self.options.dynamic
         if plane_stress not in (None, self.options.plane_stress) and self.clock.step > 0:
             raise CommandError(f"model plane-{'stress' if plane_stress else 'strain'} must precede the first step")

@@ -6,7 +6,7 @@ Positions of all nodes are known to every rank meanwhile. Below dim is 2, in spa
 
 What elements that yield remember is that of the last balance while Newton's method looks for the next one, whatever it
 tries on the way: `Local.evaluation` puts everything back. They flow where balance was found, never before: what has
-changed since the last one (temperatures, moduli, strengths, stresses that were said, loads) is borne by the strain of
+changed since the last one (temperatures, moduli, strengths, stresses that were set, loads) is borne by the strain of
 the whole increment.
 """
 
@@ -55,7 +55,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 AIM = 1e-12
 """Balance that is aimed at; rounding ends the iteration where coordinates are large."""
 ENOUGH = 1e-8
-"""Balance that must be reached, unless something else is asked for."""
+"""Balance that must be reached, unless something else is requested."""
 MOST = 60
 """Iterations after which there is no hope."""
 RENEW = 0.1
@@ -74,7 +74,7 @@ STILL = 1e-6
 """Change of stress by flow, over the largest stress, that does not count, where one flow makes the next one necessary:
 strength that follows tables, quads."""
 MUCH = 1e-3
-"""The same at the beginning, from which on elements are outside by what was said since they last flowed: then they flow
+"""The same at the beginning, from which on elements are outside by what was set since they last flowed: then they flow
 at the whole load only, however many increments lead there."""
 BEFORE, AFTER = "temperature before", "temperature after"
 """Columns of elements during a solve: temperatures of the last balance, and those of this one."""
@@ -99,7 +99,7 @@ class Balanced:
 
 @dataclass
 class _Balance:
-    """What Newton's method came to: positions (nn, dim), unbalanced over all forces, iterations, factors, joints behind
+    """What Newton's method came to: positions (nn, dim), unbalanced over all forces, iterations, factors, joints past
     their peak; error: why this is no balance, "" if it is; ratios: on the way; total: sum of forces [N/m]."""
 
     x: np.ndarray
@@ -135,10 +135,10 @@ def solve_elastic(
 ) -> Balanced:  # fmt: skip
     """Put the model into static equilibrium with the loads of this moment, at once.
 
-    Elements are elastic or yield after Mohr and Coulomb. Joints must stay before their peak, or, with `softening`, may
+    Elements are elastic or yield after Mohr-Coulomb. Joints must stay before their peak, or, with `softening`, may
     pass it and break, one after the other. Without either of these the answer does not depend on the way, and is the
     one to which relaxation goes. Prescribed velocities act for `cycles` units of time (static mode), what elements that
-    were taken out left behind has died down, velocities are zero afterwards. Counts as `cycles` steps.
+    were removed left behind has died down, velocities are zero afterwards. Counts as `cycles` steps.
 
     ratio: unbalanced over contributing forces that must be reached; what rounding allows is aimed at. solver:
     "direct" (SciPy on rank 0: the same bits on any number of ranks), "petsc", "auto": PETSc, if it is there, from
@@ -149,7 +149,7 @@ def solve_elastic(
     they have changed since; they are brought on in the same increments where elements yield.
 
     CommandError, with the model as it was: a body that can move freely, conditions without equilibrium, surfaces
-    that touch (before or in the answer), laws of users, joints behind their peak (before or in the answer), no
+    that touch (before or in the answer), user laws, joints past their peak (before or in the answer), no
     convergence.
     """
     for load in sim.surface_loads:
@@ -317,7 +317,7 @@ def _mean_conditions(sim: Blocks, cycles: int) -> np.ndarray:
 
 
 def refuse_changing_tables(sim: Blocks, what: str) -> None:
-    """CommandError if conditions of the blocks go on to change while implicit steps count no static ones."""
+    """CommandError if conditions of the blocks continue to change while implicit steps count no static ones."""
     for name in sim.changing_tables():
         raise CommandError(
             f"table '{name}' of a condition still changes with static steps, which {what} do not count. Reach its end "
@@ -376,7 +376,7 @@ def _ways(along: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def refuse_loose_bodies(sim: Blocks, nodes: Nodes, unknowns: Unknowns) -> None:
-    """CommandError naming a body that can move as a whole: its three rigid movements, in space six, are looked at where
+    """CommandError naming a body that can move as a whole: its three rigid movements, in space six, are checked where
     nodes are held (the smallest eigenvalue of the sum of squares of the movements there)."""
     hold = np.where((sim.closed_faces() & np.repeat(sim.alive, 4)), sim.partner, -1)
     of_elements, dim = connectivity.bodies(hold), sim.dim
@@ -615,7 +615,7 @@ def _balance(
     missing: np.ndarray, given: float, step: int, softening: bool, smallest: bool, flows: bool,
 ) -> _Balance:  # fmt: skip
     """Balance of an increment, see `_newton`, where elements that can yield have flowed, if `flows`, and joints have
-    opened; as it was, if there is none. smallest: more than one joint may pass its peak in it.
+    opened; as it was, if missing. smallest: more than one joint may pass its peak in it.
 
     One balance makes the next one necessary, as in steps, where strength follows tables and falls by the flow, in
     quads, where the two triangles of an overlay share their pressure after the flow and one may then flow on, and where
@@ -821,14 +821,14 @@ def _node_forces(sim: Blocks, seen: Evaluation) -> np.ndarray:
 def tangent(
     sim: Blocks, matrices: bool = True, flows: bool = True, softening: bool = False
 ) -> tuple[list[Pieces], int]:
-    """Stiffness of the owned elements and joints at the present positions, and how many joints are behind their peak,
+    """Stiffness of the owned elements and joints at the present positions, and how many joints are past their peak,
     see `of_joints`. flows: less what the flow of elements takes from it. Collective, as its parts are."""
     joints, past = of_joints(sim, softening)
     return ([*of_elements(sim, flows), *joints] if matrices else []), past
 
 
 def of_joints(sim: Blocks, softening: bool = False) -> tuple[list[Pieces], int]:
-    """Stiffness of the owned joints at the present positions, and how many are behind their peak; with softening, those
+    """Stiffness of the owned joints at the present positions, and how many are past their peak; with softening, those
     that pass it now."""
     sim.prepare_kernels(TANGENT[sim.dim])
     local, slots, size = sim.local, _lower_slots(sim), 2 * sim.dim * sim.dim

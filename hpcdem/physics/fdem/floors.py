@@ -42,7 +42,7 @@ def rounding(sim: Blocks) -> float:
 
 
 def ratio(sim: Blocks, unbalanced: float, total: float) -> float:
-    """Unbalanced forces over all forces; 0 if there are none but by rounding. Collective."""
+    """Unbalanced forces over all forces; 0 if only rounding remains. Collective."""
     if total == 0.0 or not math.isfinite(total):
         return 0.0 if total == 0.0 else math.inf
     at_rest = total < nothing(sim) and unbalanced <= rounding(sim)

@@ -1,4 +1,4 @@
-"""Free-field sides: columns of ground beyond the sides of a model, through which the motion of an earthquake goes on.
+"""Free-field sides: columns of ground beyond the sides of a model, through which the motion of an earthquake continues.
 
 Beside a vertical side the ground without what is modelled is a column that moves alike at every x: a chain of nodes at
 the heights of the nodes of the side, with the elastic constants, density and damping of its elements, and the base that
@@ -56,7 +56,7 @@ class FreeField(SurfaceLoad):
         self.nodes: dict[str, np.ndarray] = {name: np.zeros((0, n), of) for name, (of, n) in _NODES.items()}
         self._wrong: str | None = None
 
-    # ---- what is said --------------------------------------------------------------------------------------------
+    # ---- what is given --------------------------------------------------------------------------------------------
 
     @staticmethod
     def create(blocks: Blocks, chosen: Numbers) -> None:

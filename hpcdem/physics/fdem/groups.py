@@ -59,7 +59,7 @@ class Groups:
         return groups[group]
 
     def of_set(self, set_name: str) -> dict[str, np.ndarray]:
-        """The groups of a set. CommandError if there is none."""
+        """The groups of a set. CommandError if missing."""
         if set_name not in self.sets:
             raise CommandError(f"there is no set '{set_name}' of {self.kind}s; there is {_listed(self.sets)}")
         return self.sets[set_name]

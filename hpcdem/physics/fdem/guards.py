@@ -46,7 +46,7 @@ def _of_users(sim: State) -> list[str]:
 
 
 def _whole_speed(sim: State, v: np.ndarray) -> np.ndarray:
-    """Largest speed of a corner of elements [m/s]; the fourth corner of quads is not asked for."""
+    """Largest speed of a corner of elements [m/s]; the fourth corner of quads is not used."""
     corners = v[:, :6].reshape(len(v), 3, 2) if sim.dim == 2 else v.reshape(len(v), 4, 4)
     return np.sqrt((corners * corners).sum(axis=2)).max(axis=1)
 

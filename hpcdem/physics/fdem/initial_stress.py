@@ -30,7 +30,8 @@ class InitialStress(Assignments):
         """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y, in space in z)
         at the centroid as it lies in the mesh, of six-node triangles at their Gauss points. It is the stress of a
         strain by the moduli of this moment, and changes with them, see `initial_stresses`. In the plane zz, if nothing
-        is said of it, is that of plane strain, Poisson's ratio times xx + yy, and in space and in plane stress 0."""
+        is assigned to it, is that of plane strain, Poisson's ratio times xx + yy, and in space and in plane stress
+        0."""
         at = self.numbers_of_elements(elements)
         mesh, values = self._mesh(), self.per_node(lambda: self._initial(at, xx, yy, xy, zz, gradient, xz, yz))
         self.before_change()
@@ -72,7 +73,7 @@ class InitialStress(Assignments):
     def initial_stresses(self, elements: np.ndarray) -> np.ndarray:
         """Stress [Pa] (n, 4), in space (n, 6), of elements (n,) at zero strain, by their present moduli.
 
-        What was said fixes a strain: mean stress over 3 K and deviator over 2 G with the moduli of that moment. So the
+        What was set fixes a strain: mean stress over 3 K and deviator over 2 G with the moduli of that moment. So the
         mean follows the bulk modulus and the deviator the shear modulus. (In plane stress both are of the plane, and
         the bulk modulus K_2, see moduli.py.)"""
         assert self.stress0 is not None

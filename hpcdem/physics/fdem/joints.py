@@ -1,5 +1,5 @@
 """The joints of the elements that a rank holds, in the plane and in space: which law each has, what it remembers, and
-what is asked of them between steps. `Local` and `LocalSpace` say where their faces lie and have the loops of a step.
+what is queried of them between steps. `Local` and `LocalSpace` say where their faces lie and have the loops of a step.
 
 A joint has a *slot* for each of its sides, the face of an owned element; both sides compute it, each by its own slot.
 """
@@ -68,7 +68,7 @@ class Joints(NamedTuple):
 
 class JointTables:
     """slots: how many there are; by slots face, law (0: loops of elements leave it out), kind, state and history, see
-    joint_law.py; head, follow: lists of those behind their peak, `lists` of them for each `listed` slots, of the first
+    joint_law.py; head, follow: lists of those past their peak, `lists` of them for each `listed` slots, of the first
     `in_lists` slots; link: where the other side begins in x, in space each of its corners; size (slots,) [1/m], in
     space: one over the length; first_slot: of owned elements, None: four each; sides: joints of hexahedra."""
 
@@ -137,12 +137,12 @@ class JointTables:
             )
 
     def _put_histories(self) -> None:
-        """Joints behind their peak take their places; histories are in storage order."""
+        """Joints past their peak take their places; histories are in storage order."""
         histories = self.sim.histories
         at = np.flatnonzero(histories.keys() < 0)
         slot, was = self._first_slot(histories.owners()[at]) - 1 - histories.keys()[at], histories.rows[at, STATE]
         now = self.slot_state[slot]
-        there = now != NONE  # else opened meanwhile, or its partner was taken out
+        there = now != NONE  # else opened meanwhile, or its partner was removed
         there &= (now == was) | (np.maximum(now, was) <= BROKEN)  # else it has another law now
         slot, rows = slot[there], histories.rows[at[there]]
         self.slot_law[slot], self.slot_state[slot] = 0, rows[:, STATE]
@@ -276,10 +276,10 @@ class JointTables:
         for column, values in zip(columns, kept):
             column[...] = values
 
-    # ---- what is taken out of the tables ---------------------------------------------------------------------------
+    # ---- what is extracted from the tables ---------------------------------------------------------------------------
 
     def _joint_histories(self, transfer: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Owned element (0 ..) and row (histories.py) of each joint behind its peak; with `transfer` without those that
+        """Owned element (0 ..) and row (histories.py) of each joint past its peak; with `transfer` without those that
         are broken."""
         state = self.slot_state
         slots = np.flatnonzero((state > INTACT) & ((state != BROKEN) | (not transfer)))

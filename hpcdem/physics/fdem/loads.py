@@ -1,5 +1,5 @@
 """Forces from outside on corners of the elements that a rank owns: tractions on faces, dashpots of quiet faces, what
-elements left behind that were taken out, and what other physics push with (surface_loads.py)."""
+elements left behind that were removed, and what other physics push with (surface_loads.py)."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Loads:
         self.applied = np.zeros((len(sim.number) if self.some else 1, width))
 
     def _acting(self, quiet: np.ndarray) -> np.ndarray:
-        """These faces, none in static runs, where that is said."""
+        """These faces, none in static runs, where that is reported."""
         sim = self.sim
         if sim.options.dynamic:
             return quiet
@@ -84,7 +84,7 @@ class Loads:
         self._quiet_place = row[self.quiet, None] * sim.v.shape[1] + 2 * self.ends[self.quiet]
 
     def _make_relaxations(self, stride: int) -> bool:
-        """What elements that were taken out left behind at corners that are owned; whether there is some."""
+        """What elements that were removed left behind at corners that are owned; whether there is some."""
         sim, own = self.sim, self.sim.owned
         parts = [one for one in sim.relaxations if not sim.has_ended(one)]
         corner = np.concatenate([one.corner for one in parts] or [np.empty(0, np.int64)])

@@ -389,7 +389,7 @@ class Local(JointTables):
             sim.n_left, sim.n_own, sim.the_mesh().cells, sim.number, before, after, self.masses.of_motion, out
         )
 
-    # ---- what is taken out of the tables ---------------------------------------------------------------------------
+    # ---- what is extracted from the tables ---------------------------------------------------------------------------
 
     def histories(self, transfer: bool) -> Histories:
         """What joints and contacts of the owned elements remember.

@@ -167,7 +167,7 @@ class Masses:
 
 
 class MassesSpace(Masses):
-    """The true ones are made when they are asked for where steps have no need of them."""
+    """The true ones are made when they are requested where steps have no need of them."""
 
     def __init__(self, local: Any) -> None:
         self.local, self.sim = local, local.sim

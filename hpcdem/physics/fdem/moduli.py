@@ -7,7 +7,7 @@ and
     lambda = K_n - 2 G / n,     K_3 = K,     K_2 = 9 K G / (3 K + 4 G) = E / (2 (1 - nu)),
 
 so lambda is lambda' = 2 lambda G / (lambda + 2 G) in plane stress, and lambda + 2 G = E / (1 - nu^2) the modulus of the
-fastest wave. The laws of elements take lambda and 2 G of here and are told by a column of their tables,
+fastest wave. The laws of elements take lambda and 2 G of here and are given by a column of their tables,
 `elements.FREE`, that the strain across the plane is free.
 """
 
@@ -31,7 +31,7 @@ class Moduli(NamedTuple):
 
 
 def moduli(rows: Rows, plane_stress: bool) -> Moduli:
-    """Those of the models of elements that were given; zero where there is none."""
+    """Those of the models of elements that were given; zero where missing."""
     bulk, shear = (np.array(rows.column(name)) for name in ("bulk", "shear"))
     if not plane_stress:
         return Moduli(bulk, shear, bulk - 2.0 / 3.0 * shear, bulk + 4.0 / 3.0 * shear, [0, 1, 3])

@@ -32,7 +32,7 @@ class Contradiction(Exception):
 class NodeCondition:
     """What is prescribed at nodes. does_x, _y, _z: moving.FREE, VELOCITY, ACCELERATION; at_x, _y, _z: its value; force;
     constraint (moving.UNBOUND, ..., in space space.ACROSS too) and its unit vector. older: bits of the components of
-    motion (1, 2, 4) and force (8, 16, 32) that were said anew of other corners of the node: they count once these are
+    motion (1, 2, 4) and force (8, 16, 32) that were set anew of other corners of the node: they count once these are
     nodes of their own. side_x, _y, _z: of the force, 0: shared by all corners at the point, else by those there with
     the same number. part_x, _y, _z: factors of the force. damp: local damping, negative: that of
     the model."""

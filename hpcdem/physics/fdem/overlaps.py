@@ -2,7 +2,7 @@
 where, and how deep.
 
 Contact would throw them apart: an overlap d stores 3/2 P d^2 (1/h_1 + 1/h_2) per area, and the pressure is 60 E d/h at
-P = 10 E. So the first step of a new model is refused, unless overlaps are asked for.
+P = 10 E. So the first step of a new model is refused, unless overlaps are requested.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ ROUNDING = 1e-5
 DEEP = 0.1
 """Overlap over an altitude that is too much: at a third contact lets go of what comes further in."""
 AGAIN = 1.5
-"""It is said again when it has grown by this."""
+"""It is reported again when it has grown by this."""
 NAMED = 5
 """Places that a message names."""
 
 
 def check(sim: State, local: Local) -> None:
-    """At the first step of a new model: CommandError if bodies overlap and that was not asked for. The model is closed.
+    """At the first step of a new model: CommandError if bodies overlap and that was not requested. The model is closed.
     Collective."""
     o = sim.options
     if not o.collision:
@@ -103,7 +103,7 @@ def _deep(sim: State, local: Local) -> np.ndarray:
         one, other, row = pairs.element[first], pairs.element[second], pairs.row[first]
     if len(at):
         pairs.depths_of(at, sim.x, depth)
-    real = (row >= own.start) & (row < own.stop)  # a pair is told by the owner of its first element, or of its face
+    real = (row >= own.start) & (row < own.stop)  # a pair is reported by the owner of its first element, or of its face
     return _gathered(sim, np.column_stack([depth, share[at], np.minimum(one, other), np.maximum(one, other)])[real])
 
 
@@ -140,7 +140,7 @@ def _in_the_plane(sim: State, local: Local) -> np.ndarray:
     depth = np.empty((len(first), 3))
     if len(first):
         contact.depths(first, second, bodies.free, bodies.x_place, sim.x, depth)
-    real = owned[first]  # a pair is told by the owner of its first element
+    real = owned[first]  # a pair is reported by the owner of its first element
     return _named(depth[real], bodies.element[first[real]], bodies.element[second[real]], np.sqrt(sim.areas))
 
 
@@ -149,7 +149,7 @@ def _in_space(sim: State) -> np.ndarray:
     pairs, own = AllPairs(sim), sim.owned
     depth = pairs.depths(sim)
     row = pairs.face_row[pairs.first]
-    real = (row >= own.start) & (row < own.stop)  # a pair is told by the owner of its face
+    real = (row >= own.start) & (row < own.stop)  # a pair is reported by the owner of its face
     first, second = pairs.first[real], pairs.second[real]
     return _named(depth[real], pairs.face[first] // 4, pairs.element[second], np.cbrt(sim.areas))
 

@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 
 MANY = 1 << 16
-"""Elements that are looked at together."""
+"""Elements that are checked together."""
 OF_CONTACTOR = [0, 1, 2, 3, 5, 6]
 """Columns of `Surfaces.of_pairs` that a pair has: of T the part of the face, which is the contactor."""
 
 
 class Surface(NamedTuple):
     """The surface of a whole model, one copy per node of the machine. mesh, closed, closed_faces: of which it is;
-    clusters (ne, 4): numbers of the corners, those that hang together have one; faces (k,): free faces, ascending;
+    clusters (ne, 4): numbers of the corners, those that are connected have one; faces (k,): free faces, ascending;
     first (ne,): of each element with a corner on the surface its lowest free face, else the lowest of those that hang
     on its corners, -1: of others; begin, around: faces by cluster; length (ne,) [m]: median altitude of the elements of
     its body in the mesh.
@@ -334,7 +334,7 @@ class ContactSpace:
 
 class AllPairs(ContactSpace):
     """Faces and elements of which the boxes overlap now, of all elements, those inside too. What they remember and do
-    is not asked for."""
+    is not requested."""
 
     def __init__(self, sim: State) -> None:
         faces = Surface.of(sim).faces

@@ -1,4 +1,4 @@
-"""A quantity of a few objects of a model of blocks, asked for again and again, as histories do.
+"""A quantity of a few objects of a model of blocks, requested again and again, as histories do.
 
 Where the objects are is found once per storage; asking then touches them alone. What is combined over ranks is exact:
 each number comes from the one rank that has it, sums are rounded once.
@@ -75,7 +75,7 @@ class Probe(ABC):
         return self.sim.comm, self._mine(seen)
 
     def reduced(self, how: str, seen: Evaluation | Local | None = None) -> float:
-        """sum, mean, minimum or maximum of those that are there, or of "" the first of all; NaN where there is none."""
+        """sum, mean, minimum or maximum of those that are there, or of "" the first of all; NaN where missing."""
         if how == "":
             return float(self.values(seen)[0])
         comm, mine = self._parts(seen)

@@ -1,4 +1,4 @@
-"""Whether a model of blocks can be stepped: what it lacks, and what was said of parts that it does not have."""
+"""Whether a model of blocks can be stepped: what it lacks, and what was assigned to parts that it does not have."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _check_warmth(sim: State) -> None:
 
 
 def check_parts(sim: State) -> None:
-    """CommandError for what was said of parts of the calculation that are not there."""
+    """CommandError for what was assigned to parts of the calculation that are not there."""
     o = sim.options
     if sim.dim == 2 and o.potential != DISTANCE:
         raise CommandError("in two dimensions there is no choice of the potential of contact")

@@ -37,7 +37,7 @@ ARRAYS = {
 
 
 def save(sim: Blocks, path: Path | str, extra: Mapping[str, Any] | None = None) -> None:
-    """Write the state, and `extra` (JSON values) with it. Reads only: a run that saves goes on exactly like one that
+    """Write the state, and `extra` (JSON values) with it. Reads only: a run that saves resumes exactly like one that
     does not. Collective."""
     engine.save(sim, path, lambda: (state_of(sim, extra or {}), tables(sim)))
 
@@ -137,7 +137,7 @@ def restore_part(sim: Blocks, path: Path | str) -> dict[str, Any] | None:
 
 
 def _replicated(table: str) -> bool:
-    """Whether all ranks have all of this table: what is said about the model, see definition.py."""
+    """Whether all ranks have all of this table: what is assigned to the model, see definition.py."""
     return table not in ("state", "memories", checkpoint.LINKS, *SHARED_OUT) and not table.startswith(
         checkpoint.OF_PARTICLES
     )
@@ -157,8 +157,8 @@ def read(comm: Comm, path: Path | str, kind: str, what: str) -> tuple[dict[str, 
 
 
 def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
-    """Take a state and tables that were read. Collective. CommandError, with the model as it was, without the laws of
-    the user that it has."""
+    """Take a state and tables that were read. Collective. CommandError, with the model as it was, without the user
+    laws that it has."""
     user_laws.check_restored(state["scene"])
     user_functions.check_restored(state["scene"])
     sim.clear()

@@ -21,7 +21,7 @@ POTENTIAL = DISTANCE, MUNJIZA = "distance", "munjiza"
 """What contact in space presses with: the distance to the nearest side of an element, over a length of its body, or
 four times the smallest of its barycentric coordinates (Munjiza 2004)."""
 RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
-"""Parts of Rayleigh damping, and the factors of both that make its ratio what was said at its frequency."""
+"""Parts of Rayleigh damping, and the factors of both that make its ratio what was set at its frequency."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Options:
     of flow, of flow_steps sub-steps (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable
     one); thermal: heat flows, in cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise.
     mass_damping [1/s], stiffness_damping [s]: Rayleigh damping, of dynamic runs. static_since: step at which static
-    mode was switched on. plane_stress: a model of the plane is a plate whose faces bear nothing, else in plane strain,
-    see moduli.py."""
+    mode was switched on. plane_stress: a model of the plane is a plate whose faces are stress-free, else in plane
+    strain, see moduli.py."""
 
     gx: float = 0.0
     gy: float = 0.0
@@ -176,7 +176,7 @@ class Settings(Topology):
         changes of the model.
 
         value [s]: it is this. mass_scaling [s]: it is this, and nodes get the mass that makes it stable. auto on: it is
-        estimated again every 100 steps (`estimate_every`), too. Of these three the one that was said last holds and
+        estimated again every 100 steps (`estimate_every`), too. Of these three the one that was set last holds and
         ends the other two; 0 (off) takes it back. safety (0.8): part of the stability limit that is used, by estimates
         and mass scaling.
 

@@ -67,7 +67,7 @@ class Blocks(Edited):
 
     Numbers are those of the mesh, from 0, and know no ranks: elements are rows of `mesh.cells`, nodes are rows of
     `mesh.points`, faces are element * 4 + local edge, joints have the number of their lower face. Arguments called
-    elements, nodes, faces, joints take an array of numbers, or None for all. What is said of a node holds for all
+    elements, nodes, faces, joints take an array of numbers, or None for all. What is assigned to a node holds for all
     corners of elements at that point, and stays with them when joints break. Step and rebuild are here; what acts on a
     model are functions: diagnostics, changes between steps, many steps (convergence), equilibrium at once, saved_state.
 
@@ -79,8 +79,8 @@ class Blocks(Edited):
     # ---- mesh ----------------------------------------------------------------------------------------------------
 
     def take_mesh(self, mesh: Mesh) -> None:
-        """Take a mesh (checked here; equal on all ranks). Elements have no model yet, edges no joints: bodies hang
-        together as ordinary finite elements. Edges in `mesh.cracks` are open from the beginning."""
+        """Take a mesh (checked here; equal on all ranks). Elements have no model yet, edges no joints: bodies are
+        connected as ordinary finite elements. Edges in `mesh.cracks` are open from the beginning."""
         self._take(mesh)
         self._start_with(mesh)
 
@@ -175,7 +175,7 @@ class Blocks(Edited):
             self.open_model()
 
     def _standing_step(self) -> int:
-        """A step of everything but the motion: time passes, blocks stand still."""
+        """A step of everything but the motion: time passes, blocks are at rest."""
         self.clock.step += 1
         self.clock.time += self.clock.dt
         self.surface_loads.follow()
@@ -184,8 +184,8 @@ class Blocks(Edited):
         return int(self.comm.max_into(np.array([self.stop.local_request()], np.int64))[0])
 
     def check_start(self) -> None:
-        """CommandError if a load lacks something, or nothing has moved yet and bodies overlap, unless that was asked
-        for; the model is closed. Collective."""
+        """CommandError if a load lacks something, or nothing has moved yet and bodies overlap, unless that was
+        requested; the model is closed. Collective."""
         readiness.check_parts(self)
         self.surface_loads.check_start()
         if self.untouched and self.options.mechanical:
@@ -259,7 +259,7 @@ class Blocks(Edited):
 
     @contextmanager
     def one_moment(self) -> Iterator[None]:
-        """As long as this lasts the model is only looked at: forces and the energy budget are computed once, however
+        """As long as this lasts the model is only read: forces and the energy budget are computed once, however
         many ask for them."""
         self._known = {}
         try:

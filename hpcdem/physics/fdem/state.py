@@ -36,7 +36,7 @@ class ListState(RebuildState):
     """Skin over the mean edge; stored: age of the storage in steps (`age`: of the contact lists); dt: time step of the
     dynamic mode [s], 0 if it must be estimated, and the step at which it was. step, time: when the contact lists were
     made; dt is the same since then. watched: step of the last look at how deep bodies overlap; deep: the deepest
-    overlap that was said, over an altitude.
+    overlap that was reported, over an altitude.
     """
 
     skin_factor: float = NARROW
@@ -190,7 +190,7 @@ class State(ModelDefinition, Model):
         return plasticity.MEMORY if self.dim == 2 else plasticity.MEMORY_IN_SPACE
 
     def the_mesh(self) -> Mesh:
-        """The mesh; CommandError if there is none."""
+        """The mesh; CommandError if missing."""
         return self._mesh()
 
     def per_node(self, make: Callable[[], T]) -> T:
@@ -201,7 +201,7 @@ class State(ModelDefinition, Model):
 
     def time_now(self) -> float:
         """What tables and functions of conditions of blocks, bolts and liners are read at: model time [s]; in static
-        mode, where it stands still, the static steps since the mode was switched on besides, each a unit of time, or
+        mode, where it is at rest, the static steps since the mode was switched on besides, each a unit of time, or
         with creep the creep time at the end of the creep step."""
         if self.options.dynamic:
             return self.clock.time
@@ -239,8 +239,8 @@ class State(ModelDefinition, Model):
 
     def tell_time_step(self, dt: float, critical: float, added: float) -> None:
         """A line in the log about the time step [s]; critical: stability limit times safety factor [s]; added: mass
-        that mass scaling adds, over the true mass. A step that is followed (auto) is told again when it has changed by
-        a tenth."""
+        that mass scaling adds, over the true mass. A step that is followed (auto) is reported again when it has changed
+        by a tenth."""
         o = self.options
         if self.log is None or (o.auto and abs(dt - self._told_step) < 0.1 * self._told_step):
             return

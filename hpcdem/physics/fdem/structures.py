@@ -117,7 +117,7 @@ class Structure(SurfaceLoad):
     def assign(self, elements: np.ndarray, given: Mapping[str, float]) -> None:
         """Give elements (k,) properties; what they carry stays."""
 
-    # ---- what is said ----------------------------------------------------------------------------------------------
+    # ---- what is given ----------------------------------------------------------------------------------------------
 
     def alive(self, kind: str) -> np.ndarray:
         """(n,) bool: elements that were not deleted, or nodes of such. Not collective."""

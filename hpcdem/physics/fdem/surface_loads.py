@@ -28,11 +28,11 @@ class SurfaceLoad(ABC):
     of_both: ClassVar[bool] = False
     """They are the same in the plane and in space."""
     own_clock: ClassVar[bool] = False
-    """Its conditions follow tables over a time of its own, which passes where blocks stand still too."""
+    """Its conditions follow tables over a time of its own, which passes where blocks are at rest too."""
 
     @property
     def keeps_time(self) -> bool:
-        """Where blocks stand still time may pass by it: that of the first load that does so. Not collective."""
+        """Where blocks are at rest time may pass by it: that of the first load that does so. Not collective."""
         return False
 
     @classmethod
@@ -115,7 +115,7 @@ class SurfaceLoad(ABC):
         return 0.0
 
     def elements_removed(self, elements: np.ndarray) -> None:  # noqa: B027 - most have nothing to do here
-        """These elements are taken out; the model is open. Collective."""
+        """These elements are removed; the model is open. Collective."""
 
     def uses_table(self, name: str) -> bool:
         """Whether something of it follows this table of time. Not collective."""
@@ -235,7 +235,7 @@ class SurfaceLoads:
         return {load.name: load.work_done() for load in self._loads}
 
     def elements_removed(self, elements: np.ndarray) -> None:
-        """These elements are taken out; the model is open. Collective."""
+        """These elements are removed; the model is open. Collective."""
         for load in self._loads:
             load.elements_removed(elements)
 

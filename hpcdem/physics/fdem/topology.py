@@ -1,4 +1,4 @@
-"""What is there in a model of blocks, and what hangs together: elements, open faces, joints, nodes. All of it by the
+"""What is there in a model of blocks, and what is connected: elements, open faces, joints, nodes. All of it by the
 numbers of the mesh, equal on all ranks."""
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ AGAIN, CRACK = 2, 3
 
 
 class Topology:
-    """Mesh, and what of it is there and hangs together. Methods raise CommandError, alike on all ranks."""
+    """Mesh, and what of it is there and is connected. Methods raise CommandError, alike on all ranks."""
 
     mesh: Mesh | None
     partner: np.ndarray
@@ -33,13 +33,13 @@ class Topology:
     joint_row: np.ndarray
     """(4 ne,) row of the joint models, of both faces of a joint; 0: none."""
     open: np.ndarray
-    """(4 ne,) bool: faces that do not hold on to their partner (any more): broken, cracked, or it was taken out."""
+    """(4 ne,) bool: faces that do not hold on to their partner (any more): broken, cracked, or it was removed."""
     broken: np.ndarray
     """(4 ne,) by the lower face: 1 if the joint broke; more, while it is a joint again, see pressed.py."""
     slid: dict[int, tuple[float, ...]]
     """By face what broken joints remember of their slip at three points [m], see pressed.py."""
     born: np.ndarray
-    """Elements that came back after they were taken out, ascending."""
+    """Elements that came back after they were removed, ascending."""
     birthplace: np.ndarray
     """Where their corners were then (n, 4, dim) [m]."""
 
@@ -65,7 +65,7 @@ class Topology:
         """Assignments are about to change."""
 
     def changed(self, topology: bool = False, stiffness: bool = True) -> None:
-        """Assignments have changed; topology: also who hangs together with whom; stiffness: perhaps the stable time
+        """Assignments have changed; topology: also who is connected with whom; stiffness: perhaps the stable time
         step too."""
 
     def note(self, text: str) -> None:
@@ -136,7 +136,7 @@ class Topology:
         return self.existing(asked, self.node_exists(), "node")
 
     def corners_of_nodes(self, nodes: Any, whole: bool = False) -> np.ndarray:
-        """(4 ne,) bool: corners at these nodes (sides.py), those of elements that were taken out too; None: all. whole:
+        """(4 ne,) bool: corners at these nodes (sides.py), those of elements that were removed too; None: all. whole:
         and those that are one node with them."""
         return self.per_node(lambda: self._corners_of_nodes(nodes, whole))
 
@@ -160,7 +160,7 @@ class Topology:
         return corners | of[node]
 
     def clusters(self) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes of corners (ne, 4), as faces hang together now, -1 of elements that were taken out, and their lowest
+        """Nodes of corners (ne, 4), as faces are connected now, -1 of elements that were removed, and their lowest
         corners."""
         return self.per_node(self._clusters)
 
@@ -226,7 +226,7 @@ class Topology:
                 self._closed[faces] = False
 
     def closed_faces(self) -> np.ndarray:
-        """(4 ne,) bool: faces that hang together with their partner, by a joint or as one body. Not to be changed."""
+        """(4 ne,) bool: faces that are connected with their partner, by a joint or as one body. Not to be changed."""
         if self._closed is None:
             self._closed = (self.partner >= 0) & ~self.open
         return self._closed

@@ -2,7 +2,7 @@
 
 What commands say of it (conditions.py) is known to all ranks by the numbers of the mesh. Values belong to corners of
 elements and travel with them, as positions do (columns of `State.cold`); what flows between them is that of elements of
-any kind (elements.py). Corners that hang together are one node (nodes.py). Where joints break corners part with the
+any kind (elements.py). Corners that are connected are one node (nodes.py). Where joints break corners part with the
 value that they have: each side of a crack has its own.
 
 A field is a subclass that says what it is called, its properties, capacity and conductivity. Heat (physics/heat) and
@@ -128,7 +128,7 @@ class Diffusing(Conditions):
     # ---- tables of this rank -------------------------------------------------------------------------------------
 
     def storage_rebuilt(self) -> None:
-        """Elements have other rows or owners, or something was said."""
+        """Elements have other rows or owners, or something was set."""
         blocks, halo = self.blocks, self.blocks.halo
         self._make_columns()
         cold, own = blocks.cold, blocks.owned
@@ -168,7 +168,7 @@ class Diffusing(Conditions):
         """All tables of this rank are there but the length of sub-steps."""
 
     def _sets_pace(self) -> bool:
-        """The clock of the model is that of this field where blocks stand still."""
+        """The clock of the model is that of this field where blocks are at rest."""
         pace = (one for one in self.blocks.surface_loads if one.keeps_time)
         return next(pace, self) is self
 
@@ -189,7 +189,7 @@ class Diffusing(Conditions):
             )
 
     def _make_nodes(self) -> None:
-        """As faces hang together now, and what follows from it. Collective."""
+        """As faces are connected now, and what follows from it. Collective."""
         self.at = Nodes(self.blocks, self.name, self._corner_capacity, self.held)
         self._tell_obtuse()
         self.exposed.bind(self.t.shape[1])
@@ -204,7 +204,7 @@ class Diffusing(Conditions):
 
     def _find_limit(self) -> None:
         """Longest stable sub-step of nodes that are not held [s], by Gershgorin's circles: C over half the sum of
-        conductances and of their sizes, and of the transfer at faces; infinite where there is none."""
+        conductances and of their sizes, and of the transfer at faces; infinite where missing."""
         corner = self.conduction.sizes.copy()
         self.exposed.add_sizes(self.time, corner.reshape(-1))
         self._add_to_limit(corner)

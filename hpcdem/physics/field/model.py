@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MANY = 100_000
 """Sub-steps in a cycle that are too many to be meant."""
 LOOK = 100
-"""Cycles after which a field is looked at: whether it has blown up, and how long its sub-steps may be."""
+"""Cycles after which a field is checked: whether it has blown up, and how long its sub-steps may be."""
 Tables = dict[str, dict[str, np.ndarray]]
 
 
@@ -230,7 +230,7 @@ class Field(SurfaceLoad):
 
     def _divide(self, steps: int, dt: float, period: float, alone: float, within: float, instead: str) -> None:
         """Sub-steps of a cycle and their length by what was given (steps, 0: as many as are needed; dt, 0: by clocks),
-        the time of a cycle by the clock of others, 0: there is none, and the longest sub-steps [s] without and with
+        the time of a cycle by the clock of others, 0: none, and the longest sub-steps [s] without and with
         such a clock. CommandError if they are too many, which says how many of which, and what to do `instead`."""
         if dt > 0.0:
             self.sub_steps, self.dt = max(1, steps), dt
@@ -264,7 +264,7 @@ class Field(SurfaceLoad):
         )
 
     def _lowest(self, numbers: np.ndarray) -> int:
-        """Of numbers (n,) of all ranks; -1: there is none."""
+        """Of numbers (n,) of all ranks; -1: none."""
         most = np.iinfo(np.int64).max
         found = int(self.blocks.comm.min_into(np.array([numbers.min(initial=most)], np.int64))[0])
         return found if found < most else -1

@@ -1,6 +1,6 @@
-"""Nodes of a field that diffuses in elements: corners that hang together, as the joints between them hold now.
+"""Nodes of a field that diffuses in elements: corners that are connected, as the joints between them hold now.
 
-Corners that hang together through faces that are not broken are one node and carry equal copies of the value. Every
+Corners that are connected through faces that are not broken are one node and carry equal copies of the value. Every
 holder of a node adds what flows to all its corners in the order of elements, so the bits depend on neither ranks nor
 threads.
 """

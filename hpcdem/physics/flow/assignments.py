@@ -140,7 +140,7 @@ class Said(Assigned, Field):
 
     def prescribe(self, nodes: np.ndarray | None, does: int, value: Number) -> None:
         """What holds at flow nodes among these points (None: all) from now on, see `Condition`. A pressure or a level
-        wets free faces all of whose corners are among the points; without points it is said of joints alone."""
+        wets free faces all of whose corners are among the points; without points it is assigned to joints alone."""
         at = self.flow_nodes(nodes)
         said_at = np.flatnonzero(self.condition) if nodes is None else self.blocks.numbers_of_nodes(nodes)
         beside = said_at[~self.network.there[said_at]]
@@ -275,7 +275,7 @@ class Said(Assigned, Field):
         return well.asked_now(time, dt, value)
 
     def set_clock(self, time: float) -> None:
-        """The clock of flow shows this time [s]; stages of wells and leak-off go on as they were."""
+        """The clock of flow shows this time [s]; stages of wells and leak-off continue as they were."""
         ahead = time - self.time
         super().set_clock(time)
         self.since += ahead

@@ -19,12 +19,12 @@ FORCES, DENSE = 4e-6, 3.3e-11
 ITERATIONS = 5
 """Of an implicit step."""
 LONG = 1800.0
-"""Seconds of an explicit run above which a word is said of it before."""
+"""Seconds of an explicit run above which a warning precedes it."""
 
 
 @dataclass(frozen=True)
 class Cost:
-    """steps of dt [s] of flow, cycles of blocks that go with them (0: they stand still), seconds on one core."""
+    """steps of dt [s] of flow, cycles of blocks that go with them (0: they are at rest), seconds on one core."""
 
     steps: float
     dt: float
@@ -43,7 +43,7 @@ def _length(seconds: float) -> str:
 
 
 def explicit(flow: Flow, time: float) -> Cost | str:
-    """So much flow time [s] by the sub-steps that were said, or are stable now (fractures that open need shorter
+    """So much flow time [s] by the sub-steps that were set, or are stable now (fractures that open need shorter
     ones); or why that cannot be. Of a closed model; collective."""
     o, blocks = flow.blocks.options, flow.blocks
     if not o.mechanical and not o.dynamic:

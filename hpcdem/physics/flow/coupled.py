@@ -45,7 +45,7 @@ QUIET = 8
 
 class Coupled(System):
     """Blocks and their fluid, or fluid alone, while time passes by implicit steps. A context: the model is settled when
-    it is left. A checkpoint that was written inside goes on inside: nothing is settled in between that would not have
+    it is left. A checkpoint that was written inside resumes inside: nothing is settled in between that would not have
     been without it. Methods are collective; CommandError with the model as it was after the last step that found
     balance.
 
@@ -308,7 +308,7 @@ class Coupled(System):
 
 
 def leave(sim: Blocks) -> None:
-    """The model of a checkpoint that was written inside a `Coupled` is as it is after one: nobody goes on there.
+    """The model of a checkpoint that was written inside a `Coupled` is as it is after one: no run resumes there.
     Collective."""
     flow = Flow.there(sim)
     if flow is None or not flow.implicit:

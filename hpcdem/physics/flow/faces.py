@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Shore:
-    """Corners of wet free faces at which no channel ends: what is said of them gives the pressure there.
+    """Corners of wet free faces at which no channel ends: what is assigned to them gives the pressure there.
 
     at (k,): where they begin in x, flat; row (k,): of the conditions; node (k,): points of the mesh, the lowest flow
     node of their well, -1: they belong to none; ref (k,): its row in the state; apart (k, dim): from that node to the
@@ -214,7 +214,7 @@ class Faces(Channels):
         return out
 
     def add_to(self, applied: np.ndarray) -> None:
-        if not self.implicit:  # by the places of now in each step: a run that goes on has no others
+        if not self.implicit:  # by the places of now in each step: a run that continues has no others
             self.find_shore()
         self.push(self.state, kernels.P, applied)
 

@@ -367,7 +367,7 @@ class Fluid:
 
 
 def reference_pressure(flow: Flow, stress: float) -> float:
-    """p0 [Pa]: about the largest pressure that there is or will be; stress: of the rock, 0 if it stands still."""
+    """p0 [Pa]: about the largest pressure that there is or will be; stress: of the rock, 0 if it is at rest."""
     table = flow.conditions_at(flow.time)
     used = table[np.unique(flow.condition)]
     pressures = used[used[:, 0] == kernels.PRESSURE, 1]

@@ -53,7 +53,7 @@ class Flow(Values):
         self.condensed: np.ndarray | None = None
         """Positions (nn, dim) of the nodes of the blocks at which these have eliminated the elements."""
         self._checked = False
-        """The length of a sub-step that was said is one that can be."""
+        """The length of a sub-step that was set is one that can be."""
         self._told: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -134,7 +134,7 @@ class Flow(Values):
         return [*switches, *self._gravity(), self.blocks.clock.dt if o.mechanical else 0.0]
 
     def _find_step(self) -> None:
-        """Sub-steps of a cycle and their length, from what was said and what is stable."""
+        """Sub-steps of a cycle and their length, from what was set and what is stable."""
         blocks, o, limit = self.blocks, self.blocks.options, self.limit()
         self._found_for, self._checked = self._given(), False
         period = 0.0 if not o.mechanical or not o.dynamic else o.flow_every * blocks.clock.dt
@@ -146,7 +146,7 @@ class Flow(Values):
         self._tell_step(limit)
 
     def _outrun(self) -> bool:
-        """An estimated sub-step is more than half the stability limit, before it is looked at again. Collective."""
+        """An estimated sub-step is more than half the stability limit, before it is checked again. Collective."""
         o = self.blocks.options
         if o.flow_dt > 0.0 or o.flow_steps > 0 or self.cycles % max(1, GLANCE // self.sub_steps):
             return False

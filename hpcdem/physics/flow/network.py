@@ -139,7 +139,7 @@ def sides_and_free(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Those of these faces (k,) that are sides of channels, and the free ones among the others.
 
-    closed (4 ne,) bool: faces that hang together with their partner; channel (4 ne,) bool: lower faces of channels.
+    closed (4 ne,) bool: faces that are connected with their partner; channel (4 ne,) bool: lower faces of channels.
     """
     other = partner[faces]
     is_channel = channel[np.where(other >= 0, np.minimum(faces, other), faces)]

@@ -71,7 +71,7 @@ class System:
         self.unknowns = self._unknowns()
 
     def _stress(self) -> float:
-        """Mean size of the stress of elements [Pa], 0 if they stand still."""
+        """Mean size of the stress of elements [Pa], 0 if they are at rest."""
         if not self.moves:
             return 0.0
         stress = np.abs(self.sim.local.stresses(energies=False)[0])

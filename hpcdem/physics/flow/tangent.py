@@ -126,7 +126,7 @@ class Tangent:
                 + (by_part * 6.0 * held * (1.0 - held))[:, None] * s_u[ends[at]]
             )
         by_x = self._opens(x, now.table[:: LINKS[self.of.dim], kernels.APERTURE])[self.of.of][mine]
-        # Blocks that stand still need no columns.
+        # Blocks that are at rest need no columns.
         dim, first_row = self.of.dim, by_x.shape[1] if self.of.flow.blocks.options.mechanical else 0
         fill = state[:, kernels.S] + state[:, kernels.P] / self.of.bulk
         out = np.zeros((m, first_row + 2 * dim, first_row + 2 * dim))

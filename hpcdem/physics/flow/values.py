@@ -83,7 +83,7 @@ class Values(Faces):
         return {name: made[name].copy() for name in ("number", *names)}
 
     def _of_others(self, name: str, copies: bool = False) -> np.ndarray:
-        """A quantity of other physics of the flow nodes held here, NaN where there is none; with copies, then
+        """A quantity of other physics of the flow nodes held here, NaN where missing; with copies, then
         collective, those of other ranks too."""
         own = self.more[name]() if name in self.more else np.full(self.owned, math.nan)
         out = np.append(own, np.full(len(self.held) - len(own), math.nan))
@@ -97,7 +97,7 @@ class Values(Faces):
         return out
 
     def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
-        """A quantity of `QUANTITIES` of flow nodes or channels (None: all), on all ranks; NaN where there is none."""
+        """A quantity of `QUANTITIES` of flow nodes or channels (None: all), on all ranks; NaN where missing."""
         if name not in QUANTITIES[kind]:
             raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(QUANTITIES[kind])}")
         mine = self.owned_values(kind, [name])

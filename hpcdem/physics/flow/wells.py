@@ -85,7 +85,7 @@ class Well:
         return any(one.does != SHUT and one.end > time for one in self.stages)
 
     def next_change(self, time: float) -> float:
-        """The first time after this one at which a stage begins or ends; inf: there is none."""
+        """The first time after this one at which a stage begins or ends; inf: none."""
         ends = [end for one in self.stages for end in (one.begin, one.end)]
         return min((end for end in ends if end > time * (1.0 + 1e-12)), default=math.inf)
 

@@ -86,7 +86,7 @@ class FluidHeat(Assigned, Travelling):
         flow.carried = np.empty(0)
         flow.more["temperature"] = lambda: self.state[: len(self.number), kernels.T]
 
-    # ---- what is said --------------------------------------------------------------------------------------------
+    # ---- what is given --------------------------------------------------------------------------------------------
 
     def assign(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
         """Channels among these joints (None: all channels) have these properties; the fluid of those that had none has
@@ -123,7 +123,7 @@ class FluidHeat(Assigned, Travelling):
                 "face-joint c-model thermal-fluid to all"
             )
 
-    # ---- what is asked -------------------------------------------------------------------------------------------
+    # ---- what is queried -------------------------------------------------------------------------------------------
 
     @property
     def on(self) -> bool:
@@ -137,7 +137,7 @@ class FluidHeat(Assigned, Travelling):
     # ---- tables of this rank -------------------------------------------------------------------------------------
 
     def bind(self) -> None:
-        """Elements have other rows or owners, there are other channels, or something was said."""
+        """Elements have other rows or owners, there are other channels, or something was set."""
         blocks, flow = self.blocks, self.flow
         self._forget(~flow.network.there[self.number])
         if not self.on:
@@ -242,7 +242,7 @@ class FluidHeat(Assigned, Travelling):
 
     def begin_cycle(self, period: float) -> None:
         """Flow of a cycle of heat that takes so long [s]: the mean of the last cycle of flow, or that of this moment
-        where it stands still."""
+        where it is at rest."""
         flow, n = self.flow, len(self.number)
         q, delta = flow.mean_flows(), np.repeat(flow.apertures(), self.links)
         w0, w, room = self.had, flow.nodes[:, flowing.W], flow.nodes[:, flowing.V]

@@ -103,7 +103,7 @@ class Heat(Diffusing):
     def _all_held(self) -> np.ndarray:
         return self.held if self.fluid is None else np.append(self.held, self.fluid.held)
 
-    # ---- what is asked -------------------------------------------------------------------------------------------
+    # ---- what is queried -------------------------------------------------------------------------------------------
 
     @property
     def on(self) -> bool:
@@ -333,7 +333,7 @@ class Heat(Diffusing):
 
     @property
     def _may_wait(self) -> bool:
-        """Heat alone, without friction, by the clock of blocks in motion, with sub-steps of which nothing is said."""
+        """Heat alone, without friction, by the clock of blocks in motion, with sub-steps without a report."""
         o = self.blocks.options
         by_itself = o.mechanical and o.dynamic and self.flowing is None and not self._rubs
         return by_itself and o.flow_every == 1 and o.heat_steps == 0 and o.heat_dt == 0.0

@@ -1,4 +1,4 @@
-"""What elements of liners are asked for, whatever they are: beams in the plane, flat shells in space."""
+"""What elements of liners provide, whatever they are: beams in the plane, flat shells in space."""
 
 from __future__ import annotations
 

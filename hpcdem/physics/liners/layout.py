@@ -19,7 +19,7 @@ def chained(
     points (m, 2): first and last point of the mesh of each face; ends (m, 2, 2) [m]: where they are now; old: by point,
     the nodes at which liners end and begin there already; place (n, 2) [m]: of these nodes.
 
-    Returns the faces along the chains (m,), for each whether it goes on from the one before (m,), the pairs (end of a
+    Returns the faces along the chains (m,), for each whether it continues from the one before (m,), the pairs (end of a
     face, node) that are a node of before (ends are numbered 2 face + 0 or 1 in the new order), and how many points
     where more than two faces meet, or that have come apart, part it.
     """
@@ -84,8 +84,8 @@ def joined(
     points (m, 3): of the mesh, of each face, counter-clockwise; places (m, 3, 3) [m]: where these are now; old,
     old_nodes (k, 3): points and nodes of triangles of before; at (n, 3) [m]: where their nodes are.
 
-    Returns the nodes of the faces (m, 3), new ones from n on; a label of each face (m,), equal where faces hang
-    together; and how many edges where more than two faces meet, or that have come apart, part them.
+    Returns the nodes of the faces (m, 3), new ones from n on; a label of each face (m,), equal where faces are
+    connected; and how many edges where more than two faces meet, or that have come apart, part them.
     """
     m, n = len(points), len(at)
     place = np.concatenate([places.reshape(-1, 3), at])

@@ -93,7 +93,7 @@ class Liners(Structure):
     def _known(self, kind: str) -> list[str]:
         return list(KINDS[self.blocks.dim].quantities[kind])
 
-    # ---- what is said ----------------------------------------------------------------------------------------------
+    # ---- what is given ----------------------------------------------------------------------------------------------
 
     def create(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Put a liner on free faces (k,) of the rock, where they are now, without any force in it; returns the numbers

@@ -1,4 +1,4 @@
-"""Proppant in the fluid of a model of blocks: what is said of it, and its step.
+"""Proppant in the fluid of a model of blocks: what is assigned to it, and its step.
 
 Grains move between the flow nodes with the slurry of each cycle of flow, and settle in it, in sub-steps of their own
 (kernels.py). They make the slurry heavier and more viscous, bridge in narrow channels, and where a node is filled to
@@ -96,7 +96,7 @@ class Proppant(Said):
         self._settle()
         self.flow.find_geometry()
 
-    # ---- what is asked -------------------------------------------------------------------------------------------
+    # ---- what is queried -------------------------------------------------------------------------------------------
 
     @property
     def on(self) -> bool:
@@ -105,7 +105,7 @@ class Proppant(Said):
 
     def account(self) -> dict[str, float]:
         """Volumes of proppant [m2]: came by conditions and at the beginning, stored (suspended, packed), left with
-        fluid that was taken out, removed with channels; closing: what does not add up, relative: over the largest."""
+        fluid that was removed, removed with channels; closing: what does not add up, relative: over the largest."""
         self.blocks.close_model()
         n, packed = self.nodes[:, kernels.N], self.state[: len(self.number), kernels.PACKED]
         found = {"stored": self._sum(n), "packed": self._sum(n * packed)}
@@ -275,7 +275,7 @@ class Proppant(Said):
         with self.blocks.timers("proppant"):
             self._advance(dt)
         self.cycles += 1
-        if not self.blocks.options.mechanical:  # else the flow does, before it goes on
+        if not self.blocks.options.mechanical:  # else the flow does, before it continues
             flow.find_geometry()
 
     def _advance(self, dt: float) -> None:

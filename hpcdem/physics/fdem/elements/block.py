@@ -23,7 +23,7 @@ class ElementBlock:
     elements; alone: which are elements of their own, no parts of others.
 
     stiff: like c, with the largest moduli that the elements can have, by which the time step is found, `stiffer`
-    (count,) times those of their models, None: once; without: elements that have no moduli in c, as a law of the user
+    (count,) times those of their models, None: once; without: elements that have no moduli in c, as a user law
     or a larger element makes their forces.
 
     said, uncrept, initial, like s0: without plastic and creep strain, without creep strain alone, without plastic

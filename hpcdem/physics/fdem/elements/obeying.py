@@ -1,4 +1,4 @@
-"""Elements that a rank owns and that obey laws of users (user_laws.py, kernels/user_laws.py)."""
+"""Elements that a rank owns and that obey user laws (user_laws.py, kernels/user_laws.py)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LawHere:
-    """A law of the user on this rank: its table of properties, and which elements of each block have it."""
+    """A user law on this rank: its table of properties, and which elements of each block have it."""
 
     law: user_laws.UserLaw
     table: np.ndarray

@@ -1,7 +1,7 @@
 """The elements that a rank owns: what makes the stress in them, of any kind and in both dimensions.
 
-The loops over forces know elastic elements only. All else is stress without strain (`ElementBlock.s0`): what was said
-of it, what heat brings, less that of plastic and creep strain; and moduli, which may follow temperatures.
+The loops over forces know elastic elements only. All else is stress without strain (`ElementBlock.s0`): what was
+assigned, what heat brings, less that of plastic and creep strain; and moduli, which may follow temperatures.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class Solids:
     """blocks: the elements, one block for each kind; whole: those with forces in place of their parts, None: there are
     none. yielding, creeping, laws: what each law of elements needs. warms: some properties follow temperatures;
-    heated: temperatures bring stress; initial (n_own, 4 or 6) [Pa]: stress that was said, by the moduli of now;
+    heated: temperatures bring stress; initial (n_own, 4 or 6) [Pa]: stress that was set, by the moduli of now;
     initial_part (n_own,): over what it is with the largest ones, None: the same."""
 
     initial_part: np.ndarray | None = None
@@ -54,7 +54,7 @@ class Solids:
 
     @property
     def stressed(self) -> bool:
-        """Elements have stress without strain, but for laws of users."""
+        """Elements have stress without strain, but for user laws."""
         return self.sim.stress0 is not None or self.remembers or self.heated
 
     # ---- what temperatures change ----------------------------------------------------------------------------------
@@ -85,7 +85,7 @@ class Solids:
         self.yielding.follow_heat()
 
     def _find_stress_without_strain(self) -> bool:
-        """Of all elements: what was said of it, and what heat brings, less the part of plastic and creep strain.
+        """Of all elements: what was assigned, and what heat brings, less the part of plastic and creep strain.
         Returns whether heat brings any."""
         sim, heat = self.sim, self.sim.surface_loads.eigenstress(self.sim)
         self.laws.take_heat(heat)
@@ -191,7 +191,7 @@ class Solids:
         return more
 
     def other_energies(self) -> list[np.ndarray]:
-        """What else there is to add: of heat; not a number where a law of the user does not tell what it stores."""
+        """What else there is to add: of heat; not a number where a user law does not tell what it stores."""
         found = [self._energy_of_heat()] if self.heated else []
         if self.laws.some:
             of_users = user_laws.numbers(self.sim)[self.sim.number[self.sim.owned]] > 0
