@@ -47,7 +47,7 @@ def arguments(command: Command, given: Mapping[str, Any], ranged: bool = False, 
 
 
 def model_arguments(command: Command, name: str, given: Mapping[str, Any], dim: int = 2) -> dict[str, Any]:
-    """The same of a command that names a constitutive model or condition."""
+    """Arguments of a command that names a constitutive model or condition, checked as those of other commands."""
     _there(command.name, command.dims, dim)
     model = _model(command, name)
     _there(f"model {model.keyword}", model.dims, dim)

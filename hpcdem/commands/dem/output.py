@@ -284,7 +284,7 @@ def tell_energy(sim: Simulation) -> None:
 
 
 ACROSS = "work across contacts of discs and faces"
-"""The same in the tables of both sides."""
+"""Name of this entry in the tables of both sides."""
 ENERGY_WORDS = {
     "kinetic_translation": "stored: motion",
     "kinetic_rotation": "stored: rotation",

@@ -338,7 +338,7 @@ def add_part(
     first_gid: int | None = None,
     material: int = 0,
 ) -> int:
-    """The same for rows of which each rank has a part of its own: the `before`-th to the last of them, of `total`;
+    """Add rows of which each rank has its own part: the `before`-th to the last of them, of `total`;
     group: of all or (n,) i8 of each of these rows."""
     sim.open_model()
     first = sim.next_gid if first_gid is None else first_gid

@@ -108,8 +108,8 @@ def take_up(project: Project, before: float = math.inf) -> list[Any] | None:
 
 
 def restore_newest(project: Project, before: float = math.inf) -> bool:
-    """The same for a Python program, which is not run again; False if there is no checkpoint. CommandError for that of
-    a script. Then `steps.resume` finishes the command in which it was written. Collective."""
+    """Restore the newest checkpoint for a Python program, which is not run again; False if there is no checkpoint.
+    CommandError for that of a script. Then `steps.resume` finishes the command in which it was written. Collective."""
     found = _newest(project, before)
     if found is None:
         return False

@@ -54,7 +54,7 @@ def _chosen(project: Project, kind: str, where: g.Range, null_too: bool) -> np.n
 
 
 def everything(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray:
-    """The same as numbers in any case."""
+    """Numbers of what a range selects, also if it selects all."""
     found = chosen(project, kind, where, null_too)
     return _once(project, None, lambda: _Objects(project, kind, null_too).numbers) if found is None else found
 
@@ -361,8 +361,8 @@ class _Objects:
         return found
 
     def _along_surfaces(self, layer: str, distance: float, angle: float) -> np.ndarray:
-        """The same of the surfaces of a layer in space: a face that leans from one by an angle comes away from it along
-        its normal by the cosine of that."""
+        """Near the surfaces of a layer in space, at a small angle to them: a face that leans from one by an angle comes
+        away from it along its normal by the cosine of that."""
         places, found = self.places(), np.zeros(len(self.numbers), bool)
         slack = self._slack(TOLERANCE)
         middle, along = places.mean(axis=1), places.shape[1] > 1 and self.kind not in g.SUPPORTS and angle < 90.0

@@ -37,7 +37,7 @@ def model(project: Project, properties: Mapping[str, Value], where: Range | None
 
 
 def with_proppant(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """The same, and the fluid carries proppant there (physics.proppant.properties)."""
+    """Make joints channels whose fluid carries proppant (physics.proppant.properties)."""
     fluid, grains = split(dict(properties))
     joints = chosen(project, JOINT, where)
     checked(grains)

@@ -97,7 +97,7 @@ def _write(project: Project, name: str, later: Deliveries | None = None, sound: 
 
 
 def _kept(moment: MeshFrame) -> MeshFrame:
-    """The same with arrays of its own: the model continues."""
+    """A copy of a frame with its own arrays, as the model continues."""
 
     def own(table: Table) -> Table:
         return Table({name: np.array(values) for name, values in table.columns.items()}, table.offset, table.total)
@@ -169,7 +169,7 @@ OF_OTHERS = {
     "proppant_concentration": "concentration",
     "pack_pressure": "pack_pressure",
 }
-"""The same of quantities that are there with further physics."""
+"""Quantities of further physics, by object."""
 
 
 def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

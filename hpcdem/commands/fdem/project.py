@@ -271,7 +271,7 @@ class Project:
         return self.mesh
 
     def replace_mesh(self, mesh: Mesh) -> None:
-        """The same points and elements with other cracks."""
+        """Replace the mesh by one with equal points and elements and other cracks."""
         self.mesh = mesh
         self.taken = False
 

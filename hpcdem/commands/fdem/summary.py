@@ -56,7 +56,7 @@ SUPPORT_WORDS = {
     "commands": "brought by commands, as pretension",
     "closing": "closing error",
 }
-"""The same of the accounts of bolts and liners."""
+"""Names of the entries of the budgets of bolts and liners."""
 FLUID_WORDS = {
     "given": "given by conditions and at the beginning",
     "stored": "in the channels",
@@ -64,26 +64,26 @@ FLUID_WORDS = {
     "removed": "gone with channels that were taken away",
     "closing": "closing error",
 }
-"""The same of the account of the fluid, volumes at its density without pressure."""
+"""Names of the entries of the budget of the fluid, volumes at its density at zero pressure."""
 PROPPANT_WORDS = {
     "came": "came by conditions and at the beginning", "stored": "in the channels", "packed": "of it packed",
     "left": "left with fluid that was taken out", "removed": "gone with channels that were taken away",
     "closing": "closing error",
 }  # fmt: skip
-"""The same of the account of proppant."""
+"""Names of the entries of the budget of proppant."""
 HEAT_WORDS = {
     "given": "given by conditions", "commands": "brought by commands", "stored": "stored in elements, above zero",
     "fluid": "in the fluid",
     "removed": "removed with elements and channels", "closing": "closing error",
 }  # fmt: skip
-"""The same of the account of heat."""
+"""Names of the entries of the budget of heat."""
 ACROSS_WORDS = {
     "work_on_particles": "work on particles",
     "work_on_blocks": "work on blocks",
     "stored": "stored in the contacts, more than at first",
     "lost": "lost by friction, less overlaps at first",
 }
-"""The same of what went from one to the other: these four add up to nothing."""
+"""Names of the entries of the exchange of energy between particles and blocks, whose sum is 0."""
 
 
 def close(project: Project, figure: bool = True) -> None:

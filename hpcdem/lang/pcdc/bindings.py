@@ -415,7 +415,8 @@ def solve(call: Call) -> None:
 
 
 def carry_out(call: Call) -> None:
-    """Call the function of a command, then check its values against the declared units. Report once what has no effect."""
+    """Call the function of a command, then check its values against the declared units. A word without effect is
+    reported once."""
     command = call.command
     if command.idle:
         if call.project.log is not None:

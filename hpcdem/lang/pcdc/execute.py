@@ -108,11 +108,11 @@ class Interpreter:
                 raise statement.error(str(error)) from None
 
     def line(self, script: Source) -> None:
-        """The same for what was typed: the value of an expression is shown."""
+        """Execute a typed line and show the value of an expression."""
         self._execute(script, "single")
 
     def lines(self, script: Source) -> None:
-        """The same for several statements, whose values are not shown."""
+        """Execute several typed statements without showing their values."""
         self._execute(script, "exec")
 
     def include(self, text: str, file: str, names: dict[str, Any]) -> None:
@@ -298,7 +298,7 @@ class Interpreter:
         return self._placed(lambda: journal.ask_alone(_checksum(told), make, again, alone))
 
     def function(self, call: Callable[[], object]) -> Callable[[], object]:
-        """The same function, of which the journal notes what it does in the middle of a command."""
+        """Wrap a function so that the journal records what it does during a command."""
         journal = self.journal
         if journal is None or not journal.keeps_calls:
             return call

@@ -90,7 +90,7 @@ class Journal:
         return value
 
     def ask(self, checksum: int, make: Callable[[], Any], again: Callable[[], Any] | None, fails_again: bool) -> Any:
-        """The same for a method of particles, which may also change them, with these arguments. again: what is done in
+        """Answer of a method of particles, which may also change them, with these arguments. again: what is done in
         its place on the way back, None: nothing, the answer is that of the first time. fails_again: what failed is not
         tried again then, the error is."""
         if not self.replays:
@@ -109,8 +109,8 @@ class Journal:
                 self._next()
 
     def ask_alone(self, checksum: int, make: Callable[[], Any], again: bool, alone: bool) -> Any:
-        """The same for what this rank sees, which is all there is if it is alone. again: ask it on the way back, too.
-        UsageError on the way back if there were several ranks the first time."""
+        """Answer of a query of this rank's particles, which are all particles if it is alone. again: ask it on the way
+        back, too. UsageError on the way back if there were several ranks the first time."""
         if not self.replays:
             value = make()
             self.note(ASK, checksum)

@@ -76,7 +76,7 @@ class Kind:
 
 
 def varied(kind: Kind, softens: bool = False, warms: bool = False) -> Kind:
-    """The same for a property of elements, faces or joints."""
+    """A kind that may also be a table or a field, for a property of elements, faces or joints."""
     made = replace(
         kind, varied=True, softens=softens, warms=warms, python="Value" if kind.python == "float" else kind.python
     )
@@ -288,7 +288,7 @@ _IN_ANY = (
 
 
 def fitting(kind: Kind, dim: int | None) -> Kind:
-    """The same in a model of so many dimensions; None: it is not known how many there are."""
+    """The kind in a model of this number of dimensions; None: unknown."""
     return kind if dim == 2 else (_IN_ANY if dim is None else _IN_SPACE).get(kind.pattern, kind)
 
 

@@ -56,7 +56,8 @@ class Work:
             )  # fmt: skip
 
     def book_faces(self) -> None:
-        """The same on the blocks, whose velocities are those after the kick once they have stepped."""
+        """Half a step's work of the present forces on the blocks, whose velocities are those after the kick once they
+        stepped."""
         blocks, link = self.both.blocks, self.both.links()
         e = link.face_number // 4
         if link.made_for[1] == blocks.rebuilds and blocks.closed:

@@ -406,7 +406,7 @@ def _law_columns(law: np.ndarray, poisson: np.ndarray, out: np.ndarray, opened: 
 def _pair_laws(
     sim: Simulation, out: np.ndarray, iout: np.ndarray, types: np.ndarray
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """The same of pairs, and the forces at which their bonds break in tension and in shear [N]; types: of bonds."""
+    """Laws of pairs, and the forces at which their bonds break in tension and in shear [N]; types: of bonds."""
     p, rows, n = sim.particles, sim.materials.rows, len(sim.materials)
     a, b = (_storage_rows(sim, iout[:, k]) for k in (0, 1))
     first, second = p.ihot[a, MATERIAL], p.ihot[b, MATERIAL]
@@ -430,7 +430,7 @@ def _pair_laws(
 
 
 def _wall_laws(sim: Simulation, out: np.ndarray, iout: np.ndarray) -> dict[str, np.ndarray]:
-    """The same of wall contacts."""
+    """Laws of wall contacts."""
     material = sim.particles.ihot[_storage_rows(sim, iout[:, 0]), MATERIAL]
     law = sim.wall_laws[iout[:, 1] * len(sim.materials) + material]
     return _law_columns(law, sim.materials.rows["poiss"][material], out, np.zeros(len(out), bool))

@@ -20,7 +20,7 @@ EVERY = 50
 WINDOW = 20_000
 """Static steps, at least, in which the balance must get better."""
 CROSSINGS = 10.0
-"""The same in times that a wave takes there and back through the model."""
+"""Least window in times that a wave takes to cross the model and return."""
 BETTER = 0.9
 """Part of the least ratio so far that counts as progress."""
 SLIDES = 0.2

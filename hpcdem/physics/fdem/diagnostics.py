@@ -566,7 +566,7 @@ def homes(sim: Blocks, at: np.ndarray | None = None) -> np.ndarray:
 
 
 def home_corners(sim: Blocks, at: np.ndarray | None = None) -> np.ndarray:
-    """The same by corners, (n_own, 4, 2) or (n_own, 4, 3)."""
+    """The positions of `homes` by corners, (n_own, 4, 2) or (n_own, 4, 3)."""
     found = homes(sim, at)
     return found.reshape(len(found), 4, sim.stride)[:, :, : sim.dim]
 

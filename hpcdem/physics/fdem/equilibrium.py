@@ -74,8 +74,8 @@ STILL = 1e-6
 """Change of stress by flow, over the largest stress, that does not count, where one flow makes the next one necessary:
 strength that follows tables, quads."""
 MUCH = 1e-3
-"""The same at the beginning, from which on elements are outside by what was set since they last flowed: then they flow
-at the whole load only, however many increments lead there."""
+"""Change of stress at the beginning, from which on elements are outside by what was set since they last flowed: then
+they flow at the whole load only, however many increments lead there."""
 BEFORE, AFTER = "temperature before", "temperature after"
 """Columns of elements during a solve: temperatures of the last balance, and those of this one."""
 PASSES = 100

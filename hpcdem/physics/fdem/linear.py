@@ -19,7 +19,7 @@ from hpcdem.core.errors import CommandError
 MANY = 400_000
 """Unknowns from which PETSc is taken, if it is there: SuperLU then needs minutes and several GB on one rank."""
 MANY_IN_SPACE = 20_000
-"""The same in space, where factors fill up sooner."""
+"""Unknowns from which PETSc is used in space, where factors fill up sooner."""
 CONDENSED = 2000
 """Most unknowns of joints and fluid for dense matrices."""
 SINGULAR = (

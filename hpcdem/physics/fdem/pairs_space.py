@@ -305,7 +305,7 @@ class ContactSpace:
 
     @staticmethod
     def named(element: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same from rows of histories.py of the elements `element` (k,)."""
+        """Faces, targets and memory of pairs from rows of histories.py of the elements `element` (k,)."""
         key = rows.view(np.int64)[:, KEY]
         other, is_target = key >> 3, key & 4 > 0
         face = 4 * np.where(is_target, other, element) + (key & 3)
@@ -313,7 +313,7 @@ class ContactSpace:
 
     @staticmethod
     def remembered(sim: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same from the histories of the owned elements."""
+        """Faces, targets and memory of pairs from the histories of the owned elements."""
         at = np.flatnonzero(sim.histories.keys() >= 0)
         return ContactSpace.named(sim.number[sim.owned][sim.histories.owners()[at]], sim.histories.rows[at])
 

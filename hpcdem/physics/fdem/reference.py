@@ -72,13 +72,13 @@ def triangle_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid
 
 
 def tetrahedron_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) -> np.ndarray:
-    """The same (4, 3) [N] of a tetrahedron; mesh, x, v (4, 3)."""
+    """Forces (4, 3) [N] of the stress of a tetrahedron on its corners; mesh, x, v (4, 3)."""
     return triangle_forces(mesh, x, v, solid)
 
 
 def quad_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) -> np.ndarray:
-    """The same (4, 2) of a quad: the mean of two overlays of two triangles, in each of which the volume strain (and its
-    rate) is the mean by area in the mesh (Marti & Cundall 1982)."""
+    """Forces (4, 2) [N/m] of a quad: the mean of two overlays of two triangles, in each of which the volume strain (and
+    its rate) is the mean by area in the mesh (Marti & Cundall 1982)."""
     force = np.zeros((4, 2))
     for overlay in (PARTS[:2], PARTS[2:]):
         parts = [deformation(mesh[k], x[k], v[k], solid.small) for k in overlay]
@@ -93,7 +93,7 @@ def quad_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) ->
 
 
 def hexahedron_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) -> np.ndarray:
-    """The same (8, 3) [N] of a hexahedron: two overlays of five tetrahedra, with means by volume."""
+    """Forces (8, 3) [N] of a hexahedron: two overlays of five tetrahedra, with means by volume."""
     force = np.zeros((8, 3))
     for overlay in (OVERLAYS[:5], OVERLAYS[5:]):
         parts = [deformation(mesh[k], x[k], v[k], solid.small) for k in overlay]

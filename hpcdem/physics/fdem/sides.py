@@ -26,7 +26,7 @@ def points(cells: np.ndarray, numbers: np.ndarray) -> np.ndarray:
 
 
 def present(cells: np.ndarray, numbers: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """The same without sides of elements that are not there, (ne,) bool; where a point has none left, the point."""
+    """Numbers without sides of missing elements, (ne,) bool; where a point has none left, the point."""
     side = numbers >= SIDE
     gone = side & ~there[np.where(side, numbers - SIDE, 0) // 4]
     if not gone.any():

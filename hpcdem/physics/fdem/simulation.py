@@ -97,7 +97,7 @@ class Blocks(Edited):
         return self._tables().corner_masses(self, number)
 
     def place_mesh(self, mesh: Mesh) -> None:
-        """The same for a mesh that is known to be good."""
+        """Set a mesh that was checked already."""
         self._put(mesh)
         self._start_with(mesh)
 

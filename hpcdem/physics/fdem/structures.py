@@ -76,7 +76,7 @@ class Structure(SurfaceLoad):
 
     @classmethod
     def element_columns(cls, dim: int) -> Columns:
-        """The same of the elements."""
+        """Columns of the elements in a model of this number of dimensions."""
         return cls.of_elements
 
     # ---- what each kind does its way -----------------------------------------------------------------------------

@@ -136,7 +136,7 @@ class SurfaceLoad(ABC):
         return {}
 
     def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
-        """The same of what is shared out: this rank's rows, with their "number". Names of these tables are in
+        """Columns that a checkpoint holds of this rank's rows, with their "number". Names of these tables are in
         `SHARED_OUT`."""
         return {}
 
@@ -249,5 +249,5 @@ class SurfaceLoads:
         return {name: columns for load in self._loads for name, columns in load.saved_tables().items()}
 
     def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
-        """The same of what is shared out among the ranks."""
+        """Columns that a checkpoint holds of what is distributed among the ranks."""
         return {name: columns for load in self._loads for name, columns in load.saved_rows().items()}

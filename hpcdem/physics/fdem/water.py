@@ -218,7 +218,7 @@ def _on_edges(depth: np.ndarray) -> np.ndarray:
 
 
 def _on_triangles(depth: np.ndarray) -> np.ndarray:
-    """The same of triangles (n, 3), over their area."""
+    """Shares of the pressure at the corners of triangles (n, 3), over their area."""
     whole = (depth.sum(axis=1)[:, None] + depth) / 12.0
     wet = (depth > 0.0).sum(axis=1)
     whole[wet == 0] = 0.0

@@ -18,7 +18,7 @@ Number = float | str
 def with_rows(
     rows: list[tuple[float, ...]], row: np.ndarray, at: np.ndarray, values: np.ndarray
 ) -> tuple[list[tuple[float, ...]], np.ndarray]:
-    """The same rows and more, and row (n,), from 1, of objects of which those at `at` (m,) have these values, (m, k) or
+    """Extended rows, and row (n,), from 1, of objects of which those at `at` (m,) have these values, (m, k) or
     (1, k) for all."""
     rows, row = list(rows), row.copy()
     known = {one: k for k, one in enumerate(rows, 1)}

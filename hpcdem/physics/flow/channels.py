@@ -39,7 +39,8 @@ class Slurry(Protocol):
         """Conductance and weight of this rank's channels, in place. Not collective."""
 
     def everywhere(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, np.ndarray], None]:
-        """The same for all channels of the model; gathered: values of all flow nodes from those of this rank."""
+        """Conductance and weight of all channels of the model; gathered: values of all flow nodes from those of this
+        rank."""
 
     def packs(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray] | None:
         """None if no pack bears; else what all packs push with in rooms of nodes (n,) [m2], and its derivative: rows

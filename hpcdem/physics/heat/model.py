@@ -88,7 +88,7 @@ class Heat(Diffusing):
             fluid.initial(self.blocks.numbers_of_nodes(nodes), value)
 
     def prescribe_fluid(self, nodes: np.ndarray | None, temperature: Number) -> None:
-        """The same of the fluid at flow nodes among these."""
+        """Prescribe the temperature of the fluid at flow nodes among these nodes."""
         if (fluid := self.flowing) is None:
             raise CommandError("the fluid has no thermal model: assign face-joint c-model thermal-fluid first")
         fluid.prescribe(nodes, self._row_of(temperature))
@@ -187,7 +187,7 @@ class Heat(Diffusing):
         )  # fmt: skip
 
     def _touching_in_space(self) -> int:
-        """The same in space: every free face with those of its targets, each pair of faces once."""
+        """Contacts in space: every free face with those of its targets, each pair of faces once."""
         blocks, pairs = self.blocks, self.blocks.local.pairs
         if self._pairs_of is not pairs:
             self._pairs_of = pairs

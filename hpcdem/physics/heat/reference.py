@@ -110,7 +110,7 @@ def fluid_step_in_space(
     points: np.ndarray, corners: np.ndarray, p: np.ndarray, aperture: np.ndarray, viscosity: float, w: np.ndarray,
     t: np.ndarray, rock: np.ndarray, dt: float, rho_c: float, k: float, h: float, held: dict[int, float],
 ) -> tuple[np.ndarray, float]:  # fmt: skip
-    """The same, of first order, of full triangles with these corners (m, 3), rows of the nodes at points (n, 3), of
+    """A step of first order of full triangles with these corners (m, 3), rows of the nodes at points (n, 3), of
     pressure p (n,) [Pa] and fluid w (n,) [m3]: what crosses the median between each two of them; [W] for [W/m]."""
     heat, passes = np.zeros(len(points)), np.zeros(len(points))
     for at, delta in zip(corners, aperture.tolist()):

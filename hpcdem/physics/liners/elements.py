@@ -134,7 +134,7 @@ def of_bond(dim: int) -> Columns:
 
 
 def of_node(dim: int) -> Columns:
-    """The same of nodes. liner: which one; spin: rate of rotation."""
+    """Columns of the nodes of liners. liner: which one; spin: rate of rotation."""
     turns = 0 if dim == 2 else 3
     return {
         "liner": (np.int64, 0), "condition": (np.int64, 0), "spin": (np.float64, turns), "x": (np.float64, dim),

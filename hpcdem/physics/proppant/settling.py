@@ -27,7 +27,7 @@ def stokes(size: float, density: float, fluid: float, viscosity: float, gravity:
 
 @lru_cache(maxsize=8)
 def terminal(size: float, density: float, fluid: float, viscosity: float, gravity: float) -> float:
-    """The same after Schiller and Naumann."""
+    """Settling velocity after Schiller and Naumann."""
     from scipy.optimize import brentq  # as long to import as all of this package
 
     slow = stokes(size, density, fluid, viscosity, gravity)

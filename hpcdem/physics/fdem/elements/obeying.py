@@ -132,7 +132,7 @@ class Obeying:
         return memory
 
     def states(self) -> np.ndarray:
-        """The same (n_own, 1 + states), means over the parts of elements by volume."""
+        """States of user laws (n_own, 1 + states), means over the parts of elements by volume."""
         memory = self.obeyed() if self.here else self.sim.cold[user_laws.COLUMN]
         width = self._width(memory)
         found = memory[:, : 1 + width].copy()
