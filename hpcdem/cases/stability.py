@@ -50,9 +50,9 @@ class SlopeStability(Case):
     )
     first: float = quantity(1.0, "1", "the factor that is tried first", gt=0)
     precision: float = quantity(0.01, "1", "the factor lies in a range of this width over itself", gt=0, le=0.2)
-    balance: float = quantity(1e-6, "1", "unbalanced ratio at which the slope stands", gt=0, le=1e-3)
-    patience: int = quantity(100000, "1", "steps after which it does not stand", ge=1000)
-    collapse: float = quantity(0.01, "1", "displacement with which it has come down, over height", gt=0, le=0.5)
+    balance: float = quantity(1e-6, "1", "unbalanced ratio below which the slope is stable", gt=0, le=1e-3)
+    patience: int = quantity(100000, "1", "steps after which it is unstable", ge=1000)
+    collapse: float = quantity(0.01, "1", "displacement at failure, over height", gt=0, le=0.5)
 
     @model_validator(mode="after")
     def _fits(self) -> SlopeStability:

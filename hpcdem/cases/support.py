@@ -90,7 +90,7 @@ class Support(Case):
         if self.dilation > self.friction:
             raise ValueError(f"dilation is {self.dilation:g}, expected at most friction, {self.friction:g} degrees")
         if self.radius + self.bolt_length > 0.9 * self.reach * self.radius:
-            raise ValueError(f"bolt_length is {self.bolt_length:g}: bolts would come near the sides of the model")
+            raise ValueError(f"bolt_length is {self.bolt_length:g}: bolts would end near the boundaries of the model")
         if self.stress_xx == 0.0 and self.stress_yy == 0.0:
             raise ValueError("stress_xx and stress_yy are both 0, expected a stress")
         if self.liner > 0.2 * self.radius:

@@ -97,7 +97,7 @@ def run_zdem(session: Session, options: Options, source: bytes) -> None:
 
     name, log = str(options.script), session.log
     if options.arguments:
-        raise UsageError(f"{options.arguments[0]}: a ZDEM script takes no arguments, a Python program does")
+        raise UsageError(f"{options.arguments[0]}: a ZDEM script does not accept arguments (only Python programs do)")
     script = parser.parse_text(source, name)
     if options.check:
         log.info(check.summary(script, options.outdir))
@@ -339,7 +339,7 @@ STRESS_AND_STRAIN = (
 def only_with_s(context: click.Context, option: click.Parameter, value: Any) -> None:
     """UsageError for an option that makes no sense with a script."""
     if value:
-        raise click.UsageError(f"{'/'.join(option.opts[:2])} goes with -s DIR, the stress and strain of a finished run")
+        raise click.UsageError(f"{'/'.join(option.opts[:2])} requires -s DIR (stress and strain of a finished run)")
 
 
 def other_options(command: click.Command) -> click.Command:

@@ -66,7 +66,9 @@ class Setting(click.ParamType):
 @click.option("--sampling-seed", type=click.IntRange(0), metavar="S", help="Seed of the sampling itself [0].")
 @click.option("--ranks", type=click.IntRange(1), metavar="N", help="Ranks of each member [1].")
 @click.option("-j", "--threads", type=click.IntRange(1), metavar="N", help="Threads of each rank [1].")
-@click.option("--jobs", type=Jobs(), metavar="N", help="Members at once [auto: as many as there are cores for].")
+@click.option(
+    "--jobs", type=Jobs(), metavar="N", help="Number of simultaneous members [auto: as many as the cores allow]."
+)
 @click.option("--tries", type=click.IntRange(1), metavar="N", help="Number of starts of a member that fails or is "
               "killed; it resumes from its last checkpoint [2].")  # fmt: skip
 @click.option("--with", "links", type=PATH, multiple=True, metavar="FILE", help="A file or folder that the script "

@@ -167,7 +167,7 @@ class SerialComm(Comm):
         return 0
 
     def exchange(self, parcels: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-        assert not parcels, "there is no other rank"
+        assert not parcels, "a single rank has no other ranks"
         return {}
 
     def agree(self, error: str | None) -> None:

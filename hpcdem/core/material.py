@@ -79,7 +79,7 @@ def checked(given: Mapping[str, Any]) -> dict[str, float]:
     values = {name: value for name, value in given.items() if value is not None}
     for name, value in values.items():
         if name not in PROPERTIES:
-            raise CommandError(f"there is no property {name!r}; there are {', '.join(PROPERTIES)}")
+            raise CommandError(f"unknown property {name!r}; known: {', '.join(PROPERTIES)}")
         if not PROPERTIES[name].allows(value):
             raise CommandError(f"{name} must be {PROPERTIES[name].range}, got {value:g}")
         if abs(value) > LARGEST:

@@ -68,12 +68,12 @@ def _described(file: BinaryIO, length: int, rows: Sequence[Sequence[int]]) -> in
     crc, at = 0, 0
     for first, size in [*rows, (length, 0)]:
         if not at <= first <= length:
-            raise ValueError("places that are not in order")
+            raise ValueError("positions that are not in order")
         file.seek(at)
         while at < first:
             part = file.read(min(_PART, first - at))
             if not part:
-                raise ValueError("shorter than it says")
+                raise ValueError("shorter than declared")
             crc, at = zlib.crc32(part, crc), at + len(part)
         at = first + size
     return crc

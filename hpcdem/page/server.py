@@ -264,7 +264,7 @@ class Conversation(BaseHTTPRequestHandler):
                 return Answer(b"", "text/plain", HTTPStatus.SEE_OTHER, f"/{self.server.key}/")
         name = self._permitted()
         if name not in self.server.texts:
-            raise _Refused(HTTPStatus.NOT_FOUND, "there is nothing of this name")
+            raise _Refused(HTTPStatus.NOT_FOUND, "unknown name")
         return self.server.texts[name]
 
     def _called(self) -> Answer:
@@ -274,7 +274,7 @@ class Conversation(BaseHTTPRequestHandler):
             raise _Refused(HTTPStatus.FORBIDDEN, "this server accepts requests of its own page only")
         name = self._permitted()
         if name not in self.server.calls:
-            raise _Refused(HTTPStatus.NOT_FOUND, "there is nothing of this name")
+            raise _Refused(HTTPStatus.NOT_FOUND, "unknown name")
         return self.server.calls[name](self._content())
 
     def _local(self) -> None:

@@ -99,7 +99,7 @@ class Sources:
     def source(self, number: Any) -> Source:
         """One of them, by its index. HpcdemError for an unknown one."""
         if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(self.found):
-            raise HpcdemError("there are no such frames")
+            raise HpcdemError("unknown frames")
         return self.found[number]
 
     def frame(self, number: Any, place: Any) -> FrameFile:

@@ -282,7 +282,7 @@ def _components(words: Sequence[str], model: str) -> tuple[float, ...]:
     values = [_number(word, f"a component of {model}") for word in words]
     for value, most in zip(values, largest):
         if not 0.0 <= value <= most:
-            raise ValueError(f"{value:g} is not a component of {model}, which goes from 0 to {most:g} here")
+            raise ValueError(f"{value:g} is not a component of {model}, which ranges from 0 to {most:g} here")
     return tuple(value / most for value, most in zip(values, largest))
 
 

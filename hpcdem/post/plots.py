@@ -87,8 +87,8 @@ def seen_of(frame: Frame, style: Style) -> View:
     sides |= style.limits
     if sides["right"] <= sides["left"] or sides["top"] <= sides["bottom"]:
         raise UsageError(
-            f"nothing to show: x from {sides['left']:g} to {sides['right']:g} m, "
-            f"y from {sides['bottom']:g} to {sides['top']:g} m"
+            f"the limits contain nothing: x from {sides['left']:g} to {sides['right']:g} m, y from "
+            f"{sides['bottom']:g} to {sides['top']:g} m"
         )
     return View(*(sides[side] for side in SIDES))
 

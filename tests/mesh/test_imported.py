@@ -412,7 +412,7 @@ BAD_DECKS = {
     "twice": ("*NODE\n10, 5., 0.\n", r"m\.inp:10: node 10 is defined twice, at different positions"),
     "element twice": (QUADS.format("", "") + "*ELEMENT, TYPE=CPE4\n100, 20, 30, 60, 50\n", r"m\.inp:14: element 100"),
     "too few": ("*ELEMENT, TYPE=CPE4\n1, 10, 20, 50\n", r"m\.inp:10: element 1 has 3 points, CPE4 has 4"),
-    "no such set": (QUADS.format("", "") + "*ELSET, ELSET=A\nB\n", r"m\.inp:14: there is no \*ELSET 'B'"),
+    "no such set": (QUADS.format("", "") + "*ELSET, ELSET=A\nB\n", r"m\.inp:14: unknown \*ELSET 'B'"),
     "generation": (QUADS.format("", "") + "*NGEN\n10, 20, 5\n", r"m\.inp:13: \*NGEN makes points .* is not supported"),
     "no number": ("*NODE\n70, x, 0.\n", r"m\.inp:10: expected a number, not 'x'"),
     "not finite": ("*NODE\n70, inf, 0.\n", r"m\.inp:10: expected a finite number"),

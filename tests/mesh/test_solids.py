@@ -190,7 +190,7 @@ def test_faces_of_a_drawing_become_a_body(tmp_path: Path) -> None:
     drawing.saveas(tmp_path / "ore.dxf")
     (body,) = cad.read(tmp_path / "ore.dxf", "mirrored")
     np.testing.assert_allclose(body.bounds(), [[0.09, 0, 0], [0.1, 0.01, 0.01]], atol=1e-9)
-    with pytest.raises(HpcdemError, match=r"no 3DFACE in layer 'gold' .layers with some: 'else', 'mirrored', 'ore'"):
+    with pytest.raises(HpcdemError, match=r"layer 'gold' has no 3DFACE .layers with some: 'else', 'mirrored', 'ore'"):
         cad.read(tmp_path / "ore.dxf", "gold")
 
 

@@ -561,7 +561,7 @@ def test_what_may_be_asked(viewing: Viewing):
     about = viewing.ask("about", {})
     good = {"view": about["view"], "width": 100, "height": 50}
     for wanted, message in (
-        ({"frame": 99}, "no such frame"), ({"frame": "/etc/passwd"}, "frame: expected"), ({"source": 5}, "such frames"),
+        ({"frame": 99}, "no such frame"), ({"frame": "/etc/passwd"}, "frame: expected"), ({"source": 5}, "unknown fr"),
         ({"width": 10**9}, "width and height"), ({"width": 1.5}, "width: expected"), ({"view": 3}, "view: expected"),
         ({"view": {"layers": [{"object": "x"}]}}, "layer 1 (x), object: expected"),
     ):  # fmt: skip

@@ -139,7 +139,7 @@ def test_the_start_costs_next_to_nothing(make_machine, tmp_path):
 def test_what_is_wrong_at_the_start_is_said_once(make_machine):
     machine = make_machine({"proc/meminfo": "MemAvailable: 100 kB\n"}, places=places(2))
     (line,) = doctor.start_warnings(machine, SerialComm())
-    assert line.startswith("50 KiB of memory for each of 2 ranks (free 100 KiB): a rank takes") and "Cure: " in line
+    assert line.startswith("50 KiB of memory for each of 2 ranks (free 100 KiB): a rank needs") and "Cure: " in line
 
 
 def test_a_check_that_fails_ends_nothing(make_machine):

@@ -170,7 +170,7 @@ def test_options_of_stress_and_strain_belong_to_s(words):
     done = program("main", *words.split())
     assert done.returncode == 2
     asked = next(w for w in words.split() if w.startswith("-") and w != "-j")
-    assert asked in done.stderr and "goes with -s DIR" in done.stderr
+    assert asked in done.stderr and "requires -s DIR" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -271,7 +271,7 @@ def test_options_for_zdem_scripts_are_refused_for_python(resident, tmp_path, opt
 def test_a_zdem_script_takes_no_arguments(resident, tmp_path):
     (tmp_path / "a.py").write_text("START\nSTOP\n")
     done = resident(1, "a.py", "0.3", cwd=tmp_path)
-    assert done.returncode == 2 and "0.3: a ZDEM script takes no arguments" in done.stderr
+    assert done.returncode == 2 and "0.3: a ZDEM script does not accept arguments" in done.stderr
 
 
 SHORT = """\

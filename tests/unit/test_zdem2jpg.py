@@ -154,7 +154,7 @@ def test_every_option_is_explained() -> None:
     [
         (["--xmin=5000", "--xmax=4000"], "--xmax=4000 is not above --xmin=5000"),
         (["--major_locator=10", "--minor_locator=20"], "--minor_locator=20 is larger"),
-        (["--ymax=-5"], "nothing to show"),
+        (["--ymax=-5"], "limits contain nothing"),
         (["--major_locator=1"], "more than 1000 ticks"),
         (["--pagesize=2", "--fontsize=30"], "too small for numbers"),
     ],

@@ -42,7 +42,7 @@ def wedge(xs: np.ndarray, ys: np.ndarray, trim: float = 0.2) -> Wedge:
     crest = int(np.argmax(ys))
     px, py = xs[crest:], ys[crest:]
     if len(px) < 3:
-        raise ValueError("the highest point of the surface is its far end: nothing falls away from it")
+        raise ValueError("the highest point of the surface is its far end, so no slope descends from it")
     ex, ey = px[-1] - px[0], py[-1] - py[0]
     away = np.abs(ex * (py - py[0]) - ey * (px - px[0])) / np.hypot(ex, ey)
     toe = int(np.argmax(away))
@@ -54,12 +54,12 @@ def wedge(xs: np.ndarray, ys: np.ndarray, trim: float = 0.2) -> Wedge:
     if len(px) - toe >= LEAST_FRONT:
         rough = _fitted(px[toe:], py[toe:])[1]
         rise = float(np.mean(ys[: crest + toe]) - np.mean(py[toe:]))
-        what = f"behind the toe it stands {max(rise, 0.0):.4g} m higher on average than in front of it"
+        what = f"behind the toe the surface is {max(rise, 0.0):.4g} m higher on average than in front of it"
     else:
         rough, rise = _fitted(px[: toe + 1], py[: toe + 1])[1], -slope * float(px[toe] - px[0])
-        what = f"from crest to toe it falls by {max(rise, 0.0):.4g} m"
+        what = f"from crest to toe the surface falls by {max(rise, 0.0):.4g} m"
     if rise < ROUGH * rough:
-        raise ValueError(f"the surface is flat: {what}, and is rough by {rough:.4g} m (standard deviation)")
+        raise ValueError(f"the surface is flat: {what}; its roughness is {rough:.4g} m (standard deviation)")
     return Wedge((float(px[0]), float(py[0])), (float(px[toe]), float(py[toe])), float(np.degrees(np.arctan(-slope))))
 
 

@@ -149,7 +149,9 @@ def _of_this_run(folder: Path, log: Any) -> list[Path]:
     if old:
         log.warn(f"{len(old)} frames are newer than their sections, first {old[0]}: run `hpcdem -s` again")
     if not files:
-        raise HpcdemError(f"{folder / 'ss' / 'data'} holds sections of an earlier run only: run `hpcdem -s {folder}`")
+        raise HpcdemError(
+            f"{folder / 'ss' / 'data'} contains sections of an earlier run only: run `hpcdem -s {folder}`"
+        )
     return files
 
 

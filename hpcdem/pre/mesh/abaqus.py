@@ -23,8 +23,8 @@ from hpcdem.pre.mesh.file_mesh import DIMENSIONS, Block, FileMesh, lines, listed
 REFUSED = {
     "NGEN": "makes points between others", "NFILL": "makes points between others", "NCOPY": "copies points",
     "NMAP": "moves points", "ELGEN": "makes elements from others", "ELCOPY": "copies elements",
-    "SYSTEM": "gives points in a system of its own", "SYMMETRICMODELGENERATION": "makes a part of the model",
-    "IMPORT": "takes the mesh from a result",
+    "SYSTEM": "gives points in a local coordinate system", "SYMMETRICMODELGENERATION": "makes a part of the model",
+    "IMPORT": "reads the mesh from a result",
 }  # fmt: skip
 """Without what these do the mesh would be another one."""
 PLANE = re.compile(r"(?:CPE|CPS|CPEG|CAX|CGAX|DC2D|DCC2D|DCAX|DCCAX|AC2D|ACAX|STRI|S|DS|M3D|R3D|SFM3D)(\d+)[A-Z]*5?$")
@@ -381,7 +381,7 @@ class _Reader:
             of, value = self._target(scope, entry)
             if isinstance(value, str):
                 if (of_kind, value) not in of.sets:
-                    raise HpcdemError(f"{entry.line.where}: there is no *{of_kind} '{entry.value}'")
+                    raise HpcdemError(f"{entry.line.where}: unknown *{of_kind} '{entry.value}'")
                 found = self._members(of, of_kind, value, lost, above)
             else:
                 found = self._numbered(of, of_kind, value, lost)
@@ -400,7 +400,7 @@ class _Reader:
 
     def _instance_named(self, name: str, entry: Entry) -> Scope:
         if name.upper() not in self.instances:
-            raise HpcdemError(f"{entry.line.where}: there is no instance {name}")
+            raise HpcdemError(f"{entry.line.where}: unknown instance {name}")
         return self.instances[name.upper()]
 
     def _numbered(self, scope: Scope, kind: str, numbers: np.ndarray | range, lost: list[int]) -> np.ndarray:
@@ -428,7 +428,7 @@ class _Reader:
         of, value = self._target(scope, entry)
         if isinstance(value, str):
             if (ELEMENTS, value) not in of.sets:
-                raise HpcdemError(f"{entry.line.where}: there is no *ELSET '{entry.value}'")
+                raise HpcdemError(f"{entry.line.where}: unknown *ELSET '{entry.value}'")
             elements = self._members(of, ELEMENTS, value, [], ())
         else:
             elements = self._numbered(of, ELEMENTS, value, [])
@@ -536,7 +536,7 @@ def _with_files(word: Keyword, files: set[Path], depth: int) -> Iterator[Keyword
     if word.name == "INCLUDE":
         file = word.line.file.parent / word.get("INPUT")
         if not file.is_file():
-            raise HpcdemError(f"{where}: there is no file {file}")
+            raise HpcdemError(f"{where}: file {file} not found")
         yield from _pieces(file, files, depth + 1)
         return
     yield word

@@ -165,7 +165,7 @@ def _faces(path: Path, layer: str | None, scale: float | None, notes: list[str])
             rows.append((a, c, d))
     if not rows:
         known = ", ".join(f"'{name}'" for name in sorted(layers)) or "none"
-        raise HpcdemError(f"{path}: there is no 3DFACE in layer '{layer}' (layers with some: {known})" if layer else
+        raise HpcdemError(f"{path}: layer '{layer}' has no 3DFACE (layers with some: {known})" if layer else
                           f"{path}: the drawing contains no 3DFACE")  # fmt: skip
     return unit * np.array(rows)
 

@@ -130,7 +130,7 @@ def _main(into: str) -> None:
     occ = gmsh.model.occ
     number = _regions(occ, said, middle, unit)
     if not number:
-        raise SystemExit("nothing is left of the body")
+        raise SystemExit("the body has no volume left")
     number, cuts = _cut(occ, said, number, middle, unit)
     occ.synchronize()
     _refined(gmsh, said, middle, unit)

@@ -151,7 +151,7 @@ class Fit:
         found = [
             f"{len(at)} {what}, at {places(at)}"
             for at, what in (
-                (self.own, "pairs with points of their own"),
+                (self.own, "pairs with separate points"),
                 (self.cut, "quads that are cut along different diagonals"),
                 (self.parts, "pairs of other sizes or shapes (hanging points)"),
             )

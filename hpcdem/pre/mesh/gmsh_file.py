@@ -179,7 +179,7 @@ class _Reader:
             name = found[1].decode("ascii")
             end = re.compile(rb"\$End" + found[1] + rb"\b").search(content, found.end())
             if end is None:
-                raise HpcdemError(f"{self.path}: the file ends within ${name}: there is no $End{name}")
+                raise HpcdemError(f"{self.path}: the file ends within ${name}: $End{name} is missing")
             out[name] = content[found.end() : end.start()]
             at = end.end()
 

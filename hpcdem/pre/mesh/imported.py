@@ -339,7 +339,7 @@ def _refuse_kinds(data: FileMesh, dim: int) -> None:
 def _plane(data: FileMesh) -> np.ndarray:
     points = data.points
     if not len(points):
-        raise data.refuse("there are no points")
+        raise data.refuse("the file has no points")
     used = np.unique(np.concatenate([b.rows.ravel() for b in data.blocks if DIMENSIONS[b.kind] == 2]))
     z = points[used, 2]
     off = np.abs(z - z[0])

@@ -112,5 +112,5 @@ def polygon_of(layers: Layers, names: Sequence[str], size: float, holes: Sequenc
 
     region = shapely.difference(union(names), union(holes)) if holes else union(names)
     if region.is_empty:
-        raise CommandError(f"nothing is left of layer '{names[0]}' without its holes")
+        raise CommandError(f"the holes cover layer '{names[0]}' completely")
     return region

@@ -143,7 +143,7 @@ def memory(machine: Machine) -> Findings:
     each = least / len(machine.here)
     if each < COMFORTABLE:
         say = problem if each < NEEDED else warning
-        text = f"{size(each)} of memory for each of {len(machine.here)} ranks ({where} {size(least)}): a rank takes "
+        text = f"{size(each)} of memory for each of {len(machine.here)} ranks ({where} {size(least)}): a rank needs "
         cure = f"mpiexec -n {max(1, int(least // COMFORTABLE))} hpcdem ..."
         if machine.in_job:
             cure = "#SBATCH --mem-per-cpu=2G (a number without a unit means MiB)"

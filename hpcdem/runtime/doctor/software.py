@@ -123,7 +123,7 @@ def threads(machine: Machine) -> Findings:
     """The library under numba's threads."""
     layer = machine.environ.get("NUMBA_THREADING_LAYER", "omp")
     if layer not in ("omp", "workqueue"):
-        text = f"NUMBA_THREADING_LAYER={layer}: starting threads takes far longer than with OpenMP"
+        text = f"NUMBA_THREADING_LAYER={layer}: threads start much more slowly than with OpenMP"
         yield warning("threads", text, "unset NUMBA_THREADING_LAYER")
     elif launch.openmp_runtime_found():
         yield ok("threads", f"libgomp.so.1 found, {machine.here[0].threads} thread(s) per rank requested")
@@ -140,7 +140,7 @@ def mpi_library(machine: Machine) -> Findings:
         return
     library, error = machine.mpi_library
     if error:
-        yield warning("MPI", f"mpi4py finds no MPI library, so there is one rank only: {error}", "pip install mpich")
+        yield warning("MPI", f"mpi4py finds no MPI library, so only one rank is possible: {error}", "pip install mpich")
         return
     n, hosts = len(machine.places), machine.hosts
     who = f"started by {machine.launcher.name}" if machine.launcher else "started without a launcher"
