@@ -93,6 +93,10 @@ class Structure(SurfaceLoad):
     def _stored(self) -> float:
         """Energy [J/m]. Not collective."""
 
+    def _accounted(self) -> float:
+        """Of the account of energy what a command may change [J/m]. Not collective."""
+        return self._stored()
+
     @abstractmethod
     def energies(self) -> dict[str, float]:
         """The account of energy [J/m]. Not collective."""
@@ -132,12 +136,12 @@ class Structure(SurfaceLoad):
         """Take elements (k,) out, at once. The numbers of the others stay."""
         blocks = self.blocks
         blocks.before_change()
-        stored = self._stored() if self._account is not None else 0.0
+        stored = self._accounted() if self._account is not None else 0.0
         self._let_go(elements)
         self.elements["state"][elements] |= REMOVED
         self._arrange()
         if self._account is not None:
-            self.commands += self._stored() - stored
+            self.commands += self._accounted() - stored
         blocks.changed()
 
     def condition(self, nodes: np.ndarray, **changes: Any) -> None:

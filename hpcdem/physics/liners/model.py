@@ -153,7 +153,7 @@ class Liners(Structure):
                 raise CommandError(f"in space a liner is a shell with a thickness: it has no {name}")
         values = LINER.complete(given)
         blocks.before_change()
-        stored = self._stored() if self._account is not None else 0.0
+        stored = self._accounted() if self._account is not None else 0.0
         self._take_properties(elements, values)
         area = self.kind.areas(elements)[:, None]
         beams["gap"][elements] = -beams["pressure"][elements] / (values["normal_stiffness"] * area)
@@ -161,7 +161,7 @@ class Liners(Structure):
             beams["shear"][elements] = 0.0
         self._arrange()
         if self._account is not None:
-            self.commands += self._stored() - stored
+            self.commands += self._accounted() - stored
         blocks.changed()
 
     def stop(self) -> None:
@@ -225,7 +225,7 @@ class Liners(Structure):
         """Energy of the liners [J/m] since the account began: stored in beams and bond and as motion, and at_start;
         lost in beams (yield) and in the bond (slip, parting), work_on_rock, work_of_conditions, work_of_gravity,
         commands; closing: what does not add up, relative: that over the largest. Not collective."""
-        work = (self.work + self._half_step()).tolist()
+        work = (self.work + self._half_step(self.blocks.clock.dt)).tolist()
         found = {
             "stored": self._stored(), "at_start": self._stored_at_start, "lost_in_beams": work[kernels.IN_BEAMS],
             "lost_in_bond": work[kernels.IN_BOND], "work_on_rock": work[kernels.ON_ROCK],
@@ -236,14 +236,14 @@ class Liners(Structure):
         taken = found["work_on_rock"] + found["lost_in_beams"] + found["lost_in_bond"]
         return closed(found, found["stored"] - self._stored_at_start + taken - given)
 
-    def _half_step(self) -> np.ndarray:
+    def _half_step(self, dt: float) -> np.ndarray:
         """Work (5,) of conditions and gravity in the half step before this moment: a step books all of what the forces
         at its beginning do around it, and this moment has no step yet (energy.py)."""
         out, dim, nodes, time = np.zeros(kernels.WORK), self.blocks.dim, self.nodes, self.blocks.time_now()
         if self._dynamic:
             force = self._conditions_at(time, time)[:, kernels.FORCE + self.kind.parts]
             force = np.where(self._led(), force - self._total, force)
-            way = 0.5 * self.blocks.clock.dt * np.column_stack([nodes["v"], nodes["spin"]])
+            way = 0.5 * dt * np.column_stack([nodes["v"], nodes["spin"]])
             weight = self._node_table[:, kernels.WEIGHT : kernels.WEIGHT + dim]
             out[kernels.BY_CONDITIONS] = math.fsum((force * way).reshape(-1).tolist())
             out[kernels.BY_GRAVITY] = math.fsum((weight * way[:, :dim]).reshape(-1).tolist())
@@ -257,12 +257,19 @@ class Liners(Structure):
             parts.append(np.divide(squares, 2.0 * k, out=np.zeros(len(k)), where=k > 0.0))
         if self._dynamic:
             self._set_masses()
-            parts.append(self._kinetic())
+            parts.append(self._kinetic(self.blocks.clock.dt))
         return math.fsum(np.concatenate(parts).tolist())
 
-    def _kinetic(self) -> np.ndarray:
+    def _accounted(self) -> float:
+        return self._stored() - float(self._half_step(self.blocks.clock.dt).sum())
+
+    def _moving(self, dt: float) -> float:
+        """What of it depends on the time step and the masses for it."""
+        return float(self._kinetic(dt).sum() - self._half_step(dt).sum())
+
+    def _kinetic(self, dt: float) -> np.ndarray:
         """m v- v+ / 2 of the velocities before and after this moment (energy.py), of what is led m v- v- / 2."""
-        nodes, table, dt = self.nodes, self._node_table, self.blocks.clock.dt
+        nodes, table = self.nodes, self._node_table
         v = np.column_stack([nodes["v"], nodes["spin"]])
         turns = [kernels.INERTIA] * (v.shape[1] - self.blocks.dim)
         mass = table[:, [*[kernels.MASS] * self.blocks.dim, *turns]]
@@ -324,8 +331,8 @@ class Liners(Structure):
         o, dt = self.blocks.options, self.blocks.clock.dt
         if self._prepared_for == (dt, o.dynamic, o.safety):
             return
-        known, self._prepared_for = self._prepared_for is not None, (dt, o.dynamic, o.safety)
-        before, table = self._kinetic().sum(), self._node_table
+        was, self._prepared_for = self._prepared_for, (dt, o.dynamic, o.safety)
+        before, table = self._moving(was[0]) if was is not None else 0.0, self._node_table
         if not o.dynamic:
             table[:, kernels.MASS] = 0.5 * MARGIN * (1.0 + ALPHA) * self._stiffness
             table[:, kernels.INERTIA] = 0.5 * MARGIN * (1.0 + ALPHA) * self._turning
@@ -333,8 +340,8 @@ class Liners(Structure):
         least = 0.5 * (dt / o.safety) ** 2
         mass = np.maximum(self._true_mass, least * self._stiffness)
         table[:, kernels.MASS], table[:, kernels.INERTIA] = mass, np.maximum(self._true_inertia, least * self._turning)
-        if known and self._account is not None:
-            self.commands += float(self._kinetic().sum() - before)
+        if was is not None and self._account is not None:
+            self.commands += self._moving(dt) - before
         raised = table[:, kernels.INERTIA] > self._true_inertia
         self._tell_of_mass(
             mass, self._true_mass, f", and raises the rotational inertia of {int(raised.sum())}" if raised.any() else ""
@@ -355,7 +362,7 @@ class Liners(Structure):
         begins = self._account is not self.blocks.budget
         super().storage_rebuilt()
         if begins and self._account is not None:
-            self.work -= self._half_step()
+            self.work -= self._half_step(self.blocks.clock.dt)
 
     def corners(self, blocks: Any) -> np.ndarray:
         """(n_own, 4) bool: corners of the owned elements that a liner is bound to."""
@@ -439,11 +446,11 @@ class Liners(Structure):
         lost = np.isin(beams["host"], elements)
         if not lost.any():
             return
-        stored = self._stored() if self._account is not None else 0.0
+        stored = self._accounted() if self._account is not None else 0.0
         self._unbind(lost)
         self._arrange()
         if self._account is not None:
-            self.commands += self._stored() - stored
+            self.commands += self._accounted() - stored
         if self.blocks.log is not None:
             self.blocks.log.info(f"{int(lost.sum())} liner elements lost their rock, which was removed")
 
