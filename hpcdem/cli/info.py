@@ -1,4 +1,4 @@
-"""`hpcdem info FILE|DIR ...`: what a file or a run is, how far it came, and whether it is whole."""
+"""`hpcdem info FILE|DIR ...`: what a file or a run is, its progress, and whether it is complete."""
 
 from __future__ import annotations
 

@@ -177,7 +177,7 @@ def style_of(options: dict[str, Any], folder: Path, page: float, dpi: float) -> 
 
 
 def common_view(files: Sequence[Path], style: Style) -> View:
-    """One view that holds what every one of these frames would show by itself."""
+    """One view that contains what each of these frames would show alone."""
     from hpcdem.io.axes import View
     from hpcdem.io.frames import read_frame
     from hpcdem.post.plots import seen_of

@@ -49,7 +49,7 @@ class Comm(Protocol):
         The first rank of each node of the machine calls it, and the ranks of the node share one copy of its large
         arrays (halo/shared.py); pages that a rank writes to become its own. once: rank 0 alone calls it, for what need
         not be equal to the last bit. An error of it is raised on all ranks. Collective, except from inside of another
-        `make`. Without nodes to tell apart every rank calls it."""
+        `make`. Without nodes to distinguish every rank calls it."""
         if not once or self.size == 1:
             return make()
         found: Any = None

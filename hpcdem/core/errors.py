@@ -32,7 +32,7 @@ class UsageError(HpcdemError):
 
 
 class ScriptError(HpcdemError):
-    """A script line that cannot be understood or carried out: ``file:line: message``."""
+    """A script line that cannot be understood or executed: ``file:line: message``."""
 
     exit_code = EXIT_USAGE
 

@@ -17,7 +17,7 @@ Value = float | None
 
 
 class Property(NamedTuple):
-    """unit: as it is shown; values lie in [low, high], with `above` not at low itself; longest: the longest form of the
+    """unit: as shown; values lie in [low, high], with `above` not at low itself; longest: the longest form of the
     word; source: of the option, see `lang.zdem.table`; in_frames: whether it is a column of frames; noun: in errors."""
 
     text: str

@@ -25,7 +25,7 @@ class System:
     names: Mapping[str, str] = field(default_factory=dict)
 
     def label(self, unit: str) -> str:
-        """A unit of SI ("N/m", "W/(m K)") as it is called here."""
+        """A unit of SI ("N/m", "W/(m K)") by its name here."""
         return re.sub(r"[A-Za-z]+", lambda found: self.names.get(found[0], found[0]), unit)
 
     def size(self, powers: tuple[int, int, int]) -> float:
@@ -232,7 +232,7 @@ def stamped(title: str, step: int, time: float) -> str:
 
 
 def printed(unit: str) -> str:
-    """A unit as it is printed: m², kg/m³."""
+    """A unit as printed: m², kg/m³."""
     return re.sub(r"(?<=[A-Za-z])\d+", lambda found: found[0].translate(_RAISED), unit)
 
 

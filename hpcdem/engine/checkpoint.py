@@ -49,7 +49,7 @@ def take_newest(
     take: Callable[[Path], dict[str, Any]],
     fatal: type[CommandError],
 ) -> tuple[Path, dict[str, Any]] | None:
-    """The newest whole checkpoint among the .sav files of some folders, and what take(path) returned for it; None if
+    """The newest complete checkpoint among the .sav files of some folders, and what take(path) returned for it; None if
     without one. before: that of this time of the model [s] or the last one before it; UsageError without one.
     Collective.
 

@@ -168,5 +168,5 @@ def bar_ticks(low: float, high: float, log: bool = False) -> list[tuple[float, s
 
 
 def number(value: float) -> str:
-    """A tick's number as short as it is."""
+    """The shortest text of a tick's number."""
     return f"{value:.6g}" if abs(value) > 1e-9 else "0"

@@ -30,7 +30,7 @@ class _Job:
 
 
 class Deliveries:
-    """Files under way: a line of tasks on rank 0, done one after the other, from `go` on.
+    """Files under way: a queue of tasks on rank 0, executed in sequence, from `go` on.
 
     Which files are under way is known on all ranks (`expect`); errors reach all ranks by `look` and `settle`.
     """

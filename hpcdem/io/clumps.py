@@ -31,7 +31,7 @@ FARTHEST = 100.0
 """Farthest point of a disc from the centroid in radii of gyration: a rod has 1.7, a disc 1.4."""
 BODY = "clump x y angle area inertia n"
 WIDEST = 2.0
-"""Radius of gyration over the farthest point of the discs: a hoop has 1, and discs may leave out some of the shape."""
+"""Radius of gyration over the farthest point of the discs: a hoop has 1, and discs may omit some of the shape."""
 
 
 @dataclass

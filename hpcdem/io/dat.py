@@ -295,7 +295,7 @@ def read_dat(
 
     tables: names of the tables to read (all by default); the others come back empty, which saves most of the time.
     Columns that the file does not have are absent from the table; unknown columns are skipped. Groups
-    are numbered in order of first appearance. Raises HpcdemError if the file is no such file or is cut off.
+    are numbered in order of first appearance. Raises HpcdemError if the file is of another kind or truncated.
     """
     path = os.fspath(path)
     wanted = set(_TABLES if tables is None else tables)

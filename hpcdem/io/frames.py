@@ -35,7 +35,7 @@ def frame_name(step: int, suffix: str, ini: bool = False, stem: str = "all") -> 
 
 
 def list_frames(folder: str | os.PathLike) -> list[FrameFile]:
-    """The frames in a folder in the order of time: by step, the `_ini` one after the other of the same step, since it
+    """The frames in a folder in the order of time: by step, the `_ini` one after that of the same step, since it
     shows what was done between two commands. Those that an earlier run has left there, as run.json tells, do not count;
     `left_out` says which.
 

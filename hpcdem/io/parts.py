@@ -1,4 +1,4 @@
-"""Parts of a file, each read by the rank that wants it: no rank has the whole file in memory."""
+"""Parts of a file, each read by the rank that needs it: no rank has the whole file in memory."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _read(path: str | os.PathLike, parts: Parts) -> tuple[list[np.ndarray], str 
 
 def read_lines(comm: Comm, path: str | os.PathLike, begin: int, end: int) -> bytes:
     """Collective: of the bytes `begin` to `end` of a text file the lines that begin in this rank's share of them, with
-    their ends; put one after the other they are all of these bytes. HpcdemError on all ranks."""
+    their ends; joined in order they are all of these bytes. HpcdemError on all ranks."""
     first, last = (begin + at for at in share(end - begin, comm))
     (part,) = read_parts(comm, path, [(max(first - 1, begin), last)])
     text = part.tobytes()

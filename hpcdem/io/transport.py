@@ -65,7 +65,7 @@ def rows_in_blocks(arrays: Sequence[np.ndarray]) -> Iterator[Block]:
 
 
 def text_in_blocks(sections: Sequence[Section]) -> Iterator[Block]:
-    """The text of sections, one after the other, in blocks that end where a row of a table does."""
+    """The text of sections in sequence, in blocks that end where a row of a table does."""
     block, n = _buffers.take(), 0
     for section in sections:
         done, rows, width = 0, *size_of(section)

@@ -3,7 +3,7 @@
 Points are the particles in order of gid (z = 0) with every particle field as point data; `velocity` and `force` are
 3-vectors, `radius` scales glyphs. Cells are one vertex per particle, then one line per contact, then one per bond;
 cell data of the vertices is NaN, -1 for ids and 0 for flags. What has no place in PolyData (walls, wall contacts,
-settings, group names) stands in the group /hpcdem of the same file.
+settings, group names) is in the group /hpcdem of the same file.
 
 Format: VTK File Formats, section VTKHDF, https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html
 """

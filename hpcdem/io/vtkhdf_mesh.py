@@ -106,7 +106,7 @@ def whole(frame: MeshFrame, comm: Comm) -> MeshState | None:
 
 
 def _cells(sizes: np.ndarray) -> np.ndarray:
-    """(ne, 4) rows of points of elements whose corners lie one after the other."""
+    """(ne, 4) rows of points of elements whose corners are consecutive."""
     first = np.cumsum(sizes) - sizes
     cells: np.ndarray = first[:, None] + np.arange(4)
     cells[sizes < 4, 3] = -1

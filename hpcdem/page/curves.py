@@ -198,7 +198,7 @@ class Curves:
         return steps.astype(int), np.broadcast_to(filter.amount(plain, fields, text), steps.shape)
 
     def _table(self, record: Record) -> np.ndarray:
-        """(n, 3): step, time, value, in the order of steps; a line that is being written is left out, and only what is
+        """(n, 3): step, time, value, in the order of steps; an incomplete last line is ignored, and only what is
         new is read. HpcdemError."""
         known, last, rows = self._read.get(record.path, (0, b"", np.zeros((0, 3))))
         try:
@@ -260,7 +260,7 @@ def _quoted(record: Record) -> str:
 
 
 def _used(text: str, records: dict[str, Record]) -> dict[str, Record]:
-    """The histories whose names stand in an expression. HpcdemError for one that is not there."""
+    """The histories named in an expression. HpcdemError for an unknown one."""
     used = {}
     for found in _QUOTED.finditer(text):
         name = found[1] or found[2] or ""

@@ -257,7 +257,7 @@ def _zipped(content: dict[str, bytes]) -> bytes:
 
 
 def command(wanted: dict[str, Any]) -> str:
-    """The command line that makes the same files; the table stands in grading.txt, which the page offers too."""
+    """The command line that makes the same files; the table is in grading.txt, which the page offers too."""
     request = request_of(wanted)
     shape = {"ellipse": ("l_over_d", "size_rule"), "circle": ()}.get(request.shape, ("deviation", "roundness"))
     names = ["shape", "number", "slenderness", "void_ratio", *shape, "mass_exponent", "placement", "seed"]

@@ -158,7 +158,7 @@ class PageServer(ThreadingHTTPServer):
 
 
 class _Refused(Exception):
-    """A request that is not carried out; status: of HTTP."""
+    """A rejected request; status: of HTTP."""
 
     def __init__(self, status: int, why: str) -> None:
         super().__init__(why)

@@ -143,7 +143,7 @@ class Sources:
 
     def state(self) -> dict[str, Any]:
         """Frames by source, with what tells whether the last one was written again; of the first folder whether a run
-        writes there, how far it is, and its histories."""
+        writes there, its progress, and its histories."""
         self.look()
         told: dict[str, Any] = {
             "sources": [

@@ -68,7 +68,7 @@ BYTES = 20e6
 MOVED = ("elements", "joints")
 """What is drawn deformed; joints in space lie on faces of elements."""
 FINE = 2
-"""A picture at rest is the mean of so many squared pixels for each."""
+"""Each pixel of a picture at rest is the mean of this number squared."""
 FINEST = 2560 * 1600
 """Larger pictures, of screens with small pixels, are as fine as these: nobody waits ten seconds for one."""
 
@@ -419,7 +419,7 @@ def _stops(name: str) -> list[str]:
 
 
 def _said(value: Any, unit: str) -> str:
-    """A value as it is read: with the prefix of its size, of a vector its length and its components."""
+    """A value as text, with the prefix of its size; for a vector its length and components."""
     if value is None or isinstance(value, str):
         return value or "–"
     if np.ndim(value):

@@ -96,7 +96,7 @@ def _read(pipe: IO[bytes], length: int) -> bytes:
 class Worker:
     """Asks a maker, one thing at a time.
 
-    newest_wins: a request makes all earlier ones superfluous; else they are answered one after the other. longest:
+    newest_wins: a request makes all earlier ones superfluous; otherwise they are answered in sequence. longest:
     seconds after which work is ended in any case."""
 
     def __init__(self, newest_wins: bool, longest: float = LONGEST) -> None:

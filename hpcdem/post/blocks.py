@@ -34,7 +34,7 @@ GROUPS = ("#e9e4d8", "#d5dde3", "#dfe8d2", "#f1dfc8", "#e2d8e6", "#d3e4e2", "#ec
 KINDS = ((1.0, 4.0 / 3.0, TENSION, "tension"), (4.0 / 3.0, 5.0 / 3.0, MIXED, "mixed"), (5.0 / 3.0, 2.1, SHEAR, "shear"))
 """Modes of broken joints from ... to ..., 1 opened and 2 slid: colour, word."""
 MOST_EDGES = 4000
-"""The mesh of larger models is a grey mush, and is left out."""
+"""The mesh of larger models is illegible and not drawn."""
 NEAR = 1e-3
 """Corners nearer than this part of an edge share the mean of their stress."""
 LEVELS = 14
@@ -293,7 +293,7 @@ def supports(axes: Any, state: MeshState) -> list[Any]:
 
 def _kinds(state: np.ndarray, mode: np.ndarray) -> list[tuple[np.ndarray, str, float, str]]:
     """Joints, colour, part of the line width, word of the legend, in the order of drawing; what is missing is
-    left out."""
+    omitted."""
     broken = state == BROKEN
     rows = [(np.flatnonzero(state == YIELDED), YIELD, 0.45, "yielded")]
     rows.append((np.flatnonzero((state == FREE) | (broken & (mode < 1.0))), OPEN, 0.7, "initial"))

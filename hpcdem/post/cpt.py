@@ -163,7 +163,7 @@ def read_cpt(path: str | os.PathLike) -> ColourTable:
 
 
 def parse_cpt(text: str, name: str = "colour table") -> ColourTable:
-    """The colour table in a text; `name` stands in messages. Raises UsageError naming the line."""
+    """The colour table in a text; `name` is for messages. Raises UsageError naming the line."""
     model, notes = _comments(text)
     slices: list[Slice] = []
     outside: dict[str, Colour] = {}

@@ -120,8 +120,8 @@ def touched(grid: Grid, x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.
 def between(grid: Grid, table: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(n, k): the table (ny, nx, k) interpolated bilinearly at points inside the grid.
 
-    Nodes that are NaN are left out and the weights of the others made to add up to one; NaN where none is left. So a
-    table that is constant where it is known comes back constant.
+    Nodes that are NaN are ignored and the weights of the others normalised to a sum of one; NaN where none is left. So
+    a table that is constant where it is known comes back constant.
     """
     a, b = x / grid.size - grid.column, y / grid.size - grid.row
     i = np.clip(np.floor(a).astype(np.int64), 0, grid.nx - 2)

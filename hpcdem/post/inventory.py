@@ -72,7 +72,7 @@ def _of_particles(state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]
 
 
 def _of_blocks(state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]]) -> Facts:
-    """Of a PCDC script, or of a program that saved its blocks by itself."""
+    """Of a PCDC script, or of a program that saved its blocks."""
     clock, extra = state["clock"], state["extra"]
     project, run = extra.get("project"), extra.get("run") or {}
     facts: Facts = _moment(clock)

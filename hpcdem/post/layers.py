@@ -139,7 +139,7 @@ def forces(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def ids(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """The id in each particle; left out where there are too many to be read."""
+    """The id in each particle; omitted where there are too many to be read."""
     columns = frame.tables["particles"].columns
     if len(columns["gid"]) > MOST_LABELS:
         return

@@ -14,7 +14,7 @@ from hpcdem.post import plots
 from hpcdem.post.measure.figures import INK, key, label, page
 
 STEP = 5.0
-"""Arcs are drawn by chords of at most so many degrees."""
+"""Arcs are drawn by chords of at most this angle, degrees."""
 ANCHORS = "9c3708", "e0690f", "f2b53c", "a9c46c", "46a592", "3f7fb5", "6a6fc4"
 """Colours of the classes, coarse to fine, those between by interpolation."""
 TARGET, ACHIEVED = "#404040", "#c8511b"
@@ -25,7 +25,7 @@ _SIEVES = 1.0, 2.0, 5.0
 
 
 def class_colours(number: int) -> list[str]:
-    """Colours of so many classes, coarse to fine."""
+    """Colours of the given number of classes, coarse to fine."""
     rgb = np.array([[int(c[k : k + 2], 16) for k in (0, 2, 4)] for c in ANCHORS])
     at = np.linspace(0, len(rgb) - 1, max(number, 2))[:number]
     mixed = np.stack([np.interp(at, np.arange(len(rgb)), c) for c in rgb.T], 1).round().astype(int)

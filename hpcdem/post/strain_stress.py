@@ -44,7 +44,7 @@ _T = TypeVar("_T")
 @dataclass(frozen=True)
 class Options:
     """folder: with the frames; size: spacing of the grid [m]; left_wall, right_wall: ids of walls beyond which
-    particles are left out; xmove, ymove [m]: added to all coordinates; addball, delball: whether particles may be
+    particles are ignored; xmove, ymove [m]: added to all coordinates; addball, delball: whether particles may be
     added or deleted between frames; increment: strain since the frame before instead of since the first one; smooth:
     strain fitted around the nodes of the grid and averaged, instead of by the nearest neighbours of each particle;
     groups: names of those whose particles count, all by default."""

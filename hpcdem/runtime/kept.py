@@ -25,7 +25,7 @@ from typing import Any
 from hpcdem.runtime.launch import version
 
 UNUSED_DAYS = 60
-"""Kernels that nobody has used for so long are removed."""
+"""Kernels that were not used for this long are removed."""
 _DIGEST = 32
 """Bytes of SHA-256, before what a file holds."""
 _ROOM = 1 << 16

@@ -34,7 +34,8 @@ __all__ = ["late", "prepare_kernels", "turn_of", "warmup"]
 QUIET_SECONDS = 5.0
 """Between two lines on how far compiling has come."""
 PROCESSES = 8
-"""At most so many compile at the same time: the kernel that takes longest takes a fifth of the time of all."""
+"""Largest number of processes that compile at the same time: the kernel that takes longest takes a fifth of the time
+of all."""
 MEMORY = 700e6
 """Of one of them, at most [bytes]."""
 
@@ -160,7 +161,7 @@ def _text(path: Path) -> str:
 
 
 class _Progress:
-    """Says from time to time how many of so many kernels are compiled, and how long the others may take."""
+    """Reports from time to time how many kernels are compiled, and the remaining time."""
 
     def __init__(self, log: Log | None):
         self.log, self.began, self.done = log, time.monotonic(), 0

@@ -162,7 +162,7 @@ class Log:
         self._last_line = -QUIET_SECONDS
         self.every_interval = False
         self.place: Path | None = None
-        """Folder of the results, once there is one: where `at` tells how far the run is."""
+        """Folder of the results, if any: `at` reports the progress of the run there."""
         self._text = ""
         self._noted: tuple[str, int, int, float] | None = None
         self._note_due = 0.0
@@ -218,7 +218,7 @@ class Log:
     # -- progress --------------------------------------------------------------------------------------------
 
     def script_started(self, name: str, steps: int, done: int = 0) -> None:
-        """The script takes so many steps in all (0: not known), of which `done` were done by an earlier run."""
+        """Number of steps of the script (0: unknown), of which `done` were done by an earlier run."""
         self._script_steps = steps
         self._script_done = self._script_first = done
         self._script_began = self._now()
@@ -232,7 +232,7 @@ class Log:
     ) -> None:
         """A CYC or IMPLE with `steps` steps to do (0: not known) begins at this line of the script (0: no script).
 
-        step: the step number now; left out, the first call of `step` tells it. before: steps of the command that an
+        step: the step number now; by default that of the first call of `step`. before: steps of the command that an
         earlier run did. beside: of particles that are stepped with blocks, which tell of beginning and end.
         """
         self._command = Command(name, line, steps, step, before, beside)

@@ -228,7 +228,7 @@ def release_all() -> None:
 
 
 def running(folder: Path) -> dict[str, Any] | None:
-    """Who writes into a folder at this moment, as far as it is known; None if nobody does."""
+    """The run that writes into a folder at this moment, as far as known, or None."""
     return holder_of(folder)
 
 

@@ -60,7 +60,7 @@ SAME_REQUEST = 2.0
 AUTOSAVE = 1800.0
 """Seconds between automatic checkpoints."""
 LEAST_SHARE = 20.0
-"""They are at least so many times as far apart as the last one took."""
+"""Least interval between them, as a multiple of the duration of the last one."""
 
 
 def parse_limit(text: str, option: str = "--time-limit") -> float:
@@ -233,7 +233,7 @@ class StopRequests:
     # -- margin ----------------------------------------------------------------------------------------------
 
     def saved(self, seconds: float) -> None:
-        """A checkpoint took so long: the next margin follows it."""
+        """Record the duration of a checkpoint, from which the next margin follows."""
         self._last_save_took = seconds
         self._last_saved = self._last_file = time.monotonic()
 

@@ -20,7 +20,7 @@ OURS = ("array", "ntasks", "cpus-per-task", "output", "open-mode", "requeue")
 
 _TEXT = """\
 #!/bin/bash
-# Written by hpcdem sweep: a task of this array is a member of the sweep. Submit it again as it is, or by
+# Written by hpcdem sweep: a task of this array is a member of the sweep. Submit it again unchanged, or by
 #   hpcdem sweep {folder} --slurm
 #SBATCH --array={array}
 #SBATCH --ntasks={ranks}

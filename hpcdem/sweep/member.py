@@ -21,8 +21,8 @@ from hpcdem.sweep.plan import DONE, FAILED, LOG, STATE, STOPPED, Member, Plan, r
 
 
 def launcher(ranks: int, threads: int) -> list[str]:
-    """The words that start so many ranks: srun in a job of Slurm (on cores of their own, so that several members run
-    side by side), else the mpiexec beside this Python, or in PATH."""
+    """The words that start this number of ranks: srun in a job of Slurm (on cores of their own, so that several
+    members run side by side), else the mpiexec beside this Python, or in PATH."""
     if "SLURM_JOB_ID" in os.environ:
         return ["srun", "--exact", "-n", str(ranks), "-c", str(threads)]
     if ranks == 1:

@@ -116,7 +116,7 @@ def make(
                 place.symlink_to(os.path.relpath(link.resolve(), member.folder.resolve()))
     about = asdict(plan)
     del about["folder"]
-    write_json(folder / RECORD, about)  # last: a sweep whose making was cut off is made again
+    write_json(folder / RECORD, about)  # last: a sweep whose creation was interrupted is made again
     return plan, len(new)
 
 

@@ -70,7 +70,7 @@ class Report:
 
 
 def statistics(values: Iterable[float]) -> np.ndarray:
-    """STATISTICS of numbers; those that are not finite are left out, spread is that of a sample (n - 1)."""
+    """STATISTICS of numbers; values that are not finite are ignored; spread is that of a sample (n - 1)."""
     known = np.array([value for value in values if np.isfinite(value)], dtype=float)
     if not len(known):
         return np.array([0.0] + [np.nan] * (len(STATISTICS) - 1))

@@ -93,7 +93,7 @@ def panels_of_a_page(seen: View, style: Style) -> int:
 
 
 class _Sizes:
-    """Sizes of the parts of a page with panels in so many columns."""
+    """Sizes of the parts of a page with panels in this number of columns."""
 
     def __init__(
         self, seen: View, style: Style, bars: int, captions: bool, title: bool = False, columns: int = 1
@@ -318,5 +318,5 @@ def bar_ticks(table: ColourTable) -> list[tuple[float, str]]:
 
 
 def number(value: float) -> str:
-    """A number as short as it is, with a true minus sign."""
+    """The shortest text of a number, with a true minus sign."""
     return f"{value:.6g}".replace("-", MINUS) if value else "0"

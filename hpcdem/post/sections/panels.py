@@ -32,7 +32,7 @@ FINEST = 8
 BALL = 3.0
 """Material is where a ball of this many median radii cannot get to between the particles, as under the surface line."""
 VECTOR_DISCS, DISC_PIXELS = 30000, 2400
-"""More particles than this are a bitmap also in a vector picture, so many pixels wide."""
+"""More particles than this are a bitmap also in a vector picture; width of the bitmap in pixels."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What all pages of a folder have in common: the part of the plane they show, and how far each frame has come."""
+"""What all pages of a folder have in common: the part of the plane they show, and the displacement of each frame."""
 
 from __future__ import annotations
 

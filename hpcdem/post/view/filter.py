@@ -30,7 +30,7 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
 }  # fmt: skip
 """How many values each takes, and what it is."""
 GROUP = "group"
-"""`group(NAME)`, or `group(NAME, SET)`: whether an object is in a group. Names may stand in quotes."""
+"""`group(NAME)`, or `group(NAME, SET)`: whether an object is in a group. Names may be quoted."""
 _GIVEN = re.compile(r"\s*[A-Za-z_]\w*\s*=(?!=)")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[^\s(),]+")
@@ -98,7 +98,7 @@ def _without_range(text: str) -> str:
 
 
 class _Range:
-    """The words of a RANGE, taken one after the other."""
+    """The words of a RANGE, read in sequence."""
 
     def __init__(self, text: str) -> None:
         self.text, self.words = text, _WORDS.findall(text)[1:]

@@ -1,6 +1,6 @@
 """What a view is: the objects that are shown and how, the part of the plane, and what stands around it.
 
-Files `*.mv` hold it as JSON, with the names used here; what is left out has its default, other names are refused.
+Files `*.mv` hold it as JSON, with the names used here; missing names have their default, other names are rejected.
 """
 
 from __future__ import annotations

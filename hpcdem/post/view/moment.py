@@ -252,7 +252,7 @@ def _with_origin(moment: Moment, path: Path) -> Moment:
     began (`_ini`); NaN of those that were not there yet."""
     try:
         begun = [file.path for file in list_frames(path.parent) if file.ini and file.step < moment.step]
-    except HpcdemError:  # a frame by itself
+    except HpcdemError:  # a single frame
         begun = []
     if not begun or not path.name.startswith("all_"):
         return moment
@@ -408,7 +408,7 @@ def of_blocks(state: MeshState) -> Moment:
     cells, count, dim = state.cells, len(state.joints), state.points.shape[1]
 
     def mean(name: str, rows: slice) -> np.ndarray:
-        """(n, ...) of what the corners of each of these elements have, which lie one after the other."""
+        """(n, ...) of what the corners of each of these elements have, which are consecutive."""
         some = cells[rows]
         first = int(some[0, 0]) if len(some) else 0
         values = part(state.of_points, name, slice(first, int(some[-1].max()) + 1 if len(some) else 0))

@@ -26,7 +26,7 @@ TALLEST = 1.3
 """Largest height of the model over its width on paper; taller ones are narrower."""
 EDGE = "#5a5a5a"
 FINE = 2
-"""Pixels of bodies in space are the means of so many squared."""
+"""Each pixel of bodies in three dimensions is the mean of this number squared."""
 EDGES = 0.5
 """Width of their edges [points]."""
 LARGEST = 8192
@@ -146,7 +146,7 @@ def _legend(axes: Any, handles: list[tuple[str, Any]], bottom: float, font: floa
 
 
 def body(axes: Any, shown: Scene, pixels: float, dpi: float) -> None:
-    """What is seen of bodies in space, so many pixels wide."""
+    """The picture of bodies in three dimensions, of this width in pixels."""
     from hpcdem.post.view.screen import paint
 
     seen = shown.seen
@@ -279,7 +279,7 @@ def colour_bar(figure: Any, axes: Any, scale: Scale, font: float) -> None:
     bar = figure.colorbar(colours, cax=axes, extend=beyond[scale.below, scale.above], extendfrac=0.04)
     ticks = scale.ticks()
     high = axes.get_position().height * figure.get_figheight() * 72.0 / font
-    while len(ticks) > high / 1.15 and len(ticks) > 5:  # they would stand in each other
+    while len(ticks) > high / 1.15 and len(ticks) > 5:  # they would overlap
         ticks = ticks[::2]
     bar.set_ticks([place for place, _ in ticks], labels=[text for _, text in ticks], minor=False)
     bar.minorticks_off()

@@ -39,7 +39,7 @@ POINT = 1.0 / 480.0
 THROUGH = 0.35
 """Opacity of elements around rods."""
 MOST_ARROWS = 3000
-"""Of a picture: with more objects some are left out, every k-th is shown."""
+"""Of a picture: with more objects only every k-th is shown."""
 LONGEST = 0.2
 """Length of the arrow that tells how long a value is, over the width of the picture, at most."""
 ARROW = 0.05
@@ -56,11 +56,11 @@ CATEGORIES = (
     "#994f00",
     "#44aa99",
 )
-"""Of groups: ten that the colour-blind tell apart (Tol 2021, with three more)."""
+"""Of groups: ten that colour-blind readers distinguish (Tol 2021, with three more)."""
 PALE = ("#77aadd", "#eedd88", "#ee8866", "#44bb99", "#ffaabb", "#bbcc33", "#99ddff", "#aaaa00")
 """Colours of groups of elements, on which joints and bolts are visible (Tol 2021, light)."""
 CLASSES = 12
-"""Integer fields with names have a legend of at most so many."""
+"""Largest number of entries in the legend of an integer field with names."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ STILL = 1e-9
 
 
 def default_view(moment: Moment) -> ModelView:
-    """Everything that the frame has, as it is usually shown: discs by their colours, elements by what has happened to
+    """Everything that the frame has, in its default view: discs by their colours, elements by what has happened to
     them (`telling`), channels by the pressure in them, joints by mode; `HIDDEN` is there, and hidden.
     Rods and shells shine through the elements around them. Of many frames the last one says what is shown in all of
     them."""
@@ -246,7 +246,7 @@ def adjusted(
 
 
 def seen_of(moment: Moment, view: ModelView) -> View:
-    """The part of the plane: that of the view, else all that is there, as it is drawn, with some air."""
+    """The part of the plane: that of the view, else everything drawn, with a margin."""
     if view.camera is not None:
         return View(*view.camera)
     left, right, bottom, top = moment.extent(turn_of(moment, view), shift_of(moment, view.deformed))

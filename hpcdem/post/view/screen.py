@@ -1,4 +1,4 @@
-"""Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, faces in
+"""Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted in sequence, faces in
 space by their depth, and beside the colours a buffer of what each pixel shows, in which a click is looked up.
 `tests/view/plain.py` paints the same plainly."""
 
@@ -45,8 +45,8 @@ class Picture:
 def paint(
     scene: Scene, width: int, height: int, fine: int = 1, dark: bool = False, pen: float = 1.0
 ) -> Picture:  # fmt: skip
-    """The picture of a scene, so many pixels wide and high. fine: each pixel is the mean of so many squared; pen: width
-    of edges in space [pixels]."""
+    """The picture of a scene of this width and height in pixels. fine: each pixel is the mean of this number squared;
+    pen: width of edges in space [pixels]."""
     w, h = width * fine, height * fine
     colours = np.empty((h, w, 3), np.uint8)
     colours[:] = DARK_GROUND if dark else GROUND
@@ -364,7 +364,7 @@ def polygons(points, cells, kind, rows, shades, place, edges, target, number, op
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _line(x0, y0, x1, y1, width, red, green, blue, which, colours, layer, row, number, opacity):
-    """A line as squares of `width` pixels, one per column or row of its longer side, so far as it is on the picture."""
+    """A line as squares of `width` pixels, one per column or row of its longer side, as far as it is in the picture."""
     h, w = layer.shape
     # The part of it that may be on the picture (Liang and Barsky 1984).
     begin, end = 0.0, 1.0
@@ -397,7 +397,7 @@ def _line(x0, y0, x1, y1, width, red, green, blue, which, colours, layer, row, n
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def lines(ends, kind, rows, shades, place, width, target, number, opacity):
-    """Lines of so many pixels."""
+    """Lines of this width in pixels."""
     a, b, c, d = place
     colours, layer, row = target
     for k in range(len(ends)):
