@@ -231,7 +231,7 @@ def test_sections_and_pages_of_the_run_before_are_left_out(folder: Path) -> None
 def test_a_frame_that_is_named_is_looked_at(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = next(folder.glob(f"{all_(4000)}.*"))
     info.work(COMM, Log(), {"paths": [path], "as_json": False, "every": False})  # type: ignore[arg-type]
-    assert "whole" in capsys.readouterr().out
+    assert ", complete" in capsys.readouterr().out
 
 
 SCRIPT = """

@@ -479,8 +479,8 @@ def test_one_frame_has_stress_only(frames: list[Frame], tmp_path: Path) -> None:
         ({"size": 100.0}, r"-g 100: smaller than a particle \(1\d\d"),
         ({"size": 7000.0}, r"-g 7000: larger than the model in .*\.vtkhdf, 6\d\d\d m wide"),
         ({"left_wall": 17}, r"all_0000003000.vtkhdf has no wall 17; its walls: 0, 1, 2"),
-        ({"addball": False, "delball": True}, r"between all_0000006000 and all_0000006500 20 .* added: give --addball"),
-        ({"delball": False}, r"between all_0000005000 and all_0000006000 \d+ .* deleted: give --delball"),
+        ({"addball": False, "delball": True}, r"20 .* added between all_0000006000 and all_0000006500: use --addball"),
+        ({"delball": False}, r"\d+ .* deleted between all_0000005000 and all_0000006000: use --delball"),
     ],
 )
 def test_what_makes_no_sense_is_named(frames: list[Frame], tmp_path: Path, options: dict, message: str) -> None:
