@@ -81,9 +81,9 @@ def test_options_that_do_not_go_together(tmp_path, change):
         both.blocks.option(**change)
     else:
         both.blocks.time_step(**change)
-        with pytest.raises(CommandError, match="coupled to"):
+        with pytest.raises(CommandError, match="coupled blocks need"):
             both.settle_time_step()
-    with pytest.raises(CommandError, match="coupled to"):
+    with pytest.raises(CommandError, match="coupled blocks need"):
         both.advance(1)
 
 

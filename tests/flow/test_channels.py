@@ -377,7 +377,7 @@ def test_conditions_that_make_no_sense_are_refused() -> None:
         flow.assign(flow.network.channels[:1], {**WATER, "viscosity": 3e-6})
     with pytest.raises(CommandError, match="one of them"):
         flow.fill(None, pressure=1.0, saturation=1.0)
-    with pytest.raises(CommandError, match="between 0 and 1"):
+    with pytest.raises(CommandError, match="from 0 to 1"):
         flow.fill(None, saturation=1.5)
     flow.prescribe(None, kernels.SURFACE, 1.0)
     with pytest.raises(CommandError, match="flow-surface needs gravity"):

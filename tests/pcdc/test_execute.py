@@ -249,5 +249,5 @@ def test_the_python_interface(bench):
 
 
 def test_wrong_use_of_the_python_interface_is_an_error_of_the_script(bench):
-    with pytest.raises(ScriptError, match=r"script.sc:1: .*none of element, node, joint, face"):
+    with pytest.raises(ScriptError, match=r"script.sc:1: .*not one of element, node, joint, face"):
         bench("pcdc model step [len(pcdc.numbers('thing'))]\n")

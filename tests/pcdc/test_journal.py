@@ -149,7 +149,7 @@ def test_too_much_to_keep_is_told_and_refused(bench, monkeypatch):
     monkeypatch.setattr(journal, "MOST", 1000)
     bench(BOX + "for i in range(40):\n    x = pcdc.values('node', 'position-x')\n    pcdc model step 1\n")
     assert bench.interpreter.journal.lost and not bench.interpreter.journal.entries
-    assert sum("--resume cannot" in line for line in bench.blocks.log.lines) == 1
+    assert sum("--resume no longer works" in line for line in bench.blocks.log.lines) == 1
     assert bench.project.place()["journal"] is None
 
 

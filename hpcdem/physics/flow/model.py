@@ -79,7 +79,7 @@ class Flow(Values):
         given = pressure if saturation is None else saturation
         assert given is not None
         if not math.isfinite(given) or given < 0.0 or (saturation is not None and saturation > 1.0):
-            what = "the pressure must not be negative" if saturation is None else "saturation must be in [0, 1]"
+            what = "the pressure must not be negative" if saturation is None else "the saturation must lie from 0 to 1"
             raise CommandError(f"{what}, got {given:g}")
         at = self.flow_nodes(nodes)
         self.blocks.close_model()
