@@ -251,8 +251,7 @@ class Conditions(InitialStress):
             point = int(mesh.cells.reshape(-1)[at[0]])
             raise CommandError(
                 f"conditions contradict each other at node {point} at {place(mesh.points[point])}: {error}. Remove one "
-                "of them first (node boundary remove, or type 0 of a move constraint), or exclude the node by the "
-                "range"
+                "of them first (node boundary remove, or type 0 of a move constraint), or exclude it by the range"
             ) from None
 
     def acting(self) -> list[NodeCondition]:
@@ -363,9 +362,7 @@ class Conditions(InitialStress):
         their dashpots see the velocity less twice this."""
         self._only_in_space("stress zz, xz and yz, and incoming z, on faces", zz, xz, yz, incoming_z)
         if dip is not None and self.dim == 3:
-            raise CommandError(
-                "dip is for two dimensions: in three use stress-xy, stress-xz and stress-yz for shear on faces"
-            )
+            raise CommandError("dip is for two dimensions: in three use stress-xy, -xz and -yz for shear on faces")
         given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal, "zz": zz, "xz": xz, "yz": yz, "dip": dip}
         changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
         waves = {"incoming_x": incoming_x, "incoming_y": incoming_y, "incoming_z": incoming_z}
