@@ -305,7 +305,7 @@ def test_a_folder_that_holds_another_sweep_is_refused(tmp_path):
     with pytest.raises(UsageError, match="samples of a different kind"):
         hpcdem.Sweep(script, {"gravity": "1.0:2.0"}, seed="1", latin=2)
     script.write_text(FALL.replace("CYC 500", "CYC 400"))
-    with pytest.raises(UsageError, match=r"another text of fall\.py"):
+    with pytest.raises(UsageError, match=r"a different version of fall\.py"):
         hpcdem.Sweep(script, seed="1:2")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").touch()

@@ -343,7 +343,7 @@ def test_a_row_of_walls_csv_that_is_being_written_does_not_count(folder: Path, t
     with pytest.raises(HpcdemError, match="nine numbers"):
         run(tmp_path / "data", "wallforce")
     (tmp_path / "data" / "walls.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(HpcdemError, match=r"is no walls\.csv"):
+    with pytest.raises(HpcdemError, match=r"is not a walls\.csv"):
         run(tmp_path / "data", "wallforce")
 
 

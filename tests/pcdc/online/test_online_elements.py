@@ -167,7 +167,7 @@ HOSTILE = [
     ("element densify pattern 2 0 max-length 0.5", "0 or 1"),
     ("element densify max-length 0", "above 0"),
     ("element densify pattern 1 1", "lacks m{aximum}-l{ength}"),
-    ("element densify max-length 1e-6", "more than 2e\\+07"),
+    ("element densify max-length 1e-6", "at most 2e\\+07"),
     ("element delete", "this would remove all elements"),
     ("element glue between 'a' 'b' range x 0 1", "cannot be combined"),
     ("model scale (0,1)", "factors above 0"),

@@ -160,7 +160,7 @@ HOSTILE = [
     ("element create brick p0 (0,0) p1 (2,0) p2 (0,1) n 0 2", "expected a whole number above 0"),
     ("element create brick p0 (0,0) p1 (2,0) p2 (0,1) n 2 2 ratio 0 1", "expected a number above 0"),
     ("element create brick p0 (0,0) p1 (2,0) n 2 2", "lacks p2"),
-    ("element create brick p0 (0,0) p1 (2,0) p2 (0,1) n 100000 100000", "more than 2e\\+07"),
+    ("element create brick p0 (0,0) p1 (2,0) p2 (0,1) n 100000 100000", "at most 2e\\+07"),
     ("element create brick p0 (0,0) p1 (2,0) p2 (0,1) n 99 9 ratio 1e40 1", "differ too much in size"),
     ("element create geometry layer 'rim'", "mesh-size is missing"),
     ("element create geometry layer 'nothing' m-s 1", "there is no geometry layer 'nothing'"),
