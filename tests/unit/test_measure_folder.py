@@ -269,7 +269,7 @@ def test_the_log_tells_tension_from_shear(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "error", "message"),
     [
-        (["--wall", "7"], UsageError, "no such wall"),
+        (["--wall", "7"], UsageError, "unknown wall"),
         (["wallforce", "--wall", "7"], UsageError, "--wall 7: not in"),
         (["--groups", "nowhere"], UsageError, "groups: high, low; colours: lg, green, yellow"),
         (["--colors", "beige"], UsageError, "unknown colour"),
