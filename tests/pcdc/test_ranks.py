@@ -44,6 +44,8 @@ def test_a_script_runs_on_every_rank_and_speaks_once(ranks, tmp_path, n):
     [
         ("x = 1\npcdc model gravity (0,[pcdc.rank])\n",
          "script.sc:2: pcdc model gravity (0,[pcdc.rank]): its values differ between rank 0 and rank 1"),
+        (BOX + "if pcdc.rank == 0:\n    print(len(pcdc.numbers('element')))\npcdc model step 1\n",
+         "numbers element {}: rank 0 and rank 1 are at different commands (script.sc:"),
         *(pytest.param(*one, marks=pytest.mark.slow) for one in (
         ("if pcdc.rank == 0:\n    pcdc model gravity (0,1)\nelse:\n    pcdc model new\n",
          "rank 0 and rank 1 are at different commands (script.sc:2 and script.sc:4)"),

@@ -41,6 +41,8 @@ from hpcdem.lang.pcdc.vector import Vector
 from hpcdem.lang.pcdc.views import Model
 from hpcdem.runtime.progress import write
 
+LOOK = -1
+"""In the place of the number of a command: values of the model are asked for."""
 SEED = 0
 """Of the random numbers of Python and numpy, so that all ranks draw the same."""
 
@@ -125,18 +127,18 @@ class Interpreter:
         for name, value in self._own_names.items():
             names.setdefault(name, value)
         around = self._included_at
-        self._included_at = around if around is not None else self._line_of_caller()
+        self._included_at = around if around is not None else self._caller()[1]
         try:
             self._execute(script, "exec", names)
         finally:
             self._included_at = around
 
-    def _line_of_caller(self) -> int:
-        """The line of the script that is being carried out; 0 in a Python program."""
+    def _caller(self) -> tuple[str, int]:
+        """File and line of the script that is being carried out; "the program", 0 in a Python program."""
         frame: FrameType | None = sys._getframe(1)
         while frame is not None and frame.f_code.co_filename not in self.sources:
             frame = frame.f_back
-        return frame.f_lineno if frame is not None else 0
+        return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("the program", 0)
 
     def _execute(self, script: Source, mode: str, names: dict[str, Any] | None = None) -> None:
         assert script.first == len(self.statements)
@@ -275,10 +277,17 @@ class Interpreter:
         """A journal is kept: --resume will run this script again."""
         return self.journal is not None and not self.journal.lost
 
-    def look(self, make: Callable[[], Any]) -> Any:
-        """What the script asks of the model."""
+    def look(self, make: Callable[[], Any], together: str = "") -> Any:
+        """What the script asks of the model. together: the question, if all ranks must ask it at the same time."""
         journal = self.journal
-        return make() if journal is None else self._placed(lambda: journal.look(make))
+
+        def ask() -> Any:
+            if together and self.project.comm.size > 1:
+                file, line = self._caller()
+                self._agree(LOOK, f"{file}:{line}: {together}")
+            return make()
+
+        return ask() if journal is None else self._placed(lambda: journal.look(ask))
 
     def ask(
         self, told: tuple[Any, ...], make: Callable[[], Any], again: Callable[[], Any] | None = None,
@@ -316,11 +325,8 @@ class Interpreter:
         try:
             return make()
         except UsageError as error:
-            frame: FrameType | None = sys._getframe(1)
-            while frame is not None and frame.f_code.co_filename not in self.sources:
-                frame = frame.f_back
-            place = f"{frame.f_code.co_filename}:{frame.f_lineno}" if frame is not None else "the script"
-            raise self._took_another_way(error, place) from None
+            file, line = self._caller()
+            raise self._took_another_way(error, f"{file}:{line}" if line else "the script") from None
 
     def _took_another_way(self, error: UsageError, place: str) -> UsageError:
         """The error with its line, the first time that it is met."""
@@ -344,8 +350,8 @@ class Interpreter:
         }  # fmt: skip
 
     def _agree(self, index: int, told: str) -> int:
-        """Collective: all ranks are at this command with these values, or all raise ScriptError. Returns what was
-        requested from outside a while ago (runtime.stop_requests), the same on all ranks."""
+        """Collective: all ranks are at this command, or LOOK, with these values, or all raise ScriptError. Returns what
+        was requested from outside a while ago (runtime.stop_requests), the same on all ranks."""
         comm, stop = self.project.comm, self.project.blocks.stop
         asked = stop.overdue_request() if stop is not None else 0
         if comm.size == 1:
@@ -355,17 +361,23 @@ class Interpreter:
         if found[0] == -found[1]:
             return int(found[2])
         everyone = comm.allgather((index, told))
-        statement = self.statements[min(i for i, _ in everyone)]
         other = next(rank for rank, one in enumerate(everyone) if one != everyone[0])
         if everyone[other][0] != everyone[0][0]:
-            places = " and ".join(self._place(everyone[rank][0]) for rank in (0, other))
+            places = " and ".join(self._place(*everyone[rank]) for rank in (0, other))
             why = f"rank 0 and rank {other} are at different commands ({places})"
         else:
             shown = _difference(everyone[0][1], everyone[other][1])
             why = f"its values differ between rank 0 and rank {other}: {shown}"
-        raise statement.error(f"{why}; all ranks must execute the same commands with the same values")
+        why += "; all ranks must execute the same commands with the same values"
+        for at, text in everyone:
+            if at == LOOK:
+                place, _, question = text.partition(": ")
+                raise ScriptError(place.rpartition(":")[0], int(place.rpartition(":")[2]), f"{question}: {why}")
+        raise self.statements[min(i for i, _ in everyone)].error(why)
 
-    def _place(self, index: int) -> str:
+    def _place(self, index: int, told: str) -> str:
+        if index == LOOK:
+            return told.partition(": ")[0]
         if index >= len(self.statements):
             return "the end of the script"
         return f"{self.statements[index].file}:{self.statements[index].line}"

@@ -75,7 +75,7 @@ class Accounts:
 class Model(Accounts):
     """`pcdc.time`, `pcdc.node(3).velocity`, `pcdc.values('element', 'stress-yy', group='rock')`."""
 
-    def __init__(self, project: Any, look: Callable[[Callable[[], Any]], Any]) -> None:
+    def __init__(self, project: Any, look: Callable[..., Any]) -> None:
         self._project, self._look = project, look
 
     def _now(self, ask: Callable[[Any], Any]) -> Any:
@@ -129,15 +129,18 @@ class Model(Accounts):
         flow-channels that are there: of a group (group=, set=), of a layer (geometry=), or x=(from, to), y=, z= in the
         mesh, with present=True by where they are now; of a group of elements (face_of=), of elements by number
         (element=), or as RANGE has it between=, boundary=True, crack=True."""
-        return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)))
+        told = f"numbers {kind} {where}"
+        return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)), told)
 
     def values(self, kind: str, name: str, **where: Any) -> np.ndarray:
         """A quantity by name, in the order of numbers; of nodes with face_of= or element= on their side."""
-        return self._look(lambda: fdem.queries.values(self._project, _kind(kind), _name(name), _range(where)))
+        told = f"values {kind} {name} {where}"
+        return self._look(lambda: fdem.queries.values(self._project, _kind(kind), _name(name), _range(where)), told)
 
     def total(self, kind: str, name: str, **where: Any) -> float:
         """Exact sum of a quantity."""
-        return self._look(lambda: fdem.queries.total(self._project, _kind(kind), _name(name), _range(where)))
+        told = f"total {kind} {name} {where}"
+        return self._look(lambda: fdem.queries.total(self._project, _kind(kind), _name(name), _range(where)), told)
 
     def history(self, name: str) -> np.ndarray:
         """(n, 3) step, time and value of what a history has recorded."""
