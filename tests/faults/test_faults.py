@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import PATIENCE, until
+from tests.conftest import PATIENCE, processes_of_session, until
 from tests.faults.conftest import LAST_FRAME, PILE
 
 SLOW = pytest.mark.slow
@@ -38,8 +38,10 @@ def finish(resident, n, script, undisturbed, *options):
 
 
 def end_of(process):
-    """Output and exit code of a job that has been given its reason to end."""
+    """Output and exit code of a job that has been given its reason to end, once all its ranks have: the launcher may
+    end before a rank has let go of the lock of its folder."""
     out, err = process.communicate(timeout=PATIENCE)
+    until(lambda: not processes_of_session(process.pid), "the end of all ranks")
     return process.returncode, out, err
 
 
