@@ -375,7 +375,7 @@ def test_conditions_that_make_no_sense_are_refused() -> None:
             flow.prescribe(nodes, does, value)
     with pytest.raises(CommandError, match="all channels have the same fluid, but viscosity"):
         flow.assign(flow.network.channels[:1], {**WATER, "viscosity": 3e-6})
-    with pytest.raises(CommandError, match="one of them"):
+    with pytest.raises(CommandError, match="give either a pressure"):
         flow.fill(None, pressure=1.0, saturation=1.0)
     with pytest.raises(CommandError, match="from 0 to 1"):
         flow.fill(None, saturation=1.5)

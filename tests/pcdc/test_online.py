@@ -30,7 +30,7 @@ def test_each_path_has_its_state(first):
 def test_a_refusal_says_what_to_do():
     refused = [online.state(row, dim)[1] for row in online.rows() for dim in row.dims
                if online.state(row, dim)[0] == online.REFUSED]  # fmt: skip
-    assert all((" is refused" in why and ": " in why) or " is for t" in why for why in refused)
+    assert all((" is rejected" in why and ": " in why) or " is for t" in why for why in refused)
 
 
 def test_a_state_that_is_wrong_is_found(monkeypatch):

@@ -171,7 +171,7 @@ class _Line:
         command, self.way = way.command, way
         self.refuse_elsewhere(command.name, command.dims)
         if command.refused:
-            raise Refused(f"'{self.context}' is refused: {command.refused}")
+            raise Refused(f"'{self.context}' is rejected: {command.refused}")
         return command
 
     def refuse_elsewhere(self, word: object, dims: Sequence[int]) -> None:

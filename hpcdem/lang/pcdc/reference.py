@@ -101,7 +101,7 @@ def _told(command: Command) -> str:
     if command.idle:
         parts.append(f"It is read and has no effect here, which the log says once: {command.idle}.")
     if command.refused:
-        parts.append(f"It is refused: {command.refused}.")
+        parts.append(f"It is rejected: {command.refused}.")
     if command.also:
         parts.append(f"Also read: {', '.join(f'`{words}`' for words in command.also)}.")
     return " ".join(parts)

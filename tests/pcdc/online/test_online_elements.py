@@ -310,7 +310,7 @@ ADDED = [
     ("model add element 0 1 2", "flat"),
     ("model add element 0 1 10 9", "more than two elements|is there again|same side"),
     ("model add element 0 1", "the line ends where"),
-    ("element from", "is refused: a mesh of another program"),
+    ("element from", "is rejected: a mesh of another program"),
 ]
 
 
