@@ -213,7 +213,8 @@ def move(project: Project, type: Sequence[Any], where: Range | None = None) -> N
     kind, direction = type if len(type) == 2 else (type[0], (0.0,) * project.dim)
     if kind not in (0, 1, 2) and (kind != 3 or project.dim == 2):
         raise CommandError(
-            f"type {kind} is unknown: expected 0 free, 1 fixed, 2 along a vector" + " (3 is for three dimensions)" * (kind == 3)
+            f"type {kind} is unknown: expected 0 free, 1 fixed, 2 along a vector"
+            + " (3 is for three dimensions)" * (kind == 3)
         )
     if kind in (2, 3) and not any(direction):
         raise CommandError("type 2 needs the vector along which the nodes may move, for example type 2 (1,0)")
