@@ -379,7 +379,10 @@ def test_a_frame_of_an_earlier_version(play, tmp_path):
         (lambda t: t.replace("2.50e-01  -5.00e-01", "nan  -5.00e-01"), "vx of particle 0 is not a number"),
         (lambda t: t[: t.index("8.0000000000")], "rows of unequal length"),
         (lambda t: t.replace("ball num : 3", "ball num : 5"), "5 balls announced, 3 found"),
-        (lambda t: re.sub(r"^(\s+1\s+)0(\s+0.000e\+00)", r"\g<1>100\2", t, flags=re.MULTILINE), "names wall 0, which"),
+        (
+            lambda t: re.sub(r"^(\s+1\s+)0(\s+0.000e\+00)", r"\g<1>100\2", t, flags=re.MULTILINE),
+            "refers to the unknown wall 0",
+        ),
         (
             lambda t: re.sub(
                 r"^(\s+1\s+)0 ",
