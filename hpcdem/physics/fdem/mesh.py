@@ -168,7 +168,7 @@ class Mesh:
         return found
 
     def share(self, per_node: Callable[[Callable[[], Any]], Any]) -> None:
-        """Tables that are made when they are asked for become one copy per node of the machine. Collective."""
+        """Tables that are made on first use become one copy per node of the machine. Collective."""
         if len(self.hexes):
             self.__dict__["_other_half"] = per_node(lambda: self._other_half)
 
