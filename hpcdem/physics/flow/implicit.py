@@ -98,7 +98,7 @@ class Fluid:
     the blocks at the corners a, b of the lower face and p, q of the other (p faces b), in space (m, 6): a, b, c and p,
     q, r (p faces a, r faces b); ends (l, 2): of links, `of` each channel; face_at (k, dim), face_node (k, dim): nodes
     of the blocks and flow nodes at the corners of faces of this rank that fluid pushes on, first the sides of channels,
-    beyond the flow nodes the shore (model.Shore); face_key (k,): their numbers; shore_before: its state when a step
+    beyond the flow nodes the shore (faces.Shore); face_key (k,): their numbers; shore_before: its state when a step
     begins."""
 
     flow: Flow
@@ -319,8 +319,6 @@ class Fluid:
         geometry = kernels.geometry if threads == 1 else kernels.geometry_threaded
         geometry(threads, near, near + dim * dim, self.law, self.laws, corners, self.flow.viscosity, table)
         return table
-
-    # ---- derivatives ---------------------------------------------------------------------------------------------
 
     # ---- the end of a step ---------------------------------------------------------------------------------------
 
