@@ -98,7 +98,7 @@ def test_wrong_conditions_and_options_are_refused():
         (lambda: sim.time_step(value=-1.0), "must not be negative"),
         (lambda: sim.time_step(safety=2.0), "safety"),
         (lambda: sim.gravity(0.0, float("inf")), "must be finite"),
-        (lambda: changes.null(sim, None), "all elements"),
+        (lambda: changes.null(sim, None), "all remaining elements"),
         (lambda: changes.null(sim, [0], relax=-1.0), "relax"),
         (lambda: convergence.solve(sim, ratio=-1.0), "ratio must be positive"),
         (lambda: convergence.advance(sim, -1), "negative"),

@@ -55,7 +55,7 @@ SOURCES = {
     r"(?:is|are|was|were|be|been) told": 7,
     r"(?:may|can|was|were|is|are|be) said": 13,
     r"Mohr and Coulomb": 2,
-    r"asked for|(?:is|are|was|were) asked": 7,
+    r"asked for|(?:is|are|was|were) asked": 4,
     r"behind (?:its|their|the) (?:peak|strength)": 16,
     r"comes? first": 3,
     r"go(?:es|ing|ne)? on": 10,

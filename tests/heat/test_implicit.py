@@ -176,7 +176,7 @@ def test_what_implicit_steps_cannot_do_is_refused() -> None:
     sim.parts(thermal=True)
     bolts = Bolts.of(sim)
     bolts.create([(0.2, 0.2), (0.8, 0.8)])
-    with pytest.raises(CommandError, match="know no bolts"):
+    with pytest.raises(CommandError, match="do not support bolts"):
         Implicit(sim)
 
 

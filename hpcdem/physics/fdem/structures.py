@@ -227,7 +227,7 @@ class Structure(SurfaceLoad):
             return blocks.clock.time - blocks.clock.dt
         return blocks.time_now() - (0.0 if blocks.creep.on else 1.0)
 
-    # ---- what is asked -----------------------------------------------------------------------------------------------
+    # ---- queries -----------------------------------------------------------------------------------------------------
 
     def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
         """A quantity of nodes or elements (None: all), on all ranks. Not collective."""

@@ -310,7 +310,7 @@ class Channels(Travelling, Said):
         least = kernels.longest_step(*args, self.fluid("fluid_bulk"))
         return float(self.blocks.comm.min_into(np.array([least]))[0])
 
-    # ---- what is asked -----------------------------------------------------------------------------------------------
+    # ---- queries -----------------------------------------------------------------------------------------------------
 
     @property
     def links(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

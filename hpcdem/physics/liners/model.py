@@ -169,7 +169,7 @@ class Liners(Structure):
         super().stop()
         self.nodes["spin"][:] = 0.0
 
-    # ---- what is asked -----------------------------------------------------------------------------------------------
+    # ---- queries -----------------------------------------------------------------------------------------------------
 
     def _value(self, kind: str, name: str) -> np.ndarray:
         return self._node_value(name) if kind == LINER_NODE else self._element_value(name)
