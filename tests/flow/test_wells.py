@@ -194,7 +194,7 @@ def test_a_well_in_nothing() -> None:
     flow.stage("w", RATE, 1e-6, math.inf, math.inf)
     run(sim, 2)
     changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] > 0.7))
-    with pytest.raises(CommandError, match="well 'w' has no flow node any more"):
+    with pytest.raises(CommandError, match="well 'w' has no flow nodes left"):
         sim.step()
 
 

@@ -492,7 +492,7 @@ def at_rest(sim: Blocks, nodes: Nodes, looks: bool = True) -> Iterator[None]:
     try:
         hold_still(sim)
         if looks:
-            refuse_touching(sim, touching(sim), "touch")
+            refuse_touching(sim, touching(sim), "are in contact")
         yield
     finally:
         place_corners(sim, nodes.x)
