@@ -313,7 +313,7 @@ def test_channels_that_go_take_their_heat_with_them() -> None:
 def test_what_cannot_be_is_refused() -> None:
     sim, flow = line(4, 1.0)
     heat = Heat.of(sim)
-    with pytest.raises(CommandError, match="there is no heat yet"):
+    with pytest.raises(CommandError, match="no heat yet"):
         heat.of_fluid()
     heat.assign(None, GRANITE)
     fluid = heat.of_fluid()

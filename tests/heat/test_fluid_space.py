@@ -430,7 +430,7 @@ def test_obtuse_triangles_that_conduct_are_told() -> None:
 def test_what_cannot_be_is_refused() -> None:
     sim, flow = standing(box((2, 1, 2), (0.2, 0.1, 0.2)))
     heat = Heat.of(sim)
-    with pytest.raises(CommandError, match="there is no heat yet"):
+    with pytest.raises(CommandError, match="no heat yet"):
         heat.of_fluid()
     heat.assign(None, GRANITE)
     with pytest.raises(CommandError, match="the fluid has no thermal model"):

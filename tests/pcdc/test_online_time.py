@@ -187,7 +187,7 @@ def test_clocks_are_set_and_told(tmp_path):
     ):  # fmt: skip
         with pytest.raises(HpcdemError, match=why):
             rock(f"pcdc model {words}\n")
-    with pytest.raises(HpcdemError, match="there is no heat yet"):
+    with pytest.raises(HpcdemError, match="no heat yet"):
         Rock(tmp_path / "b", BLOCK + "pcdc model query thermal time\n")
 
 

@@ -235,7 +235,7 @@ def test_what_makes_no_sense_is_refused() -> None:
         (lambda: proppant.adjust({"viscosity_power": -4.0}), "viscosity_power"),
         (lambda: proppant.adjust({"proppant_concentration_limit": 0.8}), "proppant_concentration_limit"),
         (lambda: proppant.adjust({"proppant_size": 0.0}), "proppant_size"),
-        (lambda: proppant.adjust({"proppant_concentration_limit": 0.05}), "thicker than a pack, 0.05"),
+        (lambda: proppant.adjust({"proppant_concentration_limit": 0.05}), "concentration of a pack, 0.05"),
         (lambda: proppant.assign(None, {**SAND, "proppant_size": 1e-3}), "all channels have the same proppant"),
     ):  # fmt: skip
         with pytest.raises(CommandError, match=message):
