@@ -129,7 +129,7 @@ def test_a_time_step_that_is_said_later_counts(tmp_path):
         assert [clock.dt for clock in clocks] == [dt, dt] and sim.clock.time == pytest.approx(before + 3 * dt)
     settings.set_option(sim, "dt", 2e-6)
     settings_.time_step(project, value=1e-6)
-    with pytest.raises(CommandError, match="SET dt 2e-06 s and model time-step 1e-06 s differ"):
+    with pytest.raises(CommandError, match="SET dt 2e-06 s of the particles, model time-step 1e-06 s"):
         stepping.step(project, 3)
     settings_.time_step(project, value=2e-6)
     settings.set_option(sim, "frac", 0.003)

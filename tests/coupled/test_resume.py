@@ -169,7 +169,7 @@ def test_what_one_of_several_ranks_saw_cannot_be_asked_again(resident, tmp_path)
         assert again.returncode == 2, again.stdout + again.stderr
         line = 1 + SCRIPT.read_text().splitlines().index("        peep = sand['x']")
         assert f"fall.sc:{line}: ['x']: the checkpoint does not record the particles of a single rank" in again.stderr
-        assert "use gather(...)" in again.stderr
+        assert "Use gather(...)" in again.stderr
 
 
 OLD = """\

@@ -188,7 +188,7 @@ def test_what_makes_no_sense_is_refused() -> None:
     bolts = Bolts.of(sim)
     with pytest.raises(CommandError, match="vectors of 3 numbers"):
         bolts.create([(0.5, 0.5), (0.5, 0.9)])
-    with pytest.raises(CommandError, match=r"are the same, \(0.5,0.5,0.5\)"):
+    with pytest.raises(CommandError, match=r"coincide, \(0.5,0.5,0.5\)"):
         bolts.create([(0.5, 0.5, 0.5), (0.5, 0.5, 0.5)])
     with pytest.raises(CommandError, match="no node of the bolt lies in an element"):
         bolts.create([(2.0, 2.0, 2.0), (3.0, 3.0, 3.0)])
