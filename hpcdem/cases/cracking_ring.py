@@ -40,7 +40,7 @@ class CrackingRing(Ring):
     size: float = quantity(0.025, "m", "edges of the elements", gt=0)
     penalty: float = quantity(100.0, "1", "penalty of the joints, over young", gt=0)
     begin: float = quantity(
-        0.9, "1", "fraction of the temperature difference of the closed form that is applied in three parts", gt=0, lt=1
+        0.9, "1", "fraction of the temperature difference of the closed form applied in three parts", gt=0, lt=1
     )
     rise: float = quantity(0.045, "1", "of one difference to the next from there on", gt=0, le=0.2)
     end: float = quantity(1.17, "1", "last one", gt=1, le=10)

@@ -209,7 +209,7 @@ def test_outputs_after_restore_are_known_as_far_as_the_script_tells():
     assert report.runs[0].start == 90
     assert report.outputs["print"].files == 2
     assert report.outputs["ps"].files is None
-    assert any("no file 0000000090.sav" in note for note in report.notes)
+    assert any("file 0000000090.sav not found" in note for note in report.notes)
 
 
 @pytest.mark.parametrize(("steps", "number"), [(20, "about 1"), (200, "3")])

@@ -109,7 +109,7 @@ def test_a_script_runs_as_it_does_by_itself(viewing: Viewing, folder: Path):
 def test_a_run_is_interrupted_and_the_model_stays(viewing: Viewing):
     talk(viewing, SCRIPT, name="block.sc")
     viewing.ask("say", {"text": "pcdc model step 100000000"})
-    assert "at work" in refused(lambda: viewing.ask("say", {"text": "1"}))[1]
+    assert "busy" in refused(lambda: viewing.ask("say", {"text": "1"}))[1]
     time.sleep(1.0)
     viewing.ask("interrupt", {})
     said = until_ready(viewing)

@@ -147,7 +147,7 @@ def test_parameters_stay_as_they_are():
 
 
 def test_loading_without_a_model_is_refused():
-    with pytest.raises(ScriptError, match=r"UCS\.load: there is no model yet"):
+    with pytest.raises(ScriptError, match=r"UCS\.load: no model yet"):
         find("ucs")().load()
 
 
@@ -330,5 +330,5 @@ def test_on_several_ranks(launch, tmp_path):
 def test_outdir_in_a_script_is_refused(resident, tmp_path):
     (tmp_path / "a.sc").write_text("from hpcdem.cases import UCS\npcdc model new\nUCS().run(outdir='there')\n")
     done = resident(1, "a.sc", cwd=tmp_path)
-    assert done.returncode == 2 and "a.sc:3: UCS.run: outdir is for Python programs" in done.stderr
+    assert done.returncode == 2 and "a.sc:3: UCS.run: outdir applies to Python programs" in done.stderr
     assert not (tmp_path / "there").exists()

@@ -175,7 +175,7 @@ def test_without_stress_and_strain_the_first_step_is_named(tmp_path: Path) -> No
 def test_what_is_not_a_section_is_named(tmp_path: Path) -> None:
     write_wedges(tmp_path, [wedge(5)])
     (tmp_path / "ss" / "data" / "all_0000000007.npz").write_bytes(b"hello")
-    with pytest.raises(HpcdemError, match=r"all_0000000007\.npz: not a section"):
+    with pytest.raises(HpcdemError, match=r"all_0000000007\.npz is not a section"):
         run(f"-d {tmp_path}")
 
 
