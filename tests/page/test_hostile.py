@@ -236,7 +236,7 @@ PICTURE = {"source": 0, "frame": -1, "view": VIEW, "width": 40, "height": 30, "f
         ("picture", b'{"source": 1e999}', 400, "1e999: expected finite numbers"),
         ("picture", b'{"source": ' + b"9" * 40 + b"}", 400, "at most 18 digits"),
         ("view", b'{"view": {"title": "\\ud800"}}', 400, "expected text of whole characters"),
-        ("view", b'{"view": ' + b"[" * 60 + b"]" * 60 + b"}", 400, "more than 20 lists and objects"),
+        ("view", b'{"view": ' + b"[" * 60 + b"]" * 60 + b"}", 400, "more than 20 nested lists and objects"),
         ("view", {"view": {"layers": [LAYER | {"name": f"l{k}"} for k in range(300)]}}, 422, "layers: 300, at most 60"),
         ("picture", PICTURE | {"view": {"layers": [LAYER | {"name": f"l{k}"} for k in range(300)]}}, 422, "at most 60"),
     ],
