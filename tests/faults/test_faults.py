@@ -299,7 +299,7 @@ def test_a_script_out_of_a_checkpoint_writes_nowhere_else(resident, script, tmp_
     assert resident(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent).returncode == 85
     script.unlink()
     done = resident(1, "resume", cwd=script.parent)
-    assert done.returncode == 2 and "outside of" in done.stderr and "victim.dat" in done.stderr
+    assert done.returncode == 2 and "is outside" in done.stderr and "victim.dat" in done.stderr
     assert not victim.exists()
 
 

@@ -53,7 +53,7 @@ def test_what_is_computed_has_a_title_and_a_unit(tmp_path: Path):
 @pytest.mark.parametrize(
     ("x", "y", "said"),
     [
-        ("time", ["'none'"], "there is no history 'none'; there is 'force above', 'force below'"),
+        ("time", ["'none'"], "there is no history 'none'; known: 'force above', 'force below'"),
         ("time", ["2 *"], "expected a history, such as 'force above'"),
         ("time", ["__import__('way top')"], "unknown function __import__"),
         ("'way top' < 1", ["'way top'"], "expected"),
