@@ -66,7 +66,7 @@ def test_pictures_and_what_a_notebook_shows(folder: Path) -> None:
     assert plain.width == 400 and by_field.width == 300
     assert frame._repr_png_()[:4] == b"\x89PNG"
     assert "data:image/png;base64," in frame._repr_html_() and "step 20" in frame._repr_html_()
-    with pytest.raises(HpcdemError, match="unknown field nonsense"):
+    with pytest.raises(HpcdemError, match="has no field nonsense"):
         frame.picture("nonsense")
 
 
