@@ -258,7 +258,7 @@ def test_particles_that_came_or_went_are_named_unless_meant(drawn: tuple[Path, l
     folder, sections, log = drawn
     fewer = len(sections[0].particles["gid"]) - len(sections[1].particles["gid"])
     word, option = ("removed", "--delball") if fewer > 0 else ("added", "--addball")
-    assert f"{abs(fewer)} particles were {word} between all_0000006000_ini and all_0000026000: say {option} ON" in log
+    assert f"{abs(fewer)} particles were {word} between all_0000006000_ini and all_0000026000: add {option} ON" in log
     o = survey.outline(sections[1], sections[0])
     assert (o.came, o.went) == (max(-fewer, 0), max(fewer, 0))
 
