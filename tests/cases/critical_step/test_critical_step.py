@@ -213,7 +213,8 @@ def test_what_the_log_says(tmp_path):
         said[factor] = sim.log._stream.getvalue()
     assert "stability limit" not in said[0.25]
     assert (
-        "0.70 of the stability limit of the present contacts and bonds (" in said[0.7] and "is unstable" not in said[0.7]
+        "0.70 of the stability limit of the present contacts and bonds (" in said[0.7]
+        and "is unstable" not in said[0.7]
     )
     assert (
         "warning: the time step" in said[1.1]
