@@ -74,7 +74,7 @@ def run(comm: Comm, log: Any, options: Options) -> Path:
     on_first(comm, lambda: _make_fresh(fresh))
     many = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
     ranks = f", {comm.size} ranks share {'the frames' if len(frames) >= comm.size else 'each frame'}"
-    spacing = on_first(comm, lambda: _spacing(frames[0], options))
+    spacing = on_first(comm, lambda: _spacing(frames[0], options, log))
     log.info(
         f"stress and strain of {many} in {options.folder}, stress over {options.size:g} m, "
         f"nodes every {spacing:g} m{ranks * (comm.size > 1)}"
@@ -118,15 +118,24 @@ class _Output(NamedTuple):
     spacing: float
 
 
-def _spacing(first: FrameFile, options: Options) -> float:
-    """SIZE, or the largest whole part of it that is no longer than the mean diameter in the first frame, so that each
-    particle has a node of its own."""
-    if options.smooth:
-        return options.size
-    radius = read_frame(first.path, ["particles"]).tables["particles"].columns["radius"]
+def _spacing(first: FrameFile, options: Options, log: Any) -> float:
+    """SIZE, or the largest whole part of it that is no longer than the mean diameter of the bed in the first frame, so
+    that each particle has a node of its own. Reports the particles that are ignored."""
+    p = read_frame(first.path, ["particles"]).tables["particles"].columns
+    known = np.isfinite(p["x"] + p["y"] + p["radius"])
+    x, y, radius = (p[name][known] for name in ("x", "y", "radius"))
     if not len(radius) or not np.mean(radius) > 0.0:
         return options.size
-    return options.size / max(1.0, float(np.ceil(options.size / (2.0 * np.mean(radius)) - 1e-9)))
+    fixed = held_fast(p, len(known))[known]
+    chosen = bed(x, y, radius, fixed)
+    if not chosen.all():
+        log.info(
+            f"{first.path.name}: {(fixed & ~chosen).sum()} particles fixed along x and y (rows that represent walls) "
+            f"and {(~fixed & ~chosen).sum()} detached ones are ignored in strain, stress and surface"
+        )
+    if options.smooth:
+        return options.size
+    return options.size / max(1.0, float(np.ceil(options.size / (2.0 * np.mean(radius[chosen])) - 1e-9)))
 
 
 def _make_fresh(folder: Path) -> None:
@@ -203,12 +212,15 @@ def look(path: Path, options: Options) -> Snapshot:
     fixed = held_fast(p, len(p["x"]))
     try:
         moments, held = stress.moments(frame)
-        volume, thickness = stress.volume_rule(frame, bed(p["x"], p["y"], p["radius"], fixed))
+        chosen = bed(p["x"], p["y"], p["radius"], fixed)
+        volume, thickness = stress.volume_rule(frame, chosen)
     except HpcdemError as error:
         raise HpcdemError(f"{path}: {error}") from None
     move = np.array([options.xmove, options.ymove])
     x, y, walls = p["x"] + move[0], p["y"] + move[1], frame.walls
-    diameter, extent = 2.0 * float(np.mean(p["radius"])), max(np.ptp(x), np.ptp(y)) + 2.0 * float(np.max(p["radius"]))
+    radius = p["radius"][chosen]
+    diameter = 2.0 * float(np.mean(radius))
+    extent = max(np.ptp(x[chosen]), np.ptp(y[chosen])) + 2.0 * float(np.max(radius))
     if not diameter <= options.size <= extent:
         what = (
             f"smaller than a particle ({diameter:.4g} m across)" if options.size < diameter else "larger than the model"

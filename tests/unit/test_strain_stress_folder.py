@@ -283,7 +283,7 @@ def behind_a_row(frames: list[Frame], far: float = 0.0) -> list[Frame]:
         more["gid"] = np.arange(len(height) + 2) + p["gid"].max() + 1
         more["x"] = np.append(np.full(len(height), -400.0 + 1000.0 * (step > 0) - 1200.0), [-far, -far - 150.0])
         more["y"] = np.append(height, [900.0, 900.0])
-        more["radius"][:], more["fix"] = 60.0, np.append(np.full(len(height), 3), [0, 0]).astype(p["fix"].dtype)
+        more["radius"][:], more["fix"] = 20.0, np.append(np.full(len(height), 3), [0, 0]).astype(p["fix"].dtype)
         columns = {name: np.concatenate([values, more[name]]) for name, values in p.items()}
         frame.tables["particles"] = Table(columns, 0, n + len(height) + 2)
         found.append(frame)
@@ -307,6 +307,9 @@ def test_rows_that_stand_for_walls_are_in_no_field_and_carry_no_surface(
     fixed = row.particles["fixed"]
     assert fixed.sum() == 100 and not bed.particles["fixed"].any()
     assert not row.particles["distortional"][fixed].any()  # it is still listed, and drawn
+    log = Log()
+    strain_stress.run(ALONE, log, strain_stress.Options(tmp_path / "row", smooth=smooth))
+    assert any("100 particles fixed along x and y" in line and "and 2 detached ones" in line for line in log.lines)
     outlines = [survey.outline(row), survey.outline(bed)]
     assert outlines[0].extent == outlines[1].extent
 

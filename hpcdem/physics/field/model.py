@@ -4,6 +4,7 @@ from rank to rank."""
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -112,7 +113,7 @@ class Assigned:
         self.rows = [(*(math.inf if v is None else v for v in row), *later[len(row) :]) for row in rows]
 
 
-class Travelling:
+class Travelling(ABC):
     """Nodes of a field that go to the rank that owns the first element around them; those of other ranks beside its
     elements are copies. number (n,): own ones, ascending; state (n + copies, k).
 
@@ -169,9 +170,9 @@ class Travelling:
         for name in self.widths:
             setattr(self, name, getattr(self, name)[: len(gone)][~gone])
 
+    @abstractmethod
     def _book_gone(self, gone: np.ndarray) -> None:
         """What nodes (n,) bool hold is gone with them. Collective."""
-        raise NotImplementedError
 
     def _refresh(self) -> None:
         if self._copies is not None:

@@ -40,7 +40,7 @@ class Condition:
     value: Number = 0.0
 
 
-class Said(Assigned, Field):
+class FlowAssignments(Assigned, Field):
     """row (4 ne,): of the table of properties, by joint, 0: no channel; since (4 ne,): flow time at which leak-off
     began [s], inf: it has not; condition (np,): row of the conditions; said_wet (4 ne,): bits, see `BY_CONDITION`."""
 

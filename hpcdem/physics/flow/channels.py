@@ -17,7 +17,7 @@ from hpcdem.core.account import closed
 from hpcdem.core.errors import PhysicsError
 from hpcdem.physics.field.model import Travelling
 from hpcdem.physics.flow import kernels
-from hpcdem.physics.flow.assignments import Said
+from hpcdem.physics.flow.assignments import FlowAssignments
 from hpcdem.physics.flow.network import LINKS, TRIANGLE, at_nodes, links_of
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class Slurry(Protocol):
         """The fluid has flowed by a step, also an implicit one. Collective."""
 
 
-class Channels(Travelling, Said):
+class Channels(Travelling, FlowAssignments):
     """number (n,): flow nodes owned here, ascending; nodes (n, kernels.NODE): what they hold; held (n + copies,):
     numbers of the first rows of state (n + copies + more, kernels.STATE). channels_here (m,): channels of this rank,
     ascending; sides: where the corners of both their faces begin in x (m, dim); channel_table (l, kernels.CHANNEL): of
@@ -72,7 +72,7 @@ class Channels(Travelling, Said):
     nodes: np.ndarray
 
     def __init__(self, blocks: Blocks) -> None:
-        Said.__init__(self, blocks)
+        FlowAssignments.__init__(self, blocks)
         Travelling.__init__(self)
         self._start_clock(blocks.clock.time)
         self.removed = dict.fromkeys(_ACCOUNT, 0.0)

@@ -29,7 +29,7 @@ def checked(given: Mapping[str, Any]) -> dict[str, float]:
     return PROPPANT.complete(given)
 
 
-class Said(Travelling, Field):
+class ProppantAssignments(Travelling, Field):
     """values: properties by name; carries (4 ne,) bool: channels that grains can pass, by joint; condition (np,): row
     of the conditions (kind, value), by node."""
 

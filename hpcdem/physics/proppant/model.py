@@ -23,7 +23,7 @@ from hpcdem.physics.flow import kernels as flowing
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.network import LINKS
 from hpcdem.physics.proppant import kernels, settling
-from hpcdem.physics.proppant.assignments import RATE, Said
+from hpcdem.physics.proppant.assignments import RATE, ProppantAssignments
 from hpcdem.physics.proppant.properties import NAMES
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ NO_STOKES = 1.0
 """Reynolds number of a single grain beyond which Stokes' law is far off."""
 
 
-class Proppant(Said):
+class Proppant(ProppantAssignments):
     """The proppant of a model with fluid. Methods are collective unless they say otherwise; CommandError, alike on all
     ranks, for what makes no sense.
 
