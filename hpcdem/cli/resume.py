@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from hpcdem.cli.common import HELP, PATH, Finite
-from hpcdem.cli.run import Options, keeping, time_limit
+from hpcdem.cli.run import Options, keeping, running, time_limit
 from hpcdem.core.errors import EXIT_OK, HpcdemError, UsageError
 from hpcdem.runtime import run_folder
 
@@ -31,15 +31,7 @@ from hpcdem.runtime import run_folder
     help="From the last checkpoint at or before T seconds of the model.",
 )
 @keeping
-@click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="Time between automatic "
-              "checkpoints, or off [30:00].")  # fmt: skip
-@click.option("--figure/--no-figure", default=True, help="Draw the final state [yes].")
-@click.option(
-    "--balance/--no-balance",
-    default=True,
-    help="Balance the load: move strip boundaries with the measured times [yes].",
-)
-@click.option("--draw", is_flag=True, help="Let DRAW commands write pictures, draw_<step>.jpg.")
+@running
 def resume(**options: Any) -> None:
     """Resume the run that wrote into DIR [data, or this folder] from its newest complete checkpoint."""
 

@@ -394,7 +394,7 @@ def seconds(context: click.Context, option: click.Parameter, value: str | None) 
 
 
 def keeping(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options that say which checkpoints stay."""
+    """The options that say when checkpoints are written and which stay."""
     of_old = "Keep also the last checkpoint at or before "
     options = [
         click.option(
@@ -406,7 +406,28 @@ def keeping(command: Callable[..., Any]) -> Callable[..., Any]:
             help=f"{of_old}each multiple of T seconds of the model.",
         ),
         click.option("--keep-at", callback=seconds, metavar="T,...", help=f"{of_old}these times of the model, in s."),
+        click.option(
+            "--autosave", callback=time_limit, default="30:00", metavar="MM:SS",
+            help="Time between automatic checkpoints, or off [30:00].",
+        ),
     ]  # fmt: skip
+    return _with(options, command)
+
+
+def running(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of a run that begins and of one that resumes."""
+    options = [
+        click.option("--figure/--no-figure", default=True, help="Draw the final state [yes]."),
+        click.option(
+            "--balance/--no-balance", default=True,
+            help="Balance the load: move strip boundaries with the measured times [yes].",
+        ),
+        click.option("--draw", is_flag=True, help="Let DRAW commands write pictures, draw_<step>.jpg."),
+    ]  # fmt: skip
+    return _with(options, command)
+
+
+def _with(options: list[Any], command: Callable[..., Any]) -> Callable[..., Any]:
     for option in reversed(options):
         command = option(command)
     return command
@@ -465,17 +486,9 @@ class RunCommand(click.Command):
     "seconds of the model."
 )  # fmt: skip
 @keeping
-@click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="Time between automatic "
-              "checkpoints, or off [30:00].")  # fmt: skip
 @click.option("--check", is_flag=True, help="Check the script and print what it would do; run nothing.")
 @click.option("--outdir", type=PATH, metavar="DIR", help="Results [data beside the script].")
-@click.option("--figure/--no-figure", default=True, help="Draw the final state [yes].")
-@click.option(
-    "--balance/--no-balance",
-    default=True,
-    help="Balance the load: move strip boundaries with the measured times [yes].",
-)
-@click.option("--draw", is_flag=True, help="Let DRAW commands write pictures, draw_<step>.jpg.")
+@running
 @click.option(
     "--check-reproducible", type=click.IntRange(1), metavar="N", help="Log a fingerprint of the state every N steps."
 )
