@@ -1,4 +1,4 @@
-"""Steady flow from a hole to a circle around it, compared with its closed form."""
+"""Steady flow from a hole to a concentric circle, compared with its closed form."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Radial:
 
 
 class RadialFlow(Water):
-    """Water flows from a hole under pressure through jointed rock to a circle around it."""
+    """Water flows from a hole under pressure through jointed rock to a concentric circle."""
 
     name: ClassVar[str] = "radial-flow"
     title: ClassVar[str] = "Steady flow from a hole through jointed rock"

@@ -45,7 +45,7 @@ def pages(folder: str | os.PathLike, without: Collection[str] = ()) -> list[Path
 def write_gif(
     pictures: Sequence[Path], path: str | os.PathLike, fps: float, width: int | None = None, keep: Sequence[str] = ()
 ) -> Path:
-    """An animated GIF that runs for ever. Raises HpcdemError.
+    """An animated GIF that repeats without end. Raises HpcdemError.
 
     keep: colours "#rrggbb" of thin lines, which are kept however few their pixels are.
 

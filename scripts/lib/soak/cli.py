@@ -29,8 +29,8 @@ STEPS, EVERY = 2_000_000, 10_000
 @click.option("--folder", metavar="DIR", help="Results of the run [a temporary folder, removed at the end].")
 @click.option("--leak", type=float, default=0.0, hidden=True, help="MB per line that rank 0 forgets to give back.")
 def soak(steps: int, every: int | None, ranks: int, json_file: str | None, folder: str | None, leak: float) -> None:
-    """Run some 250 particles for millions of steps while particles come and go, bonds break, a wall moves to and fro,
-    borders follow an uneven load, and checkpoints are written and brought in.
+    """Run some 250 particles for millions of steps while particles come and go, bonds break, a wall moves back and
+    forth, strip boundaries follow an uneven load, and checkpoints are written and restored.
 
     A line of JSON tells every N steps what each rank holds (memory, objects, open files) and how the model is. At the
     end they are judged: nothing may grow, momentum and energy must stay in their bands. Exit code 1 if not.

@@ -1,4 +1,4 @@
-"""The model of the soak: a heap in a trough whose left wall moves to and fro and whose ground tilts.
+"""The model of the soak: a heap in a trough whose left wall moves back and forth and whose ground tilts.
 
 Rows of bonded particles rain down and break on the heap; as many of the oldest particles are taken away, so the number
 stays. All values repeat themselves with the period: nothing in the model has a reason to grow.

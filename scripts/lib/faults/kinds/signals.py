@@ -74,7 +74,7 @@ def launcher(case: Case) -> None:
     case.end(job, quiet=True)
 
 
-@kind("SIGTERM twice while ranks hang", "one rank is stopped (SIGSTOP), so the others wait in MPI for ever; they get "
+@kind("SIGTERM twice while ranks hang", "one rank is stopped (SIGSTOP), so the others wait in MPI; they get "
       "SIGTERM, which they cannot answer, and another one, which ends the job with a message", least=2)  # fmt: skip
 def hanging(case: Case) -> None:
     job = case.start()
