@@ -164,18 +164,24 @@ def test_a_bolt_stiffens_what_is_cracked() -> None:
     assert opened[1] < 0.5 * opened[0]
 
 
-def test_the_account_of_energy_closes() -> None:
-    """Pulled until bars yield and grout slips, in motion: what goes in is stored or lost, within 1 % of the losses."""
+@pytest.mark.parametrize("steps", [1, 1500])
+def test_the_account_of_energy_closes(steps) -> None:
+    """Pulled and accelerated until bars yield and grout slips: at any moment what goes in is stored or lost."""
     sim = block(True, 5e9)
     bolts = bolt(sim, (0.5, 1.0), (0.5, 0.2), segments=20, tensile_yield_force=8e3, cohesion_grout_bolt=2e5,
                  cohesion_rock_grout=2e5, damp_factor=0.1, pretension_force=3e3)  # fmt: skip
     bolts.condition(np.array([0]), does_y=kernels.VELOCITY, at_y=0.3)
     bolts.condition(np.array([20]), does_y=kernels.VELOCITY, at_y=0.1)
+    bolts.condition(np.array([10]), does_y=kernels.ACCELERATION, at_y=50.0)
+    bolts.condition(np.array([5]), force_y=2e3)
     diagnostics.account_energy(sim)
-    convergence.advance(sim, 1500)
+    convergence.advance(sim, steps)
     found, rock = bolts.energies(), diagnostics.energies(sim)
+    assert found["relative"] < 1e-11
+    if steps == 1:
+        return
     assert min(found["lost_in_bars"], found["lost_in_grout"], found["lost_by_dashpots"]) > 0.1
-    assert found["work_of_conditions"] > 1.0 and found["relative"] < 1e-3
+    assert found["work_of_conditions"] > 1.0
     assert rock["work_bolts"] == found["work_on_rock"] != 0.0 and rock["relative"] < 1e-6
     assert abs(rock["work_outside"]) < 1e-6 * abs(rock["work_bolts"])  # bolts alone drive it
 

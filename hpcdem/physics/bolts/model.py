@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.bolts import kernels, layout
 from hpcdem.physics.bolts.properties import BOLT
@@ -90,7 +89,7 @@ class Bolts(Structure):
     of_elements: ClassVar[Columns] = _ELEMENTS
     model = BOLT
     condition_type: ClassVar[type] = Condition
-    flows: ClassVar[int] = kernels.WORK
+    flows = ("work_on_rock", "lost_in_bars", "lost_in_grout", "lost_by_dashpots", "work_of_conditions")
 
     def ends(self) -> np.ndarray:
         """(m, 2) nodes of each element. Not collective."""
@@ -177,15 +176,12 @@ class Bolts(Structure):
         self._check_spacing(elements, values["spacing"])
         blocks, bars = self.blocks, self.elements
         blocks.before_change()
-        stored = self._stored() if self._account is not None else 0.0
         before = self._column("pretension_force")[elements]
-        self._take_properties(elements, values)
-        whole = elements[bars["state"][elements] & kernels.RUPTURED == 0]
-        more = (values["pretension_force"] - before) / values["spacing"]
-        bars["force"][whole] += more[bars["state"][elements] & kernels.RUPTURED == 0]
-        self._arrange()
-        if self._account is not None:
-            self.commands += self._stored() - stored
+        with self._booked():
+            self._take_properties(elements, values)
+            whole = elements[bars["state"][elements] & kernels.RUPTURED == 0]
+            more = (values["pretension_force"] - before) / values["spacing"]
+            bars["force"][whole] += more[bars["state"][elements] & kernels.RUPTURED == 0]
         blocks.changed()
 
     def _check_spacing(self, elements: np.ndarray, spacing: float) -> None:
@@ -244,21 +240,6 @@ class Bolts(Structure):
             "elements": {"first_node": self.first.copy(), **found["elements"]},
         }
 
-    def energies(self) -> dict[str, float]:
-        """Energy of the bolts [J/m] since the account began: stored: in bars and grout and as motion, and at_start;
-        lost in bars (yield, rupture), in the grout (slip), by dashpots; work_on_rock, work_of_conditions, commands
-        (pretension); closing: what does not add up, relative: that over the largest. Not collective."""
-        work, stored = self.work, self._stored()
-        found = {
-            "stored": stored, "at_start": self._stored_at_start, "lost_in_bars": float(work[kernels.IN_BARS]),
-            "lost_in_grout": float(work[kernels.IN_GROUT]), "lost_by_dashpots": float(work[kernels.IN_DASHPOTS]),
-            "work_on_rock": float(work[kernels.ON_ROCK]), "work_of_conditions": float(work[kernels.BY_CONDITIONS]),
-            "commands": self.commands,
-        }  # fmt: skip
-        given = found["work_of_conditions"] + self.commands
-        taken = float(work[[kernels.ON_ROCK, kernels.IN_BARS, kernels.IN_GROUT, kernels.IN_DASHPOTS]].sum())
-        return closed(found, stored - self._stored_at_start + taken - given)
-
     def _stored(self) -> float:
         bars, nodes = self.elements, self.nodes
         soft, grout = self._element_table[:, kernels.STIFFNESS], self._node_table[:, kernels.GROUT]
@@ -268,20 +249,38 @@ class Bolts(Structure):
         ]
         if self._dynamic:
             self._set_masses()
-            parts.append(self._kinetic())
+            parts.append(self._kinetic(self.blocks.clock.dt))
         return math.fsum(np.concatenate(parts).tolist())
 
-    def _kinetic(self) -> np.ndarray:
-        """m w- w+ / 2 of nodes that move by themselves, of the velocities before and after this moment (energy.py); of
-        those that are led m w- w- / 2."""
+    def _kinetic(self, dt: float) -> np.ndarray:
+        nodes, mass = self.nodes, self._node_table[:, kernels.MASS]
+        w = (nodes["v"] * self._tangent).sum(axis=1)
+        own = (nodes["plate"] == 0) | ~self.hosted
+        return np.where(own, 0.5 * mass * w * self._next_speeds(dt), 0.0)
+
+    def _next_speeds(self, dt: float) -> np.ndarray:
+        """(n,) speed along the bar after this moment; of nodes with a prescribed motion the present one."""
         nodes, table = self.nodes, self._node_table
         mass = table[:, kernels.MASS]
         w = (nodes["v"] * self._tangent).sum(axis=1)
         f = (self._total * self._tangent).sum(axis=1) + nodes["bond"]
-        drag, kick = 0.5 * table[:, kernels.DRAG] * self.blocks.clock.dt, self.blocks.clock.dt * f
-        after = np.divide((mass - drag) * w + kick, mass + drag, out=w.copy(), where=~self._led() & (mass > 0.0))
-        own = (nodes["plate"] == 0) | ~self.hosted
-        return np.where(own, 0.5 * mass * w * after, 0.0)
+        drag = 0.5 * table[:, kernels.DRAG] * dt
+        return np.divide((mass - drag) * w + dt * f, mass + drag, out=w.copy(), where=~self._led() & (mass > 0.0))
+
+    def _half_step(self, dt: float) -> np.ndarray:
+        out, nodes, time = np.zeros(kernels.WORK), self.nodes, self.blocks.time_now()
+        if self._dynamic:
+            given = self._conditions_at(time, time)
+            w = (nodes["v"] * self._tangent).sum(axis=1)
+            own = (nodes["plate"] == 0) | ~self.hosted
+            drag = np.where(own, 0.5 * self._node_table[:, kernels.DRAG] * (w + self._next_speeds(dt)), 0.0)
+            held = (nodes["bond"] - drag)[:, None] * self._tangent + self._total
+            axes = np.arange(self.blocks.dim)
+            force = given[:, kernels.FORCE + axes]
+            force -= np.where(given[:, kernels.DOES + 2 * axes] != kernels.FREE, held, 0.0)
+            out[kernels.BY_CONDITIONS] = 0.5 * dt * math.fsum((force * nodes["v"]).reshape(-1).tolist())
+            out[kernels.IN_DASHPOTS] = 0.5 * dt * math.fsum((drag * w).tolist())
+        return out
 
     def _led(self) -> np.ndarray:
         """(n,) bool: nodes with a prescribed velocity or acceleration."""
@@ -350,16 +349,16 @@ class Bolts(Structure):
         o, dt = self.blocks.options, self.blocks.clock.dt
         if self._prepared_for == (dt, o.dynamic, o.safety):
             return
-        known, self._prepared_for = self._prepared_for is not None, (dt, o.dynamic, o.safety)
-        before = self._kinetic().sum()
+        was, self._prepared_for = self._prepared_for, (dt, o.dynamic, o.safety)
+        before = self._moving(was[0]) if was is not None else 0.0
         k = self._stiffness + self._node_table[:, kernels.GROUT]
         if not o.dynamic:
             self._node_table[:, kernels.MASS] = 0.5 * MARGIN * (1.0 + ALPHA) * k
             return
         mass = np.maximum(self._true_mass, 0.5 * k * (dt / o.safety) ** 2)
         self._node_table[:, kernels.MASS] = mass
-        if known and self._account is not None:
-            self.commands += float(self._kinetic().sum() - before)
+        if was is not None and self._account is not None:
+            self.commands += self._moving(dt) - before
         self._tell_of_mass(mass, self._true_mass, ", along them")
 
     def _conditions_at(self, time: float, middle: float) -> np.ndarray:
@@ -466,13 +465,10 @@ class Bolts(Structure):
         lost = np.isin(self.nodes["host"], elements)
         if not lost.any():
             return
-        stored = self._stored() if self._account is not None else 0.0
         nodes = self.nodes
-        nodes["host"][lost], nodes["plate"][lost], nodes["weight"][lost] = -1, 0, 0.0
-        nodes["bond"][lost], nodes["bond_state"][lost] = 0.0, nodes["bond_state"][lost] & ~kernels.SLIPS
-        self._arrange()
-        if self._account is not None:
-            self.commands += self._stored() - stored
+        with self._booked():
+            nodes["host"][lost], nodes["plate"][lost], nodes["weight"][lost] = -1, 0, 0.0
+            nodes["bond"][lost], nodes["bond_state"][lost] = 0.0, nodes["bond_state"][lost] & ~kernels.SLIPS
         if self.blocks.log is not None:
             self.blocks.log.info(f"{int(lost.sum())} bolt nodes lost their rock, which was removed")
 

@@ -151,8 +151,8 @@ class Coupled(SurfaceLoad):
         one, other = self.particles.clock.dt, self.blocks.clock.dt
         if one != other:
             raise CommandError(
-                f"the time steps differ: {one!r} s of the particles, {other!r} s of the blocks; one must be said "
-                "for both (SET dt and model time-step), or `settle_time_step` called again"
+                f"the time steps differ: {one!r} s of the particles, {other!r} s of the blocks; set the same step for "
+                "both (SET dt and model time-step), or call `settle_time_step` again"
             )
         if self.accounted and self.particles.clumps:
             raise CommandError("the energy budget does not support clumps that are coupled to blocks: switch it off")

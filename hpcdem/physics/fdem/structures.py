@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.properties import Model
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
@@ -49,15 +51,15 @@ class Structure(SurfaceLoad):
     model: ClassVar[Model]
     condition_type: ClassVar[type]
     """Dataclass of what is prescribed at a node: does_*, at_* in the middle of a step; the rest at its time."""
-    flows: ClassVar[int]
-    """Entries of its work."""
+    flows: ClassVar[tuple[str, ...]]
+    """Entries of its work: on the rock first; those that begin with work_of bring energy in, the others take it."""
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
         self.nodes, self.elements = (empty(of(blocks.dim), 0) for of in (self.node_columns, self.element_columns))
         self.rows: list[tuple[float, ...]] = []
         self.conditions: list[Any] = [self.condition_type()]
-        self.work = np.zeros(self.flows)
+        self.work = np.zeros(len(self.flows))
         self.commands = 0.0
         self._stored_at_start = 0.0
         self._account: Any = None
@@ -93,13 +95,15 @@ class Structure(SurfaceLoad):
     def _stored(self) -> float:
         """Energy [J/m]. Not collective."""
 
-    def _accounted(self) -> float:
-        """Of the account of energy what a command may change [J/m]. Not collective."""
-        return self._stored()
+    @abstractmethod
+    def _kinetic(self, dt: float) -> np.ndarray:
+        """Energy (n,) of the motion of nodes [J/m], in steps of dt [s] with the present masses: m v- v+ / 2 of the
+        velocities before and after this moment (energy.py); of nodes with a prescribed motion m v- v- / 2."""
 
     @abstractmethod
-    def energies(self) -> dict[str, float]:
-        """The account of energy [J/m]. Not collective."""
+    def _half_step(self, dt: float) -> np.ndarray:
+        """Work (flows,) in the half step before this moment [J/m]: a step books what the forces at its beginning do
+        around it, and this moment has no step yet (energy.py). Zero in static runs."""
 
     @abstractmethod
     def _value(self, kind: str, name: str) -> np.ndarray:
@@ -121,6 +125,39 @@ class Structure(SurfaceLoad):
     def assign(self, elements: np.ndarray, given: Mapping[str, float]) -> None:
         """Give elements (k,) properties; what they carry stays."""
 
+    # ---- account of energy -------------------------------------------------------------------------------------------
+
+    def energies(self) -> dict[str, float]:
+        """Energy [J/m] since the account began: stored in elements and in grout or bond and as motion, and at_start;
+        lost (yield, slip, opening, dashpots); work on the rock, of conditions and gravity; commands (pretension and
+        other changes); closing: what does not add up, and relative: that over the largest. Not collective."""
+        work = (self.work + self._half_step(self.blocks.clock.dt)).tolist()
+        stored = self._stored()
+        found = {"stored": stored, "at_start": self._stored_at_start, **dict(zip(self.flows, work, strict=True)),
+                 "commands": self.commands}  # fmt: skip
+        return closed(found, stored - self._stored_at_start - self.commands - self._brought(work))
+
+    def _brought(self, work: Iterable[float]) -> float:
+        """What entries of work bring in, less what they take [J/m]."""
+        return math.fsum(w if name.startswith("work_of") else -w for name, w in zip(self.flows, work, strict=True))
+
+    def _accounted(self) -> float:
+        """The part of the account that commands may change [J/m]. Not collective."""
+        return self._stored() - self._brought(self._half_step(self.blocks.clock.dt).tolist())
+
+    def _moving(self, dt: float) -> float:
+        """The part of it that depends on the time step and on masses."""
+        return float(self._kinetic(dt).sum()) - self._brought(self._half_step(dt).tolist())
+
+    @contextmanager
+    def _booked(self) -> Iterator[None]:
+        """What is changed here, and what follows from it, goes to `commands` of the account."""
+        before = self._accounted() if self._account is not None else 0.0
+        yield
+        self._arrange()
+        if self._account is not None:
+            self.commands += self._accounted() - before
+
     # ---- what is given ----------------------------------------------------------------------------------------------
 
     def alive(self, kind: str) -> np.ndarray:
@@ -136,12 +173,9 @@ class Structure(SurfaceLoad):
         """Take elements (k,) out, at once. The numbers of the others stay."""
         blocks = self.blocks
         blocks.before_change()
-        stored = self._accounted() if self._account is not None else 0.0
-        self._let_go(elements)
-        self.elements["state"][elements] |= REMOVED
-        self._arrange()
-        if self._account is not None:
-            self.commands += self._accounted() - stored
+        with self._booked():
+            self._let_go(elements)
+            self.elements["state"][elements] |= REMOVED
         blocks.changed()
 
     def condition(self, nodes: np.ndarray, **changes: Any) -> None:
@@ -268,7 +302,8 @@ class Structure(SurfaceLoad):
         self._find_forces()
         if self._account is not blocks.budget:
             self._account = blocks.budget
-            self.work[:], self.commands, self._stored_at_start = 0.0, 0.0, self._stored()
+            self.work[:] = -self._half_step(blocks.clock.dt) if self._account is not None else 0.0
+            self.commands, self._stored_at_start = 0.0, self._stored()
 
     def mesh_replaced(self) -> None:
         """There is another mesh: `of_mesh` says that these are gone with the one before."""

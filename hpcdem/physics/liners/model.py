@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import LINER_ELEMENT, LINER_NODE
@@ -76,7 +75,7 @@ class Liners(Structure):
     quantities = QUANTITIES
     model = LINER
     condition_type: ClassVar[type] = Condition
-    flows: ClassVar[int] = kernels.WORK
+    flows = ("work_on_rock", "lost_in_beams", "lost_in_bond", "work_of_conditions", "work_of_gravity")
 
     @classmethod
     def node_columns(cls, dim: int) -> Columns:
@@ -153,15 +152,12 @@ class Liners(Structure):
                 raise CommandError(f"in space a liner is a shell with a thickness: it has no {name}")
         values = LINER.complete(given)
         blocks.before_change()
-        stored = self._accounted() if self._account is not None else 0.0
-        self._take_properties(elements, values)
-        area = self.kind.areas(elements)[:, None]
-        beams["gap"][elements] = -beams["pressure"][elements] / (values["normal_stiffness"] * area)
-        if values["shear_stiffness"] == 0.0:
-            beams["shear"][elements] = 0.0
-        self._arrange()
-        if self._account is not None:
-            self.commands += self._accounted() - stored
+        with self._booked():
+            self._take_properties(elements, values)
+            area = self.kind.areas(elements)[:, None]
+            beams["gap"][elements] = -beams["pressure"][elements] / (values["normal_stiffness"] * area)
+            if values["shear_stiffness"] == 0.0:
+                beams["shear"][elements] = 0.0
         blocks.changed()
 
     def stop(self) -> None:
@@ -221,24 +217,7 @@ class Liners(Structure):
             "elements": {**self.kind.ends_by_name(), **found["elements"]},
         }
 
-    def energies(self) -> dict[str, float]:
-        """Energy of the liners [J/m] since the account began: stored in beams and bond and as motion, and at_start;
-        lost in beams (yield) and in the bond (slip, parting), work_on_rock, work_of_conditions, work_of_gravity,
-        commands; closing: what does not add up, relative: that over the largest. Not collective."""
-        work = (self.work + self._half_step(self.blocks.clock.dt)).tolist()
-        found = {
-            "stored": self._stored(), "at_start": self._stored_at_start, "lost_in_beams": work[kernels.IN_BEAMS],
-            "lost_in_bond": work[kernels.IN_BOND], "work_on_rock": work[kernels.ON_ROCK],
-            "work_of_conditions": work[kernels.BY_CONDITIONS], "work_of_gravity": work[kernels.BY_GRAVITY],
-            "commands": self.commands,
-        }  # fmt: skip
-        given = found["work_of_conditions"] + found["work_of_gravity"] + self.commands
-        taken = found["work_on_rock"] + found["lost_in_beams"] + found["lost_in_bond"]
-        return closed(found, found["stored"] - self._stored_at_start + taken - given)
-
     def _half_step(self, dt: float) -> np.ndarray:
-        """Work (5,) of conditions and gravity in the half step before this moment: a step books all of what the forces
-        at its beginning do around it, and this moment has no step yet (energy.py)."""
         out, dim, nodes, time = np.zeros(kernels.WORK), self.blocks.dim, self.nodes, self.blocks.time_now()
         if self._dynamic:
             force = self._conditions_at(time, time)[:, kernels.FORCE + self.kind.parts]
@@ -260,15 +239,7 @@ class Liners(Structure):
             parts.append(self._kinetic(self.blocks.clock.dt))
         return math.fsum(np.concatenate(parts).tolist())
 
-    def _accounted(self) -> float:
-        return self._stored() - float(self._half_step(self.blocks.clock.dt).sum())
-
-    def _moving(self, dt: float) -> float:
-        """What of it depends on the time step and the masses for it."""
-        return float(self._kinetic(dt).sum() - self._half_step(dt).sum())
-
     def _kinetic(self, dt: float) -> np.ndarray:
-        """m v- v+ / 2 of the velocities before and after this moment (energy.py), of what is led m v- v- / 2."""
         nodes, table = self.nodes, self._node_table
         v = np.column_stack([nodes["v"], nodes["spin"]])
         turns = [kernels.INERTIA] * (v.shape[1] - self.blocks.dim)
@@ -358,12 +329,6 @@ class Liners(Structure):
 
     # ---- called by the blocks ----------------------------------------------------------------------------------------
 
-    def storage_rebuilt(self) -> None:
-        begins = self._account is not self.blocks.budget
-        super().storage_rebuilt()
-        if begins and self._account is not None:
-            self.work -= self._half_step(self.blocks.clock.dt)
-
     def corners(self, blocks: Any) -> np.ndarray:
         """(n_own, 4) bool: corners of the owned elements that a liner is bound to."""
         out = np.zeros((blocks.n_own, 4), bool)
@@ -446,11 +411,8 @@ class Liners(Structure):
         lost = np.isin(beams["host"], elements)
         if not lost.any():
             return
-        stored = self._accounted() if self._account is not None else 0.0
-        self._unbind(lost)
-        self._arrange()
-        if self._account is not None:
-            self.commands += self._accounted() - stored
+        with self._booked():
+            self._unbind(lost)
         if self.blocks.log is not None:
             self.blocks.log.info(f"{int(lost.sum())} liner elements lost their rock, which was removed")
 
