@@ -11,7 +11,7 @@
 See `hpcdem.Simulation` and docs/python.md. Names are loaded when they are first used: the environment has to be
 settled before numpy, numba and MPI come in.
 
-Made by ``python -m hpcdem.cli.python_stubs``; do not edit it."""
+Made by ``scripts/pages``; do not edit it."""
 
 from hpcdem.api import Simulation as Simulation
 from hpcdem.api import couple as couple

@@ -2,7 +2,7 @@
 
 A method has the words of the command: `Row` says which one it is, and the order of its arguments. Their names, kinds,
 units and texts are those of the table of the language. Editors see them in blocks.pyi, which is made from this file:
-``python -m hpcdem.cli.python_stubs``.
+``scripts/pages``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Blocks in a Python program: the commands of the PCDC language as methods, what is there as arrays.
 
-Made by ``python -m hpcdem.cli.python_stubs``; do not edit it."""
+Made by ``scripts/pages``; do not edit it."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Literal, overload

@@ -1,7 +1,7 @@
 """Methods that are made from rows of the table of the PCDC language, which says what a command takes: its names, kinds,
 units, defaults and texts. A class of methods says which command each of its methods is, and the order of arguments.
 
-Signature and docstring are there at run time, for help() and notebooks; `hpcdem.cli.python_stubs` writes them down for
+Signature and docstring are there at run time, for help() and notebooks; `scripts/pages` writes them down for
 editors and mypy.
 """
 

@@ -1,7 +1,7 @@
 """Discs in a Python program: the commands of ZDEM as methods.
 
 `Function` says which function of `hpcdem.commands.dem` a method is; arguments, types and texts are those of the
-function. Editors see them in particles.pyi, which is made from this file: ``python -m hpcdem.cli.python_stubs``.
+function. Editors see them in particles.pyi, which is made from this file: ``scripts/pages``.
 """
 
 from __future__ import annotations

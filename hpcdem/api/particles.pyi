@@ -1,6 +1,6 @@
 """Discs in a Python program: the commands of ZDEM as methods.
 
-Made by ``python -m hpcdem.cli.python_stubs``; do not edit it."""
+Made by ``scripts/pages``; do not edit it."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Unpack

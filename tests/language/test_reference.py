@@ -1,18 +1,9 @@
-"""The committed reference page is the one the table makes."""
+"""What is on the reference page of ZDEM (that it is current: tests/docs/test_pages.py)."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from hpcdem.lang.zdem import table as t
-from hpcdem.lang.zdem.reference import page
-
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "zdem_reference.md"
-
-
-def test_the_page_is_current():
-    advice = "make it again: python -m hpcdem.lang.zdem.reference > docs/zdem_reference.md"
-    assert PAGE.read_text(encoding="utf-8") == page(), advice
+from scripts.lib.pages.zdem import page
 
 
 def test_every_row_is_on_the_page():

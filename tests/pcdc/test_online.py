@@ -5,11 +5,8 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.lang.pcdc import online
 from hpcdem.lang.pcdc.table import PCDC
-from tests.conftest import ROOT
-
-PAGE = ROOT / "docs" / "pcdc_online.md"
+from scripts.lib.pages import online
 
 
 def test_all_paths_are_there():
@@ -19,7 +16,7 @@ def test_all_paths_are_there():
 
 @pytest.mark.parametrize("first", dict.fromkeys(row.path[0] for row in online.rows()))
 def test_each_path_has_its_state(first):
-    advice = "python -m hpcdem.lang.pcdc.online states"
+    advice = "renew it: ./scripts/pages"
     for row in online.rows():
         if row.path[0] == first:
             for dim, said in zip(row.dims, row.states, strict=True):
@@ -39,8 +36,3 @@ def test_a_state_that_is_wrong_is_found(monkeypatch):
     without = tuple(command for command in PCDC.commands if command.name != "model gravity")
     monkeypatch.setattr(online, "PCDC", type(PCDC)(without, PCDC.range_terms))
     assert online.state(row, 2)[0] == online.MISSING
-
-
-def test_the_page_is_current():
-    advice = "make it again: python -m hpcdem.lang.pcdc.online page > docs/pcdc_online.md"
-    assert PAGE.read_text(encoding="utf-8") == online.page(), advice

@@ -8,9 +8,9 @@ import random
 import pytest
 
 from hpcdem.core.errors import HpcdemError, ScriptError
-from hpcdem.lang.pcdc import online
 from hpcdem.lang.pcdc.parser import parse
 from hpcdem.lang.pcdc.table import PCDC
+from scripts.lib.pages import online
 from tests.pcdc.test_online_acts import contexts
 from tests.pcdc.test_time import Rock
 

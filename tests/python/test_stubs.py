@@ -12,8 +12,8 @@ import pytest
 from hpcdem.api import blocks, functions
 from hpcdem.api.methods import Models, Row, bound
 from hpcdem.api.particles import ParticleCommands
-from hpcdem.cli import python_stubs
 from hpcdem.commands import dem
+from scripts.lib.pages import stubs
 from tests.tables import each
 
 MADE = [(f"{of.__name__}.{name}", value) for of in (blocks.BlockCommands, *blocks.GROUPS)
@@ -21,8 +21,8 @@ MADE = [(f"{of.__name__}.{name}", value) for of in (blocks.BlockCommands, *block
 
 
 def test_the_stubs_are_those_of_today() -> None:
-    for path, content in python_stubs.files().items():
-        assert path.read_text() == content, f"{path} is older than the table: python -m hpcdem.cli.python_stubs"
+    for path, content in stubs.files().items():
+        assert path.read_text() == content, f"{path} is older than the table: ./scripts/pages"
 
 
 @each(("name", "method"), MADE)

@@ -17,8 +17,8 @@ from hpcdem.cases import CASES, find
 from hpcdem.cli import case
 from hpcdem.cli import chinese as helps
 from hpcdem.cli.programs import FIRST, GROUPS
-from hpcdem.cli.reference import PROGRAMS
 from hpcdem.core import chinese
+from scripts.lib.pages.options import PROGRAMS
 from tests import catalogue
 
 HAN = re.compile("[\u4e00-\u9fff]")

@@ -1,18 +1,17 @@
-"""The reference page of the PCDC language, made from the table: ``python -m hpcdem.lang.pcdc.reference``."""
+"""The reference page of the PCDC language, made from the table."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
-from hpcdem.lang.pages import escaped, first_sentence, overview, wrapped
 from hpcdem.lang.pcdc.table import PCDC, RECORDED, Command, Model, Option, Table
+from scripts.lib.pages.markdown import escaped, first_sentence, overview, wrapped
 
 _TOP = """\
 # PCDC commands
 
 This page is made from `hpcdem/lang/pcdc/table.py` and `hpcdem/physics/fdem/properties.py`; do not edit it
-(`python -m hpcdem.lang.pcdc.reference > docs/pcdc_reference.md`).
+(`./scripts/pages`).
 
 ## How a script is read
 
@@ -204,7 +203,3 @@ def _dimensions(table: Table) -> str:
         here = ", ".join(f"`{model.keyword.name}`" for model in models)
         rows.append(f"| `{command.name}` | {here} | {of[0]} | {'all' if 2 not in command.dims else of[1]} |")
     return "\n".join([*rows, ""])
-
-
-if __name__ == "__main__":
-    sys.stdout.write(page())

@@ -4,23 +4,21 @@
 between tabs the kinds of its values, the dimensions (2, 3) in which it is there, its state in each of them, and what a
 line with it needs besides: words that follow; after ``+`` pairs of a word and a value that lines with words below it
 need, too (or, between ``|``, words with their values, ``{3}`` before those of three dimensions only); after ``=`` the
-whole line. ``python -m hpcdem.lang.pcdc.online states`` writes the file with the states as they are, ``... page``
-docs/pcdc_online.md.
+whole line. ``scripts/pages`` writes the states as they are, and docs/pcdc_online.md.
 """
 
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from hpcdem.lang.pages import escaped
 from hpcdem.lang.pcdc.keywords import Keyword
 from hpcdem.lang.pcdc.parser import Refused, trace
 from hpcdem.lang.pcdc.table import PCDC
+from scripts.lib.pages.markdown import escaped
 
 FILE = Path(__file__).with_name("online.txt")
 ACTS, ALIAS, IDLE, REFUSED, MISSING = "a", "=", "-", "x", "?"
@@ -42,8 +40,7 @@ _HEAD = "| path | values | in | state | read as |"
 _TOP = """\
 # PCDC's online commands
 
-This page is made from `hpcdem/lang/pcdc/online.txt`; do not edit it
-(`python -m hpcdem.lang.pcdc.online page > docs/pcdc_online.md`).
+This page is made from `scripts/lib/pages/online.txt`; do not edit it (`./scripts/pages`).
 
 The help of PCDC lists its commands word by word. Each of these paths is here, with what becomes of it in hpcdem: it
 **acts**; it is an **alias** of another word, which does the same; it has **no effect** here, which the log says once;
@@ -197,7 +194,7 @@ def counted() -> Counter[str]:
     return Counter(STATES[one] for row in rows() for one in row.states)
 
 
-def _with_states() -> str:
+def with_states() -> str:
     """The file, with the states as they are."""
     lines = []
     for row, text in zip(rows(), FILE.read_text("utf-8").splitlines()):
@@ -205,10 +202,3 @@ def _with_states() -> str:
         states = "".join(state(row, dim)[0] for dim in row.dims)
         lines.append("\t".join([word, values, dims, states, row.needs]).rstrip("\t"))
     return "\n".join(lines) + "\n"
-
-
-if __name__ == "__main__":
-    if sys.argv[1:] == ["states"]:
-        FILE.write_text(_with_states(), "utf-8")
-    else:
-        sys.stdout.write(page())

@@ -1,18 +1,16 @@
-"""The reference page of the ZDEM language, made from the table: ``python -m hpcdem.lang.zdem.reference``."""
+"""The reference page of the ZDEM language, made from the table."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
-from hpcdem.lang.pages import escaped, first_sentence, overview, wrapped
 from hpcdem.lang.zdem.table import COLORS, FLAG, SOURCES, ZDEM, Choice, Command, Option, Row, Table
+from scripts.lib.pages.markdown import escaped, first_sentence, overview, wrapped
 
 _TOP = """\
 # ZDEM commands
 
-This page is made from the table in `hpcdem/lang/zdem/table.py`; do not edit it
-(`python -m hpcdem.lang.zdem.reference > docs/zdem_reference.md`).
+This page is made from the table in `hpcdem/lang/zdem/table.py`; do not edit it (`./scripts/pages`).
 
 ## How a script is read
 
@@ -132,7 +130,3 @@ def _colors() -> str:
     sources = ["", "## Sources", "", "The last column of the tables says where a keyword is known from:", ""]
     sources += [f"- {tag}: {text}" for tag, text in SOURCES.items()]
     return "\n".join(rows + sources)
-
-
-if __name__ == "__main__":
-    sys.stdout.write(page())

@@ -1,11 +1,9 @@
-"""The page of the Python interface, made from its docstrings: ``python -m hpcdem.cli.python_reference >
-docs/python_reference.md``."""
+"""The page of the Python interface, made from its docstrings."""
 
 from __future__ import annotations
 
 import inspect
 import re
-import sys
 from typing import Any
 
 from hpcdem.api import Call, Coupling, Frame, Frames, Simulation, blocks, couple, frames
@@ -15,8 +13,8 @@ from hpcdem.sweep import Sweep
 _TOP = """\
 # Python reference
 
-This page is made from the docstrings; do not edit it (`python -m hpcdem.cli.python_reference >
-docs/python_reference.md`). How the methods work together, with examples: [Python](python.md). Every method is
+This page is made from the docstrings; do not edit it (`./scripts/pages`).
+How the methods work together, with examples: [Python](python.md). Every method is
 collective: under mpiexec call it on all ranks. Units are SI. What a command does in detail stands with the
 command of the same name ([ZDEM](zdem_reference.md),
 [PCDC](pcdc_reference.md)).
@@ -105,7 +103,3 @@ def _listed(section: re.Match[str]) -> str:
     items = re.sub(r"\n +", " ", section[2].strip())
     rows = re.sub(r"^(.+?) : ", lambda found: f"- `{found[1]}`: ", items, flags=re.MULTILINE)
     return f"{'Returns' if section[1] == 'Returns' else 'Arguments'}:\n\n{rows}\n"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(page())

@@ -1,5 +1,5 @@
-"""What editors and mypy see of methods that are made from the table of a language: ``python -m
-hpcdem.cli.python_stubs`` writes hpcdem/__init__.pyi, hpcdem/api/blocks.pyi and particles.pyi."""
+"""What editors and mypy see of methods that are made from the table of a language: hpcdem/__init__.pyi,
+hpcdem/api/blocks.pyi and particles.pyi."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WIDTH = 120
 _HEAD = '''\
 """{doc}
 
-Made by ``python -m hpcdem.cli.python_stubs``; do not edit it."""
+Made by ``scripts/pages``; do not edit it."""
 
 '''
 _NAMES = {
@@ -135,8 +135,3 @@ def _doc(of: Any, depth: int) -> Iterator[str]:
         yield from ("    " * depth + line if line else "" for line in [*lines, '"""'])
     else:
         yield "    " * depth + lines[0] + '"""'
-
-
-if __name__ == "__main__":
-    for path, content in files().items():
-        path.write_text(content)

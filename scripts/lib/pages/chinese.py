@@ -1,4 +1,4 @@
-"""The Chinese reference pages of both languages: ``python -m hpcdem.lang.reference_zh zdem|pcdc``.
+"""The Chinese reference pages of both languages.
 
 Words, values, units and defaults are those of the tables, as on the English pages; what a command does comes from the
 catalogue `hpcdem/locale/zh`.
@@ -7,21 +7,19 @@ catalogue `hpcdem/locale/zh`.
 from __future__ import annotations
 
 import dataclasses
-import sys
 from collections.abc import Callable, Sequence
 
 from hpcdem.core.chinese import known
-from hpcdem.lang.pages import first_sentence, overview
-from hpcdem.lang.pcdc import reference as pcdc
 from hpcdem.lang.pcdc.table import PCDC
-from hpcdem.lang.zdem import reference as zdem
 from hpcdem.lang.zdem.table import COLORS, ZDEM, Option
+from scripts.lib.pages import pcdc, zdem
+from scripts.lib.pages.markdown import first_sentence, overview
 
 _HEAD = """\
 # {name} 命令
 
 本页由 `hpcdem/lang/{package}/table.py` 和 `hpcdem/locale/zh` 生成,请勿直接修改
-(`python -m hpcdem.lang.reference_zh {package} > docs/{package}_reference.zh.md`)。
+(`./scripts/pages`)。
 命令和关键字的说明是中文;完整的英文说明见 [{name} commands]({package}_reference.md)。
 """
 
@@ -194,6 +192,3 @@ def _chinese(table: str) -> str:
 
 
 PAGES: dict[str, Callable[[], str]] = {"zdem": zdem_page, "pcdc": pcdc_page}
-
-if __name__ == "__main__":
-    sys.stdout.write(PAGES[sys.argv[1]]())

@@ -1,9 +1,8 @@
-"""The page of all programs and their options, made from them: ``python -m hpcdem.cli.reference > docs/options.md``."""
+"""The page of all programs and their options, made from them."""
 
 from __future__ import annotations
 
 import inspect
-import sys
 
 import click
 
@@ -24,7 +23,7 @@ from hpcdem.cli.sweep import report, sweep
 from hpcdem.cli.view import view
 from hpcdem.cli.zdem2jpg import zdem2jpg
 from hpcdem.cli.zdemss import zdemss
-from hpcdem.lang.pages import escaped
+from scripts.lib.pages.markdown import escaped
 
 PROGRAMS: dict[str, click.Command] = {
     "hpcdem": hpcdem, "hpcdem resume": resume, "hpcdem info": info, "hpcdem -s": strain_stress,
@@ -37,9 +36,8 @@ PROGRAMS: dict[str, click.Command] = {
 _TOP = """\
 # Programs and options
 
-This page is made from the programs themselves; do not edit it (`python -m hpcdem.cli.reference >
-docs/options.md`). `--help` says the same, in part in Chinese
-([languages](running.md#language-of-messages)). `zdem` is another name of `hpcdem`. Defaults are in brackets.
+This page is made from the programs themselves; do not edit it (`./scripts/pages`). `--help` says the same, in part in
+Chinese ([languages](running.md#language-of-messages)). `zdem` is another name of `hpcdem`. Defaults are in brackets.
 
 ## Exit codes
 
@@ -77,7 +75,3 @@ def _row(option: click.Option, context: click.Context) -> str:
     if record is None:
         return ""
     return f"| `{escaped(record[0])}` | {escaped(record[1])} |"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(page())

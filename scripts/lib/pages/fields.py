@@ -1,22 +1,19 @@
-"""The page of fields of particles and quantities of blocks, made from their tables: ``python -m
-hpcdem.lang.fields_reference > docs/fields.md``."""
+"""The page of fields of particles and quantities of blocks, made from their tables."""
 
 from __future__ import annotations
 
-import sys
-
 from hpcdem.core.fields import FIELDS
-from hpcdem.lang.pages import escaped
 from hpcdem.physics.bolts.model import QUANTITIES as OF_BOLTS
 from hpcdem.physics.fdem.diagnostics import QUANTITIES
 from hpcdem.physics.flow.values import QUANTITIES as OF_FLOW
 from hpcdem.physics.liners.model import QUANTITIES as OF_LINERS
+from scripts.lib.pages.markdown import escaped
 
 _TOP = """\
 # Fields
 
-This page is made from the tables of the program; do not edit it (`python -m hpcdem.lang.fields_reference >
-docs/fields.md`). How files are laid out: [Files](files.md). `hpcdem draw FRAME --list` says which of them a frame has.
+This page is made from the tables of the program; do not edit it (`./scripts/pages`).
+How files are laid out: [Files](files.md). `hpcdem draw FRAME --list` says which of them a frame has.
 
 Scripts of PCDC write hyphens (`stress-xx`), frames and Python underscores; Python takes both. Units are those of
 the plane, in which forces, energies and rates are of a metre of thickness; in space N/m becomes N, J/m J, m2/s m3/s.
@@ -54,7 +51,3 @@ def page() -> str:
             lines += ["", f"## Blocks: {kind}", "", "| quantity | unit | |", "|---|---|---|"]
             lines += [f"| `{name}` | {unit} | {escaped(doc)} |" for name, (unit, doc) in of.items()]
     return "\n".join(lines) + "\n"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(page())
