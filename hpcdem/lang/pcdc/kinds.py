@@ -63,7 +63,7 @@ class Kind:
     """``table 'name' over x`` or ``field 'name'`` may stand for it: it differs from place to place."""
     softens: bool = False
     """``table 'name' over plastic-strain`` may, too."""
-    warms: bool = False
+    temperature_dependent: bool = False
     """So may ``table 'name' over temperature``, or over another field of elements."""
     python: str = "float"
     """Its type in a Python program, in the words of `hpcdem.api.types`."""
@@ -71,14 +71,21 @@ class Kind:
     @property
     def axes(self) -> tuple[str, ...]:
         """What a table that stands for it can be over; z in space only."""
-        there = {PLASTIC_STRAIN: self.softens, **dict.fromkeys(range(TEMPERATURE, len(AXES)), self.warms)}
+        there = {
+            PLASTIC_STRAIN: self.softens,
+            **dict.fromkeys(range(TEMPERATURE, len(AXES)), self.temperature_dependent),
+        }
         return tuple(axis for k, axis in enumerate(AXES) if there.get(k, True))
 
 
-def varied(kind: Kind, softens: bool = False, warms: bool = False) -> Kind:
+def varied(kind: Kind, softens: bool = False, temperature_dependent: bool = False) -> Kind:
     """A kind that may also be a table or a field, for a property of elements, faces or joints."""
     made = replace(
-        kind, varied=True, softens=softens, warms=warms, python="Value" if kind.python == "float" else kind.python
+        kind,
+        varied=True,
+        softens=softens,
+        temperature_dependent=temperature_dependent,
+        python="Value" if kind.python == "float" else kind.python,
     )
     return replace(made, pattern=f"{kind.pattern}|table <s> over {'|'.join(made.axes)}|field <s>")
 

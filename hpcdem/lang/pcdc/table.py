@@ -265,7 +265,7 @@ def declared(
         one = model.property(name.replace("-", "_"))
         default = one.otherwise or ("" if one.default is None else f"{one.default:g}")
         kind = limited(one.low, one.high, one.low_itself, one.unit)
-        kind = kind if uniform else varied(kind, one.softens, one.warms)
+        kind = kind if uniform else varied(kind, one.softens, one.temperature_dependent)
         required = not (default or one.optional)
         options.append(
             Option(notation, (kind,), one.doc, one.unit, default, required, also=(also or {}).get(name, ()),

@@ -118,11 +118,13 @@ class Assignments(Settings):
         rows = softening_rows(self.element_rows)
         return bool(self._of_rows(rows, self.element_row, lambda: self.alive).any())
 
-    def warms(self) -> tuple[np.ndarray, np.ndarray]:
+    def temperature_dependent(self) -> tuple[np.ndarray, np.ndarray]:
         """Elements (ne,) and joints (4 ne,) bool with a property that follows a table over temperature or another
         field."""
         elements, joints = (
-            np.any([rows.column(temperature_table(p.name)) > 0.0 for p in of.properties if p.warms], axis=0)
+            np.any(
+                [rows.column(temperature_table(p.name)) > 0.0 for p in of.properties if p.temperature_dependent], axis=0
+            )
             for rows, of in ((self.element_rows, MECH_MOHR_COULOMB), (self.joint_rows, COHESIVE))
         )
         return (

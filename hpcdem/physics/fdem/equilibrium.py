@@ -561,7 +561,7 @@ def _follow(
     whole, size = steps * unit, unit
     missing, outside = np.zeros(x.shape), False
     try:
-        _warm(sim, 0.0)
+        _apply_heating(sim, 0.0)
         if whole > 1:
             missing, _, total = unbalanced(sim, nodes, unknowns, x)
             nodes.least = max(total, nodes.least) if softening else nodes.least
@@ -569,7 +569,7 @@ def _follow(
         while done < whole:
             size = min(size, whole - done)
             left = 1.0 - (done + size) / whole
-            _warm(sim, 1.0 - left)
+            _apply_heating(sim, 1.0 - left)
             found = _balance(
                 sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step, softening or slides,
                 size == 1, yields and (left == 0.0 or not outside),
@@ -598,8 +598,8 @@ def _follow(
     return x, Balanced(found.ratio, iterations, factors, unknowns.count, solver.name, increments)
 
 
-def _warm(sim: Blocks, part: float) -> None:
-    """Elements have so much of what is new in their temperatures, if that is known."""
+def _apply_heating(sim: Blocks, part: float) -> None:
+    """Apply this part of the change of temperature since the last solution to the elements, if it is known."""
     if BEFORE in sim.cold:
         before, after = sim.cold[BEFORE], sim.cold[AFTER]
         sim.cold[TEMPERATURE][:] = after if part == 1.0 else before + part * (after - before)

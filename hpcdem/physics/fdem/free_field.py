@@ -216,9 +216,9 @@ class FreeField(SurfaceLoad):
         if not blocks.alive[element].all():
             gone = element[~blocks.alive[element]][0]
             return f"element {gone} of a free-field side was removed: use element-face boundary remove first"
-        obeys = user_laws.numbers(blocks)[element] > 0
-        if obeys.any():
-            return f"element {element[obeys][0]} of a free-field side has a user law: columns are elastic"
+        has_law = user_laws.numbers(blocks)[element] > 0
+        if has_law.any():
+            return f"element {element[has_law][0]} of a free-field side has a user law: columns are elastic"
         if blocks.log is not None and blocks.yielding()[element].any():
             blocks.log.warn_once("free field", "elements of free-field sides can yield: their columns are elastic")
         quiet = blocks.quiet_faces()[self.faces["face"][:, 0]]

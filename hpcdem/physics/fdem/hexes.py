@@ -39,7 +39,7 @@ class Hexes:
     """count: hexahedra of this rank; rows (count, 6): storage rows of their tetrahedra; begin (count,): which owned
     element the first of these is; of (count, 24): corner of the hexahedron at each corner of these; place: see
     `hexes.forces`; corner_of (n, 4): of all rows of storage, the place in x and force of the corner that has the forces
-    of each corner; model (count,): row of their models; remember: some may yield, creep or obey a user
+    of each corner; model (count,): row of their models; remember: some may yield, creep or have a user
     law, each tetrahedron has a stress without strain of its own."""
 
     def __init__(self, sim: State, true_mass: np.ndarray) -> None:

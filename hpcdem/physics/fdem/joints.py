@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 LAWS = {COULOMB_JOINT.name: joint_law.COULOMB, BARTON_BANDIS.name: joint_law.BARTON_BANDIS}
-_WARM = tuple(one.name for one in COHESIVE.properties if one.warms)
+_BY_TEMPERATURE = tuple(one.name for one in COHESIVE.properties if one.temperature_dependent)
 NOW: dict[int, tuple[Any, int]] = {2: (build.edges_now, 14), 3: (joints_space.faces_now, 22)}
 """By dimension: what a joint is at this moment, and into how many columns: means of opening, slip [m], normal and shear
 stress [Pa]; these stresses at its three points; forces on the corners of this side [N/m], in space [N]."""
@@ -73,7 +73,7 @@ class JointTables:
     space: one over the length; first_slot: of owned elements, None: four each; sides: joints of hexahedra."""
 
     sim: State
-    warms: bool
+    temperature_dependent: bool
     slots: int
     in_lists: int
     listed: int
@@ -97,23 +97,23 @@ class JointTables:
         """Their tables; joints that follow temperature have a row of their own on each side, behind those of the
         properties."""
         rows = self.sim.joint_rows
-        warm = [rows.column(temperature_table(name)) > 0.0 for name in _WARM]
-        self.warm_slots = np.flatnonzero(np.any(warm, axis=0)[self.slot_kind])
-        self.warm_of = self.slot_kind[self.warm_slots].astype(np.int64)
-        own = len(rows) + np.arange(len(self.warm_slots))
-        self.slot_law[self.warm_slots] = self.slot_kind[self.warm_slots] = own
-        every = np.concatenate([np.arange(len(rows)), self.warm_of])
+        warm = [rows.column(temperature_table(name)) > 0.0 for name in _BY_TEMPERATURE]
+        self.slots_by_temperature = np.flatnonzero(np.any(warm, axis=0)[self.slot_kind])
+        self.law_by_temperature = self.slot_kind[self.slots_by_temperature].astype(np.int64)
+        own = len(rows) + np.arange(len(self.slots_by_temperature))
+        self.slot_law[self.slots_by_temperature] = self.slot_kind[self.slots_by_temperature] = own
+        every = np.concatenate([np.arange(len(rows)), self.law_by_temperature])
         self.joint_table, self.joint_beyond = tables(rows, row=every)
         if (law := laws_of(rows)).any():
             slides = np.flatnonzero(law[self.slot_kind[: self.slots]])
             self.slot_law[slides], self.slot_state[slides] = 0, BROKEN + law[self.slot_kind[slides]]
             self._relink()
-        if self.warms:
+        if self.temperature_dependent:
             self._follow_joints()
 
     def _follow_joints(self) -> None:
         """The laws of joints at their temperatures."""
-        sim, slots = self.sim, self.warm_slots
+        sim, slots = self.sim, self.slots_by_temperature
         face = self.slot_face[slots]
         own, corners = sim.where[face // 4] - sim.n_left, (sim.the_mesh().face_corners(face) % 4).T
 
@@ -123,8 +123,8 @@ class JointTables:
             # Both sides of a face in space begin at one corner and go round it the other way.
             return 0.5 * (first + others[0]) if len(others) == 1 else (first + (others[0] + others[1])) / 3.0
 
-        rows, of = sim.joint_rows, self.warm_of
-        warm = {name: by_temperature.values(sim, rows, name, of, mean) for name in _WARM}
+        rows, of = sim.joint_rows, self.law_by_temperature
+        warm = {name: by_temperature.values(sim, rows, name, of, mean) for name in _BY_TEMPERATURE}
         self.joint_table[len(rows) :], self.joint_beyond[len(rows) :] = tables(rows, warm, of)
 
     def _agree_on_lost(self, lost: int, what: str) -> None:

@@ -137,13 +137,13 @@ class Local(JointTables):
 
     def _hold(self, blocks: Sequence[ElementBlock]) -> None:
         """These are the elements."""
-        self.warms = any(bool(one.any()) for one in self.sim.warms())
-        self.solids = Solids(self.sim, blocks, self.warms, self.whole)
+        self.temperature_dependent = any(bool(one.any()) for one in self.sim.temperature_dependent())
+        self.solids = Solids(self.sim, blocks, self.temperature_dependent, self.whole)
         self.yielding, self.creeping, self.laws = self.solids.yielding, self.solids.creeping, self.solids.laws
 
     def follow_heat(self) -> None:
         """Temperatures have changed: moduli, strengths and stress without strain are those of now."""
-        if self.warms:
+        if self.temperature_dependent:
             self._follow_joints()
         self.solids.follow_heat()
 

@@ -36,7 +36,7 @@ class Property:
     """May be left out without a default: it then follows from several others."""
     softens: bool = False
     """A table over plastic strain may stand for it."""
-    warms: bool = False
+    temperature_dependent: bool = False
     """A table over temperature may stand for it."""
     internal: bool = False
     """Given by the program, not by name."""
@@ -205,11 +205,11 @@ def softening_rows(rows: Rows) -> np.ndarray:
     return yields & np.any([rows.column(name) > 0.0 for name in names], axis=0)
 
 
-def _warming(*properties: Property) -> tuple[Property, ...]:
-    """The internal properties of those that can follow a table over temperature."""
+def _temperature_tables(*properties: Property) -> tuple[Property, ...]:
+    """Make the internal property that names the table over temperature, for each property that can follow one."""
     return tuple(
         Property(temperature_table(one.name), "", f"table of {one.name} over temperature", 0.0, internal=True)
-        for one in properties if one.warms
+        for one in properties if one.temperature_dependent
     )  # fmt: skip
 
 
@@ -261,7 +261,7 @@ _SOLID = (
              "runs", 0.0),
 )  # fmt: skip
 
-_WARM_SOLID = tuple(replace(one, warms=one.name == "young") for one in _SOLID)
+_SOLID_BY_TEMPERATURE = tuple(replace(one, temperature_dependent=one.name == "young") for one in _SOLID)
 _ELASTIC = (
     _friction("friction angle of its surfaces where they have no contact model"),
     Property("penalty", "Pa", "contact penalty of its surfaces where they have no contact model; 0: that of its "
@@ -275,14 +275,19 @@ MECH_ISO_ELASTIC = Model(
     "mech_iso_elastic",
     ELEMENT,
     "isotropic, elastic, large rotations",
-    (*_WARM_SOLID, *_ELASTIC, *_warming(*_WARM_SOLID), _DAMP_B),
+    (*_SOLID_BY_TEMPERATURE, *_ELASTIC, *_temperature_tables(*_SOLID_BY_TEMPERATURE), _DAMP_B),
     _elastic,
 )
 
-_WARM_STRENGTH = (
-    Property("cohesion", "Pa", "cohesion", 0.0, softens=True, warms=True),
+_STRENGTH_BY_TEMPERATURE = (
+    Property("cohesion", "Pa", "cohesion", 0.0, softens=True, temperature_dependent=True),
     Property(
-        "tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts", 0.0, softens=True, warms=True
+        "tensile",
+        "Pa",
+        "tensile strength; no more than cohesion / tan(friction) counts",
+        0.0,
+        softens=True,
+        temperature_dependent=True,
     ),
 )
 MECH_MOHR_COULOMB = Model(
@@ -290,13 +295,13 @@ MECH_MOHR_COULOMB = Model(
     ELEMENT,
     "elastic up to the strength of Mohr and Coulomb or in tension, then plastic",
     (
-        *_WARM_SOLID,
+        *_SOLID_BY_TEMPERATURE,
         _friction("internal friction angle; also that of its surfaces where they have no contact model", softens=True),
-        *_WARM_STRENGTH,
+        *_STRENGTH_BY_TEMPERATURE,
         Property("dilation", "degrees", "dilation angle, at most the friction angle", 0.0, high=89.0, softens=True),
         *(Property(softening_table(name), "", f"table of {name} over plastic strain", 0.0, internal=True)
           for name in SOFTENS),
-        *_warming(*_WARM_SOLID, *_WARM_STRENGTH),
+        *_temperature_tables(*_SOLID_BY_TEMPERATURE, *_STRENGTH_BY_TEMPERATURE),
         _ELASTIC[1],
         _DAMP_B,
     ),
@@ -380,11 +385,11 @@ CONTACT_MOHR_COULOMB = Model(
     ),
 )  # fmt: skip
 
-_WARM_JOINT = (
-    Property("cohesion", "Pa", "cohesion; 0: friction alone", warms=True),
-    Property("tensile_strength", "Pa", "tensile strength; 0: none", warms=True),
-    Property("gf1", "N/m", "fracture energy, mode I", warms=True),
-    Property("gf2", "N/m", "fracture energy, mode II", warms=True),
+_JOINT_BY_TEMPERATURE = (
+    Property("cohesion", "Pa", "cohesion; 0: friction alone", temperature_dependent=True),
+    Property("tensile_strength", "Pa", "tensile strength; 0: none", temperature_dependent=True),
+    Property("gf1", "N/m", "fracture energy, mode I", temperature_dependent=True),
+    Property("gf2", "N/m", "fracture energy, mode II", temperature_dependent=True),
 )
 COHESIVE = Model(
     "classic_intrinsic_cohesive_interface",
@@ -392,13 +397,13 @@ COHESIVE = Model(
     "cohesive zone that breaks in tension, in shear, or both",
     (
         _friction("friction angle"),
-        *_WARM_JOINT,
+        *_JOINT_BY_TEMPERATURE,
         Property("penalty_normal", "Pa", "penalty of opening", otherwise="10 E", low_itself=False),
         Property("penalty_overlay", "Pa", "penalty of a closed joint", optional=True, follows="penalty_normal",
                  otherwise="that of opening", low_itself=False),
         Property("penalty_shear", "Pa", "penalty of shear", optional=True, follows="penalty_normal",
                  otherwise="that of opening", low_itself=False),
-        *_warming(*_WARM_JOINT),
+        *_temperature_tables(*_JOINT_BY_TEMPERATURE),
     ),
     lambda values: _cohesive(values),
 )  # fmt: skip

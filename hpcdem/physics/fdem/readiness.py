@@ -39,7 +39,7 @@ def check(sim: State) -> None:
 
 def _check_warmth(sim: State) -> None:
     """CommandError where properties follow temperatures that are not there, or surroundings that cannot follow."""
-    elements, joints = sim.warms()
+    elements, joints = sim.temperature_dependent()
     if not elements.any() and not joints.any():
         return
     for what, at, rows, row in (("element", elements, sim.element_rows, sim.element_row),

@@ -330,7 +330,11 @@ class Diffusing(Conditions):
             self._begin_cycle()
             if self._found_for != self._given():
                 self._find_step()
-            if blocks.budget is not None and blocks.options.dynamic and (self.expands or blocks.local.warms):
+            if (
+                blocks.budget is not None
+                and blocks.options.dynamic
+                and (self.expands or blocks.local.temperature_dependent)
+            ):
                 blocks.budget.pause(blocks, by_heat=True)
             self._sub_steps()
             self.cycles += 1

@@ -14,7 +14,7 @@ import numpy as np
 from hpcdem.core.memory import sparse_zeros
 from hpcdem.physics.fdem import by_temperature, user_laws
 from hpcdem.physics.fdem.elements.creeping import Creeping
-from hpcdem.physics.fdem.elements.obeying import Obeying
+from hpcdem.physics.fdem.elements.user_laws import UserLaws
 from hpcdem.physics.fdem.elements.yielding import Yielding
 from hpcdem.physics.fdem.moduli import moduli
 
@@ -24,31 +24,35 @@ if TYPE_CHECKING:
 
 
 class Solids:
-    """blocks: the elements, one block for each kind; whole: those with forces in place of their parts, None: there are
-    none. yielding, creeping, laws: what each law of elements needs. warms: some properties follow temperatures;
-    heated: temperatures bring stress; initial (n_own, 4 or 6) [Pa]: stress that was set, by the moduli of now;
-    initial_part (n_own,): over what it is with the largest ones, None: the same."""
+    """The elements that a rank owns, with everything that determines their stress.
+
+    blocks: the elements, one block for each kind; whole: elements whose forces replace those of their parts, or None;
+    yielding, creeping, laws: tables of plasticity, creep and user laws; temperature_dependent: a property follows a
+    table over temperature; heated: there is thermal stress; initial (n_own, 4 or 6) [Pa]: initial stress, scaled to the
+    present moduli; initial_part (n_own,): this scale relative to the largest moduli, None for 1."""
 
     initial_part: np.ndarray | None = None
     heated = False
 
-    def __init__(self, sim: State, blocks: Sequence[ElementBlock], warms: bool, whole: Any = None) -> None:
-        self.sim, self.blocks, self.warms, self.whole = sim, blocks, warms, whole
-        if warms:
+    def __init__(
+        self, sim: State, blocks: Sequence[ElementBlock], temperature_dependent: bool, whole: Any = None
+    ) -> None:
+        self.sim, self.blocks, self.temperature_dependent, self.whole = sim, blocks, temperature_dependent, whole
+        if temperature_dependent:
             for of in blocks:
                 of.set_apart()
         if sim.stress0 is None:
             self.initial = sparse_zeros((sim.n_own, len(blocks[0].kind.components)))
         else:
             self.initial = sim.initial_stresses(sim.number[sim.owned])
-        self._said = self.initial.copy() if warms else self.initial
+        self._said = self.initial.copy() if temperature_dependent else self.initial
         self.yielding, self.creeping = Yielding(sim, blocks), Creeping(sim, blocks)
         self.remembers = self.yielding.some or self.creeping.some
         if self.remembers:
             for of in blocks:
                 of.remember()
-        self.laws = Obeying(sim, blocks, self.initial, self.yielding.on)
-        if warms:
+        self.laws = UserLaws(sim, blocks, self.initial, self.yielding.on)
+        if temperature_dependent:
             self._follow()
         self.heated = self._find_stress_without_strain()
 
@@ -61,9 +65,9 @@ class Solids:
 
     def follow_heat(self) -> None:
         """Temperatures have changed: moduli, strengths and stress without strain are those of now."""
-        if self.warms:
+        if self.temperature_dependent:
             self._follow()
-        if self.warms or self.heated:
+        if self.temperature_dependent or self.heated:
             self._find_stress_without_strain()
 
     def _follow(self) -> None:
@@ -120,15 +124,16 @@ class Solids:
     # ---- in a step -------------------------------------------------------------------------------------------------
 
     def move_on(self, every: bool) -> None:
-        """Elements flow, creep and obey, as those of this step do before its forces. every: also those that can do so
-        within the loop over their forces."""
+        """Update plastic flow, creep and user laws before the forces of this step.
+
+        every: include the laws that the loop over forces would update itself."""
         sim = self.sim
         if self.yielding.on:
             self.yielding.flow(sim.clock.step, every=every)
         if self.creeping.now:
             self.creeping.creep(sim.cold["creep"], [of.s0 for of in self.blocks], keep=sim.options.dynamic)
         if self.laws.here:
-            self.laws.obey(sim.cold[user_laws.COLUMN], [of.s0 for of in self.blocks], every=every)
+            self.laws.update(sim.cold[user_laws.COLUMN], [of.s0 for of in self.blocks], every=every)
 
     def changing(self) -> list[np.ndarray]:
         """What `move_on`, or the loop over forces, changes."""
@@ -170,7 +175,7 @@ class Solids:
         if self.creeping.some:
             crept = self.creeping.crept(s0)
         if self.laws.here:
-            self.laws.obeyed(s0)
+            self.laws.updated(s0)
         return s0, plastic, crept
 
     def remembered_energy(self, plastic: np.ndarray | None, crept: np.ndarray | None) -> np.ndarray:

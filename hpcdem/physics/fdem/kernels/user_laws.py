@@ -47,11 +47,12 @@ _WORD = tuple(lane(k) for k in range(9))
 _X2, _X3 = lane(4), lane(8)
 
 
-class Obeying(NamedTuple):
-    """What the loops over forces need of a law: some (blocks,) bool: blocks of triangles with an element that has it;
-    row (n + 3,) i4: of each element, in the flat table of properties, `table`; dt [s]; first_row: storage row of the
-    first owned element; memory (n_own, 1 + parts states): what these remember, from column 1 on, `width` columns for
-    each part."""
+class LawTables(NamedTuple):
+    """Tables of a user law for the loops over forces.
+
+    some (blocks,) bool: blocks of triangles that contain an element with the law; row (n + 3,) i4: row of each element
+    in the flat table of properties `table`; dt [s]; first_row: storage row of the first owned element; memory
+    (n_own, 1 + parts states): state variables from column 1 on, `width` columns for each part."""
 
     some: np.ndarray
     row: np.ndarray
@@ -63,8 +64,8 @@ class Obeying(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """The kernels of a law, on one thread and on several: those that find stress and states, and in the plane those in
-    the place of `elements.triangles` and `elements.quads`."""
+    """Kernels of a law, on one thread and on several: they update stress and states (find), or in the plane replace
+    `elements.triangles` and `elements.quads`."""
 
     find: Any
     find_threaded: Any
@@ -332,28 +333,28 @@ def _moving(one: _Law, first: int, kind: Kind) -> tuple[Any, Any]:
                 four_columns(lanes, lanes_of + k * U(CAPACITY) + e, table, (r0 + k, r1 + k, r2 + k, r3 + k))
 
     @njit(nogil=True, error_model="numpy")
-    def take(n, of, rows, obeying, lanes):
-        gather(n, of, obeying.table, lanes)
+    def take(n, of, rows, tables, lanes):
+        gather(n, of, tables.table, lanes)
         for p in range(n_parts):
             for k in range(n_states):
-                at, column = U(first_state + p * n_states + k) * U(CAPACITY), 1 + p * obeying.width + k
+                at, column = U(first_state + p * n_states + k) * U(CAPACITY), 1 + p * tables.width + k
                 for e in range(n):
-                    lanes[at + U(e)] = obeying.memory[rows[e] - obeying.first_row, column]
+                    lanes[at + U(e)] = tables.memory[rows[e] - tables.first_row, column]
 
     @njit(nogil=True, error_model="numpy")
-    def put(n, rows, obeying, lanes):
+    def put(n, rows, tables, lanes):
         for p in range(n_parts):
             for k in range(n_states):
-                at, column = U(first_state + p * n_states + k) * U(CAPACITY), 1 + p * obeying.width + k
+                at, column = U(first_state + p * n_states + k) * U(CAPACITY), 1 + p * tables.width + k
                 for e in range(n):
                     if lanes[own + U(e)] == 1.0:
-                        obeying.memory[rows[e] - obeying.first_row, column] = lanes[at + U(e)]
+                        tables.memory[rows[e] - tables.first_row, column] = lanes[at + U(e)]
 
     return take, put
 
 
 def _triangles(one: _Law) -> tuple[Any, Any]:
-    """The loops in the place of `elements.triangles`."""
+    """Make the loops that replace `elements.triangles`."""
     first_state, own = LANES + len(one.columns) + 1, lane(LANES + list(one.columns).index(OWN))
     evaluate, (take, put) = one.at(LANES, first_state, (S11, S22, S12, S33)), _moving(one, LANES, TRIANGLE)
 
@@ -362,39 +363,39 @@ def _triangles(one: _Law) -> tuple[Any, Any]:
         """The law for its elements, elasticity for others."""
         s11, s22, s12, s33 = elements.elastic(e, e11, e22, e12, trace, dt, lanes)
         found = evaluate(e, (e11, e22, e12, trace, dt), lanes)
-        obeys = lanes[own + e] == 1.0
+        has_law = lanes[own + e] == 1.0
         return (
-            found[0] if obeys else s11, found[1] if obeys else s22, found[2] if obeys else s12,
-            found[3] if obeys else s33,
+            found[0] if has_law else s11, found[1] if has_law else s22, found[2] if has_law else s12,
+            found[3] if has_law else s33,
         )  # fmt: skip
 
     loop = elements.stress_loop(chosen)
 
     @njit(nogil=True, error_model="numpy")
-    def stress(b, n, first, rows, small, beta, obeying, lanes):
-        if not obeying.some[b]:
+    def stress(b, n, first, rows, small, beta, tables, lanes):
+        if not tables.some[b]:
             elements.elastic_stress(n, small, beta, 0.0, lanes)
             return
-        take(n, obeying.row[first:], rows[first:], obeying, lanes)
-        loop(n, small, beta, obeying.dt, lanes)
-        put(n, rows[first:], obeying, lanes)
+        take(n, tables.row[first:], rows[first:], tables, lanes)
+        loop(n, small, beta, tables.dt, lanes)
+        put(n, rows[first:], tables, lanes)
 
     blocks = elements.triangle_blocks(stress, len(one.columns) + 1 + len(one.states))
 
     @njit(nogil=True, error_model="numpy")
-    def triangles(threads, obeying, *args):
+    def triangles(threads, tables, *args):
         for t in range(threads):
-            blocks(obeying, t, threads, *args)
+            blocks(tables, t, threads, *args)
 
     @njit(parallel=True, error_model="numpy")
     def triangles_threaded(
-        threads, obeying, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
+        threads, tables, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
         follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
         of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
     ):  # fmt: skip
         for t in prange(threads):
             blocks(
-                obeying, t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state,
+                tables, t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state,
                 history, head, follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special,
                 some_special, force, of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
             )  # fmt: skip
@@ -403,7 +404,7 @@ def _triangles(one: _Law) -> tuple[Any, Any]:
 
 
 def _quads(one: _Law) -> tuple[Any, Any]:
-    """The loops in the place of `elements.quads`."""
+    """Make the loops that replace `elements.quads`."""
     n_columns, n_states = len(one.columns), len(one.states)
     own, (take, put) = lane(QUAD_LANES + list(one.columns).index(OWN)), _moving(one, QUAD_LANES, QUAD)
     of_part = [
@@ -425,11 +426,11 @@ def _quads(one: _Law) -> tuple[Any, Any]:
             apart = abs(first - second) > 2.0 * parts.SHARED * size
             shared = (one * first + two * second) / (one + two)
             p, q = 0.5 * (shared - first if apart else 0.0), 0.5 * (shared - second if apart else 0.0)
-            obeys = lanes[own + e] == 1.0
+            has_law = lanes[own + e] == 1.0
             return (
-                u[0] + p if obeys else s11, u[1] + p if obeys else s22, u[2] if obeys else s12,
-                u[3] if obeys else s33, v[0] + q if obeys else t11, v[1] + q if obeys else t22,
-                v[2] if obeys else t12, v[3] if obeys else t33,
+                u[0] + p if has_law else s11, u[1] + p if has_law else s22, u[2] if has_law else s12,
+                u[3] if has_law else s33, v[0] + q if has_law else t11, v[1] + q if has_law else t22,
+                v[2] if has_law else t12, v[3] if has_law else t33,
             )  # fmt: skip
 
         return chosen
@@ -438,27 +439,27 @@ def _quads(one: _Law) -> tuple[Any, Any]:
     overlay_1 = elements.overlay_loop(1, pair(of_part[2], of_part[3]))
 
     @njit(nogil=True, error_model="numpy")
-    def stress(n, item, row, small, beta, obeying, lanes):
-        take(n, obeying.row[item[0] :], row, obeying, lanes)
-        overlay_0(n, small, beta, obeying.dt, lanes)
-        overlay_1(n, small, beta, obeying.dt, lanes)
-        put(n, row, obeying, lanes)
+    def stress(n, item, row, small, beta, tables, lanes):
+        take(n, tables.row[item[0] :], row, tables, lanes)
+        overlay_0(n, small, beta, tables.dt, lanes)
+        overlay_1(n, small, beta, tables.dt, lanes)
+        put(n, row, tables, lanes)
 
     blocks = elements.quad_blocks(stress, n_columns + 1 + 4 * n_states)
 
     @njit(nogil=True, error_model="numpy")
-    def quads(threads, obeying, *args):
+    def quads(threads, tables, *args):
         for t in range(threads):
-            blocks(obeying, t, threads, *args)
+            blocks(tables, t, threads, *args)
 
     @njit(parallel=True, error_model="numpy")
     def quads_threaded(
-        threads, obeying, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
+        threads, tables, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
         beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
     ):  # fmt: skip
         for t in prange(threads):
             blocks(
-                obeying, t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state,
+                tables, t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state,
                 history, table, beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
             )  # fmt: skip
 

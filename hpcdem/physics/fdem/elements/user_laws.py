@@ -1,4 +1,4 @@
-"""Elements that a rank owns and that obey user laws (user_laws.py, kernels/user_laws.py)."""
+"""User laws of the elements that a rank owns (laws: physics/fdem/user_laws.py; loops: kernels/user_laws.py)."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LawHere:
-    """A user law on this rank: its table of properties, and which elements of each block have it."""
+    """A user law on this rank, with its table of properties and the elements of each block that have it (who)."""
 
     law: user_laws.UserLaw
     table: np.ndarray
     who: tuple[np.ndarray, ...]
 
     def some(self, of: ElementBlock) -> np.ndarray:
-        """(blocks,) bool: which blocks of the kernel of triangles have one of them."""
+        """Find the blocks of the kernel of triangles that contain an element with this law: (blocks,) bool."""
         found = np.zeros(-(-of.count // BLOCK), bool)
         if of.kind is TRIANGLE:
             found[self.who[0] // BLOCK] = True
         return found
 
 
-class Obeying:
-    """Of the elements in `blocks`, whose initial stress is initial (n_own, 4 or 6) [Pa].
+class UserLaws:
+    """User laws of the elements in `blocks`, whose initial stress is initial (n_own, 4 or 6) [Pa].
 
-    some: owned elements have such a law; here: the laws that they have; with_forces: of each block, the one that runs
-    in the loop over the forces, and its `LawHere.some`: that of most elements, in the plane; of others the stress is
-    found before. Both give the same bits."""
+    some: whether an owned element has a user law; here: the laws of owned elements; with_forces: for each block, the
+    law that the loop over forces evaluates (in the plane, the law of most elements) and its `LawHere.some`. The other
+    laws are evaluated before that loop, with the same bits."""
 
     def __init__(self, sim: State, blocks: Sequence[ElementBlock], initial: np.ndarray, yields: bool) -> None:
         self.sim, self.blocks, self.initial, self.here = sim, blocks, initial, list[LawHere]()
@@ -70,46 +70,46 @@ class Obeying:
                 self.with_forces[k] = one, one.some(of)
 
     def take_heat(self, heat: np.ndarray | None) -> None:
-        """Strain of heat, in space: stress of heat (n_own,) over -3 K."""
+        """Set the thermal strain of elements in space: thermal stress (n_own,) [Pa] divided by -3 K."""
         self.thermal = np.zeros(0)
         if self.some and heat is not None and self.sim.dim == 3:
             row = self.sim.element_row[self.sim.number[self.sim.owned]]
             self.thermal = heat / (-3.0 * np.array(self.sim.element_rows.column("bulk"))[row])
 
     def lay(self) -> None:
-        """What such an element has flowed or crept, with another model, is not of the law."""
+        """Reset elements with a user law to their initial stress: plastic and creep strain are of earlier models."""
         for of in self.blocks if self.here else ():
             at = np.flatnonzero(self._number[of.first])
             if len(of.s0):
                 of.s0[at, :, : self.initial.shape[1]] = self.initial[of.first[at], None]
 
     def before(self, k: int) -> bool:
-        """Whether the stress of some in block k is found before the loop over its forces."""
+        """Whether a law of block k is evaluated before the loop over forces."""
         runs = self.with_forces[k]
         return any(len(one.who[k]) and (runs is None or one is not runs[0]) for one in self.here)
 
     def forces(self, k: int, usual: Any, *args: Any) -> None:
-        """The loop over the forces of block k, `usual` if no law runs in it; args: its arguments."""
+        """Run the loop over the forces of block k with arguments args: `usual` if that loop evaluates no user law."""
         runs, sim = self.with_forces[k], self.sim
         if runs is None:
             usual(*args)
             return
-        from hpcdem.physics.fdem.kernels.user_laws import Obeying as Given
+        from hpcdem.physics.fdem.kernels.user_laws import LawTables
 
         (one, some), of, memory = runs, self.blocks[k], sim.cold[user_laws.COLUMN]
-        given = Given(some, of.model, one.table, self._dt(), sim.n_left, memory, self._width(memory))
+        given = LawTables(some, of.model, one.table, self._dt(), sim.n_left, memory, self._width(memory))
         one.law.loops.with_forces(of.kind, sim.threads)(args[0], given, *args[1:])
 
     def _dt(self) -> float:
         return float(self.sim.clock.dt) if self.sim.options.dynamic else 0.0
 
     def _width(self, memory: np.ndarray) -> int:
-        """Columns of what a part remembers."""
+        """Number of state variables of a part of an element."""
         return (memory.shape[1] - 1) // self.sim.element_parts
 
-    def obey(self, memory: np.ndarray, s0: Sequence[np.ndarray], every: bool) -> None:
-        """Laws at the present positions: memory, see `user_laws.begin`, becomes that after it, s0 of the blocks [Pa]
-        the stress. every: those too that run in the loop over forces."""
+    def update(self, memory: np.ndarray, s0: Sequence[np.ndarray], every: bool) -> None:
+        """Evaluate laws at the present positions: update memory (see `user_laws.begin`) and the stress s0 [Pa] of the
+        blocks. every: include the laws that the loop over forces evaluates."""
         for one in self.here:
             for k, who in enumerate(one.who):
                 runs = self.with_forces[k]
@@ -124,16 +124,16 @@ class Obeying:
             not sim.options.large_strain, memory, self._width(memory), s0,
         )  # fmt: skip
 
-    def obeyed(self, s0: Sequence[np.ndarray] | None = None) -> np.ndarray:
-        """State variables, see `user_laws.begin`, after this moment, which the next forces will see; s0 of the blocks
-        [Pa] becomes their stress. The model stays as it is."""
+    def updated(self, s0: Sequence[np.ndarray] | None = None) -> np.ndarray:
+        """Compute the state variables (see `user_laws.begin`) that the next forces will use, and the stress s0 [Pa] of
+        the blocks, without changing the model."""
         memory = self.sim.cold[user_laws.COLUMN].copy()
-        self.obey(memory, [of.s0.copy() for of in self.blocks] if s0 is None else s0, every=True)
+        self.update(memory, [of.s0.copy() for of in self.blocks] if s0 is None else s0, every=True)
         return memory
 
     def states(self) -> np.ndarray:
-        """States of user laws (n_own, 1 + states), means over the parts of elements by volume."""
-        memory = self.obeyed() if self.here else self.sim.cold[user_laws.COLUMN]
+        """Average the states of user laws over the parts of each element by volume: (n_own, 1 + states)."""
+        memory = self.updated() if self.here else self.sim.cold[user_laws.COLUMN]
         width = self._width(memory)
         found = memory[:, : 1 + width].copy()
         for of in self.blocks if width else ():
@@ -142,8 +142,8 @@ class Obeying:
         return found
 
     def trying(self, law: user_laws.UserLaw, kind: str) -> None:
-        """The law is this one, for this kind of elements, which none has: the kernels that steps and looks call are
-        called now, or by the next forces."""
+        """Compile the kernels of a law for a kind of elements of which no element has it: those that steps and
+        outputs call are called here or by the next forces."""
         nobody, sim = np.zeros(0, np.int64), self.sim
         one = LawHere(law, np.zeros(len(law.columns)), tuple(nobody for _ in self.blocks))
         memory = sim.cold[user_laws.COLUMN] = np.zeros((sim.n_own, 1 + sim.element_parts * len(law.states)))
