@@ -40,8 +40,9 @@ class ParticleCommands:
         color: str | int | None = None,
         xv: float | None = None,
         yv: float | None = None,
+        delete: bool = False,
     ) -> None:
-        """WALL: make a wall from node to node, or change the one with this id; what is left out stays.
+        """WALL: make a wall from node to node, or change or delete the one with this id; what is left out stays.
 
         Parameters
         ----------
@@ -50,6 +51,7 @@ class ParticleCommands:
         kn, ks, fric : normal and shear stiffness [N/m], for particles of the linear law, and friction coefficient.
         color : name or number.
         xv, yv : velocity, until it is changed [m/s].
+        delete : remove the wall with its contacts; accepts only id.
         """
     def ball(
         self,

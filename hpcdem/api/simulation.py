@@ -31,6 +31,7 @@ from hpcdem.core.nearest import hint
 from hpcdem.core.place import place as _place
 from hpcdem.io import checkpoint
 from hpcdem.lang.zdem.execute import Interpreter, find, tell_warnings
+from hpcdem.lang.zdem.lexer import read_lines
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.physics.dem.materials import MATERIAL
 from hpcdem.runtime.checkpoints import newest_first
@@ -374,9 +375,10 @@ class Simulation(ParticleCommands, BlockCommands):
     @_command
     def command(self, text: str) -> None:
         """Carry out lines of the ZDEM language on this model."""
-        begins = text.split()[:1] and text.split()[0][:3].lower() in ("sta", "res", "loa")
         name, line = _place()
         try:
+            first = next(read_lines(text.encode("utf-8", errors="surrogatepass"), "command"), None)
+            begins = first is not None and first.tokens[0].word[:3] in ("sta", "res", "loa")
             script = parse_text(text if begins else "RES model\n" + text, str(self.directory / "command"))
             interpreter = Interpreter(script)
             tell_warnings(script, self.engine)

@@ -78,6 +78,7 @@ def _write(pipe: IO[bytes], code: int, answer: bytes) -> None:
 def request_of(wanted: dict[str, Any]) -> Request:
     """The library's request. Raises HpcdemError that begins with `table:ROW:` or with the name of a field."""
     from hpcdem.pre.specimen import PLACEMENTS, SHAPES, Request, parse_grading
+    from hpcdem.pre.specimen.shapes import APPLIES
 
     grading = parse_grading(_text(wanted.get("rows")), TABLE)
     values: dict[str, Any] = {}
@@ -101,6 +102,7 @@ def request_of(wanted: dict[str, Any]) -> Request:
             if not isinstance(wanted[name], kind) or isinstance(wanted[name], bool):
                 raise HpcdemError(f"{name}: read {str(wanted[name])[:20]}, which is not allowed")
             values[name] = wanted[name]
+    values = {name: value for name, value in values.items() if values["shape"] in APPLIES.get(name, SHAPES)}
     return Request(sizes=tuple(grading.sizes), percents=tuple(grading.percent), **values)
 
 
@@ -258,8 +260,10 @@ def _zipped(content: dict[str, bytes]) -> bytes:
 
 def command(wanted: dict[str, Any]) -> str:
     """The command line that makes the same files; the table is in grading.txt, which the page offers too."""
+    from hpcdem.pre.specimen.shapes import APPLIES
+
     request = request_of(wanted)
-    shape = {"ellipse": ("l_over_d", "size_rule"), "circle": ()}.get(request.shape, ("deviation", "roundness"))
+    shape = [name for name, shapes in APPLIES.items() if request.shape in shapes]
     names = ["shape", "number", "slenderness", "void_ratio", *shape, "mass_exponent", "placement", "seed"]
     if request.placement == "cells":
         names.append("cell")

@@ -92,6 +92,8 @@ LINES = [
     ("WALL id 1 nodes (0 0 10 xv 2)", "expected a second number for nodes: two points"),
     ("WALL xv 2.0", "id missing; for example: WALL"),
     ("WALL id 1", "nothing to do"),
+    ("WALL id 1 delete fric 0.3", "delete accepts only the id"),
+    ("WALL id 9 delete", "there is no wall 9 yet (walls so far: 1)"),
     ("WALL", "id missing"),
     ("WALL id 9 xv 2", "there is no wall 9 yet (walls so far: 1)"),
     ("BOX left 0 right 10 bottom 0", "height missing; for example: BOX"),
@@ -411,6 +413,7 @@ RUNS = [
     ("RES good.sav\nSET dt 1e-3\nIMPLE wall id 9 xmove 1", "IMPLE: there is no wall with id 9 (walls so far: 4)"),
     ("RES good.sav\nSET dt 1e-3\nIMPLE wall id 4 xmove 1", "IMPLE: wall 4 does not move"),
     ("RES good.sav\nWALL id 9 xv 1", "WALL: there is no wall with id 9"),
+    ("RES good.sav\nWALL id 9 delete", "WALL: there is no wall with id 9"),
     ("RES good.sav\nPLOT 7 8\nSTOP", "STOP: PLOT 8 7: there is no HIST 8"),
     ("RES good.sav\nBALL id 1 x 50 y 5 rad 1", "BALL: a particle with id 1 exists already"),
 ]

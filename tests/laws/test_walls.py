@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem.commands.dem import cycles, particles, properties, walls
+from hpcdem.commands.dem import cycles, history, particles, properties, walls
 from hpcdem.commands.dem import settings as settings_of
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.dem import diagnostics
@@ -415,3 +415,36 @@ def test_a_box_that_holds(tmp_path):
 def test_an_empty_box_is_an_error(tmp_path):
     with pytest.raises(CommandError, match="BOX is empty"):
         walls.box(model(tmp_path), 0.0, 0.0, 0.0, 1.0)
+
+
+def test_a_wall_that_is_deleted(tmp_path):
+    """The ball loses the force of the wall, keeps that of the wall made after it with its shear force, and nothing
+    acts when all are gone."""
+    far, floor, side = ((-5.0, 5.0), (5.0, 5.0)), ((-5.0, 0.0), (5.0, 0.0)), ((0.9, -5.0), (0.9, 5.0))
+    sim = held(tmp_path, 0.0, 0.9, far, floor, side, fric=1.0)
+    carry(sim, 0, x=0.01, n=50)
+    before = at_wall(sim, 0, 2), at_wall(sim, 0, 1)
+    assert before[0].fn == pytest.approx(0.11 * K) and before[1].fs != 0.0
+    walls.wall(sim, 0, delete=True)
+    assert sim.walls.id.tolist() == [1, 2]
+    steps(sim, 1)
+    assert (at_wall(sim, 0, 2), at_wall(sim, 0, 1)) == before
+    walls.wall(sim, 1, delete=True)
+    steps(sim, 1)
+    assert force(sim)[:2] == pytest.approx((-0.11 * K, 0.0)) and at_wall(sim, 0, 2) == before[0]
+    walls.wall(sim, 2, delete=True)
+    steps(sim, 1)
+    assert not force(sim).any()
+    with pytest.raises(CommandError, match="no wall with id 2"):
+        walls.wall(sim, 2, delete=True)
+
+
+def test_walls_that_cannot_be_deleted(tmp_path):
+    sim = held(tmp_path, 0.0, 0.9, ((-5.0, 0.0), (5.0, 0.0)))
+    walls.box(sim, -9.0, 9.0, -9.0, 20.0)
+    history.hist(sim, 3, 10, "ystress wall 0")
+    for name, message in ((0, "wall 0 cannot be deleted: HIST 3 records its"), (100, "a side of BOX, which cannot")):
+        with pytest.raises(CommandError, match=message):
+            walls.wall(sim, name, delete=True)
+    with pytest.raises(CommandError, match="delete accepts only the id"):
+        walls.wall(sim, 0, fric=0.1, delete=True)

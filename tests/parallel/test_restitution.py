@@ -15,6 +15,8 @@ SHOWER = """\
 START
 BOX left 0 right 60 bottom 0 height 20 kn 1e7 ks 1e7 fric 0.3
 WALL id 5 nodes (1, 20) (1, 0) kn 1e7 ks 1e7 xv 2.0
+WALL id 7 nodes (20, 1) (30, 3) kn 1e7 ks 1e7 fric 0.3
+WALL id 6 nodes (59, 0) (59, 20) kn 1e7 ks 1e7 fric 0.3
 GEN num 700 rad discrete 0.3 0.4 0.5 x (2 58) y (0 18) group sand
 PROP density 2500 kn 1e7 ks 8e6 fric 0.4 yv -9.0
 SET DT 2e-4 GRAVITY 0 -9.8 print 600 save 400 restitution 0.45
@@ -22,6 +24,7 @@ CYC 700
 PROP ebmod 1e7 gbmod 1e7 tstrength 1e4 sstrength 1e4 RANGE x (0 30)
 FIX x RANGE x (40 45)
 SET restitution 0.8
+WALL id 7 delete
 CYC 500
 STOP
 """

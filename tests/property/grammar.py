@@ -443,6 +443,19 @@ class Maker:
         self.walls[ident] = speed
         self.add(f"WALL id {ident} {axis} {number(speed)}", self.perhaps(20, "fric 0.1"))
 
+    def do_delete_a_wall(self) -> None:
+        free = [
+            ident
+            for ident in sorted(self.walls)
+            if not any(
+                f"wall id {ident} " in line or "strain wall" in line for line in self.lines if line.startswith("HIST")
+            )
+        ]
+        if free and self.chance(30):
+            ident = self.pick(*free)
+            del self.walls[ident]
+            self.add(f"WALL id {ident} delete")
+
     def do_new_wall(self) -> None:
         """A paddle inside, or the floor once more."""
         if 0 in self.walls and self.chance(40):

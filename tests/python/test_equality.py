@@ -38,6 +38,7 @@ PROP density 2.2e3 fric 0.4 shear 2.9e9 poiss 0.2 damp 0.2 hertz range group rai
 FREE x range group row
 BOND break range x 0.0 1500.0
 EXP end.dat group range group rain
+WALL id 0 delete
 CYC 300
 STOP
 """
@@ -74,7 +75,10 @@ sim.free("x", where="group row")
 sim.break_bonds("x 0.0 1500.0")
 sim.export("end.dat", group=True, where="group rain")
 sim.command('''
+# a comment at the beginning, and a blank line
+
 SET print 0   # a comment
+WALL id 0 delete
 CYC 300
 ''')
 assert len(seen) == sim.steps // 7, len(seen)

@@ -158,10 +158,10 @@ def _warn_of_overstretched(sim: Simulation, which: np.ndarray) -> None:
         )
 
 
-def warn_of_two_stiffnesses(sim: Simulation) -> None:
-    """Say it if there are bonds whose shear stiffness is not that of their contacts: each opening and closing under
-    shear then changes the energy. A warning where nothing damps the motion, else a line.
-    Collective."""
+def warn_of_stiffnesses(sim: Simulation) -> None:
+    """Warn of bonds without a normal stiffness, which never break in tension; and say it if there are bonds whose shear
+    stiffness is not that of their contacts: each opening and closing under shear then changes the energy. A warning
+    where nothing damps the motion, else a line. Collective."""
     state = len(sim.bond_types), len(sim.materials), sim.bonds, sim.settings.lsm
     if state == sim.bonds_looked_at or not sim.bonds_left():
         return
@@ -181,6 +181,8 @@ def warn_of_two_stiffnesses(sim: Simulation) -> None:
     of_contact = law[:, contacts.B] * np.where(hertz, np.sqrt(two_rt * np.maximum(-gap, 0.0)), 1.0)
     of_bond = law[:, contacts.B] * np.where(hertz, np.sqrt(two_rt * lists.u_made[slots]), 1.0)
     of_bond = np.where(elastic, types["gbmod"] * area / length, of_bond)
+    of_tension = np.where(elastic, types["ebmod"], law[:, contacts.A])
+    _warn_of_loose_bonds(sim, np.sort(p.ihot[np.stack([i, j])][:, of_tension == 0.0, GID], axis=0).T.tolist())
     larger, smaller = np.maximum(of_bond, of_contact), np.minimum(of_bond, of_contact)
     damped = (np.maximum(rows["damp"][first], rows["damp"][second]) > 0.0) | (sim.settings.lsm > 0.0)
     some = np.flatnonzero((types["conserving"] == 0.0) & (hertz | (larger - smaller > 1e-6 * larger)))
@@ -206,6 +208,18 @@ def warn_of_two_stiffnesses(sim: Simulation) -> None:
         sim.log.warn_once("two shear stiffnesses", f"{text}. Nothing damps {undamped} of these pairs")
     else:
         sim.log.info(f"{text}. Damping dissipates energy but may be insufficient under small loads")
+
+
+def _warn_of_loose_bonds(sim: Simulation, ids: list[list[int]]) -> None:
+    """A warning of bonds without normal stiffness: ids of their particles, those of this rank. Collective."""
+    number, firsts = sim.count(len(ids)), sim.comm.allgather(sorted(ids)[:1])
+    if number and sim.log is not None:
+        a, b = min(one for part in firsts for one in part)
+        sim.log.warn_once(
+            f"{number} loose bonds",
+            f"{number} bonds have no normal stiffness, that of particles {a} and {b} among them: they carry "
+            "no tension and never break in tension. Assign ebmod with tstrength, or kn with n_bond",
+        )
 
 
 def break_bonds(sim: Simulation, where: Selection | None = None) -> int:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from hpcdem.commands.dem import output
-from hpcdem.commands.dem.bonds import warn_of_two_stiffnesses
+from hpcdem.commands.dem.bonds import warn_of_stiffnesses
 from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.outputs import OUTPUTS
@@ -257,7 +257,7 @@ def start(
         "name": name, "first": first, "last": None if steps is None else first + steps, "origin": origin,
         "intervals": intervals, "final_frame": final_frame, "position": sim.position,
     }  # fmt: skip
-    warn_of_two_stiffnesses(sim)
+    warn_of_stiffnesses(sim)
     _warn_about_the_time_step(sim)
     if initial_frame:
         sim.last_frame = None  # the model may have been changed since, at the same step

@@ -33,7 +33,7 @@ from hpcdem.io.frames import frame_name
 from hpcdem.io.ps import write_ps
 from hpcdem.io.vtk import write_vtk
 from hpcdem.io.vtkhdf import write_vtkhdf
-from hpcdem.physics.dem import budget, diagnostics, guards, saved_state
+from hpcdem.physics.dem import budget, diagnostics, saved_state
 from hpcdem.physics.dem.platens import OF_PARTS
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.runtime import launch, run_folder
@@ -231,21 +231,21 @@ DEEP = 0.5
 
 
 def warn_of_overlaps(sim: Simulation) -> None:
-    """Name the worst contacts with an overlap beyond half the smaller radius, once per command. Collective."""
+    """One line about contacts with an overlap beyond half the smaller radius, once per command: their number and the
+    deepest. Collective."""
     key = f"overlaps since step {sim.progress['first'] if sim.progress is not None else sim.clock.step}"
     if sim.comm.bcast(sim.log.has_warned(key)):
         return
-    worst, number = diagnostics.overlaps_beyond(sim, DEEP, guards.NAMED)
-    lines = []
+    worst, number = diagnostics.overlaps_beyond(sim, DEEP, 1)
     for o in worst:
         who = f"particle {o.id1} and wall {o.id2}" if o.wall else f"particles {o.id1} and {o.id2}"
         made_of = " | ".join(sim.materials.describe(m) for m in dict.fromkeys(o.materials))
-        lines.append(f"  {who} at ({o.x:g}, {o.y:g}): overlap {o.u:g} m, {o.ratio:.2f} of the radius; {made_of}")
-    sim.log.warn_once(
-        key,
-        f"step {sim.clock.step}: {number} contacts overlap by more than half the smaller radius; the stiffness is too "
-        "small for the load, or particles were created with overlaps\n" + "\n".join(lines),
-    )
+        sim.log.warn_once(
+            key,
+            f"step {sim.clock.step}: {number} contacts overlap by more than half the smaller radius, {who} at "
+            f"({o.x:g}, {o.y:g}) by {o.ratio:.2f} of it ({o.u:g} m; {made_of}). Use a larger stiffness, or create "
+            "particles without overlap",
+        )
 
 
 def write_energy(sim: Simulation, _: Snapshot | None = None) -> None:

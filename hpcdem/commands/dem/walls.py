@@ -19,8 +19,9 @@ def wall(
     color: int | None = None,
     xv: float | None = None,
     yv: float | None = None,
+    delete: bool = False,
 ) -> None:
-    """WALL: make a wall from node to node, or change the one with this id; what is left out stays.
+    """WALL: make a wall from node to node, or change or delete the one with this id; what is left out stays.
 
     Parameters
     ----------
@@ -29,9 +30,15 @@ def wall(
     kn, ks, fric : normal and shear stiffness [N/m], for particles of the linear law, and friction coefficient.
     color : name or number.
     xv, yv : velocity, until it is changed [m/s].
+    delete : remove the wall with its contacts; accepts only id.
     """
     if id < 0:
         raise CommandError(f"wall id must not be negative, got {id}")
+    if delete:
+        if any(given is not None for given in (nodes, kn, ks, fric, color, xv, yv)):
+            raise CommandError(f"wall {id}: delete accepts only the id")
+        _delete(sim, id)
+        return
     if nodes is not None and not np.isfinite(nodes).all():
         raise CommandError(f"nodes of wall {id} must be finite numbers, got {nodes}")
     if nodes is not None:
@@ -85,6 +92,23 @@ def box(
     for side, (p1, p2) in corners.items():
         forget(sim, sim.walls.of_side(side))
         _set(sim, sim.walls.put_side(side, p1, p2), kn, ks, fric)
+
+
+def _delete(sim: Simulation, id: int) -> None:
+    """Remove a wall. CommandError for a side of BOX and for a wall that a HIST follows."""
+    row = sim.walls.row(id)
+    if sim.walls.side[row]:
+        raise CommandError(f"wall {id} is a side of BOX, which cannot be deleted")
+    for number, (_, what) in sim.history_wishes.items():
+        name, *of = what.split()
+        if of[:1] == ["wall"] and str(id) in of[1].split("|"):
+            raise CommandError(f"wall {id} cannot be deleted: HIST {number} records its {name}")
+    forget(sim, row)
+    partner = sim.hist.partner
+    partner[partner < -1 - row] += 1
+    sim.walls.remove(row)
+    sim.tables_changed()
+    sim.check_soon()
 
 
 def forget(sim: Simulation, row: int | None) -> None:

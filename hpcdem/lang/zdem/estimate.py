@@ -142,6 +142,8 @@ class _Follower:
     def _wall(self, s: Statement) -> None:
         """Its middle and velocity along x."""
         name = s.get("id")
+        if s.get("delete"):
+            self.walls.pop(name, None)
         if s.get("nodes"):
             self.walls[name] = sum(x for x, _ in s.get("nodes")) / 2.0, 0.0
         if name in self.walls:

@@ -159,6 +159,11 @@ def _wall(statement: Statement, known: _Known) -> None:
         known.walls[wall] = (0.0, 0.0)
     elif wall not in known.walls and known.complete:
         raise statement.error(f"there is no wall {wall} yet ({_walls(known)}); nodes make one")
+    if "delete" in statement.arguments:
+        if known.boxed and wall in BOX_IDS.values():
+            raise statement.error(f"wall {wall} is a side of BOX, which cannot be deleted")
+        known.walls.pop(wall, None)
+        return
     x, y = known.walls.get(wall, (None, None))
     known.walls[wall] = (statement.get("xv", x), statement.get("yv", y))
 

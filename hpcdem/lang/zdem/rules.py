@@ -46,7 +46,9 @@ def check_place(statement: Statement, before: Sequence[Statement]) -> None:
 
 def _wall(s: Statement) -> None:
     if len(s.arguments) == 1:
-        raise s.error("nothing to do; give nodes, kn, ks, fric, color, xv or yv")
+        raise s.error("nothing to do; give nodes, kn, ks, fric, color, xv, yv or delete")
+    if "delete" in s.arguments and len(s.arguments) > 2:
+        raise s.error("delete accepts only the id")
     nodes = s.get("nodes")
     if nodes is not None and nodes[0] == nodes[1]:
         x, y = nodes[0]

@@ -467,7 +467,8 @@ COMMANDS = (
     ),
     Command(
         "WALL",
-        "With nodes: creates a wall, or replaces the wall of this id. Without nodes: changes the given properties. "
+        "With nodes: creates a wall, or replaces the wall of this id. Without nodes: changes the given properties, or "
+        "deletes the wall. "
         "Both sides act, with the same properties, unless SET wallside left was given before; stiffnesses are for "
         "linear contacts only.",
         options=(
@@ -479,9 +480,10 @@ COMMANDS = (
             _COLOR,
             Option("xv", "velocity in x", kind=FLOAT, unit="m/s", default="0"),
             Option("yv", "velocity in y", kind=FLOAT, unit="m/s", default="0"),
+            Option("delete", "deletes the wall and its contacts", source="X"),
         ),
         example=("WALL ID 1, NODES ( 10.0 , 10000.0 ) ( 10.0 , 10.0 ), kn=0e10 ks=0e10 fric 0.0 COLOR blue",
-                 "WALL id 1 xv 2.0"),
+                 "WALL id 1 xv 2.0", "WALL id 1 delete"),
         does="walls.wall",
     ),
     # ---- particles

@@ -17,7 +17,7 @@ class Walls:
     """Columns by name: id (n,) i8; p1, p2, v (n, 2) f8; kn, ks, fric (n,) f8; color (n,) i8; one_sided (n,) bool;
     side (n,) i8: 0, or 1 to 4 for the walls of BOX in the order of BOX_IDS.
 
-    A wall keeps its place in the table for good (contact histories refer to it).
+    Contact histories refer to walls by their rows, which change only when an earlier wall is removed.
     """
 
     def __init__(self) -> None:
@@ -62,6 +62,11 @@ class Walls:
             getattr(self, name)[at] = 0
         self.id[at], self.p1[at], self.p2[at], self.one_sided[at] = wall_id, p1, p2, one_sided
         return at
+
+    def remove(self, row: int) -> None:
+        """Take a wall out of the table."""
+        for name in self.COLUMNS:
+            setattr(self, name, np.delete(getattr(self, name), row, axis=0))
 
     def put_side(self, side: str, p1: tuple[float, float], p2: tuple[float, float]) -> int:
         """Make a wall of BOX, or give it new end points and default properties; returns its row. CommandError where its

@@ -20,7 +20,7 @@ from hpcdem.pre.specimen import counts as number_of
 from hpcdem.pre.specimen.cells import in_cells, order
 from hpcdem.pre.specimen.dense import pack
 from hpcdem.pre.specimen.grading import Grading, grading, parse_grading, read_grading
-from hpcdem.pre.specimen.shapes import ANGLE, SHAPES, SIZE_RULES, bodies, check_shape, numbers
+from hpcdem.pre.specimen.shapes import ANGLE, APPLIES, SHAPES, SIZE_RULES, bodies, check_shape, numbers
 
 __all__ = [
     "MOST", "PLACEMENTS", "SHAPES", "SIZE_RULES", "ClassRow", "Density", "Grading", "Outlines", "Request", "Specimen",
@@ -65,6 +65,12 @@ class Request:
             object.__setattr__(self, name, tuple(float(v) for v in getattr(self, name)))
         grading(self.sizes, self.percents)
         check_shape(self.shape, self.l_over_d, self.size_rule, self.deviation, self.roundness)
+        for name, shapes in APPLIES.items():
+            if self.shape not in shapes and getattr(self, name) != type(self).__dataclass_fields__[name].default:
+                raise CommandError(
+                    f"{name.replace('_', ' ')} {getattr(self, name)} applies to {', '.join(shapes)} grains, not to "
+                    f"{self.shape} grains; omit it"
+                )
         if (self.number is None) == (self.width is None):
             raise CommandError("expected either the number of grains or the width of the box")
         if self.number is not None and not 1 <= self.number <= MOST:

@@ -20,6 +20,11 @@ from hpcdem.physics.polyarc.outlines import Outlines, uniform_outlines
 
 SIDES = {"triangle": 3, "quadrilateral": 4, "pentagon": 5}
 SHAPES = ("circle", "ellipse", *SIDES)
+APPLIES = {
+    "l_over_d": ("ellipse",), "size_rule": ("ellipse",), "deviation": tuple(SIDES), "roundness": tuple(SIDES),
+}  # fmt: skip
+"""Which shapes have these parameters. The manual lists an angle deviation and a roundness of ellipses too, without
+saying what they are: their outline follows from the axes."""
 SIZE_RULES = ("major", "minor", "area")
 """Which length of an ellipse is its size: the long axis, the short axis, or the diameter of the circle of its area."""
 NARROWEST = 5.0

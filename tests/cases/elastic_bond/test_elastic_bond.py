@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import math
 
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import bonds, particles, properties
+from hpcdem.commands.dem import bonds, cycles, particles, properties
+from hpcdem.runtime.progress import Log
 from tests.cases.elastic_bond import exact
 from tests.support import carry, force, model, only, pair, steps, value, watch
 
@@ -246,3 +248,20 @@ def test_bonds_that_break_at_once_are_announced(tmp_path, keys, disk):
     assert sim.broken() == (breaks, 0) and 0 < breaks < 25
     again = bonds.bond(sim, **keys, tolerate=float(last.min()) - 1e-9)
     assert again == 0 and len(log) == 1
+
+
+@pytest.mark.parametrize("keys, kn, number", [
+    ({"tstrength": exact.T, "sstrength": exact.C}, 1e9, 1), ({"n_bond": 1e6}, 0.0, 1),
+    ({"ebmod": exact.E, "tstrength": exact.T}, 1e9, 0), ({"n_bond": 1e6}, 1e9, 0),
+])  # fmt: skip
+def test_bonds_without_normal_stiffness_are_named_before_the_run(tmp_path, keys, kn, number):
+    sim = model(tmp_path)
+    said = io.StringIO()
+    sim.log = Log(stream=said)
+    for gid in range(2):
+        particles.ball(sim, gid, 2.0 * gid, 0.0, 1.0)
+    properties.prop(sim, density=1000.0, kn=kn, ks=1e9)
+    bonds.bond(sim, **keys)
+    cycles.cycle(sim, 1)
+    text = "bonds have no normal stiffness, that of particles 0 and 1 among them"
+    assert (f"{number} {text}" in " ".join(said.getvalue().split())) == bool(number)
