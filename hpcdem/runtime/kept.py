@@ -30,7 +30,7 @@ _DIGEST = 32
 """Bytes of SHA-256, before what a file holds."""
 _ROOM = 1 << 16
 """Bytes that a folder must take to be one for kernels."""
-_PACKAGE = Path(__file__).resolve().parent.parent
+_PACKAGE = Path(__file__).absolute().parent.parent
 _DAY = 86400.0
 
 
