@@ -165,7 +165,7 @@ PARTICLES = "import hpcdem; hpcdem.Simulation().box(0, 1, 0, 1) #"
 
 @pytest.mark.parametrize(
     ("name", "text", "code", "said"),
-    [pytest.param("loop.sc", OWN_LOOP, 130, "in line 6 of loop.sc, before the next command; nothing was saved",
+    [pytest.param("loop.sc", OWN_LOOP, 130, "in line 6 of loop.sc before the next command; nothing was saved",
                   marks=pytest.mark.slow),
      ("loop.sc", COMMANDS, 85, "stopped at step 0 by Ctrl-C; checkpoint data"),
      pytest.param("loop.py", OWN_LOOP.replace("pcdc mesh", PARTICLES), 130, "in line 6 of loop.py",
