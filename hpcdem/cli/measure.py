@@ -60,6 +60,8 @@ def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
 @click.option("--skin", type=FINITE, metavar="H", help="faults: ignore the zone within H m of the base and of the "
               "pushing wall [2 cells].")  # fmt: skip
 @click.option("--increment", is_flag=True, help="faults: strain from frame to frame even if sections exist.")
+@click.option("--over-time", is_flag=True, help="faults: follow each fault through the frames: birth, growth, merging, "
+              "slip, throw, heave, offset of horizons.")  # fmt: skip
 @click.option("--ids", type=Numbers(), default="", metavar="I,J", help="tracks: particles with these ids.")
 @click.option("--near", "points", type=pictures.Numbers(2), multiple=True, metavar="X,Y", help=
     "tracks: the particles nearest to this point (m) in the first frame; repeatable.")  # fmt: skip
@@ -128,7 +130,8 @@ def request(options: dict[str, Any]) -> Any:
         walls=tuple(dict.fromkeys(options["walls"])), groups=tuple(options["groups"]), colors=tuple(colors),
         first=options["first"], last=options["last"], xmove=options["xmove"], ymove=options["ymove"],
         width=options["width"], formats=tuple(options["formats"]), strain=options["strain"], length=options["length"],
-        skin=options["skin"], increment=options["increment"], ids=tuple(options["ids"]), points=options["points"],
+        skin=options["skin"], increment=options["increment"], over_time=options["over_time"],
+        ids=tuple(options["ids"]), points=options["points"],
         number=options["number"], log=options["log"], history=options["history"], bins=options["bins"],
         completeness=options["completeness"], released=options["energy"] == "released", joule=options["joule"],
         box=box,

@@ -16,6 +16,7 @@ from hpcdem.sweep.tables import STATISTICS, Band, Column, Report, statistics
 DRAWN = {
     "wedge": ("height[m]", "width[m]", "toe_x[m]", "taper[deg]"),
     "faults": ("bands", "reverse", "normal", "dip[deg]"),
+    "faults_total": ("faults", "active", "slip[m]", "share_of_shortening"),
     "wallforce": ("fx[N]", "fy[N]", "work[J]"),
     "layers all": ("envelope_area[m2]", "porosity"),
     "cracks": ("broken_share", "particles_from_0.5"),

@@ -22,10 +22,13 @@ STATISTICS = ("members", "mean", "spread", *(f"q{round(100 * q):02d}" for q in Q
 
 SERIES: dict[str, tuple[str, ...]] = {
     "wedge": (), "wallforce": ("wall",), "layers": ("kind", "name"), "cracks": (), "cracks_joints": (), "fragments": (),
-    "fluid": (), "emission": (),
+    "fluid": (), "emission": (), "faults_total": (),
 }  # fmt: skip
 """Tables of `hpcdem measure` with a row per moment, or one for each of these keys."""
 TIMES = ("step", "ini", "time[s]", "shortening[m]", "from", "to")
+OF_FAULTS = ("born_shortening[m]", "born_time[s]", "x[m]", "dip_at_birth[deg]", "dip[deg]", "length[m]", "slip[m]",
+             "throw[m]", "heave[m]", "largest_slip_rate[m/s]", "share_of_shortening")  # fmt: skip
+"""What is compared of the n-th fault of each member."""
 APART = ("tracks",)
 """Measures of single particles, which are others in each member."""
 
@@ -94,7 +97,7 @@ def measured(folder: Path, data: Path) -> tuple[dict[Column, Series], Series | N
     for name, keys in SERIES.items():
         if (folder / f"{name}.csv").exists():
             found |= _series(name, rows(folder / f"{name}.csv"), keys)
-    if (folder / "faults.csv").exists():
+    if (folder / "faults.csv").exists() and not (folder / "faults_total.csv").exists():
         found |= _faults(rows(folder / "faults.csv"), moments(folder))
     for path in sorted([*data.glob("hist_*.csv"), *data.glob("history_*.csv")]):
         found |= _series(path.stem, rows(path), ())
@@ -103,6 +106,9 @@ def measured(folder: Path, data: Path) -> tuple[dict[Column, Series], Series | N
         single = {
             f"emission.{n}": _number(v) for n, v in rows(folder / "emission_b.csv")[-1].items() if n in ("b", "a")
         }
+    if (folder / "faults_summary.csv").exists():
+        for row in rows(folder / "faults_summary.csv"):  # the n-th to appear in each member
+            single |= {f"fault {row['fault']}.{n}": _number(row[n]) for n in OF_FAULTS}
     return found, _profile(folder / "surface.csv"), single
 
 

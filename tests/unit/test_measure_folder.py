@@ -129,6 +129,36 @@ def test_rows_that_stand_for_walls_are_no_surface(
     assert counts or crest == pytest.approx(float(table(folder / "measure", "wedge")[-1]["crest_y[m]"]), abs=1.0)
 
 
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_a_row_of_particles_that_pushes_counts_as_the_wall(folder: Path, tmp_path: Path, mirror: float) -> None:
+    """Wall 1 replaced by a row of fixed particles with its face where the wall was, over a base of fixed particles that
+    moves as far: the same shortening, width and frames; also from the right."""
+    up = np.arange(R, 9000.0, 2.0 * R)
+    for path in folder.glob("all_*.vtkhdf"):
+        f = read_frame(path)
+        p, n = f.tables["particles"].columns, len(up) + 8
+        wall = float(f.walls["p1"][1, 0])
+        x = np.append(np.full(len(up), wall - R), wall - R - 2.0 * R * np.arange(8))
+        new = {"gid": 10**6 + np.arange(n), "x": x, "y": np.append(up, np.full(8, -R)), "radius": np.full(n, R)}
+        p["fix"] = np.zeros(len(p["gid"]), np.uint8)
+        new["fix"] = np.full(n, 3, np.uint8)
+        for name, values in p.items():
+            p[name] = np.concatenate([values, new.get(name, np.zeros(n))]).astype(values.dtype)
+        p["x"] *= mirror
+        f.walls["p1"][:, 0] *= mirror
+        f.walls["p2"][:, 0] *= mirror
+        f.tables["particles"].total = len(p["gid"])
+        for name in f.walls:
+            f.walls[name] = f.walls[name][:1]
+        write(tmp_path, f, path.stem.endswith("_ini"))
+    lines = run(tmp_path, "wedge")
+    assert f"{len(up) + 8} particles fixed along x and y push" in lines[0]
+    here, there = table(tmp_path / "measure", "wedge"), table(folder / "measure", "wedge")
+    for name in ("step", "shortening[m]", "width[m]", "height[m]"):
+        assert column(here, name) == pytest.approx(column(there, name), nan_ok=True, abs=200.0 if mirror < 0 else 1e-6)
+    assert column(here, "shortening[m]") == pytest.approx(column(there, "shortening[m]"), abs=1e-6)
+
+
 def test_a_model_pushed_from_the_right_is_the_mirror_image(folder: Path, tmp_path: Path) -> None:
     for path in folder.glob("all_*.vtkhdf"):
         f = read_frame(path)

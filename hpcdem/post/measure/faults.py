@@ -84,7 +84,7 @@ def _straight(places: np.ndarray, weight: np.ndarray, shortest: float) -> list[n
         run = max(
             (_best_run(places[left], weight[left], a) for a in _ANGLES), key=lambda r: float(weight[left[r]].sum())
         )
-        centre, direction = _axis(places[left[run]], weight[left[run]])
+        centre, direction = axis_of(places[left[run]], weight[left[run]])
         offset = places[left] - centre
         along, across = offset @ direction, np.abs(offset @ [-direction[1], direction[0]])
         low, high = along[run].min(), along[run].max()
@@ -116,7 +116,7 @@ def _best_run(places: np.ndarray, weight: np.ndarray, angle: float) -> np.ndarra
     return max(runs, key=lambda r: float(weight[r].sum()))
 
 
-def _axis(points: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def axis_of(points: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Centre and direction of the line through points by their weights."""
     centre = np.average(points, axis=0, weights=weight)
     value, vector = np.linalg.eigh(np.atleast_2d(np.cov((points - centre).T, aweights=weight, ddof=0)))
@@ -126,7 +126,7 @@ def _axis(points: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def _band(x: np.ndarray, y: np.ndarray, weight: np.ndarray, vergence: int, cell: float) -> Band:
     """The line through cells by their weights."""
     points = np.column_stack([x, y])
-    centre, direction = _axis(points, weight)
+    centre, direction = axis_of(points, weight)
     along = (points - centre) @ direction
     dip = float(np.degrees(np.arctan2(direction[1], direction[0])))
     dip = dip - 180.0 if dip > 90.0 else dip + 180.0 if dip <= -90.0 else dip

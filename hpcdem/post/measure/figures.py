@@ -14,6 +14,7 @@ from hpcdem.io.axes import CM, View, view
 from hpcdem.post import plots
 from hpcdem.post.layers import Look
 from hpcdem.post.measure import cracks
+from hpcdem.post.measure.fault_history import History
 from hpcdem.post.measure.grains import Grains
 from hpcdem.post.measure.kinds import WEDGE_HEAD, Done, cracking, layer_series, paths, wedge_rows
 from hpcdem.post.measure.kinds import drawn as last_drawn
@@ -234,6 +235,71 @@ def faults(done: Done, plan: Plan, final: Grains) -> Any:
     text = f"step {g.step}: |strain since {since}| > {drawn.threshold:g}"
     ax.text(1.0, 1.015, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=plots.FONT - 1.0)
     return figure
+
+
+def faults_over_time(stamps: Sequence[Stamp], found: History, final: Grains) -> Any:
+    """Faults over the last section; slip of each over shortening, thick while it is active; when each is active. Those
+    with most slip, one for each of LINES, are coloured and numbered, the others grey."""
+    from matplotlib import patheffects
+
+    seen = section_view(final)
+    steps = [stamp.step for stamp in stamps]
+    count = len(found.faults)
+    figure, (ax, slips, bars) = page([section_height(seen), 6.0, min(max(0.34 * count, 1.2), 7.0)], [1.3, GAP])
+    draw_section(ax, final, seen, pale())
+    at, axis = when(stamps)
+    lines = {f.number: found.curve(f) for f in found.faults}
+    most = sorted(lines, key=lambda n: (-float(lines[n][1].max()), n))[: len(LINES)]
+    shades = dict(zip(sorted(most), LINES))
+    size, unit = length_unit(max((float(slip.max()) for _, slip in lines.values()), default=1.0))
+    for f in sorted(found.faults, key=lambda f: (f.number in shades, f.number)):
+        shade, named = shades.get(f.number, "#b0b0b0"), f.number in shades
+        frames, slip = lines[f.number]
+        active = np.array([found.active(f, max(k, f.born), steps) for k in frames])
+        x, y = at[frames], slip / size
+        slips.plot(x, y, color=shade, lw=0.7)
+        slips.plot(x, np.where(active, y, np.nan), color=shade, lw=2.0, solid_capstyle="round")
+        if f.merged is not None:
+            slips.plot(x[-1], y[-1], "x", color=shade, ms=4.0, mew=1.0)
+        bars.plot(x[[0, -1]], [f.number] * 2, color=shade, lw=0.5)
+        bars.plot(x, np.where(active, float(f.number), np.nan), color=shade, lw=2.6, solid_capstyle="butt")
+        last = found.profiles[f.number][int(frames[-1])]
+        if frames[-1] < len(stamps) - 1:
+            continue
+        edge = [patheffects.Stroke(linewidth=3.0, foreground="white"), patheffects.Normal()]
+        ax.plot(last.x, last.y, color=shade if named else "#606060", lw=(1.9 if active[-1] else 1.1) if named else 0.6,
+                path_effects=edge if named else None, zorder=4.0 + named)  # fmt: skip
+        if named:
+            top = int(np.nanargmax(last.y))
+            ax.annotate(str(f.number), (last.x[top], last.y[top]), xytext=(0, 2), textcoords="offset points",
+                        fontsize=plots.FONT - 2.0, ha="center", va="bottom", color=shade, zorder=6.0,
+                        path_effects=edge)  # fmt: skip
+    slips.set_xlim(*_with_air(at))
+    bars.set_xlim(*slips.get_xlim())
+    slips.set_ylim(*_with_air(np.concatenate([slip / size for _, slip in lines.values()] or [np.ones(1)]), 0.0))
+    ends = [float(lines[n][1][-1]) / size for n in shades]
+    gap = 0.045 * float(slips.get_ylim()[1])
+    for place, n in zip(_apart(ends, gap), shades):
+        right = at[lines[n][0][-1]]
+        slips.annotate(str(n), (right, place), (3, 0), textcoords="offset points", color=shades[n],
+                       fontsize=plots.FONT - 2.0, va="center", annotation_clip=False)  # fmt: skip
+    bars.set_ylim(count + 0.7, 0.3)
+    bars.set_yticks(range(1, count + 1, 1 if count <= 12 else 5))
+    label(slips, None, f"slip ({unit})")
+    label(bars, axis, "fault")
+    for panel in (slips, bars):
+        panel.grid(lw=0.3, color="#d0d0d0")
+    text = f"step {final.step}: {count} fault{'s' if count != 1 else ''}; thick lines: active"
+    ax.text(1.0, 1.015, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=plots.FONT - 1.0)
+    return figure
+
+
+def _apart(places: Sequence[float], gap: float) -> list[float]:
+    """Places moved up such that they lie at least `gap` apart, in the order given."""
+    moved, lowest = [0.0] * len(places), -np.inf
+    for k in sorted(range(len(places)), key=lambda k: (places[k], k)):
+        moved[k] = lowest = max(places[k], lowest + gap)
+    return moved
 
 
 def _paint(ax: Any, part: Any) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.core.fields import sides_of_box
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import FrameFile, list_frames, read_frame
+from hpcdem.io.vtkhdf_mesh import is_mesh_frame, read_mesh_frame
 from hpcdem.post.surface import held_fast
 
 Walls = dict[int, tuple[tuple[float, float], tuple[float, float]]]
@@ -73,6 +74,8 @@ class Grains:
 
 def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grains:
     """The grains of one frame file. tables: "bonds" and "contacts", where wanted. Raises HpcdemError."""
+    if path.suffix == ".vtkhdf" and is_mesh_frame(path):
+        return elements(path)
     frame = read_frame(path, ["particles", *tables])
     p = frame.tables["particles"].columns
     none = np.zeros(0)
@@ -91,6 +94,25 @@ def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grain
     return Grains(frame.step, gid[order], x, y, r, color, group, _walls(frame), frame.time, ini, **pairs, fixed=fixed)
 
 
+def elements(path: Path) -> Grains:
+    """The elements of a frame of blocks as grains: at their centroids, with the radius of a disc of their area, the
+    colour by the number of their group. Raises HpcdemError in space."""
+    state = read_mesh_frame(path, solid=True)
+    if state.points.shape[1] == 3:
+        raise HpcdemError(f"faults: supports blocks in two dimensions only; {path.name} has three")
+    order = np.argsort(state.of_elements["number"], kind="stable")
+    cells = state.cells[order]
+    corners = np.where(cells >= 0, cells, cells[:, [0]])
+    weight = (cells >= 0)[..., None] / (cells >= 0).sum(axis=1)[:, None, None]
+    x, y = (state.points[corners, :2] * weight).sum(axis=1).T
+    column, names = next(iter(state.group_names.items()), ("", []))
+    row = state.of_elements[column][order].astype(np.int64) if column else np.full(len(order), -1)
+    group = np.array([*names, ""], dtype=object)[np.where(row >= 0, row, len(names))]
+    radius = np.sqrt(state.of_elements["area"][order] / np.pi)
+    gid = state.of_elements["number"][order].astype(np.int64)
+    return Grains(state.step, gid, x, y, radius, np.maximum(row, 0) % 10, group, {}, state.time)
+
+
 def _walls(frame: Frame) -> Walls:
     none = np.zeros((0, 2))
     ends = zip(frame.walls.get("id", none), frame.walls.get("p1", none), frame.walls.get("p2", none))
@@ -99,6 +121,8 @@ def _walls(frame: Frame) -> Walls:
 
 def walls_of(path: Path) -> Walls:
     """The walls of a frame file alone. Raises HpcdemError."""
+    if path.suffix == ".vtkhdf" and is_mesh_frame(path):
+        return {}
     return _walls(read_frame(path, ()))
 
 
@@ -141,13 +165,38 @@ def driving_wall(first: Walls, last: Walls) -> int | None:
     return wall if wall is not None and ways[wall] > 0.0 else None
 
 
-def when_it_moves(frames: Sequence[FrameFile], wall: int) -> int:
-    """Number of the last frame before a wall leaves its place; 0 if it never does. Raises HpcdemError."""
-    start = walls_of(frames[0].path)
+def pushing_row(first: Grains, last: Grains) -> np.ndarray:
+    """Ids of the row of particles that pushes: of those fixed along x and y in both frames, which went equally far
+    along x and stand higher than wide, those that went farthest; none: no such row moves."""
+    a, b = common(first.take(first.fixed), last.take(last.fixed))
+    way = b.x - a.x
+    far = float(np.abs(way).max(initial=0.0))
+    best = np.zeros(0, np.int64)
+    if far > 0.0:
+        order = np.argsort(way, kind="stable")
+        rows = np.split(order, np.flatnonzero(np.diff(way[order]) > 1e-3 * far) + 1)
+        upright = [row for row in rows if np.ptp(b.y[row]) > np.ptp(b.x[row]) and abs(way[row]).min() > 1e-3 * far]
+        best = b.gid[max(upright, key=lambda row: float(np.abs(way[row]).min()), default=best)]
+    return best
+
+
+def face_of_row(g: Grains, row: np.ndarray, forward: int) -> float:
+    """x [m] of the face of a row of particles (ids) towards +x or -x: the median over its height; NaN without it."""
+    some = np.isin(g.gid, row)
+    if not some.any():
+        return float("nan")
+    x, y, r = forward * g.x[some] + g.r[some], g.y[some], g.r[some]
+    high = np.floor(y / (2.0 * float(r.max()))).astype(np.int64)
+    edges = [float(x[high == k].max()) for k in np.unique(high)]
+    return forward * float(np.median(edges))
+
+
+def when_it_moves(frames: Sequence[FrameFile], moved: Callable[[FrameFile], bool]) -> int:
+    """Number of the last frame before something leaves its place; 0 if it never does. Raises HpcdemError."""
     low, high = 0, len(frames)  # at rest, gone
     while high - low > 1:
         k = (low + high) // 2
-        low, high = (low, k) if gone(start, walls_of(frames[k].path), wall) > 0.0 else (k, high)
+        low, high = (low, k) if moved(frames[k]) else (k, high)
     return low if high < len(frames) else 0
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.post.measure import cracks, faults, layers, wedge
-from hpcdem.post.measure.grains import Grains, Walls, middle
+from hpcdem.post.measure import cracks, fault_history, faults, layers, wedge
+from hpcdem.post.measure.grains import Grains, Walls
 from hpcdem.post.measure.scene import Plan, Scene, Stamp
 from hpcdem.post.measure.surface import surface
 from hpcdem.post.section import read_section
@@ -21,6 +21,8 @@ Done = list[tuple[Stamp, Any]]
 NAN = float("nan")
 TOTAL, STEP = 0.5, 0.2
 """Thresholds of strain for faults: of that since the first section, and of that from frame to frame."""
+TIMES_MEAN, LEAST_STEP = 3.0, 0.005
+"""Threshold for faults over time: this many means of |strain| of the frame, and this strain at least."""
 SHORTEST, SKIN = 6.0, 2.0
 """Shortest band, and how near to the base and to the wall strain is that of these, in cells."""
 
@@ -54,7 +56,8 @@ def wedge_part(scene: Scene) -> wedge.Shape | str:
     bed, plan = scene.bed, scene.plan
     sign = plan.forward
     walls = {i: ((sign * a[0], a[1]), (sign * b[0], b[1])) for i, (a, b) in bed.walls.items()}
-    back = None if plan.wall not in walls else float(np.mean(walls[plan.wall], axis=0)[0])
+    face = plan.face(scene.all)
+    back = sign * face if np.isfinite(face) else None
     try:
         return wedge.shape(sign * bed.x, bed.y, bed.r, walls, plan.cell, back)
     except ValueError as reason:
@@ -98,11 +101,13 @@ def without_wedge(done: Done) -> list[tuple[Stamp, str]]:
 
 @dataclass(frozen=True)
 class Faults:
-    """Bands of a frame; the field they were picked in, and the particles to draw below, for the last frame."""
+    """Bands of a frame, and for faults over time the ids of their particles; the field they were picked in, and the
+    particles to draw below, for the last frame."""
 
     bands: list[faults.Band]
     total: bool
     threshold: float
+    ids: tuple[np.ndarray, ...] = ()
     x: np.ndarray | None = None
     y: np.ndarray | None = None
     strain: np.ndarray | None = None
@@ -133,15 +138,17 @@ def faults_part(scene: Scene) -> Faults | None:
     request = plan.request
     cell = float(x[1] - x[0]) if len(x) > 1 else plan.cell
     threshold = request.strain if request.strain is not None else TOTAL if total else STEP
+    if request.over_time and request.strain is None:
+        threshold = max(TIMES_MEAN * float(np.nanmean(np.abs(field))), LEAST_STEP)
     skin = request.skin if request.skin is not None else SKIN * cell
     rise, height = wedge.base(now.x, now.y, now.r, now.walls, cell, float(now.x.min()), float(now.x.max()))
     shortest = request.length if request.length is not None else SHORTEST * cell
     low = height + rise * x + skin
-    if plan.wall in now.walls:
-        face = float(middle(now.walls, plan.wall)[0])
+    if np.isfinite(face := plan.face(now)):
         low = np.where(plan.forward * (x - face) < skin, np.inf, low)
     picked = faults.bands(x, y, field, threshold, shortest, low[None, :])
-    return Faults(picked, total, threshold, x, y, np.where(y[:, None] >= low, field, NAN), now)
+    ids = tuple(fault_history.members(band, now, cell) for band in picked) if request.over_time else ()
+    return Faults(picked, total, threshold, ids, x, y, np.where(y[:, None] >= low, field, NAN), now)
 
 
 def drawn(parts: Sequence[Faults | None]) -> Faults | None:
@@ -152,7 +159,7 @@ def drawn(parts: Sequence[Faults | None]) -> Faults | None:
 
 def without_fields(part: Faults) -> Faults:
     """The bands alone, to send over."""
-    return Faults(part.bands, part.total, part.threshold)
+    return Faults(part.bands, part.total, part.threshold, part.ids)
 
 
 FAULT_HEAD = (
@@ -172,6 +179,110 @@ def faults_sheets(done: Done, plan: Plan) -> list[Sheet]:
                 )  # fmt: skip
 
     return [Sheet("faults", (*Stamp.HEAD, *FAULT_HEAD), rows())]
+
+
+HISTORY_HEAD = (
+    "fault", "state", "x[m]", "y[m]", "length[m]", "dip[deg]", "dips_to", "vergence", "sense", "slip[m]",
+    "mean_slip[m]", "throw[m]", "heave[m]", "opening[m]", "slip_rate[m/s]", "slip_per_shortening", "band_length[m]",
+    "x1[m]", "y1[m]", "x2[m]", "y2[m]",
+)  # fmt: skip
+SUMMARY_HEAD = (
+    "fault", "born_step", "born_time[s]", "born_shortening[m]", "last_active_step", "last_active_shortening[m]",
+    "frames_active", "end", "vergence", "sense", "x[m]", "y[m]", "dip_at_birth[deg]", "dip[deg]", "length[m]",
+    "slip[m]", "mean_slip[m]", "throw[m]", "heave[m]", "opening[m]", "largest_slip_rate[m/s]", "share_of_shortening",
+)  # fmt: skip
+
+
+def layer_names(g: Grains, plan: Plan) -> np.ndarray:
+    """(n,): the layer of each particle: its colour, or its group where all have one colour."""
+    if len(np.unique(g.color)) > 1:
+        return np.array([plan.request.color(c) for c in g.color.tolist()], dtype=object)
+    return g.group
+
+
+def _words(slip: float, dip: float) -> tuple[str, str, str]:
+    """To which side a fault dips, which way the hanging wall went, sense."""
+    ways = ("left", "right")
+    return ways[dip <= 0.0], ways[slip * dip > 0.0], "reverse" if slip > 0.0 else "normal"
+
+
+def history_sheets(stamps: Sequence[Stamp], found: fault_history.History) -> list[Sheet]:
+    """All faults together in each frame; each fault in each frame, each fault, slip along them, offset of horizons."""
+    steps = [stamp.step for stamp in stamps]
+    rows, summary, along, offsets = [], [], [], []
+    for f in found.faults:
+        before, fastest = (f.born - 1, 0.0), NAN
+        last: tuple[Any, ...] | None = None
+        active = [k for k in range(len(stamps)) if found.active(f, k, steps)]
+        for k, p in sorted(found.profiles[f.number].items()):
+            stamp, j = stamps[k], p.best
+            offsets += [(*stamp.row, stamp.shortening, f.number, name, *row) for name, row in p.horizons.items()]
+            if j is None:
+                continue
+            one = [float(getattr(p, name)[j]) for name in ("slip", "throw", "heave", "opening")]
+            slip, gap = one[0] - before[1], stamp.time - stamps[before[0]].time
+            way = stamp.shortening - stamps[before[0]].shortening
+            rate = slip / gap if gap > 0.0 else NAN
+            fastest = float(np.nanmax([fastest, abs(rate)])) if np.isfinite([fastest, rate]).any() else NAN
+            known = np.flatnonzero(np.isfinite(p.x))
+            ends = [float(v[m]) for m in known[[0, -1]] for v in (p.x, p.y)]
+            spacing = float(p.s[1] - p.s[0]) if len(p.s) > 1 else 0.0
+            length = float(np.hypot(ends[2] - ends[0], ends[3] - ends[1])) + spacing
+            bands = sum(s.band.length for s in f.seen.get(k, ()))
+            middle = float(np.mean(ends[::2])), float(np.mean(ends[1::2]))
+            last = (*_words(one[0], p.dip)[1:], *middle, abs(p.dip), length, one[0], p.mean, *one[1:])
+            rows.append((
+                *stamp.row, stamp.shortening, f.number, "active" if k in active else "inactive", *middle, length,
+                abs(p.dip), *_words(one[0], p.dip), one[0], p.mean, *one[1:], rate,
+                slip / way if abs(way) > 0.0 else NAN, bands if k in active else 0.0, *ends,
+            ))  # fmt: skip
+            before = (k, one[0]) if gap > 0.0 else before
+            known = np.isfinite(p.slip)
+            along += [
+                (*stamp.row, stamp.shortening, f.number, *map(float, row))
+                for row in zip(*(v[known] for v in (p.s, p.x, p.y, p.slip, p.throw, p.heave, p.opening)))
+            ]
+        if last is None:
+            continue
+        since, until = stamps[f.born - 1], stamps[max(found.profiles[f.number])]
+        way = until.shortening - since.shortening
+        merged = f.merged is not None
+        end = f"merged into {f.merged[0]}" if f.merged else "active" if active[-1] == len(stamps) - 1 else "inactive"
+        if not merged and max(found.profiles[f.number]) < len(stamps) - 1:
+            end = "removed"
+        born, latest = stamps[f.born], stamps[active[-1]]
+        first = max(f.seen[f.born], key=lambda s: s.band.length).band
+        summary.append((
+            f.number, born.step, born.time, born.shortening, latest.step, latest.shortening, len(f.seen), end,
+            *last[:4], abs(first.dip), *last[4:], fastest, last[-2] / way if abs(way) > 0.0 else NAN,
+        ))  # fmt: skip
+    rows.sort(key=lambda row: (row[0], row[1], row[4]))
+    head = (*Stamp.HEAD, "shortening[m]")
+    heaves = np.zeros((len(found.faults), len(stamps)))
+    slips = np.zeros_like(heaves)
+    for f, heave, slip in zip(found.faults, heaves, slips):
+        for k, p in sorted(found.profiles[f.number].items()):  # a fault that merged keeps what it had
+            if p.best is not None:
+                heave[k:], slip[k:] = p.heave[p.best], abs(p.slip[p.best])
+    total = (
+        (
+            *stamp.row, stamp.shortening, sum(f.born <= k for f in found.faults),
+            sum(found.active(f, k, steps) for f in found.faults), float(slips[:, k].sum()),
+            float(slips[:, k].max(initial=0.0)), float(heaves[:, k].sum()),
+            float(heaves[:, k].sum()) / stamp.shortening if abs(stamp.shortening) > 0.0 else NAN,
+        )
+        for k, stamp in enumerate(stamps)
+    )  # fmt: skip
+    return [
+        Sheet("faults_total", (*head, "faults", "active", "slip[m]", "largest_slip[m]", "heave[m]",
+                               "share_of_shortening"), total),
+        Sheet("faults", (*head, *HISTORY_HEAD), rows),
+        Sheet("faults_summary", SUMMARY_HEAD, summary),
+        Sheet("faults_along", (*head, "fault", "s[m]", "x[m]", "y[m]", "slip[m]", "throw[m]", "heave[m]",
+                               "opening[m]"), along),
+        Sheet("faults_horizons", (*head, "fault", "horizon", "x[m]", "y[m]", "slip[m]", "throw[m]", "heave[m]"),
+              offsets),
+    ]  # fmt: skip
 
 
 # --- tracks and layers -----------------------------------------------------------------------------------------

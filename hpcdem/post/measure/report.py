@@ -21,8 +21,9 @@ from hpcdem.io.disk import explain
 from hpcdem.io.frames import FrameFile, left_out, list_frames
 from hpcdem.io.vtkhdf_mesh import MeshState
 from hpcdem.post import fluid
-from hpcdem.post.measure import block_figures, blocks, bodies, cracks, emission, figures, kinds
+from hpcdem.post.measure import block_figures, blocks, bodies, cracks, emission, fault_history, figures, kinds
 from hpcdem.post.measure import walls as curves
+from hpcdem.post.measure.fault_history import History
 from hpcdem.post.measure.grains import Grains
 from hpcdem.post.measure.kinds import Done, Sheet
 from hpcdem.post.measure.scene import BLOCK_KINDS, KINDS, SOLID_KINDS, Plan, Request, Scene, look, make_plan
@@ -59,17 +60,20 @@ def run(comm: Comm, log: Any, request: Request, without: Sequence[str] = ()) -> 
     if of_blocks and not on_first(comm, lambda: bool(list_frames(request.folder))):
         what = [kind for kind in what if kind in request.what and kind not in BLOCK_KINDS]
     of_frames = [kind for kind in what if kind in FRAMES]
+    if request.over_time and "faults" not in what:
+        raise UsageError("--over-time requires faults: `hpcdem measure DIR faults --over-time`")
     written: list[Path] = []
     if of_frames:
         plan, final = on_first(comm, lambda: make_plan(request, of_frames))
         on_first(comm, lambda: _tell(log, plan, final, of_frames))
         parts = _measure(comm, log, plan, of_frames)
+        history = _follow(comm, log, plan, parts["faults"]) if request.over_time and "faults" in what else None
     on_first(comm, lambda: request.target.mkdir(parents=True, exist_ok=True))
     for kind in what:
         if kind == "wallforce":
             work = lambda: _wallforce(request)  # noqa: E731
         else:
-            work = lambda: _write(kind, parts[kind], plan, final)  # noqa: B023, E731
+            work = lambda: _write(kind, parts[kind], plan, final, history)  # noqa: B023, E731
         files, problem = on_first(comm, lambda: _tried(work, bool(request.what)))  # noqa: B023
         if problem is not None:
             log.info(f"skipped: {problem}")
@@ -86,7 +90,8 @@ def run(comm: Comm, log: Any, request: Request, without: Sequence[str] = ()) -> 
 def _tell(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
     first, last = plan.frames[0], plan.frames[-1]
     count = "1 frame" if first is last else f"{len(plan.frames)} frames, {first.path.stem} to {last.path.stem}"
-    wall = "no wall moves along x" if plan.wall is None else f"wall {plan.wall} moves"
+    row = f"{len(plan.row)} particles fixed along x and y push" if len(plan.row) else "no wall moves along x"
+    wall = row if plan.wall is None else f"wall {plan.wall} moves"
     hint = "; --from 0 for those before it moves" if plan.request.first is None and first.step > 0 else ""
     log.info(f"{count}; {wall}{hint}; columns of {plan.cell:g} m")
     held, of_bed = int(final.fixed.sum()), [kind for kind in ("surface", "wedge", "tracks") if kind in what]
@@ -170,6 +175,64 @@ def _one_field(parts: list[dict[str, Any]]) -> None:
     for part in parts:
         if part["faults"] is not None and part["faults"] is not drawn:
             part["faults"] = kinds.without_fields(part["faults"])
+
+
+def _follow(comm: Comm, log: Any, plan: Plan, done: Done) -> History | None:
+    """Collective: faults through the frames, on rank 0 (None elsewhere). Ranks share the faults to place them in their
+    reference frames, then stretches of frames to measure them."""
+
+    def tracked() -> tuple[list[fault_history.Fault], int]:
+        bands = [zip(part.bands, part.ids) if part else () for _, part in done]
+        return fault_history.track([[fault_history.Seen(*pair) for pair in pairs] for pairs in bands])
+
+    faults, brief = on_first(comm, tracked)
+
+    def placed() -> dict[int, fault_history.Plane]:
+        found: dict[int, fault_history.Plane] = {}
+        for f in faults[comm.rank :: comm.size]:
+            reference = _read(plan.frames[f.born - 1], plan, ())
+            p = fault_history.plane(f, reference, plan.cell, kinds.layer_names(reference, plan))
+            found |= {} if p is None else {f.number: p}
+        return found
+
+    planes = {number: p for part in comm.allgather(_each(comm, placed)) for number, p in part.items()}
+
+    def measured() -> list[tuple[int, int, fault_history.Profile]]:
+        found, n = [], len(plan.frames)
+        for k in range(n * comm.rank // comm.size, n * (comm.rank + 1) // comm.size):
+            alive = [f for f in faults if f.number in planes and f.born <= k and (f.merged is None or k < f.merged[1])]
+            if alive:
+                now = _read(plan.frames[k], plan, ())
+                found += [(f.number, k, fault_history.measure(planes[f.number], now, k)) for f in alive]
+        return found
+
+    parts = comm.gather(_each(comm, measured))
+    if parts is None:
+        return None
+    profiles: dict[int, dict[int, fault_history.Profile]] = {}
+    for number, k, profile in (row for part in parts for row in part):
+        if profile.best is not None:
+            profiles.setdefault(number, {})[k] = profile
+    first = _read(plan.frames[0], plan, ())
+    history = fault_history.history(faults, profiles, brief, float(np.mean(first.r)))
+    log.info(
+        f"faults over time: {len(history.faults)} faults; ignored: {history.brief} bands seen in one frame only, "
+        f"{history.still} bands whose sides slid by less than a mean radius"
+    )
+    return history
+
+
+def _each(comm: Comm, work: Callable[[], _T]) -> _T:
+    """Collective: each rank's own result; the HpcdemError of one is raised on all."""
+    result, error = None, None
+    try:
+        result = work()
+    except HpcdemError as failure:
+        error = str(failure)
+    except OSError as failure:
+        error = explain(failure.filename or "a frame", failure, "read")
+    comm.agree(error)
+    return result  # type: ignore[return-value]
 
 
 # --- blocks ----------------------------------------------------------------------------------------------------
@@ -297,10 +360,17 @@ def _draw_blocks(
 # --- files -----------------------------------------------------------------------------------------------------
 
 
-def _write(kind: str, done: Done, plan: Plan, final: Grains) -> list[Path]:
+def _write(kind: str, done: Done, plan: Plan, final: Grains, history: History | None) -> list[Path]:
     """Table and figure of one measurement."""
     request, recipe = plan.request, FRAMES[kind]
     _refuse(kind, done, plan)
+    if kind == "faults" and history is not None:
+        stamps = [stamp for stamp, _ in done]
+        files = [write_sheet(request.target, sheet) for sheet in kinds.history_sheets(stamps, history)]
+        for suffix in request.formats:
+            figure = figures.faults_over_time(stamps, history, final)
+            files.append(figures.save(figure, request.target / f"faults.{suffix}"))
+        return files
     more = (final,) if kind == "cracks" else ()
     files = [write_sheet(request.target, sheet) for sheet in recipe.sheets(done, plan, *more)]
     to_draw = kind != "wedge" or len(kinds.without_wedge(done)) < len(done)

@@ -10,15 +10,18 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.io.frames import FrameFile
+from hpcdem.io.frames import FrameFile, list_mesh_frames
 from hpcdem.post.measure import tracks
 from hpcdem.post.measure.grains import (
     Grains,
     columns_of,
     driving_wall,
+    face_of_row,
+    gone,
     grains,
     in_time,
     middle,
+    pushing_row,
     walls_of,
     when_it_moves,
 )
@@ -40,7 +43,8 @@ class Request:
     only particles of these; first, last: steps, by default from the
     last frame before the wall moves to the last; xmove, ymove: added to all coordinates; width: of columns and cells;
     formats: of figures; strain, length, skin: threshold, shortest band and height above the base for faults; increment:
-    strain from frame to frame even if there are sections; ids, points, number: particles to follow; log: of the run.
+    strain from frame to frame even if there are sections; over_time: faults with an identity through the frames, by
+    the strain from frame to frame; ids, points, number: particles to follow; log: of the run.
     history: name of that which is drawn with the emission, none: none; bins: of its rate; completeness: magnitude Mc;
     released: energies since the peak of the joints; joule: J per unit of energy in the files; box: its least
     x, y, z, then its greatest [m].
@@ -62,6 +66,7 @@ class Request:
     length: float | None = None
     skin: float | None = None
     increment: bool = False
+    over_time: bool = False
     ids: tuple[int, ...] = ()
     points: tuple[tuple[float, float], ...] = ()
     number: int = 1
@@ -96,54 +101,89 @@ class Request:
 @dataclass(frozen=True)
 class Plan:
     """What holds for all frames: in the order of time, which have sections, width of columns [m], the wall that pushes,
-    the direction +1 or -1 into which it pushes, its place in the first frame [m], ids of particles to follow."""
+    or the ids of the row of particles that does; the direction +1 or -1 into which it pushes, its place in the first
+    frame [m], ids of particles to follow."""
 
     request: Request
     frames: list[FrameFile]
     sections: frozenset[str]
     cell: float
     wall: int | None
+    row: np.ndarray
     forward: int
     start: float
     followed: np.ndarray
 
+    def face(self, g: Grains) -> float:
+        """x [m] of the face of what pushes; NaN without it."""
+        if self.wall is not None:
+            return float(middle(g.walls, self.wall)[0])
+        return face_of_row(g, self.row, self.forward) if len(self.row) else float("nan")
+
     def shortening(self, g: Grains) -> float:
-        """Displacement of the pushing wall [m], else NaN."""
-        return float("nan") if self.wall is None else self.forward * (float(middle(g.walls, self.wall)[0]) - self.start)
+        """Displacement of what pushes [m], else NaN."""
+        return self.forward * (self.face(g) - self.start)
 
 
 def make_plan(request: Request, what: Sequence[str]) -> tuple[Plan, Grains]:
     """The plan, and the last frame that has particles. Raises HpcdemError."""
     frames = in_time(request.folder, request.first or 0, request.last)
+    if not frames and set(what) == {"faults"}:  # the estimator needs no more than points that keep their numbers
+        frames = list_mesh_frames(request.folder)
+        frames = [f for f in frames if (request.first or 0) <= f.step <= (request.last or f.step)]
     if not frames:
         between = (f" from step {request.first}" if request.first else "") + (
             f" to step {request.last}" if request.last is not None else ""
         )
         raise HpcdemError(f"{request.folder} contains no frames (all_<step>.vtkhdf or all_<step>.dat){between}")
-    wall = _wall(request, frames)
-    if request.first is None and wall is not None:
-        frames = frames[when_it_moves(frames, wall) :]
+    wall, row, frames = _pusher(request, frames)
+    if request.first is None and (wall is not None or len(row)):
+        begin = _place(frames[0], request, wall, row)
+        frames = frames[when_it_moves(frames, lambda file: abs(_place(file, request, wall, row) - begin) > 0.0) :]
     first = _with_particles(request, frames)
     last = _with_particles(request, frames[::-1])
-    start = float("nan") if wall is None else float(middle(first.walls, wall)[0])
-    forward = -1 if start > float(np.mean(first.x)) else 1
+    forward = -1 if _place(frames[0], request, wall, row) > float(np.mean(first.x)) else 1
+    start = _place(frames[0], request, wall, row, forward)
     cell = columns_of(first.r) if request.width is None else request.width
     folder = request.folder / "ss" / "data"
-    sections = frozenset() if request.increment else frozenset(p.stem for p in folder.glob("all_*.npz"))
+    sections = (
+        frozenset() if request.increment or request.over_time else frozenset(p.stem for p in folder.glob("all_*.npz"))
+    )
     followed = _followed(request, first, last) if "tracks" in what else np.zeros(0, np.int64)
-    return Plan(request, frames, sections, cell, wall, forward, start, followed), last
+    return Plan(request, frames, sections, cell, wall, row, forward, start, followed), last
 
 
-def _wall(request: Request, frames: Sequence[FrameFile]) -> int | None:
-    """The wall that pushes."""
+def _pusher(request: Request, frames: list[FrameFile]) -> tuple[int | None, np.ndarray, list[FrameFile]]:
+    """The wall that pushes, or the ids of the row of particles that does: whichever went farther along x; the frames
+    from the first one on that has it."""
+    none = np.zeros(0, np.int64)
     first, last = walls_of(frames[0].path), walls_of(frames[-1].path)
-    if not request.walls:
-        return driving_wall(first, last)
-    wall = request.walls[0]
-    if wall not in first:
-        ids = ", ".join(map(str, sorted(first))) or "none"
-        raise UsageError(f"--wall {wall}: unknown wall in {frames[0].path.name}; its walls: {ids}")
-    return wall
+    if request.walls:
+        wall = request.walls[0]
+        if wall not in first:
+            ids = ", ".join(map(str, sorted(first))) or "none"
+            raise UsageError(f"--wall {wall}: unknown wall in {frames[0].path.name}; its walls: {ids}")
+        return wall, none, frames
+    moving = driving_wall(first, last)
+    end = look(frames[-1], request)
+    if end.fixed.any():
+        for k, file in enumerate(frames):
+            begin = look(file, request)
+            if not begin.fixed.any():
+                continue
+            row = pushing_row(begin, end)
+            way = abs(face_of_row(end, row, 1) - face_of_row(begin, row, 1)) if len(row) else 0.0
+            if way > 0.0 and (moving is None or way > gone(first, last, moving)):
+                return None, row, frames[k:]
+            break
+    return moving, none, frames
+
+
+def _place(file: FrameFile, request: Request, wall: int | None, row: np.ndarray, forward: int = 1) -> float:
+    """x [m] of the face of what pushes in a frame; NaN without it."""
+    if wall is not None:
+        return float(middle(walls_of(file.path), wall)[0]) + request.xmove
+    return face_of_row(look(file, request), row, forward) if len(row) else float("nan")
 
 
 def _with_particles(request: Request, frames: Sequence[FrameFile]) -> Grains:
