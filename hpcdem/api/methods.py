@@ -125,7 +125,7 @@ class Row:
         return PCDC.command(self.command)
 
     @functools.cached_property
-    def said(self) -> Model | None:
+    def model_row(self) -> Model | None:
         """The model or condition that is named."""
         return next((one for one in self.row.models if one.keyword.name == self.model), None)
 
@@ -146,7 +146,8 @@ class Row:
 
     def _all(self) -> Iterator[Argument]:
         """All that the command takes, as keywords."""
-        options = (*self.said.leading, *self.said.options) if self.said else (*self.row.leading, *self.row.options)
+        named = self.model_row or self.row
+        options = (*named.leading, *named.options)
         for name, option in {option.name: option for option in options}.items():
             if option.refused or name in self.without.split() or (self.only and name not in self.only.split()):
                 continue
@@ -224,7 +225,7 @@ class Row:
 
     @property
     def docstring(self) -> str:
-        summary = self.doc or (self.said.doc if self.said else self.row.doc)
+        summary = self.doc or (self.model_row.doc if self.model_row else self.row.doc)
         if where := DIMENSIONS.get(self.row.dims):
             summary = f"{where[0].upper()}{where[1:]}: {summary[0].lower()}{summary[1:]}"
         rows = [(one.name, one.text) for one in self.arguments if one.text]
@@ -387,9 +388,9 @@ def refer(classes: Iterable[type]) -> None:
     names: dict[str, str] = {}
     for of, name, value in made:
         row = value.made_by
-        said = f"{row.command} {row.model}" if isinstance(row, Row) and row.model else row.command
+        command = f"{row.command} {row.model}" if isinstance(row, Row) and row.model else row.command
         word = getattr(of, "_word", "")
-        names[said] = f"`{word}.{name}`" if word else f"`{name}`"
+        names[command] = f"`{word}.{name}`" if word else f"`{name}`"
     calls = re.compile(rf"(?<![\w-])({'|'.join(sorted(names, key=len, reverse=True))})(?![\w-])")
     for _, _, value in made:
         arguments = value.made_by.arguments if isinstance(value.made_by, Row) else ()

@@ -60,11 +60,11 @@ def carried_out(
         raise HpcdemError(f"{at[0]}:{at[1]}: {name}: {error}") from error
 
 
-def _wrong(said: str, names: Collection[str]) -> str:
+def _wrong(text: str, names: Collection[str]) -> str:
     """What Python says of a call, shorter, and with the argument that was meant."""
-    if (found := _UNKNOWN.search(said)) and names:
+    if (found := _UNKNOWN.search(text)) and names:
         return f"there is no argument '{found[1]}'{hint(found[1], names)}; there is {', '.join(names)}"
-    return _OWN_NAME.sub("", said)
+    return _OWN_NAME.sub("", text)
 
 
 def raised_by_the_user(error: BaseException) -> bool:

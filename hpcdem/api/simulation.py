@@ -216,8 +216,8 @@ class Simulation(ParticleCommands, BlockCommands):
             progress and rows of the energy account; 0 turns one off.
         others : outputs of a kind that was added.
         """
-        said = {name: value for name, value in locals().items() if name not in ("self", "others")} | others
-        for name, value in said.items():
+        given = {name: value for name, value in locals().items() if name not in ("self", "others")} | others
+        for name, value in given.items():
             if value is None:
                 continue
             if name == "outdir":

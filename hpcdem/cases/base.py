@@ -169,14 +169,14 @@ def explained(kind: type[Case], error: ValidationError) -> str:
     """What is wrong with the parameters, the first of them."""
     first = error.errors()[0]
     if not first["loc"]:  # several that do not go together
-        return f"{kind.__name__}: {validation.said(first)}"
+        return f"{kind.__name__}: {validation.message(first)}"
     name = str(first["loc"][0])
     known = kind.model_fields
     if name not in known:
         return f"{kind.__name__} has no parameter '{name}'{hint(name, known) or '.'} Known: {', '.join(known)}"
     unit = unit_of(known[name])
     what = known[name].description if unit in ("", "1") else f"{known[name].description}, {unit}"
-    expected = validation.said(first) or validation.expected(first)
+    expected = validation.message(first) or validation.expected(first)
     return f"{kind.__name__}: {name} is {first['input']}, expected {expected} ({what})"
 
 

@@ -90,6 +90,6 @@ def report(findings: Sequence[Finding], stream: TextIO) -> int:
         table.add_row(f"[{STYLES[name]}]{name.lower()}[/]", *(escape(" ".join(text.split())) for text in row))
     console.print(table)
     counts = {name: sum(f.level.name == name for f in findings) for name in ("PROBLEM", "WARNING")}
-    said = [f"{n} {name.lower()}{'s' * (n > 1)}" for name, n in counts.items() if n]
-    console.print(", ".join(said) if said else "no problems", end="\n")
+    found = [f"{n} {name.lower()}{'s' * (n > 1)}" for name, n in counts.items() if n]
+    console.print(", ".join(found) if found else "no problems", end="\n")
     return EXIT_ERROR if counts["PROBLEM"] else EXIT_OK

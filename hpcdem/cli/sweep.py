@@ -220,8 +220,8 @@ def from_file(path: Path, options: Mapping[str, Any]) -> dict[str, Any]:
     read["values"] = tuple((name, _values(path, name, value)) for name, value in given.get("set", {}).items())
     over = {name: value for name, value in options.items() if value not in (None, (), False) and name != "script"}
     if "values" in over:
-        said = {name for name, _ in over["values"]}
-        over["values"] = (*(pair for pair in read["values"] if pair[0] not in said), *over["values"])
+        names = {name for name, _ in over["values"]}
+        over["values"] = (*(pair for pair in read["values"] if pair[0] not in names), *over["values"])
     return read | over
 
 

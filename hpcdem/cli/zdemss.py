@@ -50,9 +50,9 @@ def _switch(name: str, default: str, text: str, *more: str) -> Any:
     return click.option(name, *more, type=SWITCH, default=default, help=f"{text} [{default}].")
 
 
-def _length(name: str, default: float | None, text: str, said: str | None = None) -> Any:
-    said = f"{default:g}" if said is None else said
-    return click.option(name, type=POSITIVE, default=default, metavar="VALUE", help=f"{text} [{said}].")
+def _length(name: str, default: float | None, text: str, shown: str | None = None) -> Any:
+    shown = f"{default:g}" if shown is None else shown
+    return click.option(name, type=POSITIVE, default=default, metavar="VALUE", help=f"{text} [{shown}].")
 
 
 def _limits(axis: str) -> Any:

@@ -126,15 +126,15 @@ def doubt(where: System, name: str, unit: str, value: float) -> str:
     own = where.size(kind.powers)
     if kind.low <= abs(value) * own <= kind.high:
         return ""
-    said = f"{name} {value:g} {where.label(kind.unit)} is an unlikely {kind.name}"
+    text = f"{name} {value:g} {where.label(kind.unit)} is an unlikely {kind.name}"
     fits = [(size != 1.0, abs(math.log(abs(value) * size / kind.usual)), called, size) for called, size in kind.meant
             if kind.low <= abs(value) * size <= kind.high]  # fmt: skip
     if not fits:
         low, high = kind.low / own, kind.high / own
-        return f"{said}: expected {low:.3g} to {high:.3g}; used unchanged"
+        return f"{text}: expected {low:.3g} to {high:.3g}; used unchanged"
     *_, called, size = min(fits)
     factor = size / own
-    return f"{said}: looks like {called}; x {factor:g} makes it {value * factor:g}; used unchanged"
+    return f"{text}: looks like {called}; x {factor:g} makes it {value * factor:g}; used unchanged"
 
 
 # -- prefixes: a value in the unit that people would use for its size ----------------------------------------------

@@ -30,11 +30,11 @@ def expected(error: Mapping[str, Any]) -> str:
         words = [a or b for a, b in re.findall(r"'([^']*)'|(\S+)(?:,| or |$)", str(context["expected"]))]
         return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
     if kind == "string_pattern_mismatch":
-        return next((said for sign, said in _PATTERNS.items() if sign in context["pattern"]), "another text")
+        return next((message for sign, message in _PATTERNS.items() if sign in context["pattern"]), "another text")
     return _KINDS.get(kind.partition("_")[0], "another value")
 
 
-def said(error: Mapping[str, Any]) -> str:
+def message(error: Mapping[str, Any]) -> str:
     """The sentence of a rule of ours ("limits: 1 is not below 1"), "" for what the validator itself refused."""
     return str(error["msg"]).removeprefix("Value error, ") if error["type"] == "value_error" else ""
 

@@ -336,8 +336,8 @@ def _read(text: bytes) -> dict[str, Any]:
         content = json.loads(text, parse_int=_whole, parse_float=_finite, parse_constant=_finite)
         _look_through(content)
     except (ValueError, RecursionError) as problem:
-        said = str(problem) if isinstance(problem, _UnfitError) else ""
-        raise _Refused(HTTPStatus.BAD_REQUEST, said or "expected a JSON object") from None
+        message = str(problem) if isinstance(problem, _UnfitError) else ""
+        raise _Refused(HTTPStatus.BAD_REQUEST, message or "expected a JSON object") from None
     if not isinstance(content, dict):
         raise _Refused(HTTPStatus.BAD_REQUEST, "expected a JSON object")
     return content

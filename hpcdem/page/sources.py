@@ -68,15 +68,15 @@ class Sources:
 
     def _see_one(self) -> None:
         """HpcdemError if there are frames, and none of their first ones can be shown."""
-        said: HpcdemError | None = None
+        failure: HpcdemError | None = None
         for source in self.found:
             try:
                 self.moment(source.frames[0])
                 return
             except HpcdemError as problem:
-                said = said or problem
-        if said is not None:
-            raise said
+                failure = failure or problem
+        if failure is not None:
+            raise failure
 
     def look(self) -> None:
         """See which frames there are now."""

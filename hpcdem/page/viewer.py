@@ -256,7 +256,7 @@ class Viewer:
             else:
                 told = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
             unit = shown.moment.unit_of(name)
-            values.append([name, told, unit, _said(told if names else value, unit)])
+            values.append([name, told, unit, _printed(told if names else value, unit)])
         told_of = {"point": None if picture.near is None else self._hit(shown, picture, int(column), int(row))}
         number = objects.value(objects.number, which) if objects.number in objects.fields else which
         place_of = {axis: float(v) for axis, v in zip("xyz", objects.centre(which))}
@@ -418,7 +418,7 @@ def _stops(name: str) -> list[str]:
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in [*shades, np.rint(255.0 * shades_of(name)[-1]).astype(int)]]
 
 
-def _said(value: Any, unit: str) -> str:
+def _printed(value: Any, unit: str) -> str:
     """A value as text, with the prefix of its size; for a vector its length and components."""
     if value is None or isinstance(value, str):
         return value or "–"

@@ -181,7 +181,7 @@ def executed(text: str, path: str, name: str) -> dict[str, Any]:
     try:
         exec(code, vars(module))
     except (Exception, SystemExit) as error:  # whatever the user's own code does
-        raise Wrong(_last_line(error, path), _said(error)) from None
+        raise Wrong(_last_line(error, path), _message(error)) from None
     sys.modules[module.__name__] = module  # where numba looks for the modules of kernels that were kept
     return vars(module)
 
@@ -269,7 +269,7 @@ def stiffness_of(declared: Declared, law: str, values: Mapping[str, np.ndarray],
             try:
                 bound[i] = float(declared.stiffness(**{name: float(values[name][i]) for name in of}))
             except (Exception, SystemExit) as error:  # the user's own code
-                raise CommandError(f"{law}: its stiffness fails: {_said(error)}") from None
+                raise CommandError(f"{law}: its stiffness fails: {_message(error)}") from None
     else:
         bound = np.full(len(next(iter(values.values()))), float(declared.stiffness))
     wrong = ~(np.isfinite(bound) & (bound > 0.0))
@@ -291,7 +291,7 @@ def compiled(kernel: Any, types: Any, path: str, line: int) -> Any:
     return kernel.overloads[tuple(types)].signature.return_type
 
 
-def _said(error: BaseException) -> str:
+def _message(error: BaseException) -> str:
     """What a user's own code raised."""
     if isinstance(error, SystemExit):
         code = "" if error.code is None else repr(error.code)

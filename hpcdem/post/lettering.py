@@ -30,10 +30,10 @@ def lettered(figure: Any, kind: str = "png") -> str:
 
     lost: set[str] = set()
     for text in figure.findobj(Text):
-        said = "".join(text.get_text().split())
-        if said.isascii():
+        letters = "".join(text.get_text().split())
+        if letters.isascii():
             continue
-        some = frozenset(said) - _letters(findfont(text.get_fontproperties()))
+        some = frozenset(letters) - _letters(findfont(text.get_fontproperties()))
         if not some:
             continue
         found = font_of(some)

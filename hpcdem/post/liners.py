@@ -66,6 +66,6 @@ def draw(axes: Any, state: MeshState) -> list[Any]:
         most = float(force.reshape(-1)[np.abs(force).argmax()])
         handles.append(Patch(color=FORCE, alpha=0.35, label=f"N up to {with_prefix(most, 'N/m', 3, state.units)}"))
     if moment.any():
-        said = with_prefix(float(np.abs(moment).max()), "N m/m", 3, state.units)
-        handles.append(Line2D([], [], color=MOMENT, linewidth=1.1, label=f"M up to {said}"))
+        largest = with_prefix(float(np.abs(moment).max()), "N m/m", 3, state.units)
+        handles.append(Line2D([], [], color=MOMENT, linewidth=1.1, label=f"M up to {largest}"))
     return handles or [Line2D([], [], color=BEAM, linewidth=1.8, label="liner without force")]

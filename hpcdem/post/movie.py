@@ -81,10 +81,10 @@ def write_mp4(pictures: Sequence[Path], path: str | os.PathLike, fps: float, wid
     codecs = ["-c:v", "libx264", "-crf", "18", "-preset", "medium"], ["-c:v", "mpeg4", "-q:v", "2"]
     with atomic_path(path) as temporary:
         for codec in codecs:
-            said = _encode(program, pictures, size, fps, codec, temporary)
-            if said is None:
+            output = _encode(program, pictures, size, fps, codec, temporary)
+            if output is None:
                 return path
-        raise HpcdemError(f"cannot make {path}: ffmpeg reports: {said}")
+        raise HpcdemError(f"cannot make {path}: ffmpeg reports: {output}")
 
 
 def _encode(
@@ -111,9 +111,9 @@ def _encode(
         except BaseException:
             process.kill()
             raise
-        said = process.stderr.read().decode(errors="replace").strip()
+        output = process.stderr.read().decode(errors="replace").strip()
         failed = process.wait() != 0
-    return (said.splitlines() or ["nothing"])[-1] if failed else None
+    return (output.splitlines() or ["nothing"])[-1] if failed else None
 
 
 def ffmpeg() -> str | None:

@@ -327,17 +327,17 @@ class Log:
         known = 0.0 < status.dt_critical < math.inf
         critical = f" ({status.dt / status.dt_critical:.2f} of the critical one)" if known else ""
 
-        def said(value: float, unit: str, digits: int = 4) -> str:
+        def shown(value: float, unit: str, digits: int = 4) -> str:
             return with_prefix(value, unit, digits, status.units)
 
-        parts.append(f"time {said(status.time, 's', 6)}, time step {said(status.dt, 's')}{critical}")
+        parts.append(f"time {shown(status.time, 's', 6)}, time step {shown(status.dt, 's')}{critical}")
         parts.append(
-            f"kinetic energy {said(status.kinetic, 'J')}, unbalanced force {status.unbalanced_ratio:.3g} of the mean "
+            f"kinetic energy {shown(status.kinetic, 'J')}, unbalanced force {status.unbalanced_ratio:.3g} of the mean "
             "contact force"
         )
         parts.append(f"{status.particles} particles, {status.contacts} contacts, {bonds(status)}")
         if status.walls:
-            forces = (f"{i} ({said(fx, 'N')}, {said(fy, 'N')})" for i, fx, fy in status.walls)
+            forces = (f"{i} ({shown(fx, 'N')}, {shown(fy, 'N')})" for i, fx, fy in status.walls)
             parts.append(f"forces on walls: {', '.join(forces)}")
         return " | ".join(parts)
 

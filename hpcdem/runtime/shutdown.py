@@ -62,8 +62,8 @@ def describe(error: BaseException) -> Failure:
         if error.args == ("SIGTERM",):
             return Failure(EXIT_TERMINATED, "hpcdem: ended by a second SIGTERM; nothing was saved")
         if error.args == ("own loop",):
-            said = f"hpcdem: interrupted{_line_of_script(error)} before the next command; nothing was saved"
-            return Failure(EXIT_INTERRUPTED, said)
+            message = f"hpcdem: interrupted{_line_of_script(error)} before the next command; nothing was saved"
+            return Failure(EXIT_INTERRUPTED, message)
         return Failure(EXIT_INTERRUPTED, "hpcdem: interrupted; nothing was saved")
     return Failure(EXIT_ERROR, "".join(traceback.format_exception(error)).rstrip())
 

@@ -116,15 +116,15 @@ def _choice(script: Adjustable, name: str, words: str | Sequence[object], sample
     return _different(name, [script.value(name, f"{value!r}") for value in even])
 
 
-def _whole_numbers(said: str, words: str, low: float, high: float) -> list[Value]:
+def _whole_numbers(given: str, words: str, low: float, high: float) -> list[Value]:
     """From low to high."""
     if not (low.is_integer() and high.is_integer()):
         raise UsageError(
-            f"{said}: without sampling, a range consists of whole numbers. Give the number of values, such as "
+            f"{given}: without sampling, a range consists of whole numbers. Give the number of values, such as "
             f"{words}:5, or use --latin N or --sobol N"
         )
     if high - low >= MOST:
-        raise UsageError(f"{said}: more than {MOST} values")
+        raise UsageError(f"{given}: more than {MOST} values")
     return [int(low) + k for k in range(int(high - low) + 1)]
 
 

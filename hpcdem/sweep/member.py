@@ -78,8 +78,8 @@ def run(plan: Plan, member: Member) -> int:
             # mpiexec of either MPI hands on SIGUSR1, which makes hpcdem save and stop.
             signal.signal(number, lambda *_: process.send_signal(signal.SIGUSR1))
         code: int | None = process.wait()
-        said = os.fstat(log.fileno()).st_size > begin
-    if code == EXIT_OK and not said:
+        wrote = os.fstat(log.fileno()).st_size > begin
+    if code == EXIT_OK and not wrote:
         code = None  # a run names itself; srun has been seen to end with 0 without having started anything
     state["code"] = code
     state["state"] = DONE if code == EXIT_OK else STOPPED if code == EXIT_CHECKPOINT else FAILED

@@ -59,7 +59,7 @@ def test_what_does_not_fit_is_counted_with_places(name: str) -> None:
     assert found.bodies == (1 if name == "whole" else 2)
     assert (len(found.own), len(found.cut), len(found.parts)) == (own, cut, parts)
     assert all(np.allclose(at[:, -1], 1.0, atol=1e-6) for at in (found.own, found.cut, found.parts))
-    assert ("mesh glue" in found.said()) == (name != "whole")
+    assert ("mesh glue" in found.description()) == (name != "whole")
 
 
 GLUED = [
@@ -77,7 +77,7 @@ def test_blocks_of_all_kinds_are_glued(below: int | str, above: int | str, cells
     mesh = made.mesh
     check(mesh)
     found = fit.fit(mesh)
-    assert found.bodies == 1 and found.said() == "" and mesh.areas().sum() == pytest.approx(2.0)
+    assert found.bodies == 1 and found.description() == "" and mesh.areas().sum() == pytest.approx(2.0)
     edges = mesh.edges()
     whole = mesh.points[mesh.face_points(edges.faces[~edges.inner, 0])]
     for side in range(6):  # nothing is free but the sides of the whole, and they are covered
@@ -128,7 +128,7 @@ def test_seams_within_one_body(kind: int | str) -> None:
     assert fit.fit(mesh).bodies == 1 and len(fit.fit(mesh).parts)
     mesh = glue.glued(mesh).mesh
     check(mesh)
-    assert fit.fit(mesh).said() == "" and mesh.areas().sum() == pytest.approx(4.0)
+    assert fit.fit(mesh).description() == "" and mesh.areas().sum() == pytest.approx(4.0)
 
 
 def test_a_whole_stays_as_it_is() -> None:

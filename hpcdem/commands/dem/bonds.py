@@ -196,13 +196,13 @@ def warn_of_stiffnesses(sim: Simulation) -> None:
     if not number or sim.log is None:
         return
     _, a, b, bond_ks, contact_ks, by_modulus, by_hertz = worst[0]
-    said = partial(with_prefix, unit="N/m", system=sim.settings.units)
+    shown = partial(with_prefix, unit="N/m", system=sim.settings.units)
     text = (
         f"{number} bonds have another shear stiffness open than touching, that of particles {a} and {b} most: "
-        f"{said(bond_ks)} ({'G A/L of the bond' if by_modulus else 'ks at the moment of bonding'}) and "
-        f"{said(contact_ks)} (ks of the contact{', which goes to 0 with the overlap' if by_hertz else ''}). Pairs that "
-        "open and close under shear create energy; add the word `conserving` to the line of the bonds to prevent this "
-        "(docs/physics.md, Bonds)"
+        f"{shown(bond_ks)} ({'G A/L of the bond' if by_modulus else 'ks at the moment of bonding'}) and "
+        f"{shown(contact_ks)} (ks of the contact{', which goes to 0 with the overlap' if by_hertz else ''}). Pairs "
+        "that open and close under shear create energy; add the word `conserving` to the line of the bonds to prevent "
+        "this (docs/physics.md, Bonds)"
     )
     if undamped:
         sim.log.warn_once("two shear stiffnesses", f"{text}. Nothing damps {undamped} of these pairs")

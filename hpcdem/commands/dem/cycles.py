@@ -127,18 +127,18 @@ def _check_materials(sim: Simulation) -> None:
     if sim.comm.any(bool(light.any())):
         raise CommandError(_described(sim, light, "that are free to move have no density (PROP density)"))
     hertz = rows["hertz"] != 0.0
-    lawful = np.where(hertz, rows["shear"], rows["kn"]) > 0.0
-    in_use = sim.used(p["material"], sim.materials) & lawful
+    has_law = np.where(hertz, rows["shear"], rows["kn"]) > 0.0
+    in_use = sim.used(p["material"], sim.materials) & has_law
     if not in_use.any():  # nobody has one: particles that fly through each other, which is meant
         return
     cure = "(PROP shear, poiss and hertz, or kn and ks, after the line that makes them)"
-    lawless = ~lawful[p["material"]]
-    if sim.comm.any(bool((lawless & free).any())):
-        raise CommandError(_described(sim, lawless & free, f"have no contact law, while others have {cure}"))
+    without_law = ~has_law[p["material"]]
+    if sim.comm.any(bool((without_law & free).any())):
+        raise CommandError(_described(sim, without_law & free, f"have no contact law, while others have {cure}"))
     # Fixed ones may be out of reach; if not, Hertz particles have no common law with them.
-    if (in_use & hertz).any() and sim.comm.any(bool(lawless.any())):
+    if (in_use & hertz).any() and sim.comm.any(bool(without_law.any())):
         text = _described(
-            sim, lawless, f"that are fixed have no contact law {cure}; a touch of Hertz particles is an error"
+            sim, without_law, f"that are fixed have no contact law {cure}; a touch of Hertz particles is an error"
         )
         if sim.log is not None:
             sim.log.warn_once(f"lawless {text}", text)
@@ -294,7 +294,7 @@ def _watch_the_time_step(sim: Simulation) -> None:
 def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
     """dt beside the estimate of the critical step and the true one where it comes near; once, a warning if it is beyond
     one. Collective."""
-    dt, said = sim.clock.dt, partial(with_prefix, unit="s")
+    dt, shown = sim.clock.dt, partial(with_prefix, unit="s")
     near = dt > NEAR * critical or (math.isinf(critical) and sim.bonds_left() > 0)
     highest = diagnostics.highest_frequency(sim) if near else 0.0
     sim.step_limit = 0.0 if 0.5 * dt * highest > 1.0 else critical  # 0: the worst is reported
@@ -302,12 +302,12 @@ def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
         return
     if highest > 0.0:
         text = (
-            f"{when}the time step {said(dt)} is {0.5 * dt * highest:.2f} of the stability limit of the present "
-            f"contacts and bonds ({said(2.0 / highest)})"
+            f"{when}the time step {shown(dt)} is {0.5 * dt * highest:.2f} of the stability limit of the present "
+            f"contacts and bonds ({shown(2.0 / highest)})"
         )
         if math.isfinite(critical):
             text += f", {dt / critical:.2f} of the critical one as estimated from masses and stiffnesses "
-            text += f"({said(critical)})"
+            text += f"({shown(critical)})"
         if 0.5 * dt * highest > 1.0:
             sim.log.warn_once("unstable time step", f"{text}; beyond the limit the undamped step is unstable")
         elif dt > critical and not sim.log.has_warned("critical time step"):
@@ -321,8 +321,8 @@ def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
     elif dt > critical:
         sim.log.warn_once(
             "critical time step",
-            f"{when}the time step {said(dt)} is {dt / critical:.2f} times the critical one as estimated from masses "
-            f"and stiffnesses ({said(critical)}); results may be noisy. Reduce the time step if the run becomes "
+            f"{when}the time step {shown(dt)} is {dt / critical:.2f} times the critical one as estimated from masses "
+            f"and stiffnesses ({shown(critical)}); results may be noisy. Reduce the time step if the run becomes "
             "unstable",
         )
 

@@ -70,16 +70,16 @@ def _by_frac(both: Coupled) -> float:
     """The time step [s] that SET frac of the particles asks for, if that is stable for all; 0 without SET frac."""
     from hpcdem.commands.dem import cycles
 
-    particles, said = both.particles, both.blocks.options.dt
+    particles, assigned = both.particles, both.blocks.options.dt
     if particles.settings.frac <= 0.0:
         return 0.0
     wanted = cycles.time_step(particles)
-    if said > wanted:
+    if assigned > wanted:
         raise CommandError(
             f"the time steps differ: SET frac {particles.settings.frac:g} gives {wanted:g} s for the particles, model "
-            f"time-step is {said:g} s; set only one of them"
+            f"time-step is {assigned:g} s; set only one of them"
         )
-    return said or min(wanted, both.stable_time_step())
+    return assigned or min(wanted, both.stable_time_step())
 
 
 def _warn(both: Coupled) -> None:

@@ -54,14 +54,14 @@ def proppant_condition(
     """Concentration of the slurry that comes in at flow nodes [1], or volume of proppant that does [m2/s, at each]; the
     last one holds."""
     given = {CONCENTRATION: proppant_volumetric_concentration, RATE: proppant_volumetric_flow_rate}
-    said = {kind: value for kind, value in given.items() if value is not None}
-    if len(said) != 1:
+    chosen = {kind: value for kind, value in given.items() if value is not None}
+    if len(chosen) != 1:
         raise CommandError(
             "proppant inflow at a flow node needs one of proppant-volumetric-concentration and "
             "proppant-volumetric-flow-rate"
         )
     proppant = needed(project, Proppant)
-    kind, value = assignments.from_now(project, proppant.time, said).popitem()
+    kind, value = assignments.from_now(project, proppant.time, chosen).popitem()
     proppant.prescribe(points(project, where), kind, value)
 
 
@@ -96,11 +96,11 @@ def condition(
     if isinstance(flow_surface, (tuple, list)):
         flow_surface = _level(project, flow_surface)
     given: dict[str, Number | None] = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
-    said = {name: value for name, value in given.items() if value is not None}
-    if len(said) != 1:
-        raise CommandError(f"a flow node has one of {', '.join(given)}, got {' and '.join(said) or 'none'}")
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if len(chosen) != 1:
+        raise CommandError(f"a flow node has one of {', '.join(given)}, got {' and '.join(chosen) or 'none'}")
     flow = needed(project, Flow)
-    name, value = assignments.from_now(project, flow.time, said).popitem()
+    name, value = assignments.from_now(project, flow.time, chosen).popitem()
     flow.prescribe(points(project, where), _DOES[name], value)
 
 
@@ -157,10 +157,10 @@ def stage(
     """One more stage of a well: a rate [m2/s] up to a pressure (limit [Pa]), a pressure [Pa], or shut in; time: of flow
     that it takes [s], None: no end."""
     given = {w.RATE: rate, w.PRESSURE: pressure, w.SHUT: 0.0 if shut_in else None}
-    said = {does: value for does, value in given.items() if value is not None}
-    if len(said) != 1:
-        raise CommandError(f"a stage of a well is one of rate, pressure, shut_in, got {' and '.join(said) or 'none'}")
-    does, value = assignments.from_now(project, needed(project, Flow).time, said).popitem()
+    chosen = {does: value for does, value in given.items() if value is not None}
+    if len(chosen) != 1:
+        raise CommandError(f"a stage of a well is one of rate, pressure, shut_in, got {' and '.join(chosen) or 'none'}")
+    does, value = assignments.from_now(project, needed(project, Flow).time, chosen).popitem()
     duration, most = (math.inf if one is None else one for one in (time, limit))
     needed(project, Flow).stage(name, does, value, duration, most)
 

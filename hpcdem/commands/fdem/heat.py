@@ -88,12 +88,12 @@ def face_condition(
     """Heat flux into faces [W/m2], or transfer [W/(m2 K)] from an environment of this temperature; without a
     coefficient with that of the elements. Without a range: all faces on the surface of the model."""
     given: dict[str, Any] = {"flux": heat_flux, "transfer": transfer_coeficient, "environment": environment_temperature}
-    said = {name: value for name, value in given.items() if value is not None}
-    if not said:
+    values = {name: value for name, value in given.items() if value is not None}
+    if not values:
         raise CommandError("heat through faces is one of heat_flux, transfer_coeficient, environment_temperature")
     heat = needed(project, Heat)
     faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
-    heat.expose(faces, **assignments.from_now(project, heat.time, said))
+    heat.expose(faces, **assignments.from_now(project, heat.time, values))
 
 
 def remove_conditions(project: Project, where: Range | None = None, rock: bool = True, fluid: bool = True) -> None:

@@ -76,7 +76,7 @@ def create(
         _ = project.layers[layer]
     if project.dim == 3:
         others = {"type": type != "tri", "irregular": irregular, "smooth": smooth}
-        lost = [word for word, said in others.items() if said]
+        lost = [word for word, given in others.items() if given]
         if lost:
             raise CommandError(f"{lost[0]} of mesh create is for two dimensions")
         _fill(project, from_layer, size, group, set_name, refine_layer, hole, regions, embed, crack, bodies)
@@ -253,8 +253,8 @@ def import_file(
         project.groups[ELEMENT].assign(range(cells, cells + len(mesh.cells)), group, set_name)
     low, high = (", ".join(f"{c:g}" for c in at) for at in (mesh.points.min(axis=0), mesh.points.max(axis=0)))
     apart = project.comm.per_node(lambda: int(bodies_of(mesh.face_partners()).max()) + 1)
-    said = f"{apart} bodies, which meet by contact" if apart > 1 else "one body"
-    _say(project, f"{path.name}: from ({low}) to ({high}) m, {said}")
+    note = f"{apart} bodies, which meet by contact" if apart > 1 else "one body"
+    _say(project, f"{path.name}: from ({low}) to ({high}) m, {note}")
     for kind, sets in ((ELEMENT, mesh.groups), (NODE, found.nodes), (FACE, found.faces)):
         names = [f"set '{name}': " + ", ".join(f"'{group}'" for group in of) for name, of in sets.items()]
         if names:
@@ -262,7 +262,7 @@ def import_file(
     if found.notes:
         _say(project, f"{path.name}: left out: " + "; ".join(found.notes))
     whole = project.whole_mesh()
-    unfit = project.comm.per_node(lambda: fit.fit(whole, cells).said())
+    unfit = project.comm.per_node(lambda: fit.fit(whole, cells).description())
     if unfit and project.log is not None:
         project.log.warn(f"{path.name}: {unfit}")
 

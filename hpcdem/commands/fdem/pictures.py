@@ -50,7 +50,7 @@ def image(
     if project.hidden.any():
         for of in ("elements", "joints"):
             only.setdefault(of, everything(project, SHOWN[of], (UseHidden(False),)))
-    said = project.to_read(view) if view else None
+    settings = project.to_read(view) if view else None
     looks |= {"limits": "full"} if full else {}
     step = project.step
     path = project.to_write(project.folder() / f"{stem}_{step:010d}{suffix if suffix in FIGURES else FIGURES[0]}")
@@ -61,7 +61,7 @@ def image(
     def picture() -> None:
         assert state is not None
         moment = of_blocks(state)
-        shown: ModelView = default_view(moment) if said is None else read_view(said)
+        shown: ModelView = default_view(moment) if settings is None else read_view(settings)
         more: dict[str, Any] = {"deformed": deformed, "title": title, "eye": eye, "section": section}
         if camera is not None:
             (left, bottom), (right, top) = camera

@@ -360,9 +360,9 @@ def _flow_on(project: Project, run: Coupled, flow: Flow, end: float) -> None:
             _write_due(project)
             if project.log is not None and clocks.monotonic() - told > QUIET_SECONDS:
                 told = clocks.monotonic()
-                said = partial(with_prefix, unit="s")
-                now, whole = said(flow.time, digits=6), said(end, digits=6)
-                project.log.info(f"flow time {now} of {whole}, time step {said(flow.implicit_dt)}")
+                shown = partial(with_prefix, unit="s")
+                now, whole = shown(flow.time, digits=6), shown(end, digits=6)
+                project.log.info(f"flow time {now} of {whole}, time step {shown(flow.implicit_dt)}")
             if flow.time < last:
                 _answer_requests(project)
 
@@ -688,10 +688,10 @@ class _Report:
         joints = f" | joints: {yielded} yielded, {broken} broken" if intact + yielded + broken else ""
         if deep := diagnostics.deep_overlaps(blocks):
             joints += f" | {deep} overlaps beyond {overlaps.DEEP:g} of an altitude"
-        said = partial(with_prefix, unit="s")
-        time = f" | time {said(clock.time, digits=6)}, time step {said(clock.dt)}" if self.project.dynamic else ""
+        shown = partial(with_prefix, unit="s")
+        time = f" | time {shown(clock.time, digits=6)}, time step {shown(clock.dt)}" if self.project.dynamic else ""
         if blocks.creep.on:
-            time += f" | creep time {said(blocks.creep.time, digits=6)}"
+            time += f" | creep time {shown(blocks.creep.time, digits=6)}"
         if not blocks.options.mechanical:
             return f"step {clock.step}{time}{joints}"
         return f"step {clock.step}{time} | unbalanced force ratio {diagnostics.unbalanced_ratio(blocks):.3g}{joints}"

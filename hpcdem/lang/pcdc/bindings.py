@@ -395,13 +395,13 @@ def option(call: Call) -> None:
 def table(call: Call) -> None:
     """Pairs of numbers, and from when times count."""
     given = call.given()
-    numbers, said = given.get("data"), given.get("type", {})
+    numbers, kind = given.get("data"), given.get("type", {})
     if numbers is not None and len(numbers) % 2:
         raise CommandError(f"data are pairs of numbers, time and value; got {len(numbers)} numbers")
-    if "type" in given and len(said) != 1:
+    if "type" in given and len(kind) != 1:
         raise CommandError("type is relative-time or absolute-time")
     pairs = None if numbers is None else list(zip(numbers[::2], numbers[1::2]))
-    fdem.assignments.table(call.project, given["name"], pairs, "relative_time" in said if said else None)
+    fdem.assignments.table(call.project, given["name"], pairs, "relative_time" in kind if kind else None)
 
 
 @converter

@@ -125,21 +125,21 @@ def memory(text: str, file: str, ranks: int, here: int, free: float | None) -> s
     if not count:
         return ""
     one, mega = footprint.expected(count, dim, ranks, here), 1e-6
-    said = (
+    text = (
         f"memory: {count} elements on {ranks} rank{'s' * (ranks > 1)} take about {one.rank * mega:.0f} MB per rank, at "
         f"most {one.most * mega:.0f} MB, and {one.shared * mega:.0f} MB shared by the ranks of a node: on one node "
         f"{one.node * mega:.0f} MB at most"
     )
     if other:
-        said += f" (without the mesh of line {other}, whose size is not known before it is made)"
+        text += f" (without the mesh of line {other}, whose size is not known before it is made)"
     if free is None:
-        return said
+        return text
     if one.node > free:
         raise HpcdemError(
-            f"{said}. It does not fit: {free * mega:.0f} MB are free here. Use fewer elements, or more nodes with "
+            f"{text}. It does not fit: {free * mega:.0f} MB are free here. Use fewer elements, or more nodes with "
             "fewer ranks each"
         )
-    return f"{said}, of {free * mega:.0f} MB that are free"
+    return f"{text}, of {free * mega:.0f} MB that are free"
 
 
 _MAKES_MESHES = ("mesh create", "mesh import", "mesh equilateral", "mesh patch", "model restore", "element create")

@@ -105,10 +105,12 @@ def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | 
     auto = arguments.get("auto")
     if "update-frequency" in arguments and auto is not True and not isinstance(auto, Pending):
         raise ValueError("update-frequency needs auto on")
-    said = [told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)]
-    if len(said) > 1:
-        raise ValueError(f"{said[0]} and {said[1]} cannot be combined: both set the time step")
-    if said == ["value"] and "safety" in arguments:
+    given = [
+        told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)
+    ]
+    if len(given) > 1:
+        raise ValueError(f"{given[0]} and {given[1]} cannot be combined: both set the time step")
+    if given == ["value"] and "safety" in arguments:
         raise ValueError("value and safety cannot be combined: a given time step is used unchanged")
 
 

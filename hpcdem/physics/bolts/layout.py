@@ -45,8 +45,8 @@ def parts(span: float, segments: int | None, length: float | None) -> int:
     too many."""
     wanted = float(segments) if segments is not None else span / float(length or span)
     if not wanted <= MOST:
-        said = f"segments {segments}" if segments is not None else f"length {length:g}"
-        raise CommandError(f"{said} would make {wanted:.2g} segments of {span:g} m of bolt, more than {MOST:g}")
+        size = f"segments {segments}" if segments is not None else f"length {length:g}"
+        raise CommandError(f"{size} would make {wanted:.2g} segments of {span:g} m of bolt, more than {MOST:g}")
     return max(1, math.ceil(wanted - 1e-9))
 
 

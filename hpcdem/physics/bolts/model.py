@@ -336,7 +336,9 @@ class Bolts(Structure):
             self._node_spacing[at] = spacing
             self._stiffness[at] += np.where(there | dead[at], table[:, kernels.STIFFNESS], 0.0)
         self._node_table, self._true_mass = nodal, nodal[:, kernels.MASS].copy()
-        self._rubs = bool((nodal[self.hosted][:, [kernels.ROCK_FRICTION, kernels.BOLT_FRICTION]] > 0.0).any())
+        self._slides_with_friction = bool(
+            (nodal[self.hosted][:, [kernels.ROCK_FRICTION, kernels.BOLT_FRICTION]] > 0.0).any()
+        )
         self._prepared_for = None
         self._mine, self._rows = np.empty(0, np.int64), np.empty(0, np.int64)
         if n:
@@ -442,7 +444,7 @@ class Bolts(Structure):
         [Pa]."""
         blocks, seen = self.blocks, np.zeros((len(self), self.blocks.dim + 1))
         kernels.host_points(self._mine, self._rows, self.nodes["weight"], blocks.x, blocks.stride, seen)
-        if self._rubs and len(self._mine):
+        if self._slides_with_friction and len(self._mine):
             rows, place = np.unique(self._rows, return_inverse=True)
             stress, _ = blocks.local.stresses(rows - blocks.n_left, energies=False, flow=False)
             across = np.empty(len(self._mine))

@@ -292,14 +292,14 @@ class Coupled(SurfaceLoad):
         (SET dt, model time-step); else `stable_time_step`. CommandError if they were told different ones."""
         particles, blocks = self.particles, self.blocks
         self._check_options()
-        said = [value for value in (particles.settings.dt, blocks.options.dt) if value > 0.0]
-        if dt <= 0.0 and len(set(said)) > 1:
+        steps = [value for value in (particles.settings.dt, blocks.options.dt) if value > 0.0]
+        if dt <= 0.0 and len(set(steps)) > 1:
             raise CommandError(
-                f"SET dt {said[0]:g} s and model time-step {said[1]:g} s differ: set the same value, or only one of "
+                f"SET dt {steps[0]:g} s and model time-step {steps[1]:g} s differ: set the same value, or only one of "
                 "them"
             )
         stable = self.stable_time_step()
-        dt = dt if dt > 0.0 else said[0] if said else stable
+        dt = dt if dt > 0.0 else steps[0] if steps else stable
         if not math.isfinite(dt):
             raise CommandError("no time step: neither contacts nor elements limit it; use SET dt")
         particles.settings.dt = dt
@@ -312,21 +312,21 @@ class Coupled(SurfaceLoad):
             blocks.time_step(value=dt)
         blocks.close_model()
         self._changed = True
-        self._settled = self._said()
+        self._settled = self._assigned_steps()
         if particles.log is not None:
             particles.log.info(f"particles and blocks: time step {dt:.4g} s, {dt / stable:.2f} of the stable one")
         return dt
 
-    def _said(self) -> tuple[float, float, float]:
+    def _assigned_steps(self) -> tuple[float, float, float]:
         settings = self.particles.settings
         return settings.dt, settings.frac, self.blocks.options.dt
 
     def heed_time_step(self, by_frac: Callable[[], float]) -> None:
         """Settle the time step again if a command has said one, for particles or blocks, since that was done. by_frac:
         what SET frac asks for [s], 0 without it. CommandError if the two were told different ones."""
-        if self._said() == self._settled:
+        if self._assigned_steps() == self._settled:
             return
-        (dt, _, value), (dt_before, _, value_before) = self._said(), self._settled
+        (dt, _, value), (dt_before, _, value_before) = self._assigned_steps(), self._settled
         new = {one for one, before in ((dt, dt_before), (value, value_before)) if one > 0.0 and one != before}
         if len(new) > 1:
             raise CommandError(
@@ -425,7 +425,7 @@ class Coupled(SurfaceLoad):
         self.late = int(state["late"])
         self._law_key = None
         self._known, self._changed, self._asleep = known, True, False
-        self._settled = self._said()
+        self._settled = self._assigned_steps()
 
     def release(self) -> None:
         """Decouple the two; both may continue alone. Not collective."""

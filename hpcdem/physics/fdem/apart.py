@@ -37,15 +37,15 @@ def check(sim: State, local: Local, error: type[Exception]) -> None:
     mesh = sim.the_mesh()
     at = ", ".join(f"{c:g}" for c in mesh.points[mesh.face_points(np.array([face]))][0].mean(axis=0))
     name = sim.joint_rows.name(sim.joint_row[face]).replace("_", "-")
-    said = (
+    text = (
         f"face-joint {face} ({name}) at ({at}) has slipped or opened by {way:.3g} m, {share:.2g} of its size. Its "
         "sides still interact over the whole joint"
     )
     advice = "longer edges along the joint, or classic-intrinsic-cohesive-interface, whose broken faces meet as contact"
     if share > GONE:
-        raise error(f"{said}; the run ends where that is more than its size. What follows: {advice}")
+        raise error(f"{text}; the run ends where that is more than its size. What follows: {advice}")
     if sim.log is not None:
-        sim.log.warn_once("joints slide far", f"{said}. Right for larger slip: {advice}")
+        sim.log.warn_once("joints slide far", f"{text}. Right for larger slip: {advice}")
 
 
 def _rows(sim: State, local: Local) -> np.ndarray:

@@ -91,7 +91,7 @@ class Conditions(InitialStress):
 
     def followed_tables(self) -> list[str]:
         """Tables over time that conditions of nodes and faces follow."""
-        said: set[str] = set()
+        used: set[str] = set()
         of_both: list[tuple[list[Any], np.ndarray]] = [
             (self.conditions, self.corner_row), (self.loads, self.load_row)
         ]  # fmt: skip
@@ -99,8 +99,8 @@ class Conditions(InitialStress):
             for row, one in enumerate(rows):
                 texts = {value for value in asdict(one).values() if isinstance(value, str)}
                 if texts and (column == row).any():
-                    said |= texts
-        return [name for name in self.tables if name in said]
+                    used |= texts
+        return [name for name in self.tables if name in used]
 
     def velocity_condition(
         self,
@@ -222,9 +222,9 @@ class Conditions(InitialStress):
         has = self.corner_row > 0
         has[at] = False
         others = np.flatnonzero(has)
-        said = np.array([max(getattr(one, f"side_{axis}") for axis in forces) for one in self.conditions])
+        sides = np.array([max(getattr(one, f"side_{axis}") for axis in forces) for one in self.conditions])
         most = np.zeros(len(self._mesh().points), np.int64)
-        np.maximum.at(most, cells[others], said[self.corner_row[others]])
+        np.maximum.at(most, cells[others], sides[self.corner_row[others]])
         return 1 + most[cells[at]]
 
     def _make_older(self, others: np.ndarray, changes: dict[str, Any]) -> None:

@@ -154,8 +154,8 @@ class Edited(State):
     def tables_over_time(self) -> list[str]:
         """Tables that conditions of blocks, bolts and liners follow; fluid and heat have clocks of their own."""
         others = [load for load in self.surface_loads if not load.own_clock]
-        said = self.followed_tables()
-        return [name for name in self.tables if name in said or any(load.uses_table(name) for load in others)]
+        used = self.followed_tables()
+        return [name for name in self.tables if name in used or any(load.uses_table(name) for load in others)]
 
     def changing_tables(self) -> list[str]:
         """Those of which later values are others than that of now."""

@@ -78,12 +78,12 @@ class InitialStress(Assignments):
         the bulk modulus K_2, see moduli.py.)"""
         assert self.stress0 is not None
         out = self.stress0[elements]
-        said, now = self.stress0_row[elements], self.element_row[elements]
+        assigned, now = self.stress0_row[elements], self.element_row[elements]
         ratio = np.ones((len(out), 2))
         of = moduli(self.element_rows, self.options.plane_stress)
         for c, modulus in enumerate((of.bulk, of.shear)):
-            other = (said > 0) & (modulus[said] != modulus[now])
-            ratio[other, c] = modulus[now[other]] / modulus[said[other]]
+            other = (assigned > 0) & (modulus[assigned] != modulus[now])
+            ratio[other, c] = modulus[now[other]] / modulus[assigned[other]]
         other = (ratio != 1.0).any(axis=1)  # the rest keeps every bit
         normal = of.normal
         mean = out[other][:, normal].mean(axis=1, keepdims=True)

@@ -286,7 +286,7 @@ class Mesh:
     def stress_points(self, elements: np.ndarray) -> np.ndarray:
         """(n, dim) [m] where the initial stress of these elements is theirs: at their centroids, see
         `Kind.said_of_parts`."""
-        return centres(self.points, self.cells[elements]) if self.macro.said_of_parts else self.centroids(elements)
+        return centres(self.points, self.cells[elements]) if self.macro.stress_of_parts else self.centroids(elements)
 
     def nearest_element(self, points: np.ndarray, cells: np.ndarray, at: tuple[float, ...], among: np.ndarray) -> int:
         """Which of the cells (n, 4) of points (m, dim) holds the point `at`, or is nearest to it; among: of these."""
@@ -353,9 +353,9 @@ def check(mesh: Mesh, source: str = "mesh", names: Names | None = None) -> None:
     if not len(mesh.cells):
         raise HpcdemError(f"{source}: there are no elements")
     for finding in (_bad_numbers, _bad_hexes, _bad_shapes, _bad_points, _bad_edges, _bad_names):
-        said = finding(mesh, names or Names())
-        if said:
-            raise HpcdemError(f"{source}: {said}")
+        problem = finding(mesh, names or Names())
+        if problem:
+            raise HpcdemError(f"{source}: {problem}")
 
 
 def _at(mesh: Mesh, point: int) -> str:

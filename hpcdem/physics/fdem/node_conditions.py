@@ -157,62 +157,62 @@ def _moved(one: NodeCondition, values: dict[str, tuple[int, Number]], keep: bool
 
 def _on_a_line(one: NodeCondition, given: list[str]) -> NodeCondition:
     way = dict(zip("xyz", one.way))
-    said = {axis: (getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")) for axis in given}
-    for axis, (_, value) in said.items():
+    assigned = {axis: (getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")) for axis in given}
+    for axis, (_, value) in assigned.items():
         if way[axis] == 0.0 and value != 0.0:
             raise Contradiction(f"{_constraint(one)} and {one.motion(axis)}")
     leading = [axis for axis in given if way[axis] != 0.0]
     if not leading:
         return _moved(one, {}, keep=True)
-    kinds = {said[axis][0] for axis in leading}
+    kinds = {assigned[axis][0] for axis in leading}
     alone = [axis for axis in way if way[axis] != 0.0]
     if len(alone) == 1:  # along an axis
-        return _moved(one, {axis: said.get(axis, (said[leading[0]][0], 0.0)) for axis in way})
-    if len(kinds) > 1 or any(isinstance(said[axis][1], str) for axis in leading):
-        if all(value == 0.0 for _, value in said.values()):
+        return _moved(one, {axis: assigned.get(axis, (assigned[leading[0]][0], 0.0)) for axis in way})
+    if len(kinds) > 1 or any(isinstance(assigned[axis][1], str) for axis in leading):
+        if all(value == 0.0 for _, value in assigned.values()):
             return _moved(one, {axis: (moving.VELOCITY, 0.0) for axis in way})
         raise Contradiction(
             f"{_constraint(one)} and {' and '.join(map(one.motion, leading))}: along an oblique line numbers of one "
             "kind are prescribed"
         )
     first = max(leading, key=lambda axis: abs(way[axis]))
-    speed = float(said[first][1]) / way[first]
+    speed = float(assigned[first][1]) / way[first]
     for axis in leading:
-        if abs(float(said[axis][1]) - speed * way[axis]) > STRAIGHT * abs(speed):
+        if abs(float(assigned[axis][1]) - speed * way[axis]) > STRAIGHT * abs(speed):
             raise Contradiction(f"{_constraint(one)} and {' and '.join(map(one.motion, given))}")
-    kind = said[first][0]
-    return _moved(one, {axis: (kind, said[axis][1] if axis in said else speed * way[axis]) for axis in way})
+    kind = assigned[first][0]
+    return _moved(one, {axis: (kind, assigned[axis][1] if axis in assigned else speed * way[axis]) for axis in way})
 
 
 def _in_a_plane(one: NodeCondition, given: list[str]) -> NodeCondition:
     normal = dict(zip("xyz", one.way))
-    said = {axis: (getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")) for axis in given}
+    assigned = {axis: (getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")) for axis in given}
     touched = [axis for axis in normal if normal[axis] != 0.0]
     if len(touched) == 1:  # across an axis
         (axis,) = touched
-        if said.get(axis, (moving.FREE, 0.0))[1] != 0.0:
+        if assigned.get(axis, (moving.FREE, 0.0))[1] != 0.0:
             raise Contradiction(f"{_constraint(one)} and {one.motion(axis)}")
-        return _moved(one, {**said, axis: (moving.VELOCITY, 0.0)})
+        return _moved(one, {**assigned, axis: (moving.VELOCITY, 0.0)})
     known = [axis for axis in given if normal[axis] != 0.0]
     if not known:
         return one
-    still = all(said[axis][1] == 0.0 for axis in known)
-    kinds = {said[axis][0] for axis in known}
-    if not still and (len(kinds) > 1 or any(isinstance(said[axis][1], str) for axis in known)):
+    still = all(assigned[axis][1] == 0.0 for axis in known)
+    kinds = {assigned[axis][0] for axis in known}
+    if not still and (len(kinds) > 1 or any(isinstance(assigned[axis][1], str) for axis in known)):
         raise Contradiction(
             f"{_constraint(one)} and {' and '.join(map(one.motion, known))}: across an oblique vector numbers of one "
             "kind are prescribed"
         )
-    kind = said[known[0]][0]
-    out = 0.0 if still else sum(normal[axis] * float(said[axis][1]) for axis in known)
-    left = [axis for axis in touched if axis not in said]
+    kind = assigned[known[0]][0]
+    out = 0.0 if still else sum(normal[axis] * float(assigned[axis][1]) for axis in known)
+    left = [axis for axis in touched if axis not in assigned]
     if not left:
-        size = max(abs(normal[axis] * float(said[axis][1])) for axis in known) if not still else 0.0
+        size = max(abs(normal[axis] * float(assigned[axis][1])) for axis in known) if not still else 0.0
         if abs(out) > STRAIGHT * size:
             raise Contradiction(f"{_constraint(one)} and {' and '.join(map(one.motion, known))}")
-        return _moved(one, said)
+        return _moved(one, assigned)
     if len(left) == 1:
-        return _moved(one, {**said, left[0]: (kind, -out / normal[left[0]] if out else 0.0)})
+        return _moved(one, {**assigned, left[0]: (kind, -out / normal[left[0]] if out else 0.0)})
     if not still:
         raise Contradiction(
             f"{_constraint(one)} and {one.motion(known[0])}: beside a plane that is oblique to it a component is 0, or "
@@ -220,7 +220,7 @@ def _in_a_plane(one: NodeCondition, given: list[str]) -> NodeCondition:
         )
     # One component is zero and the others lie in a plane: a line.
     along = _cross(np.array([float(axis == known[0]) for axis in "xyz"]), np.array(one.way))
-    rest = {axis: of for axis, of in said.items() if axis != known[0]}
+    rest = {axis: of for axis, of in assigned.items() if axis != known[0]}
     line = replace(_moved(one, rest, keep=True), constraint=moving.ALONG, way=_unit(along))
     return acting(line, 3) if rest else line
 
@@ -246,8 +246,8 @@ def together(rows: Sequence[NodeCondition], dim: int) -> NodeCondition:
         force = _latest([one for one in rows if getattr(one, f"force_{axis}") != 0.0], 8 << k)
         for several, names in ((motion, ("does", "at")), (force, ("force", "side"))):
             values = [{f"{name}_{axis}": getattr(one, f"{name}_{axis}") for name in names} for one in several]
-            told_by = names if names[0] == "does" else names[:1]  # sides may share one force
-            if len({tuple(one[f"{name}_{axis}"] for name in told_by) for one in values}) > 1:
+            compared = names if names[0] == "does" else names[:1]  # sides may share one force
+            if len({tuple(one[f"{name}_{axis}"] for name in compared) for one in values}) > 1:
                 told = dict.fromkeys(one.motion(axis) if names[0] == "does" else one.push(axis) for one in several)
                 raise Contradiction(" and ".join(told))
             found = replace(found, **values[0] if values else {})
@@ -256,6 +256,6 @@ def together(rows: Sequence[NodeCondition], dim: int) -> NodeCondition:
     return replace(found, constraint=kind, way=way, damp=max(one.damp for one in rows))
 
 
-def _latest(said: list[NodeCondition], bit: int) -> list[NodeCondition]:
+def _latest(assigned: list[NodeCondition], bit: int) -> list[NodeCondition]:
     """Those that count: that are not older, else all."""
-    return [one for one in said if not one.older & bit] or said
+    return [one for one in assigned if not one.older & bit] or assigned

@@ -44,19 +44,19 @@ def check(sim: State, local: Local) -> None:
         f"elements {int(a)} and {int(b)} by {depth:.3g} m at ({', '.join(f'{c:g}' for c in place)})"
         for depth, *place, a, b in found[:NAMED]
     )
-    said = f"{len(found)} pairs of elements overlap before the first step, {places}"
+    text = f"{len(found)} pairs of elements overlap before the first step, {places}"
     if o.overlap == REFUSE:
         raise CommandError(
-            f"{said}: contact would repel them violently. Separate them, or use model option overlap relax in a static "
+            f"{text}: contact would repel them violently. Separate them, or use model option overlap relax in a static "
             "stage (keep: start with the overlap)"
         )
     if o.overlap == RELAX and o.dynamic:
         raise CommandError(
-            f"{said}: model option overlap relax separates them in a static stage: model option dynamic off, model "
+            f"{text}: model option overlap relax separates them in a static stage: model option dynamic off, model "
             "solve, then dynamic on"
         )
     if sim.log is not None:
-        sim.log.info(said)
+        sim.log.info(text)
 
 
 def part(sim: State, local: Local) -> float:
@@ -79,14 +79,14 @@ def tell(sim: State, local: Local) -> None:
         "the altitude"
         for depth, *place, share, a, b in found[:NAMED]
     )
-    said = (
+    text = (
         f"step {sim.clock.step}: {len(found)} pairs of elements overlap by more than {DEEP:g} of an altitude: "
         f"{places}. Contact is too soft for the load: use a larger penalty-normal (10 to 100 E)"
     )
     if o.deep_overlap == STOP:
-        raise PhysicsError(f"{said}; stopped by model option deep-overlap stop")
+        raise PhysicsError(f"{text}; stopped by model option deep-overlap stop")
     if sim.log is not None:
-        sim.log.warn(f"{said}; model option deep-overlap stop ends the run there")
+        sim.log.warn(f"{text}; model option deep-overlap stop ends the run there")
 
 
 def _deep(sim: State, local: Local) -> np.ndarray:

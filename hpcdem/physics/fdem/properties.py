@@ -150,10 +150,10 @@ def _elastic(values: dict[str, Any]) -> None:
     """All four moduli from two of them."""
     given = [name for name in MODULI if name in values]
     if len(given) != 2:
-        said = f"got {', '.join(given)}" if given else "got none"
+        got = f"got {', '.join(given)}" if given else "got none"
         raise CommandError(
             f"an elastic model needs two of young, poisson_ratio, shear, bulk (Pa; usually young and poisson_ratio), "
-            f"{said}"
+            f"{got}"
         )
     young, poisson, shear, bulk = (values.get(name, math.nan) for name in MODULI)
     if given == ["young", "poisson_ratio"]:

@@ -77,12 +77,12 @@ def check_parts(sim: State) -> None:
             raise CommandError(f"{others[0].replace('_', '-')} move with the blocks: model option mechanical on")
         if sim.creep.on:
             raise CommandError("elements creep while blocks move: model creep off, or model option mechanical on")
-    said = "one-way" if o.one_way else "sub-step" if o.flow_steps > 0 else "time-step" if o.flow_dt > 0.0 else ""
+    setting = "one-way" if o.one_way else "sub-step" if o.flow_steps > 0 else "time-step" if o.flow_dt > 0.0 else ""
     if o.flow_every != 1 and not o.one_way and "heat" not in sim.surface_loads:
-        said = "sub-step"
-    if said and "fluid" not in sim.surface_loads:
+        setting = "sub-step"
+    if setting and "fluid" not in sim.surface_loads:
         raise CommandError(
-            f"{said} of flow is set, but no joint has a hydraulic model: assign face-joint c-model "
+            f"{setting} of flow is set, but no joint has a hydraulic model: assign face-joint c-model "
             "hydraulic-porous-medium"
         )
     if (o.heat_steps > 0 or o.heat_dt > 0.0) and "heat" not in sim.surface_loads:

@@ -248,16 +248,16 @@ class State(ModelDefinition, Model):
         limit = critical / o.safety
         scaled = f"by mass scaling, which adds {added:.3g} times the mass"
         how = "given" if o.dt else scaled if o.mass_scaling else "estimated"
-        said = partial(with_prefix, unit="s")
-        allowed = f"; the safety factor {o.safety:g} allows {said(critical)}" if dt != critical else (
+        shown = partial(with_prefix, unit="s")
+        allowed = f"; the safety factor {o.safety:g} allows {shown(critical)}" if dt != critical else (
             f", as the safety factor {o.safety:g} allows"
         )  # fmt: skip
         self.log.info(
-            f"time step {said(dt)} ({how}): {dt / limit:.2f} of the stability limit of {said(limit)}{allowed}"
+            f"time step {shown(dt)} ({how}): {dt / limit:.2f} of the stability limit of {shown(limit)}{allowed}"
         )
         if dt > critical * (1.0 + 1e-9):
             self.log.warn_once(
                 f"critical time step {dt > limit}",
-                f"the time step {said(dt)} is {dt / limit:.2f} of the stability limit of {said(limit)}; the safety "
-                f"factor {o.safety:g} allows {said(critical)}. Reduce it if the run becomes unstable",
+                f"the time step {shown(dt)} is {dt / limit:.2f} of the stability limit of {shown(limit)}; the safety "
+                f"factor {o.safety:g} allows {shown(critical)}. Reduce it if the run becomes unstable",
             )

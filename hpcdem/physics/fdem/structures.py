@@ -210,9 +210,9 @@ class Structure(SurfaceLoad):
     def driven(self) -> int | None:
         """The first node that is made to move. Not collective."""
         for node in np.flatnonzero(self.alive(self.parts[1])).tolist():
-            said = asdict(self.conditions[self.nodes["condition"][node]])
-            if any(name.startswith("does_") and does != FREE and said[f"at_{name[5:]}"] != 0.0
-                   for name, does in said.items()):  # fmt: skip
+            condition = asdict(self.conditions[self.nodes["condition"][node]])
+            if any(name.startswith("does_") and does != FREE and condition[f"at_{name[5:]}"] != 0.0
+                   for name, does in condition.items()):  # fmt: skip
                 return node
         return None
 

@@ -213,8 +213,8 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
     full = {name: np.broadcast_to(np.asarray(value, float), shape).reshape(-1) for name, value in values.items()}
     n = full["bulk"].size
     modulus = full["bulk"] + 4.0 / 3.0 * full["shear"]
-    said = stiffness_of(declared, law, full, "Pa")
-    bound = modulus if said is None else said
+    declared_stiffness = stiffness_of(declared, law, full, "Pa")
+    bound = modulus if declared_stiffness is None else declared_stiffness
     table = np.ascontiguousarray(np.array([full.get(name, np.ones(n)) for name in columns]).T)
     begin = np.array([state.initial for state in declared.state])
     stress, strain = STRESS[declared.dim], STRAIN[declared.dim]

@@ -264,10 +264,10 @@ class Diffusing(Conditions):
         log = self.blocks.log
         if log is None or not math.isfinite(self.dt) or abs(self.dt - self._told) <= 0.1 * self._told:
             return
-        self._told, said = self.dt, partial(with_prefix, unit="s")
+        self._told, shown = self.dt, partial(with_prefix, unit="s")
         log.info(
-            f"{self.name}: {counted(self.sub_steps, 'sub-step')} of {said(self.dt)} in each cycle; the stability limit "
-            f"is {said(self._limit)}"
+            f"{self.name}: {counted(self.sub_steps, 'sub-step')} of {shown(self.dt)} in each cycle; the stability "
+            f"limit is {shown(self._limit)}"
         )
         if self.dt > self._limit:
             log.warn_once(
@@ -412,14 +412,14 @@ class Diffusing(Conditions):
                 "waited": self.waited, **own}  # fmt: skip
 
     @property
-    def _said(self) -> dict[str, np.ndarray]:
+    def _assigned_rows(self) -> dict[str, np.ndarray]:
         """What is saved of elements, nodes and faces, of all ranks, by the names of tables."""
         rows = {"elements": self.row, "points": self.held, "faces": self.exposed.row}
         return {f"{self.name}_{name}": row for name, row in rows.items()}
 
     def saved_tables(self) -> Tables:
         """Elements with their properties, prescribed nodes and faces, of all ranks."""
-        return {name: assigned.numbered(row) for name, row in self._said.items()}
+        return {name: assigned.numbered(row) for name, row in self._assigned_rows.items()}
 
     @classmethod
     def restored(cls, blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> Self:
@@ -430,6 +430,6 @@ class Diffusing(Conditions):
         made.exposed.conditions = [FaceCondition(**one) for one in state["faces"]]
         for name in ("prescribed", "accounts", *made.kept):
             setattr(made, name, state.get(name, getattr(made, name)))
-        for name, row in made._said.items():
+        for name, row in made._assigned_rows.items():
             assigned.put_back(row, tables[name])
         return made

@@ -55,7 +55,7 @@ class FlowAssignments(Assigned, Field):
         mesh = blocks.the_mesh()
         self.since = np.full(mesh.cells.size, math.inf)
         self.condition = np.zeros(len(mesh.points), np.int32)
-        self.said_wet = np.zeros(mesh.cells.size, np.int8)
+        self.wet_bits = np.zeros(mesh.cells.size, np.int8)
         self.conditions: list[Condition] = [Condition()]
         self.wells: list[Well] = []
         self._fluid: dict[str, float] = {}
@@ -142,8 +142,8 @@ class FlowAssignments(Assigned, Field):
         """What holds at flow nodes among these points (None: all) from now on, see `Condition`. A pressure or a level
         wets free faces all of whose corners are among the points; without points it is assigned to joints alone."""
         at = self.flow_nodes(nodes)
-        said_at = np.flatnonzero(self.condition) if nodes is None else self.blocks.numbers_of_nodes(nodes)
-        beside = said_at[~self.network.there[said_at]]
+        nodes_with_condition = np.flatnonzero(self.condition) if nodes is None else self.blocks.numbers_of_nodes(nodes)
+        beside = nodes_with_condition[~self.network.there[nodes_with_condition]]
         for well in self.wells:
             both = np.intersect1d(well.points, at)
             if len(both):
@@ -157,18 +157,18 @@ class FlowAssignments(Assigned, Field):
         if does == kernels.RATE:
             self._dry(np.union1d(at, beside))
         elif nodes is not None:
-            self.said_wet[around(self.blocks.the_mesh(), said_at)[0]] |= BY_CONDITION
+            self.wet_bits[around(self.blocks.the_mesh(), nodes_with_condition)[0]] |= BY_CONDITION
         self.blocks.changed(stiffness=False)
 
     def _dry(self, points: np.ndarray) -> None:
         """No condition says any more that water stands before faces with a corner among these points."""
-        self.said_wet[around(self.blocks.the_mesh(), points)[1]] &= ~BY_CONDITION
+        self.wet_bits[around(self.blocks.the_mesh(), points)[1]] &= ~BY_CONDITION
 
     def remove_conditions(self, nodes: np.ndarray | None) -> None:
         """Take back what is prescribed at these points (None: all)."""
         self._unset(self.condition, nodes)
         if nodes is None:
-            self.said_wet &= ~BY_CONDITION
+            self.wet_bits &= ~BY_CONDITION
         else:
             self._dry(nodes)
 
@@ -193,9 +193,9 @@ class FlowAssignments(Assigned, Field):
         one well."""
         does = np.array([one.does for one in self.conditions])[self.condition]
         held = np.isin(does, (kernels.PRESSURE, kernels.SURFACE))
-        self.said_wet[around(self.blocks.the_mesh(), np.flatnonzero(held))[0]] |= BY_CONDITION
+        self.wet_bits[around(self.blocks.the_mesh(), np.flatnonzero(held))[0]] |= BY_CONDITION
         for well in self.wells:
-            self.said_wet[around(self.blocks.the_mesh(), well.points)[0]] |= BY_WELL
+            self.wet_bits[around(self.blocks.the_mesh(), well.points)[0]] |= BY_WELL
 
     # ---- wells -------------------------------------------------------------------------------------------------------
 
@@ -219,7 +219,7 @@ class FlowAssignments(Assigned, Field):
         if nodes is not None:
             asked = self.blocks.numbers_of_nodes(nodes)
             wall = np.setdiff1d(asked, at)
-            self.said_wet[around(self.blocks.the_mesh(), asked)[0]] |= BY_WELL
+            self.wet_bits[around(self.blocks.the_mesh(), asked)[0]] |= BY_WELL
         self.condition[wall] = 0
         self.wells.append(Well(name, at, wall=wall))
         self.blocks.changed(stiffness=False)

@@ -42,7 +42,7 @@ class Faces(Channels):
         self.shore = Shore()
         self.p0 = 0.0
         """Pressure that the variables of implicit steps are measured by, while these are being done [Pa]; else 0."""
-        self._told_wet = ""
+        self._reported_wet = ""
         self._wet, self._wet_rows = np.empty(0, np.int64), np.empty((0, blocks.dim), np.int64)
         """Wet free faces of this rank, and rows of the state at their corners."""
         self._loads: list[list[tuple[np.ndarray, ...]]] = []
@@ -67,7 +67,7 @@ class Faces(Channels):
 
     def _is_wet(self, free: np.ndarray) -> np.ndarray:
         """Free faces (k,) before which water is said to stand, and on which no stress is prescribed."""
-        return (self.said_wet[free] > 0) & ~self.blocks.stressed(free)
+        return (self.wet_bits[free] > 0) & ~self.blocks.stressed(free)
 
     def _sides_and_free(self) -> tuple[np.ndarray, np.ndarray]:
         """Faces of owned elements, ascending: sides of channels, and free ones."""
@@ -96,9 +96,9 @@ class Faces(Channels):
     def _tell_wet(self, free: np.ndarray) -> None:
         """A word in the log about the free faces (k,) of this rank where they are others than before. Collective."""
         blocks, mesh = self.blocks, self.blocks.the_mesh()
-        said_wet, stressed = self.said_wet[free] > 0, blocks.stressed(free)
+        wet_bits, stressed = self.wet_bits[free] > 0, blocks.stressed(free)
         between = self.network.there[mesh.face_points(free)].all(axis=1)
-        kinds = said_wet & ~stressed, said_wet & stressed, between & ~said_wet & ~stressed
+        kinds = wet_bits & ~stressed, wet_bits & stressed, between & ~wet_bits & ~stressed
         wet, total, dry = blocks.comm.sum_into(np.array([kind.sum() for kind in kinds], np.int64)).tolist()
         told = []
         if wet:
@@ -112,9 +112,9 @@ class Faces(Channels):
                 "holds their nodes)"
             )
         text = "; ".join(told)
-        if blocks.log is not None and text != self._told_wet:
+        if blocks.log is not None and text != self._reported_wet:
             blocks.log.info(f"flow: {text or 'no free face is wet any more'}")
-        self._told_wet = text
+        self._reported_wet = text
 
     def corners(self, blocks: Any) -> np.ndarray:
         out = np.zeros((blocks.n_own, 4), bool)

@@ -157,10 +157,10 @@ class Flow(Values):
         known, before = self._told
         if log is None or (abs(self.dt - known) <= 0.1 * known and abs(limit - before) <= 0.1 * before):
             return
-        self._told, said = (self.dt, limit), partial(with_prefix, unit="s")
+        self._told, shown = (self.dt, limit), partial(with_prefix, unit="s")
         log.info(
-            f"flow: {counted(self.sub_steps, 'sub-step')} of {said(self.dt)} in each cycle; the stability limit is "
-            f"{said(2.0 * limit)}, half of it {said(limit)}"
+            f"flow: {counted(self.sub_steps, 'sub-step')} of {shown(self.dt)} in each cycle; the stability limit is "
+            f"{shown(2.0 * limit)}, half of it {shown(limit)}"
         )
         if self.dt > limit * (1.0 + 1e-9):
             log.warn_once(
@@ -198,10 +198,10 @@ class Flow(Values):
         least = stable.min(initial=math.inf)
         least = float(self.blocks.comm.min_into(np.array([least]))[0])
         if self.dt > FAR * least:
-            said_by = "time-step" if self.blocks.options.flow_dt > 0.0 else "sub-step"
+            setting = "time-step" if self.blocks.options.flow_dt > 0.0 else "sub-step"
             first = self._lowest(self.number[stable == least])
             raise CommandError(
-                f"model {said_by} hydraulic: sub-steps of {self.dt:.4g} s are {self.dt / least:.3g} times what is "
+                f"model {setting} hydraulic: sub-steps of {self.dt:.4g} s are {self.dt / least:.3g} times what is "
                 f"stable at flow node {first}, {least:.4g} s, so the flow would become unstable. Reduce them, or use "
                 "model solve hydraulic, which uses implicit steps"
             )
@@ -304,12 +304,12 @@ class Flow(Values):
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
         """Channels with their properties, prescribed nodes, and faces said to be wet, of all ranks; see `condensed`."""
-        channels, faces = assigned.numbered(self.row), np.flatnonzero(self.said_wet)
+        channels, faces = assigned.numbered(self.row), np.flatnonzero(self.wet_bits)
         at = {} if self.condensed is None else {"flow_condensed": dict(zip("xyz", self.condensed.T))}
         return at | {
             "flow_channels": {**channels, "since": self.since[channels["number"]]},
             "flow_conditions": assigned.numbered(self.condition),
-            "flow_wet": {"number": faces, "said": self.said_wet[faces].astype(np.int64)},
+            "flow_wet": {"number": faces, "said": self.wet_bits[faces].astype(np.int64)},
         }  # fmt: skip
 
     @staticmethod
@@ -333,7 +333,7 @@ class Flow(Values):
         made.since[channels["number"]] = channels["since"]
         assigned.put_back(made.condition, points)
         if "flow_wet" in tables:
-            made.said_wet[tables["flow_wet"]["number"]] = tables["flow_wet"]["said"]
+            made.wet_bits[tables["flow_wet"]["number"]] = tables["flow_wet"]["said"]
         else:
             made._wet_of_before()
         made.frozen = state.get("frozen", False)

@@ -29,7 +29,7 @@ def _coordinates(x, row, corners, px, py, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def rub(first, second, start, row, quad, x, v, history, effusivity, part, dt, out):
+def friction_heat(first, second, start, row, quad, x, v, history, effusivity, part, dt, out):
     """Add the heat (rows, w) [J/m] of a step dt [s] to the corners of the elements held here.
 
     first, second (m,): pairs of bodies; start, row, quad (bodies,): see pairs.Bodies; x, v (rows, .): positions and the

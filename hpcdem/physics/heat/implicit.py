@@ -190,8 +190,8 @@ class Implicit:
         lowest = at.leads[at.ids] // 4
         self._mine = (row >= sim.owned.start) & (row < sim.owned.stop) & (sim.number[row] == lowest)
         self._ids = at.ids[self._mine]
-        said = (part.tobytes() for part in (at.leads, heat.held, heat.exposed.row, heat.row))
-        made_for = dt, sim.alive.tobytes(), *said, *(part.tobytes() for part in heat.contacts)
+        parts = (part.tobytes() for part in (at.leads, heat.held, heat.exposed.row, heat.row))
+        made_for = dt, sim.alive.tobytes(), *parts, *(part.tobytes() for part in heat.contacts)
         if fluid is not None:
             made_for = *made_for, *fluid.made_for()
         if not sim.comm.any(self.solver is None or made_for != self._made_for):

@@ -14,7 +14,7 @@ MOST = 10
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def rub(first, second, face, face_row, row, touching, v, force, history, effusivity, part, dt, out):
+def friction_heat(first, second, face, face_row, row, touching, v, force, history, effusivity, part, dt, out):
     """Heat of friction, see `friction.rub`: add that (rows, 4) [J] of a step dt [s] to the corners of the elements held
     here.
 

@@ -27,7 +27,7 @@ RARELY, MOST = 1e-2, 10
 """Part of the stability limit for which heat by itself waits while blocks move, and steps of these, at most."""
 NEAR, DEEP = 1e-3, 0.2
 """How far apart, and how deep in each other, faces may be that touch for heat, over the mean edge."""
-RUBBED = "heat_of_friction"
+HEAT_OF_FRICTION = "heat_of_friction"
 """Column of elements: of corners heat of friction that waits for the next cycle [J/m]."""
 
 
@@ -58,7 +58,7 @@ class Heat(Diffusing):
         self._pairs_of: Any = None
         self._facing = np.empty((2, 0, 3), np.int64), np.empty(0)
         self._touch = np.empty((0, 4), np.int64), np.empty((0, 4)), np.empty(0)
-        self._rubs = False
+        self._has_friction = False
         self._power: np.ndarray | None = None
 
     set_step: ClassVar[str] = "model time-step thermal"
@@ -128,9 +128,9 @@ class Heat(Diffusing):
         heat = self.column("capacity")[row] * blocks.element_rows.column("density")[blocks.element_row[blocks.number]]
         self._effusivity = np.sqrt(np.sqrt(along * across) * heat)
         parts = self.column("friction_heat")[self.row]
-        self._rubs = bool((parts[blocks.alive] > 0.0).any())
-        if self._rubs and RUBBED not in cold:
-            cold[RUBBED] = np.zeros_like(cold[self.given])
+        self._has_friction = bool((parts[blocks.alive] > 0.0).any())
+        if self._has_friction and HEAT_OF_FRICTION not in cold:
+            cold[HEAT_OF_FRICTION] = np.zeros_like(cold[self.given])
         if self.fluid is not None:
             self.fluid.bind()
 
@@ -293,8 +293,8 @@ class Heat(Diffusing):
     def _step_done(self) -> None:
         if self._may_wait:
             self.owed += self.blocks.clock.dt
-        if self._rubs and self.blocks.options.mechanical:
-            self._rub()
+        if self._has_friction and self.blocks.options.mechanical:
+            self._add_friction_heat()
 
     def _waits(self) -> bool:
         fluid = self.flowing
@@ -335,10 +335,10 @@ class Heat(Diffusing):
     def _may_wait(self) -> bool:
         """Heat alone, without friction, by the clock of blocks in motion, with sub-steps without a report."""
         o = self.blocks.options
-        by_itself = o.mechanical and o.dynamic and self.flowing is None and not self._rubs
+        by_itself = o.mechanical and o.dynamic and self.flowing is None and not self._has_friction
         return by_itself and o.flow_every == 1 and o.heat_steps == 0 and o.heat_dt == 0.0
 
-    def _rub(self) -> None:
+    def _add_friction_heat(self) -> None:
         """Surfaces have slid for a step."""
         blocks = self.blocks
         pairs: Any = blocks.local.pairs
@@ -346,24 +346,24 @@ class Heat(Diffusing):
             out = np.zeros(self.t.shape)
             how = self._effusivity, self.column("friction_heat")[self.row[blocks.number]], blocks.clock.dt, out
             if blocks.dim == 3:
-                kernels_space.rub(
+                kernels_space.friction_heat(
                     pairs.first, pairs.second, pairs.face, pairs.face_row, pairs.row, pairs.touching, blocks.v,
                     pairs.out, pairs.history, *how,
                 )  # fmt: skip
             else:
-                friction.rub(
+                friction.friction_heat(
                     pairs.first, pairs.second, pairs.start, pairs.row, pairs.quad, blocks.x, blocks.v, pairs.history,
                     *how,
                 )  # fmt: skip
-            blocks.cold[RUBBED] += out[blocks.owned]
+            blocks.cold[HEAT_OF_FRICTION] += out[blocks.owned]
 
     def _take_friction(self) -> None:
         """What has come from friction flows in during this cycle, evenly."""
-        if self._rubs:
-            rubbed = self.blocks.cold[RUBBED]
-            self.blocks.cold[self.given] += rubbed
-            self._power = rubbed / (self.sub_steps * self.dt)
-            rubbed[:] = 0.0
+        if self._has_friction:
+            friction_heat = self.blocks.cold[HEAT_OF_FRICTION]
+            self.blocks.cold[self.given] += friction_heat
+            self._power = friction_heat / (self.sub_steps * self.dt)
+            friction_heat[:] = 0.0
 
     def _add_inflow(self, q: np.ndarray) -> bool:
         if self._passes:
@@ -372,7 +372,7 @@ class Heat(Diffusing):
             self._beside.add_wall_heat(q.reshape(-1))
         if self._power is not None:
             q[self.blocks.owned] += self._power
-        return self._passes or self._beside is not None or self._rubs
+        return self._passes or self._beside is not None or self._has_friction
 
     # ---- state on disk -------------------------------------------------------------------------------------------
 

@@ -19,7 +19,7 @@ def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
     sim = _heated(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]), threads)
     pairs, one = np.array([0]), np.ones(2)
-    friction.rub(
+    friction.friction_heat(
         pairs, pairs + 1, np.zeros(2, np.int64), np.arange(2), np.zeros(2, bool), sim.x, sim.v,
         np.zeros((1, 6)), one, one, 1.0, np.zeros((2, 3)),
     )  # fmt: skip
@@ -31,7 +31,7 @@ def in_space(threads: int = 1) -> None:
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
     _heated(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
     pairs, one = np.zeros(1, np.int64), np.ones(1)
-    kernels_space.rub(
+    kernels_space.friction_heat(
         pairs, pairs, pairs, pairs, pairs, np.zeros(1, np.uint8), np.zeros((1, 16)), np.zeros((1, 21)),
         np.zeros((1, 5)), one, one, 1.0, np.zeros((1, 4)),
     )  # fmt: skip

@@ -82,8 +82,8 @@ def draw_folder(request: Request, comm: Comm, log: Any, workers: int = 1) -> Non
             for k, part in enumerate(parts, 1):
                 bars = "_sigma1" if request.sigma1 and kind.key == panels.DISTORTIONAL.key else ""
                 name = f"series_{kind.key}{bars}" + (f"_{k}" if len(parts) > 1 else "")
-                said = tuple(captions[path.stem] for path in part)
-                tasks.append(OneSeries(name, part, ss, seen, kind, style, said, request.formats))
+                captions_here = tuple(captions[path.stem] for path in part)
+                tasks.append(OneSeries(name, part, ss, seen, kind, style, captions_here, request.formats))
     log.info(f"{len(files)} sections of {request.folder}: {len(tasks)} pages")
     draw_all(tasks, comm, workers, log.info)
     log.info(

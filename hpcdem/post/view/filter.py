@@ -58,13 +58,13 @@ def chosen(text: str, count: int, fields: Mapping[str, np.ndarray], groups: Grou
     return np.broadcast_to(found, (count,)).copy()
 
 
-def amount(text: str, fields: Mapping[str, np.ndarray], said: str) -> Any:
+def amount(text: str, fields: Mapping[str, np.ndarray], source: str) -> Any:
     """The value of an expression of numbers and fields, a number or one per object. said: what the user wrote, for
     HpcdemError."""
     try:
         return _Evaluation(text, fields, lambda *_: np.zeros(0, bool))._amount(parsed(text), 0)
     except HpcdemError as error:
-        raise HpcdemError(f"'{said[:60]}': {str(error).partition(': ')[2].replace('a filter', 'it')}") from None
+        raise HpcdemError(f"'{source[:60]}': {str(error).partition(': ')[2].replace('a filter', 'it')}") from None
 
 
 def _lines(text: str) -> list[str]:

@@ -151,7 +151,7 @@ def _wrong(errors: Sequence[Mapping[str, Any]], given: Mapping[str, Any]) -> str
     if len(loc) > 1:
         place.append(f"value {int(loc[1]) + 1}")
     where = f"{', '.join(place)}: " if place else ""
-    if rule := validation.said(first):
+    if rule := validation.message(first):
         return f"{where}{rule}"
     if first["type"] == "extra_forbidden":
         table = "layer" if known is Layer.model_fields else "view"

@@ -615,8 +615,8 @@ def _arrows(moment: Moment, objects: Objects, result: Painted, seen: View) -> tu
     factor = layer.arrows * ARROW * seen.width / max(longest, 1e-300)
     if longest > 0.0:
         value = _round(min(longest, LONGEST * seen.width / factor))
-        said = units.printed(units.with_prefix(value, moment.unit_of(layer.vectors)))
-        result.reference = Reference(f"{layer.vectors.replace('_', ' ')} {said}", factor * value)
+        value_text = units.printed(units.with_prefix(value, moment.unit_of(layer.vectors)))
+        result.reference = Reference(f"{layer.vectors.replace('_', ' ')} {value_text}", factor * value)
     return at[some][shown], far[shown] * factor
 
 

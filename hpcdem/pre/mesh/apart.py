@@ -8,10 +8,10 @@ import sys
 from hpcdem.core.errors import HpcdemError
 
 
-def run(module: str, *words: str, said: str = "", failed: str) -> None:
+def run(module: str, *words: str, sent: str = "", failed: str) -> None:
     """`python -m module words`, with `said` on its input. HpcdemError `failed`: its last line, or how it ended."""
     done = subprocess.run(
-        [sys.executable, "-m", module, *words], input=said, text=True, capture_output=True, check=False
+        [sys.executable, "-m", module, *words], input=sent, text=True, capture_output=True, check=False
     )
     if done.returncode:
         told = [line for line in done.stderr.splitlines() if line.strip()]

@@ -74,7 +74,7 @@ def filled(wishes: Wishes, group: str) -> Filled:
             raise CommandError(
                 f"refine-layer must make elements smaller, but size {size:g} is larger than that of the mesh"
             )
-    said = {
+    request = {
         "outline": state(list(wishes.outline)), "holes": state(list(wishes.holes)), "size": wishes.size,
         "regions": [state(list(of)) for _, of in wishes.regions], "middle": (0.5 * (low + high)).tolist(),
         "refine": [
@@ -85,7 +85,7 @@ def filled(wishes: Wishes, group: str) -> Filled:
     }  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="hpcdem-") as folder:
         into = Path(folder) / "mesh.npz"
-        apart.run("hpcdem.pre.mesh.fill", str(into), said=json.dumps(said), failed="Gmsh could not make the mesh")
+        apart.run("hpcdem.pre.mesh.fill", str(into), sent=json.dumps(request), failed="Gmsh could not make the mesh")
         with np.load(into, allow_pickle=False) as found:
             points, cells, region, of_layer = (found[name] for name in ("points", "cells", "region", "of_layer"))
             faces = found["faces"]
@@ -104,10 +104,10 @@ def filled(wishes: Wishes, group: str) -> Filled:
     return Filled(points, cells, {name: np.concatenate(rows) for name, rows in groups.items()}, on, notes)
 
 
-def _refined(gmsh: Any, said: dict[str, Any], middle: np.ndarray, unit: float) -> None:
+def _refined(gmsh: Any, request: dict[str, Any], middle: np.ndarray, unit: float) -> None:
     """Edges have their size inside of the solids, and grow in proportion to the distance from them."""
-    rest = said["size"]
-    near = [(one, size, distance) for of, size, distance in said["refine"] for one in restored(of)]
+    rest = request["size"]
+    near = [(one, size, distance) for of, size, distance in request["refine"] for one in restored(of)]
 
     def edges(_dim: int, _tag: int, x: float, y: float, z: float, _size: float) -> float:
         at = np.array([[x, y, z]]) * unit + middle
@@ -119,21 +119,21 @@ def _refined(gmsh: Any, said: dict[str, Any], middle: np.ndarray, unit: float) -
 
 
 def _main(into: str) -> None:
-    said = json.load(sys.stdin)
+    request = json.load(sys.stdin)
     gmsh = shapes.begun()
-    middle, unit = np.array(said["middle"]), float(said["size"])
+    middle, unit = np.array(request["middle"]), float(request["size"])
     for name, value in (
         ("Mesh.Algorithm3D", HXT), ("Mesh.MeshSizeMax", 1.0), ("Mesh.MeshSizeFromPoints", 0),
         ("Mesh.MeshSizeExtendFromBoundary", 0),
     ):  # fmt: skip
         gmsh.option.setNumber(name, value)
     occ = gmsh.model.occ
-    number = _regions(occ, said, middle, unit)
+    number = _regions(occ, request, middle, unit)
     if not number:
         raise SystemExit("the body has no volume left")
-    number, cuts = _cut(occ, said, number, middle, unit)
+    number, cuts = _cut(occ, request, number, middle, unit)
     occ.synchronize()
-    _refined(gmsh, said, middle, unit)
+    _refined(gmsh, request, middle, unit)
     try:
         gmsh.model.mesh.generate(3)
     except Exception:  # HXT gives up at tips that are sharper than it likes
@@ -164,20 +164,20 @@ def _main(into: str) -> None:
     np.savez(into, points=points, cells=numbers.reshape(-1, 4), region=region, faces=faces, of_layer=of_layer)
 
 
-def _regions(occ: Any, said: dict[str, Any], middle: np.ndarray, unit: float) -> dict[int, int]:
+def _regions(occ: Any, request: dict[str, Any], middle: np.ndarray, unit: float) -> dict[int, int]:
     """The volumes (tag: region, 0 where it is none) of the outline without its holes."""
 
     def bodies(given: list[Any]) -> shapes.Tags:
         return [tag for one in restored(given) for tag in shapes.body(occ, one, middle, unit)]
 
-    body = bodies(said["outline"])
+    body = bodies(request["outline"])
     if len(body) > 1:
         body, _ = occ.fuse(body[:1], body[1:])
-    holes = bodies(said["holes"])
+    holes = bodies(request["holes"])
     if holes:
         body, _ = occ.cut(body, holes)
     number = {tag: 0 for _, tag in body}
-    for k, given in enumerate(said["regions"]):
+    for k, given in enumerate(request["regions"]):
         tools = bodies(given)
         pieces = [(3, tag) for tag in number]
         _, parents = occ.fragment(pieces, tools)
@@ -189,14 +189,14 @@ def _regions(occ: Any, said: dict[str, Any], middle: np.ndarray, unit: float) ->
 
 
 def _cut(
-    occ: Any, said: dict[str, Any], number: dict[int, int], middle: np.ndarray, unit: float
+    occ: Any, request: dict[str, Any], number: dict[int, int], middle: np.ndarray, unit: float
 ) -> tuple[dict[int, int], dict[int, int]]:
     """The volumes (tag: region) cut along surfaces, and the faces (tag: layer) that these have become."""
     tools: shapes.Tags = []
     layer: list[int] = []
-    for k, given in enumerate(said["surfaces"]):
+    for k, given in enumerate(request["surfaces"]):
         for one in restored(given):
-            made = shapes.surface(occ, one, middle, unit, said["reach"])
+            made = shapes.surface(occ, one, middle, unit, request["reach"])
             pieces, _ = occ.intersect(made, [(3, tag) for tag in number], removeTool=False)
             flat = [tag for tag in pieces if tag[0] == 2]
             tools += flat

@@ -146,7 +146,7 @@ class Fit:
     cut: np.ndarray
     parts: np.ndarray
 
-    def said(self) -> str:
+    def description(self) -> str:
         """What does not fit, "" if all does."""
         found = [
             f"{len(at)} {what}, at {places(at)}"
@@ -189,5 +189,5 @@ def fit(mesh: Mesh, since: int = 0) -> Fit:
 
 def places(at: np.ndarray) -> str:
     """The first of these (k, dim), in words."""
-    said = [f"({', '.join(f'{c:g}' for c in one)})" for one in at[:PLACES]]
-    return ", ".join(said) + (" and others" if len(at) > PLACES else "")
+    text = [f"({', '.join(f'{c:g}' for c in one)})" for one in at[:PLACES]]
+    return ", ".join(text) + (" and others" if len(at) > PLACES else "")

@@ -201,10 +201,10 @@ def _on_sides(
             lost |= mesh.inside_macros(edges.faces[rows, 0])
         if lost.any():
             what = "lines" if dim == 2 else "surfaces"
-            said = f"{what} of the group '{name}' are not {'edges' if dim == 2 else 'faces'} of the elements"
+            text = f"{what} of the group '{name}' are not {'edges' if dim == 2 else 'faces'} of the elements"
             if data.strict:
-                raise data.refuse(said)
-            notes.append(f"{int(lost.sum())} {said}")
+                raise data.refuse(text)
+            notes.append(f"{int(lost.sum())} {text}")
         if (~lost).any():
             layers[name] = given[~lost]
             both = edges.faces[rows[~lost]].ravel()
@@ -258,10 +258,10 @@ def _by_meshio(path: Path) -> FileMesh:
     known = sorted(meshio.extension_to_filetypes)
     if path.suffix.lower() not in known:
         raise HpcdemError(f"{path}: files *{path.suffix} are not supported; known: {', '.join(known)}")
-    said = io.StringIO()
+    text = io.StringIO()
     try:
         # meshio prints what it cannot read and then ends the program.
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with contextlib.redirect_stdout(text), contextlib.redirect_stderr(text):
             found = meshio.read(path)
     except (Exception, SystemExit):
         raise HpcdemError(f"{path}: not a readable mesh: damaged, or not a *{path.suffix} file") from None

@@ -48,12 +48,12 @@ def snapped(surfaces: Sequence[Named], bodies: Sequence[Any], size: float) -> tu
             else:
                 kept.append(one)
         out.append((name, kept))
-    said = (
+    counts = (
         (turned, f"were rotated: they crossed others at less than {LEAST_ANGLE:g} degrees"),
         (shrunk, "were shortened: they ended within a quarter of an edge of the surface"),
         (lost, "were omitted: they lie outside the body, or are smaller than a quarter of an edge"),
     )
-    return out, [f"{count} discs {what}" for count, what in said if count]
+    return out, [f"{count} discs {what}" for count, what in counts if count]
 
 
 def _aligned(disc: Disc, before: Sequence[Disc], size: float) -> Disc:

@@ -362,8 +362,8 @@ def _filled(
         except HpcdemError:
             raise
         except Exception as error:  # gmsh raises nothing more special
-            said = [line for line in gmsh.logger.get() if line.startswith(("Error", "Warning"))]
-            raise HpcdemError(f"gmsh could not make the mesh: {'; '.join(said[:3]) or error}") from error
+            messages = [line for line in gmsh.logger.get() if line.startswith(("Error", "Warning"))]
+            raise HpcdemError(f"gmsh could not make the mesh: {'; '.join(messages[:3]) or error}") from error
         finally:
             gmsh.logger.stop()
             gmsh.model.remove()

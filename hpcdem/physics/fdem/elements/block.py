@@ -26,7 +26,7 @@ class ElementBlock:
     (count,) times those of their models, None: once; without: elements that have no moduli in c, as a user law
     or a larger element makes their forces.
 
-    said, uncrept, initial, like s0: without plastic and creep strain, without creep strain alone, without plastic
+    elastic, uncrept, initial, like s0: without plastic and creep strain, without creep strain alone, without plastic
     strain. creeping (m,): which can creep. law (n, parts): rows of the table of yield surfaces; flowing (m + 3,): which
     can yield, see `flow.flows`. over_parts: volume (count,) over that of what each is stored as, None: the same.
     """
@@ -43,7 +43,7 @@ class ElementBlock:
         self.stored, self.volume, self.count = stored, volume, len(stored)
         self.first = np.ascontiguousarray(stored[:, 0])
         self.stiff, self.without = c, np.zeros(0, np.int64)
-        self.said, self.uncrept, self.initial = (np.zeros((0, *self.s0.shape[1:])) for _ in range(3))
+        self.elastic, self.uncrept, self.initial = (np.zeros((0, *self.s0.shape[1:])) for _ in range(3))
         self.creeping = self.flowing = np.zeros(0, np.int64)
         self.model = np.zeros(self.count + 3, np.int32)
         self.model[: self.count] = sim.element_row[sim.number[self.first + sim.n_left]]
@@ -110,7 +110,7 @@ class ElementBlock:
 
     def remember(self) -> None:
         """Some elements of the model yield or creep."""
-        self.said, self.uncrept, self.initial = (np.zeros_like(self.s0) for _ in range(3))
+        self.elastic, self.uncrept, self.initial = (np.zeros_like(self.s0) for _ in range(3))
 
     def histories(self, memory: np.ndarray, width: int) -> np.ndarray:
         """What their parts remember (count, parts, width), of the rows of owned elements."""

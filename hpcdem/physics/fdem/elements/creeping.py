@@ -78,7 +78,7 @@ class Creeping:
         found = [np.zeros(of.count) for of in self.blocks]
         for of, energy in zip(self.blocks, found):
             if of.count:
-                creep.stored(np.arange(of.count), of.tables, of.said, of.model, self.table, memory, energy)
+                creep.stored(np.arange(of.count), of.tables, of.elastic, of.model, self.table, memory, energy)
         return found
 
     def lost(self) -> np.ndarray:

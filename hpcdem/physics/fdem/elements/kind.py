@@ -99,7 +99,7 @@ class Kind:
     stored: int = 1
     cells: tuple[tuple[int, ...], ...] = ()
     shape: int = 0
-    said_of_parts: bool = False
+    stress_of_parts: bool = False
     laws: tuple[str, ...] = ()
 
     def only(self, law: str, follow: Sequence[str]) -> str:
@@ -179,7 +179,7 @@ HEXAHEDRON = Kind(
 SIX_NODE_TRIANGLE = Kind(
     "six-node triangle", "six-node triangles", SixNodeTriangles, 2, 6, (tuple(range(6)),) * six.GAUSS, six.GAUSS,
     ((0, 3, 1), (1, 4, 2), (2, 5, 0)), 4, 1, six.LAMBDA, six.TWO_MU, six.FREE, volume=six.AREA,
-    stored=six.PARTS, cells=((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)), shape=3, said_of_parts=True,
+    stored=six.PARTS, cells=((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)), shape=3, stress_of_parts=True,
     laws=("mech_iso_elastic",),
 )  # fmt: skip
 """Its nodes 3, 4, 5 are between 0 and 1, 1 and 2, 2 and 0."""

@@ -45,7 +45,7 @@ class Solids:
             self.initial = sparse_zeros((sim.n_own, len(blocks[0].kind.components)))
         else:
             self.initial = sim.initial_stresses(sim.number[sim.owned])
-        self._said = self.initial.copy() if temperature_dependent else self.initial
+        self._assigned = self.initial.copy() if temperature_dependent else self.initial
         self.yielding, self.creeping = Yielding(sim, blocks), Creeping(sim, blocks)
         self.remembers = self.yielding.some or self.creeping.some
         if self.remembers:
@@ -78,14 +78,14 @@ class Solids:
             for of in self.blocks:
                 of.follow(part)
         if sim.stress0 is not None:
-            said = sim.stress0_row[sim.number[sim.owned]]
-            before = by_temperature.part_of_young(sim, said, by_temperature.unstressed(sim))
+            stress_row = sim.stress0_row[sim.number[sim.owned]]
+            before = by_temperature.part_of_young(sim, stress_row, by_temperature.unstressed(sim))
             if part is not None or before is not None:
                 ratio = np.ones(sim.n_own) if part is None else part.copy()
                 if before is not None:
-                    ratio /= np.where(said > 0, before, 1.0)
+                    ratio /= np.where(stress_row > 0, before, 1.0)
                 self.initial_part = ratio
-                self.initial[:] = self._said * ratio[:, None]
+                self.initial[:] = self._assigned * ratio[:, None]
         self.yielding.follow_heat()
 
     def _find_stress_without_strain(self) -> bool:
@@ -110,7 +110,7 @@ class Solids:
             return
         blocks, yielding, creeping = self.blocks, self.yielding, self.creeping
         for of in blocks:
-            of.said[:] = of.uncrept[:] = of.s0
+            of.elastic[:] = of.uncrept[:] = of.s0
         if creeping.some:
             creeping.relieve([(of, np.arange(of.count), of.uncrept, of.s0) for of in blocks])
         for of in blocks:
@@ -118,7 +118,7 @@ class Solids:
         if yielding.some:
             yielding.relieve([(of.initial, of.s0) for of in blocks])
         if yielding.some and creeping.some:  # some that creep may have yielded before, with another model
-            yielding.relieve([(of.said, of.uncrept) for of in blocks])
+            yielding.relieve([(of.elastic, of.uncrept) for of in blocks])
             creeping.relieve([(of, of.creeping, of.uncrept, of.s0) for of in blocks])
 
     # ---- in a step -------------------------------------------------------------------------------------------------
@@ -186,8 +186,8 @@ class Solids:
         if crept is not None:
             found = self.creeping.stored(crept)
             if plastic is not None:
-                initial = [of.said.copy() for of in self.blocks]
-                with_ = [(of, np.arange(of.count), of.said, s0) for of, s0 in zip(self.blocks, initial)]
+                initial = [of.elastic.copy() for of in self.blocks]
+                with_ = [(of, np.arange(of.count), of.elastic, s0) for of, s0 in zip(self.blocks, initial)]
                 self.creeping.relieve(with_, crept)
         for of, energy in zip(self.blocks, found):
             of.share_out(energy, more)
@@ -210,12 +210,12 @@ class Solids:
         stress = np.asarray(sim.surface_loads.eigenstress(sim))
         of = moduli(sim.element_rows, sim.options.plane_stress)
         bulk = of.bulk[sim.element_row[number]]
-        said = sim.initial_stresses(number) if sim.stress0 is not None else np.zeros((sim.n_own, 4))
+        initial = sim.initial_stresses(number) if sim.stress0 is not None else np.zeros((sim.n_own, 4))
         if (part := by_temperature.part_of_young(sim)) is not None:
             bulk = bulk * part
         if self.initial_part is not None:
-            said = said * self.initial_part[:, None]
-        mean = said[:, of.normal].sum(axis=1) / len(of.normal)
+            initial = initial * self.initial_part[:, None]
+        mean = initial[:, of.normal].sum(axis=1) / len(of.normal)
         energy = stress * (0.5 * stress + mean) / bulk * sim.areas[number]
         for block in self.blocks:
             if block.over_parts is not None:
