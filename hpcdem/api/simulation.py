@@ -259,8 +259,8 @@ class Simulation(ParticleCommands, BlockCommands):
         wall : its id.
         xmove, ymove : distance along x or y [m]; one of the two.
         print, save, ps, vtk : distance that the wall goes between two frames, checkpoints, vector pictures, .vtk files
-            [m]; left out, there is none until the end.
-        others : the same for outputs of a kind that was added.
+            [m]; omitted: only at the end.
+        others : this distance for outputs of an added kind.
         """
         self._refuse_only_blocks()
         engine = self.engine

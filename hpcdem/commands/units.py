@@ -22,7 +22,7 @@ def declared(before: str, name: str, log: Any, late: bool) -> str:
         raise CommandError(f"the units of this model are {units.CHOICES[before]} already; a new model can have others")
     if log is not None and not before:
         if late:
-            log.warn("units: values that were given before this line were not looked at")
+            log.warn("units: values given before this line were not checked")
         if new != units.SI.name:
             log.warn_once(
                 f"units {new}",

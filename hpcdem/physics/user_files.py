@@ -2,7 +2,7 @@
 that text.
 
 Only the file is known by its text: what it defines has the name FILE:FUNCTION and a digest of the text, which stands in
-checkpoints. What a checkpoint names is never looked for: the script names the file.
+checkpoints. The file named in a checkpoint is never opened: the script names the file.
 """
 
 from __future__ import annotations
@@ -116,9 +116,9 @@ def agreed(sim: Model, path: Path, what: str, kind: str, take: Callable[[str, st
 
 
 def in_turn(comm: Comm, act: Callable[[], None]) -> float:
-    """One rank of each machine type acts first, then one of each host, then the rest: what the first ones compile is
-    kept for the others (`made_of`). Returns the seconds that this took if it compiled something and took long enough to
-    be told, else 0. Collective."""
+    """Call act on one rank of each machine type first, then on one of each host, then on the rest, so that the others
+    load what the first compile (`made_of`). Returns the seconds that compilation took if that is worth a report, else
+    0. Collective."""
     from numba.core import event
 
     began = time.perf_counter()
@@ -135,7 +135,7 @@ def in_turn(comm: Comm, act: Callable[[], None]) -> float:
 def made_of(function: Callable[..., Any], path: str) -> str | None:
     """What a function of the file `path` is made of when it is compiled, besides the text of the file: values of the
     global names that it and the functions that it calls use. None if there is something among them of another file, or
-    of which that cannot be told: then what is compiled must not be kept."""
+    for which this is unknown: then compiled code must not be kept."""
     told: list[str] = []
     seen: set[FunctionType] = set()
 
@@ -205,7 +205,7 @@ def checked(
 ) -> list[str]:
     """The names of the arguments of a law, in their order. Wrong.
 
-    of: class of properties; base: properties that there are anyway; given: other arguments, of which it must take those
+    of: class of properties; base: properties that exist anyway; given: other arguments, of which it must take those
     of `needed`."""
     line, own, states = declared.line, declared.properties, declared.state
     for kind, things, wanted in (("property", own, of), ("state variable", states, StateVariable)):

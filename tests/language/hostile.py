@@ -38,7 +38,7 @@ LINES = [
     ("DRAW -interval 5", "expected a keyword: interval"),
     ("DRAW -bluff", "expected a keyword: interval"),
     ("PROP rubber", "rubber marks the bonds of the same line"),
-    ("PROP conserving", "conserving is said of the bonds of the same line"),
+    ("PROP conserving", "conserving applies to the bonds of the same line"),
     ("PROP xp 10e6 RANGE y {top} - 1000.0 {top}", "blanks are not allowed in an expression: write {top}-1000.0"),
     ("DEL RANGE y {top} - 1000.0", "blanks are not allowed in an expression: write {top}-1000.0"),
     ("DEL RANGE y {top}- 1000.0 {top}", "blanks are not allowed in an expression: write {top}-1000.0"),

@@ -118,7 +118,7 @@ def test_another_text_does_not_go_on(alone, launch, tmp_path):
     )
     done = launch(1, "again.py", "--no-figure", "--outdir", "other", cwd=folder)
     assert (
-        done.returncode != 0 and "of another text of pairs.py: with a changed law a run does not go on" in done.stderr
+        done.returncode != 0 and "of another text of pairs.py: a run cannot resume with a changed law" in done.stderr
     )
     shutil.copy(LAWS, folder)
     done = launch(1, "again.py", "--no-figure", "--outdir", "other", cwd=folder)

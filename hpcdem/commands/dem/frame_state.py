@@ -84,7 +84,7 @@ class _Discs:
         self.comm, self.gid, self._rows = comm, gid, rows
 
     def of(self, ids: np.ndarray) -> np.ndarray:
-        """(m, 4), zeros of those that there are not. Collective."""
+        """(m, 4), zeros where a row does not exist. Collective."""
 
         def answer(asked: np.ndarray) -> np.ndarray:
             out = np.zeros((len(asked), 4))

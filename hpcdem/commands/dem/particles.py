@@ -233,7 +233,7 @@ def gline(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """GLINE: a row of particles from p1 towards p2, of spacing 2 rad cratio; overlaps are not looked at.
+    """GLINE: a row of particles from p1 towards p2, of spacing 2 rad cratio; overlaps are not checked.
 
     Parameters
     ----------

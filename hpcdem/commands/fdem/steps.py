@@ -579,7 +579,7 @@ def _no_equilibrium(project: Project, watch: Watch, reason: str, ratio: float, f
 
 
 def _what_moves(project: Project) -> str:
-    """The body that slides away, or that there is none. Collective."""
+    """Describe the body that slides away, or state that none does. Collective."""
     body = convergence.sliding_body(project.blocks)
     if body is None:
         return "no body slides away: joints may still yield, loads may change, or rounding limits the ratio"

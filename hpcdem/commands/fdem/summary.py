@@ -67,7 +67,7 @@ FLUID_WORDS = {
 """Names of the entries of the budget of the fluid, volumes at its density at zero pressure."""
 PROPPANT_WORDS = {
     "came": "came by conditions and at the beginning", "stored": "in the channels", "packed": "of it packed",
-    "left": "left with fluid that was taken out", "removed": "gone with channels that were taken away",
+    "left": "left with fluid that was removed", "removed": "gone with channels that were taken away",
     "closing": "closing error",
 }  # fmt: skip
 """Names of the entries of the budget of proppant."""

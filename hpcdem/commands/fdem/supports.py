@@ -1,4 +1,4 @@
-"""What is said to bolts and liners in the same way."""
+"""Commands that bolts and liners share."""
 
 from __future__ import annotations
 

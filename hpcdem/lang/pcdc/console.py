@@ -118,7 +118,7 @@ def _broken_is_whole(text: str) -> bool:
 
 
 def _statements(python: str) -> int:
-    """How many statements of Python a text has; 1 if that cannot be said."""
+    """Count the Python statements of a text; 1 if it cannot be parsed."""
     try:
         return len(ast.parse(python).body)
     except (SyntaxError, ValueError, RecursionError, MemoryError):

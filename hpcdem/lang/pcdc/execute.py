@@ -1,7 +1,7 @@
-"""Carries out a script: runs its Python, and hands every command to a function of `hpcdem.commands.fdem`.
+"""Execute a script: run its Python, and call a function of `hpcdem.commands.fdem` for each command.
 
-The Python of a script runs on every rank; its commands are collective. Before one is carried out the ranks compare
-what they were told, so that a rank that took another way is found at once.
+The Python of a script runs on every rank; its commands are collective. Before executing a command the ranks compare
+what they received, so that a rank that takes another branch is detected immediately.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from hpcdem.lang.pcdc.views import Model
 from hpcdem.runtime.progress import write
 
 LOOK = -1
-"""In the place of the number of a command: values of the model are asked for."""
+"""Used instead of the number of a command when a script queries values of the model."""
 SEED = 0
 """Of the random numbers of Python and numpy, so that all ranks draw the same."""
 

@@ -22,7 +22,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, PhysicsError, ScriptError, UsageError
 
 MOST = 64 << 20
-"""Bytes of answers that are kept; of a script that looked at more no run can resume from a checkpoint."""
+"""Largest size of recorded answers in bytes; a run whose script queried more cannot resume from a checkpoint."""
 ENTRY = 32
 """Bytes that an entry counts for at least."""
 
@@ -149,7 +149,7 @@ class Journal:
         return value
 
     def call_again(self) -> None:
-        """Call the functions that were called in the command or method that is being passed over."""
+        """Call the functions that the skipped command or method had called."""
         while self.replays and self._past[self._at][0] == CALL:
             number = self._past[self._at][1]
             if number >= len(self.functions):
@@ -178,9 +178,10 @@ class Journal:
         return self._at < len(self._past)
 
     def meet(self, checksum: int) -> bool:
-        """The script comes to a command that it came to before. True if it is the one to continue with, False if it is
-        to be passed over; functions that were called in it are called. UsageError if it is another one; the error that
-        it met is raised again."""
+        """Compare the next command of the script with the recorded one.
+
+        Returns True if the run continues with this command, False if the command is skipped; functions that it had
+        called are called. Raises UsageError if it is another command, and an error that it had raised."""
         if self._past[self._at] != [COMMAND, checksum]:
             raise self._other_way("another line, or other values, were executed there before")
         self._next()
@@ -191,7 +192,7 @@ class Journal:
         return False
 
     def names(self) -> dict[str, Any] | None:
-        """What the command that was just passed over brought, if it was `model restore`."""
+        """Return the names that the command just skipped had restored, if it was `model restore`."""
         return self._next()[1] if self.replays and self._past[self._at][0] == NAMES else None
 
     def _fail_again(self) -> None:

@@ -106,7 +106,7 @@ def _prop(s: Statement) -> None:
             )
     first = [key for key in BOND_MODEL_1 if key in s.arguments]
     second = [key for key in BOND_MODEL_2 if key in s.arguments]
-    for word, does in (("rubber", "marks"), ("conserving", "is said of")):
+    for word, does in (("rubber", "marks"), ("conserving", "applies to")):
         if word in s.arguments and not first and not second:
             raise s.error(f"{word} {does} the bonds of the same line; give their strengths with it")
     if first and second:

@@ -3,8 +3,8 @@
 The strips of the particles and those of the blocks stay what they are. At a search all ranks learn the boxes around
 each one's discs, the free faces in a box go there, and the owners of discs answer which faces have a disc near. Every
 step the ends of these faces travel to the owners of the discs, who compute the contacts, and their forces travel back;
-the owner of a face adds them up in the order of gids. So sums know no ranks, and only those exchange messages who share
-a contact.
+the owner of a face adds them up in the order of gids. The sums do not depend on the ranks, and only ranks that share a
+contact exchange messages.
 """
 
 from __future__ import annotations

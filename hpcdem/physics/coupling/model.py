@@ -289,7 +289,7 @@ class Coupled(SurfaceLoad):
 
     def settle_time_step(self, dt: float = 0.0) -> float:
         """Give both the same time step and return it [s]: `dt`; else what was set for one of them or for both alike
-        (SET dt, model time-step); else `stable_time_step`. CommandError if they were told different ones."""
+        (SET dt, model time-step); else `stable_time_step`. CommandError if particles and blocks have different ones."""
         particles, blocks = self.particles, self.blocks
         self._check_options()
         steps = [value for value in (particles.settings.dt, blocks.options.dt) if value > 0.0]
@@ -322,8 +322,8 @@ class Coupled(SurfaceLoad):
         return settings.dt, settings.frac, self.blocks.options.dt
 
     def heed_time_step(self, by_frac: Callable[[], float]) -> None:
-        """Settle the time step again if a command has said one, for particles or blocks, since that was done. by_frac:
-        what SET frac asks for [s], 0 without it. CommandError if the two were told different ones."""
+        """Settle the time step again if a command has assigned one to particles or blocks since then. by_frac:
+        the step that SET frac requests [s], 0 without it. CommandError if particles and blocks have different ones."""
         if self._assigned_steps() == self._settled:
             return
         (dt, _, value), (dt_before, _, value_before) = self._assigned_steps(), self._settled

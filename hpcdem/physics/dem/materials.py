@@ -12,12 +12,12 @@ from hpcdem.core.errors import CommandError
 from hpcdem.core.material import PROPERTIES
 
 OWN = tuple(f"own{k}" for k in range(8))
-"""Columns for the properties that a law of the user declares, in their order."""
+"""Columns for the properties that a user law declares, in their order."""
 MOST_LAWS = 64
 """Laws of the user in a model."""
 _FIRST = ("density", "fric", "shear", "poiss", "damp", "kn", "ks", "hertz", "xp", "yp", "law", *OWN)
 MATERIAL = np.dtype([(name, "f8") for name in (*_FIRST, *(name for name in PROPERTIES if name not in _FIRST))])
-"""Properties of `core.material`; 1 for the Hertz-Mindlin law; number of the law of the user (user_laws.py), and its
+"""Properties of `core.material`; 1 for the Hertz-Mindlin law; number of the user law (user_laws.py), and its
 properties. New columns are at the end: older checkpoints have the first ones, in this order."""
 
 BOND_TYPE = np.dtype(

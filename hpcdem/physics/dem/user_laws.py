@@ -19,13 +19,13 @@ arguments are numbers by these names:
 - kn, ks, fric, shear, poiss, and its own properties, each of the two discs mixed: kn and ks as springs in series, the
   smaller fric, the mean of shear and poiss, its own as they say.
 
-`stiffness`, a number [N/m] or a function of these properties, is what dFn/du and dFs/ds are never above; without it the
-kn and ks of the pair. The time step follows from it. `energy`, a function of u, fs, two_rt, state variables and
+`stiffness`, a number [N/m] or a function of these properties, is an upper bound of dFn/du and dFs/ds (default: the kn
+and ks of the pair). The time step follows from it. `energy`, a function of u, fs, two_rt, state variables and
 properties, returns what a contact stores [J] in its normal and in its shear direction; without it no account of energy
 can be kept.
 
-A model may have several laws (`ModelLaws`): pairs of discs with the same one follow it, and what discs with two of them
-do is said for these two.
+A model may have several laws (`ModelLaws`). Pairs of discs with one law follow it; a law for pairs of discs with two
+different laws is assigned separately.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ class PairLaw:
 
 
 class ModelLaws:
-    """The laws of the user in a model. Their numbers, in the column law of materials, are 1, 2, ... in the order in
+    """The user laws of a model. Their numbers, in the column law of materials, are 1, 2, ... in the order in
     which they were given to discs, and never change their meaning.
 
     between: for two numbers, the lower first, of discs that touch: the number of the law of such pairs, and values of
@@ -196,7 +196,7 @@ class ModelLaws:
         return ", ".join(law.title for law in self.laws)
 
     def unaccounted(self) -> str:
-        """The first law of which it is not known what it stores; empty if there is none."""
+        """Return the title of the first law that declares no stored energy; empty if all declare it."""
         return next((law.title for law in self.laws if law.declared.energy is None), "")
 
     def number(self, name: str) -> int:
@@ -224,7 +224,7 @@ class ModelLaws:
         """Its number, which is a new one if need be. Collective."""
         if not self.number(law.name):
             if len(self.laws) == MOST_LAWS:
-                raise CommandError(f"a model can have {MOST_LAWS} laws of the user, it has that many")
+                raise CommandError(f"a model can have at most {MOST_LAWS} user laws, and has that many")
             self.take((*self.laws, law), sim)
         return self.number(law.name)
 
@@ -449,7 +449,7 @@ def _known(name: str) -> PairLaw:
     raise UnknownLaw(
         f"the checkpoint has discs with the law {title}, "
         + (
-            f"of another text of {title.rpartition(':')[0]}: with a changed law a run does not go on"
+            f"of another text of {title.rpartition(':')[0]}: a run cannot resume with a changed law"
             if other
             else f"which this script has not named: PROP law {title} in any line of it does"
         )

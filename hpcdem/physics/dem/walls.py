@@ -8,7 +8,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import BOX_IDS
 
 OLD_SIDES = ("left", "right", "bottom", "top")
-"""The walls with ids -1 to -4 in checkpoints that know no column `side`."""
+"""The walls with ids -1 to -4 in checkpoints without the column `side`."""
 
 _SIDES = f"{min(BOX_IDS.values())} to {max(BOX_IDS.values())}"
 

@@ -228,7 +228,7 @@ class Assignments(Settings):
         if not all(map(_is_number, given.values())):
             old, names, which = old, names[which], np.arange(len(of))  # one set for each object
         else:
-            old, of = present, of[np.unique(which, return_index=True)[1]]  # one for each that there is
+            old, of = present, of[np.unique(which, return_index=True)[1]]  # one for each that exists
         made = []
         for name in np.unique(names).tolist():
             at, model = np.flatnonzero(names == name), properties.MODELS[name]

@@ -337,7 +337,7 @@ def stresses(x, triangle_rows, quad_rows, c, q, s0, quad_s0, small, first, stres
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def relink(state, slots, each, lists, head, follow):
-    """The lists of joints behind their peak, `lists` of them for each block of `each` slots, from the states of these
+    """Make the lists of joints past their peak, `lists` of them for each block of `each` slots, from their states
     (slots,)."""
     for b in range(len(head)):
         head[b] = -1

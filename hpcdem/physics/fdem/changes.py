@@ -1,4 +1,4 @@
-"""Changes of a model between steps: elements taken out and brought back, cracks made, velocities set."""
+"""Changes of a model between steps: elements are excavated or restored, cracks made, velocities assigned."""
 
 from __future__ import annotations
 

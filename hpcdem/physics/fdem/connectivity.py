@@ -132,7 +132,7 @@ def corner_counts(cells: np.ndarray) -> np.ndarray:
 
 
 def find_edges(edges: Edges, pairs: np.ndarray, n_points: int) -> np.ndarray:
-    """(k,) i8 rows of `edges` that join these pairs (k, 2) of points, in either direction; -1 where there is none."""
+    """(k,) i8 rows of `edges` that join these pairs (k, 2) of points, in either direction; -1 where no edge does."""
     pairs = np.asarray(pairs, np.int64).reshape(-1, 2)
     if not len(pairs) or not len(edges):
         return np.full(len(pairs), -1, np.int64)
@@ -182,7 +182,7 @@ def _corner_roots(cells, partner, jointed, parent):
 
 
 def corner_clusters(cells: np.ndarray, partner: np.ndarray, jointed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes: sets of corners at one point that hang together through faces without a joint.
+    """Find the nodes: sets of corners at one point that are connected through faces without a joint.
 
     `jointed` (4 ne,) bool marks the faces with a joint (one face of the two is enough). Returns (node (ne, 4) i8 of
     each corner, -1 for the fourth of a triangle; lead (nn,) i8, the lowest corner of each node). Nodes are numbered
@@ -213,7 +213,7 @@ def _element_roots(partner, parent):
 def bodies(partner: np.ndarray) -> np.ndarray:
     """(ne,) i8 number of the body of each element, bodies counted by their lowest element.
 
-    A body hangs together through faces with a partner; set partner[face] = -1 on both sides to cut there.
+    Elements of one body are connected through faces with a partner; set partner[face] = -1 on both sides to cut there.
     """
     root = np.empty(len(partner) // 4, np.int64)
     _element_roots(partner, root)
@@ -248,7 +248,7 @@ def boundary_loops(cells: np.ndarray, partner: np.ndarray) -> list[np.ndarray]:
     """Surface faces in walking order, one array (m,) i8 per loop, the body to the left (outlines counter-clockwise).
 
     Each loop starts with its lowest face, and loops come in the order of these. Where a body touches itself in a point
-    the walk stays with the elements that hang together there.
+    the walk stays on the elements that are connected there.
     """
     surface = int((partner < 0).sum())
     order, starts = np.empty(surface, np.int64), np.empty(surface + 1, np.int64)

@@ -145,8 +145,8 @@ def watch(sim: Blocks, window: int | None = None, limit: int | None = None, ends
 
     ends: the run ends by itself, so that usually there is neither. Otherwise the limit is 1 000 000 static or
     10 000 000 dynamic steps, and the window of static runs ten times as long as a wave takes there and back, at
-    least 20 000 steps; waves in motion die down as slowly as their damping is low, so there is none in dynamic
-    runs."""
+    least 20 000 steps; waves decay slowly where damping is low, so
+    dynamic runs have no such limit."""
     for name, value in (("window", window), ("limit", limit)):
         if value is not None and value < 0:
             raise CommandError(f"{name} must not be negative, got {value}")

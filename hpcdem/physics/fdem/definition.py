@@ -108,7 +108,7 @@ class ModelDefinition(Conditions):
 
 
 _OPEN = {"least": -math.inf, "greatest": math.inf}
-"""JSON knows no infinity."""
+"""Infinite defaults, stored as null because JSON has no infinity."""
 
 
 def _plain(field: dict[str, Any]) -> dict[str, Any]:

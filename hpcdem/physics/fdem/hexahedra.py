@@ -119,7 +119,7 @@ def halves(cells: np.ndarray, hexes: np.ndarray) -> np.ndarray:
     _, of = places(cells, hexes)
     inside = 4 * np.arange(PARTS)[:, None, None] + tetrahedra.FACES
     side = _SIDE_OF[tuple(np.moveaxis(of[:, inside.reshape(-1, 3)], 2, 0))]
-    order = np.argsort(side, axis=1, kind="stable")[:, -2 * len(FACES) :]  # inner faces come first
+    order = np.argsort(side, axis=1, kind="stable")[:, -2 * len(FACES) :]  # inner faces lead
     return (4 * hexes[:, 8, None] + order).reshape(-1, len(FACES), 2)
 
 

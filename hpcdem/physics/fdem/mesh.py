@@ -1,8 +1,8 @@
 """The mesh of the blocks: points, elements, and what is known about them before the first step.
 
 In the plane elements are triangles and quads, in space tetrahedra. Points, elements (cells), faces and edges are
-numbered for the whole model, see `connectivity` and `tetrahedra`; the numbers know no ranks. In space what the plane
-calls an edge is a face with three points. `hpcdem.pre.mesh` makes meshes.
+numbered for the whole model, see `connectivity` and `tetrahedra`; the numbers do not depend on ranks. In space what the
+plane calls an edge is a face with three points. `hpcdem.pre.mesh` makes meshes.
 """
 
 from __future__ import annotations
@@ -261,7 +261,7 @@ class Mesh:
         return found
 
     def find_edges(self, edges: Edges, points: np.ndarray) -> np.ndarray:
-        """(k,) i8 rows of `edges` with these points (k, 2), in space (k, 3); -1 where there is none."""
+        """(k,) i8 rows of `edges` with these points (k, 2), in space (k, 3); -1 where the mesh has no such edge."""
         found: np.ndarray = self._of.find_edges(edges, points, len(self.points))
         return found
 
@@ -324,7 +324,7 @@ def _sorted_pairs(pairs: np.ndarray, dim: int) -> np.ndarray:
 
 
 def edge_rows(mesh: Mesh, edges: Edges, layer: str) -> np.ndarray:
-    """Rows of `edges` that lie on a geometry layer; HpcdemError if the mesh knows no such layer."""
+    """Rows of `edges` that lie on a geometry layer; HpcdemError if the mesh has no such layer."""
     if layer not in mesh.layers:
         raise HpcdemError(f"the mesh has no edges of a layer '{layer}' (layers: {_listed(mesh.layers)})")
     return np.sort(mesh.find_edges(edges, mesh.layers[layer]))
@@ -453,7 +453,7 @@ def _bad_points(mesh: Mesh, names: Names) -> str | None:
         p, q = min((int(min(t)), int(max(t))) for t in twins)
         return (
             f"points {names.point(p)} and {names.point(q)} lie in the same place {_at(mesh, p)} of one body: elements "
-            "on both sides would not hang together; merge the points (a crack between them is an edge flagged as crack)"
+            "on both sides would not be connected; merge the points (a crack between them is an edge flagged as crack)"
         )
     return None
 

@@ -14,7 +14,7 @@ OUTSIDE, MUCH = 1e-6, 1e-3
 """Part of its largest component by which a stress must be beyond the strength to be spoken of: one that was given, one
 that relaxation begins with."""
 LOCKS = 0.45
-"""Poisson's ratio above which tetrahedra are said to lock."""
+"""Poisson's ratio above which a notice says that tetrahedra lock."""
 
 
 def tell_of_tables(sim: Any) -> None:

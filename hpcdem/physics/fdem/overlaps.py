@@ -1,8 +1,8 @@
 """Bodies that overlap: before anything has moved, and later so deep that contact no longer tells inside from outside;
 where, and how deep.
 
-Contact would throw them apart: an overlap d stores 3/2 P d^2 (1/h_1 + 1/h_2) per area, and the pressure is 60 E d/h at
-P = 10 E. So the first step of a new model is refused, unless overlaps are requested.
+Contact would repel them violently: an overlap d stores 3/2 P d^2 (1/h_1 + 1/h_2) per area, and the pressure is 60 E d/h
+at P = 10 E. So the first step of a new model is refused, unless overlaps are requested.
 """
 
 from __future__ import annotations

@@ -167,10 +167,10 @@ class Surfaces:
         [Pa], tan(phi), and the columns of the table of dampers, face i on the first side.
 
         The smaller of both (damping: what damps more). Where neither says anything: the normal stress of two jointed
-        elements goes on when the joint between them breaks closed, P = P_overlay / (3 h (1 / h_i + 1 / h_j)), h_i, h_j:
-        altitudes on the joint of length h; otherwise 10 E. shared (m,) [m2]: length squared of the face that both
-        elements have in common in the mesh, 0: there is none (the mean edges then take its place); overlay (m,) [Pa]:
-        of the joint that was there, else NaN.
+        elements continues when the joint between them breaks closed, P = P_overlay / (3 h (1 / h_i + 1 / h_j)), h_i,
+        h_j: altitudes on the joint of length h; otherwise 10 E. shared (m,) [m2]: length squared of the face that both
+        elements have in common in the mesh, 0 for none (the mean edges then replace it); overlay (m,) [Pa]: of the
+        joint that was there, else NaN.
 
         T is shared out between the two contactors as their stress is, 3 P d over the altitude of the other one, so that
         both reach their part at the same overlap and bear T together.

@@ -1,5 +1,6 @@
 """Broken joints whose faces lie opposite each other, while blocks and fluid go by implicit steps: they are joints
-without strength for so long, which press by their penalty and rub, and free faces again afterwards.
+without strength for that time, which transmit compression by their penalty and friction, and free faces again
+afterwards.
 
 What they remember of their slip (SLIPPED, the line that friction unloads along) is kept in between by face, so that
 one command after another ends where both would have ended at once.

@@ -253,9 +253,9 @@ _SOLID = (
     Property("density", "kg/m3", "density", low_itself=False),
     Property("young", "Pa", "Young's modulus E", optional=True, low_itself=False),
     Property("poisson_ratio", "1", "Poisson's ratio", optional=True, low=-1.0, high=0.4999, low_itself=False),
-    Property("shear", "Pa", "shear modulus, with the bulk modulus in the place of E and Poisson's ratio",
+    Property("shear", "Pa", "shear modulus; with the bulk modulus it replaces E and Poisson's ratio",
              optional=True, low_itself=False),
-    Property("bulk", "Pa", "bulk modulus, with the shear modulus in the place of E and Poisson's ratio",
+    Property("bulk", "Pa", "bulk modulus; with the shear modulus it replaces E and Poisson's ratio",
              optional=True, low_itself=False),
     Property("damp_factor", "1", "viscous damping, part of the critical 2 L sqrt(rho E); without effect in static "
              "runs", 0.0),
@@ -293,7 +293,7 @@ _STRENGTH_BY_TEMPERATURE = (
 MECH_MOHR_COULOMB = Model(
     "mech_mohr_coulomb",
     ELEMENT,
-    "elastic up to the strength of Mohr and Coulomb or in tension, then plastic",
+    "elastic up to the Mohr-Coulomb or tensile strength, then plastic",
     (
         *_SOLID_BY_TEMPERATURE,
         _friction("internal friction angle; also that of its surfaces where they have no contact model", softens=True),
@@ -311,14 +311,14 @@ MECH_MOHR_COULOMB = Model(
 USER = Model(
     "user",
     ELEMENT,
-    "a law of the user, in a Python file: what its elements have beside what the law declares",
+    "a user law, in a Python file: properties of its elements in addition to those that the law declares",
     (*_SOLID, *_ELASTIC),
     _elastic,
 )  # fmt: skip
 
 
 def _kelvin_zz(values: dict[str, Any]) -> None:
-    """The strain of a Kelvin unit has no volume: zz is -xx - yy, also where it is said."""
+    """The strain of a Kelvin unit has no volume: zz is -xx - yy, also where it is assigned."""
     xx, yy = (np.asarray(values[name]) for name in ("kelvin_strain_xx", "kelvin_strain_yy"))
     zz = np.asarray(values.setdefault("kelvin_strain_zz", 0.0 - xx - yy))
     wrong = np.abs(xx + yy + zz) > 1e-9 * np.maximum(np.maximum(np.abs(xx), np.abs(yy)), np.abs(zz))
@@ -333,16 +333,16 @@ KELVIN_STRAIN = {
     2: ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy"),
     3: ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy", "kelvin_strain_xz", "kelvin_strain_yz"),
 }
-"""Of them elements are told, in the plane and in space; zz follows."""
+"""Components that a command assigns, in the plane and in space; zz follows."""
 MECH_BURGERS = Model(
     "mech_burgers",
     ELEMENT,
     "elastic in its volume, creeping in its shape after Burgers",
     (
         *(one for one in _SOLID if one.name not in ("shear", "bulk")),
-        Property("bulk", "Pa", "bulk modulus; in the place of the one that E and Poisson's ratio give", optional=True,
+        Property("bulk", "Pa", "bulk modulus, instead of the one that E and Poisson's ratio give", optional=True,
                  low_itself=False),
-        Property("maxwell_shear", "Pa", "shear modulus of the Maxwell unit; in the place of the one that E and "
+        Property("maxwell_shear", "Pa", "shear modulus of the Maxwell unit, instead of the one that E and "
                  "Poisson's ratio give", optional=True, low_itself=False),
         Property("maxwell_viscosity", "Pa s", "viscosity of the Maxwell unit; 0: no dashpot", 0.0),
         Property("kelvin_shear", "Pa", "shear modulus of the Kelvin unit; 0: no Kelvin unit", 0.0),
@@ -351,7 +351,7 @@ MECH_BURGERS = Model(
                    low=-math.inf)
           for name in KELVIN_STRAIN[2]),
         _friction("friction angle of its surfaces where they have no contact model"),
-        Property("kelvin_strain_zz", "1", "strain zz of the Kelvin unit at that moment, to be said of all three",
+        Property("kelvin_strain_zz", "1", "strain zz of the Kelvin unit at that time; assign all three",
                  low=-math.inf, optional=True, otherwise="-xx - yy", dims=(3,)),
         *(Property(name, "1", f"strain {name[-2:]} of the Kelvin unit at that moment", 0.0, low=-math.inf, dims=(3,))
           for name in KELVIN_STRAIN[3][3:]),

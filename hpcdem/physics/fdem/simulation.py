@@ -59,14 +59,14 @@ OUTSIDE, MUCH = 1e-6, 1e-3
 """Part of its largest component by which a stress must be beyond the strength to be spoken of: one that was given, one
 that relaxation begins with."""
 LOCKS = 0.45
-"""Poisson's ratio above which tetrahedra are said to lock."""
+"""Poisson's ratio above which a notice says that tetrahedra lock."""
 
 
 class Blocks(Edited):
     """One model of blocks on one communicator. Every method is collective unless it says otherwise.
 
-    Numbers are those of the mesh, from 0, and know no ranks: elements are rows of `mesh.cells`, nodes are rows of
-    `mesh.points`, faces are element * 4 + local edge, joints have the number of their lower face. Arguments called
+    Numbers are those of the mesh, from 0, and do not depend on ranks: elements are rows of `mesh.cells`, nodes are rows
+    of `mesh.points`, faces are element * 4 + local edge, joints have the number of their lower face. Arguments called
     elements, nodes, faces, joints take an array of numbers, or None for all. What is assigned to a node holds for all
     corners of elements at that point, and stays with them when joints break. Step and rebuild are here; what acts on a
     model are functions: diagnostics, changes between steps, many steps (convergence), equilibrium at once, saved_state.

@@ -41,8 +41,8 @@ _TURNS = _turns()
 
 
 def canonical(cells: np.ndarray) -> np.ndarray:
-    """The same tetrahedra (ne, 4), turned so that their lowest point comes first and the second lowest next: both sides
-    of a face then begin at the same point of it."""
+    """Turn tetrahedra (ne, 4) so that their lowest point leads and the second lowest follows: both sides of a face
+    then begin at the same point of it."""
     order = np.argsort(cells, axis=1, kind="stable")
     return np.take_along_axis(cells, _TURNS[order[:, 0], order[:, 1]], axis=1) if len(cells) else cells
 
@@ -97,7 +97,7 @@ def edges_of(cells: np.ndarray, _points: int = 0, partner: np.ndarray | None = N
 
 
 def find_edges(faces: Edges, points: np.ndarray, _points: int = 0) -> np.ndarray:
-    """(k,) i8 rows of `faces` with these points (k, 3) in any order; -1 where there is none."""
+    """(k,) i8 rows of `faces` with these points (k, 3) in any order; -1 where the mesh has no such face."""
     points = np.sort(np.asarray(points, np.int64).reshape(-1, 3), axis=1)
     if not len(points) or not len(faces):
         return np.full(len(points), -1, np.int64)
@@ -132,7 +132,7 @@ def _corner_roots(cells, partner, faces, apart, parent):
 
 
 def corner_clusters(cells: np.ndarray, partner: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes: sets of corners at one point that hang together through faces that are not `apart` (4 ne,) bool. Returns
+    """Nodes: sets of corners at one point that are connected through faces that are not `apart` (4 ne,) bool. Returns
     (node (ne, 4) i4, lead (nn,) i8), see `connectivity.corner_clusters`."""
     root = np.empty(4 * len(cells), np.int64)
     _corner_roots(cells, partner, FACES, np.asarray(apart, bool), root)

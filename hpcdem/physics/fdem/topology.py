@@ -27,7 +27,7 @@ class Topology:
     partner: np.ndarray
     """(4 ne,) the face on the other side of each face, -1: none."""
     alive: np.ndarray
-    """(ne,) bool: elements that were not taken out."""
+    """(ne,) bool: elements that are present (not excavated)."""
     touches: np.ndarray
     """(ne,) bool: elements that have contact."""
     joint_row: np.ndarray

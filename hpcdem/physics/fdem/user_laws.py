@@ -29,7 +29,7 @@ tetrahedra. The time step follows from
 lambda + 2 mu of the moduli.
 
 Only the file is known by its text: a law has the name FILE:FUNCTION and a digest of the text, which stands in
-checkpoints. What a checkpoint names is never looked for: the script names the file.
+checkpoints. The file named in a checkpoint is never opened: the script names the file.
 """
 
 from __future__ import annotations
@@ -300,7 +300,7 @@ def check_plane_stress(sim: State) -> None:
 
 
 def some(sim: State) -> str:
-    """An element with a law of the user, for messages."""
+    """Name an element that has a user law, for messages."""
     return f"element {np.flatnonzero((numbers(sim) > 0) & sim.alive)[0]}"
 
 
@@ -324,7 +324,7 @@ def begin(sim: State) -> None:
 
 
 def _kinds(sim: State, law: UserLaw, some: np.ndarray | None = None) -> list[str]:
-    """Kinds of elements that there are, among some of them (ne,) bool; without any the simple one."""
+    """Kinds of the selected elements (ne,) bool; the simple kind if none is selected."""
     simple, several = ("triangle", "quad") if law.dims == (2,) else ("tetrahedron", "hexahedron")
     if sim.mesh is None or sim.mesh.dim not in law.dims:
         return [simple]
@@ -362,9 +362,7 @@ def quantity(sim: State, variable: str) -> str:
     found = quantities(sim)
     if OF_LAW + variable not in found:
         known_ = ", ".join(name.removeprefix(OF_LAW) for name in found) or "none"
-        raise CommandError(
-            f"no law of the user that elements have has a state variable '{variable}'; there is {known_}"
-        )
+        raise CommandError(f"no user law of the elements has a state variable '{variable}'; available: {known_}")
     return OF_LAW + variable
 
 
@@ -401,7 +399,7 @@ def check_restored(state: Mapping[str, Any]) -> None:
         raise UnknownLaw(
             f"the checkpoint has elements with the law {title}, "
             + (
-                f"of another text of {title.rpartition(':')[0]}: with a changed law a run does not go on"
+                f"of another text of {title.rpartition(':')[0]}: a run cannot resume with a changed law"
                 if other
                 else "which this script has not named: element law 'FILE:FUNCTION' before model restore does"
             )

@@ -180,7 +180,7 @@ def creeping_in_space(threads: int = 1) -> None:
 
 
 def tangent_in_space(threads: int = 1) -> None:
-    """Those of the static solve of tetrahedra: with joints, of which one is behind its peak, and yielding."""
+    """Those of the static solve of tetrahedra: with joints, of which one is past its peak, and yielding."""
     sim = _in_space(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
     sim.initial_stress(None, yy=1e3)
     sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
@@ -281,7 +281,7 @@ def in_space(threads: int = 1) -> None:
 
 
 def _rest(mesh: Mesh, threads: int) -> None:
-    """One body at rest, of which an element is taken out slowly."""
+    """One body at rest, of which an element is removed gradually."""
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)

@@ -66,7 +66,7 @@ class Faces(Channels):
         return sides, free[self._is_wet(free)]
 
     def _is_wet(self, free: np.ndarray) -> np.ndarray:
-        """Free faces (k,) before which water is said to stand, and on which no stress is prescribed."""
+        """Return the free faces (k,) that are assigned to be wet and carry no prescribed stress."""
         return (self.wet_bits[free] > 0) & ~self.blocks.stressed(free)
 
     def _sides_and_free(self) -> tuple[np.ndarray, np.ndarray]:

@@ -365,7 +365,7 @@ class Fluid:
 
 
 def reference_pressure(flow: Flow, stress: float) -> float:
-    """p0 [Pa]: about the largest pressure that there is or will be; stress: of the rock, 0 if it is at rest."""
+    """p0 [Pa]: estimate of the largest pressure now or later; stress: that of the rock, 0 if it is at rest."""
     table = flow.conditions_at(flow.time)
     used = table[np.unique(flow.condition)]
     pressures = used[used[:, 0] == kernels.PRESSURE, 1]

@@ -34,7 +34,7 @@ class Outlines:
 
     @property
     def arcs_each(self) -> int:
-        """Arcs of every outline; 0 if they differ, or if there is none."""
+        """Number of arcs of every outline; 0 if the outlines differ or there are no outlines."""
         number = np.diff(self.start)
         return int(number[0]) if len(number) and (number == number[0]).all() else 0
 

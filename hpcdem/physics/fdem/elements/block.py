@@ -106,7 +106,7 @@ class ElementBlock:
         s0 = self.s0 if s0 is None else s0
         return s0.reshape(len(s0), s0.shape[1] * s0.shape[2])
 
-    # ---- what elements remember, and what owned elements are told ----------------------------------------------------
+    # ---- state variables of elements, and tables of owned elements ---------------------------------------------------
 
     def remember(self) -> None:
         """Some elements of the model yield or creep."""

@@ -49,7 +49,8 @@ from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW, TENSION_NOW
 from hpcdem.physics.fdem.six import kernels as six
 
 KEPT = 1e-6
-"""Part of the elastic stiffness that an element keeps in the tangent: at the tip of the surface there is none."""
+"""Part of the elastic stiffness that an element keeps in the tangent, which would be zero at the tip of the yield
+surface."""
 PAIRS = ((0, 1), (0, 2), (1, 2))
 
 
