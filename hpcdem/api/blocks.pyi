@@ -666,8 +666,8 @@ class Elements(Stressed):
         density : density [kg/m3].
         young : Young's modulus E [Pa].
         poisson_ratio : Poisson's ratio.
-        shear : shear modulus, with the bulk modulus in the place of E and Poisson's ratio [Pa].
-        bulk : bulk modulus, with the shear modulus in the place of E and Poisson's ratio [Pa].
+        shear : shear modulus; with the bulk modulus it replaces E and Poisson's ratio [Pa].
+        bulk : bulk modulus; with the shear modulus it replaces E and Poisson's ratio [Pa].
         damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs (default:
             0).
         friction : friction angle of its surfaces where they have no contact model [degrees] (default: 0).
@@ -715,8 +715,8 @@ class Elements(Stressed):
         density : density [kg/m3].
         young : Young's modulus E [Pa].
         poisson_ratio : Poisson's ratio.
-        shear : shear modulus, with the bulk modulus in the place of E and Poisson's ratio [Pa].
-        bulk : bulk modulus, with the shear modulus in the place of E and Poisson's ratio [Pa].
+        shear : shear modulus; with the bulk modulus it replaces E and Poisson's ratio [Pa].
+        bulk : bulk modulus; with the shear modulus it replaces E and Poisson's ratio [Pa].
         friction : internal friction angle; also that of its surfaces where they have no contact model [degrees]
             (default: 0).
         cohesion : cohesion [Pa] (default: 0).
@@ -755,8 +755,8 @@ class Elements(Stressed):
         density : density [kg/m3].
         young : Young's modulus E [Pa].
         poisson_ratio : Poisson's ratio.
-        shear : shear modulus, with the bulk modulus in the place of E and Poisson's ratio [Pa].
-        bulk : bulk modulus, with the shear modulus in the place of E and Poisson's ratio [Pa].
+        shear : shear modulus; with the bulk modulus it replaces E and Poisson's ratio [Pa].
+        bulk : bulk modulus; with the shear modulus it replaces E and Poisson's ratio [Pa].
         damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs (default:
             0).
         friction : friction angle of its surfaces where they have no contact model [degrees] (default: 0).
@@ -796,17 +796,16 @@ class Elements(Stressed):
         density : density [kg/m3].
         young : Young's modulus E [Pa].
         poisson_ratio : Poisson's ratio.
-        bulk : bulk modulus; in the place of the one that E and Poisson's ratio give [Pa].
+        bulk : bulk modulus, instead of the one that E and Poisson's ratio give [Pa].
         kelvin_shear : shear modulus of the Kelvin unit; 0: no Kelvin unit [Pa] (default: 0).
         kelvin_viscosity : viscosity of the Kelvin unit; 0: no Kelvin unit [Pa s] (default: 0).
-        maxwell_shear : shear modulus of the Maxwell unit; in the place of the one that E and Poisson's ratio give
-            [Pa].
+        maxwell_shear : shear modulus of the Maxwell unit, instead of the one that E and Poisson's ratio give [Pa].
         maxwell_viscosity : viscosity of the Maxwell unit; 0: no dashpot [Pa s] (default: 0).
         kelvin_strain_xx : strain xx of the Kelvin unit at that moment; its zz is -xx - yy (default: 0).
         kelvin_strain_yy : strain yy of the Kelvin unit at that moment; its zz is -xx - yy (default: 0).
         kelvin_strain_xy : strain xy of the Kelvin unit at that moment; its zz is -xx - yy (default: 0).
-        kelvin_strain_zz : strain zz of the Kelvin unit at that moment, to be said of all three (in three dimensions;
-            default: -xx - yy).
+        kelvin_strain_zz : strain zz of the Kelvin unit at that time; assign all three (in three dimensions; default:
+            -xx - yy).
         kelvin_strain_xz : strain xz of the Kelvin unit at that moment (in three dimensions; default: 0).
         kelvin_strain_yz : strain yz of the Kelvin unit at that moment (in three dimensions; default: 0).
         damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs (default:
@@ -1118,8 +1117,8 @@ class Elements(Stressed):
         density : density [kg/m3].
         young : Young's modulus E [Pa].
         poisson_ratio : Poisson's ratio.
-        shear : shear modulus, with the bulk modulus in the place of E and Poisson's ratio [Pa].
-        bulk : bulk modulus, with the shear modulus in the place of E and Poisson's ratio [Pa].
+        shear : shear modulus; with the bulk modulus it replaces E and Poisson's ratio [Pa].
+        bulk : bulk modulus; with the shear modulus it replaces E and Poisson's ratio [Pa].
         damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs.
         friction : friction angle of its surfaces where they have no contact model; the internal one of
             mechanical-mohr-coulomb [degrees].
@@ -1132,14 +1131,12 @@ class Elements(Stressed):
         dilation : dilation angle, at most the friction angle [degrees].
         kelvin_shear : shear modulus of the Kelvin unit; 0: no Kelvin unit [Pa].
         kelvin_viscosity : viscosity of the Kelvin unit; 0: no Kelvin unit [Pa s].
-        maxwell_shear : shear modulus of the Maxwell unit; in the place of the one that E and Poisson's ratio give
-            [Pa].
+        maxwell_shear : shear modulus of the Maxwell unit, instead of the one that E and Poisson's ratio give [Pa].
         maxwell_viscosity : viscosity of the Maxwell unit; 0: no dashpot [Pa s].
         kelvin_strain_xx : strain xx of the Kelvin unit at that moment; its zz is -xx - yy.
         kelvin_strain_yy : strain yy of the Kelvin unit at that moment; its zz is -xx - yy.
         kelvin_strain_xy : strain xy of the Kelvin unit at that moment; its zz is -xx - yy.
-        kelvin_strain_zz : strain zz of the Kelvin unit at that moment, to be said of all three (in three
-            dimensions).
+        kelvin_strain_zz : strain zz of the Kelvin unit at that time; assign all three (in three dimensions).
         kelvin_strain_xz : strain xz of the Kelvin unit at that moment (in three dimensions).
         kelvin_strain_yz : strain yz of the Kelvin unit at that moment (in three dimensions).
         conductivity : thermal conductivity [W/(m K)].

@@ -132,7 +132,7 @@ class ParticleCommands:
         color: str | int = 0,
         group: str = '***',
     ) -> int:
-        """GLINE: a row of particles from p1 towards p2, of spacing 2 rad cratio; overlaps are not looked at.
+        """GLINE: a row of particles from p1 towards p2, of spacing 2 rad cratio; overlaps are not checked.
 
         Parameters
         ----------
