@@ -1,1 +1,1 @@
-"""What every model has, whatever its physics: the step, when lists are rebuilt, storage, accounts of energy."""
+"""What models of any physics share: the step, rebuilds of lists, storage and energy budgets."""

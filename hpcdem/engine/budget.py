@@ -1,9 +1,9 @@
-"""The account of energy of a model of any physics: what is stored, what was done and lost since it began.
+"""Energy budget of a model of any physics: stored energy, and work done and lost since the budget began.
 
-Steps book flows a whole kick at a time, from half step to half step; readings are of whole steps. So the account is
-taken up (`begin`) without the half of the coming kick that a reading at that moment would add, and brought to the whole
-step (`pause`) before something else than a step changes the model: what that changes of what is stored is the
-difference of two readings, and booked as such when the account is taken up again.
+Steps book each flow for a whole kick, that is, from half step to half step; readings are taken at whole steps. `begin`
+therefore subtracts the half of the coming kick that a reading at that moment would add, and `pause` brings the budget
+to the whole step before anything other than a step changes the model. The change of stored energy between a pause and
+the next `begin` is booked as the effect of that change.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ M = TypeVar("M")
 
 
 class Reading(NamedTuple, Generic[N]):
-    """What is stored now, what was when the account began, and the flows since then; by name."""
+    """Stored energy now, stored energy when the budget began, and flows since then, by name."""
 
     stored: dict[str, N]
     start: dict[str, N]
@@ -25,9 +25,9 @@ class Reading(NamedTuple, Generic[N]):
 
 
 class Budget(ABC, Generic[M, N]):
-    """accounts: flows up to now or, while steps are booked (running), up to where they were taken up; start, left: what
-    was stored at the beginning (None: it has not begun) and at the last pause. Integers are those of
-    exact_sum.as_integer, and this rank's share; floats are of all ranks."""
+    """accounts: flows up to now or, while steps are booked (running), up to the last `begin`. start, left: stored
+    energy at the beginning (None: not begun) and at the last pause. Integers are sums of exact_sum.as_integer over this
+    rank; floats are sums over all ranks."""
 
     def __init__(self, stored: Iterable[str], flows: Iterable[str], nothing: N) -> None:
         self.accounts: dict[str, N] = dict.fromkeys(flows, nothing)
@@ -38,18 +38,19 @@ class Budget(ABC, Generic[M, N]):
 
     @abstractmethod
     def _read(self, sim: M) -> tuple[dict[str, N], dict[str, N]]:
-        """What is stored at the present whole step, and the first half of what the coming kick does. Collective."""
+        """Read the stored energy at the present whole step, and half of the work of the coming kick. Collective."""
 
     @abstractmethod
     def _booked(self, sim: M) -> dict[str, N]:
-        """Flows of the steps since the account was taken up that are not in the accounts yet. Collective."""
+        """Return the flows of steps since the last `begin` that the accounts do not include yet. Collective."""
 
     @abstractmethod
     def _book_change(self, change: dict[str, N]) -> None:
-        """Change of the stored energy while the budget was not updated."""
+        """Book the change of stored energy while the budget was paused."""
 
     def begin(self, sim: M) -> None:
-        """Steps follow, whose flows are booked. The model is closed, its tables are fresh. Collective."""
+        """Start to book the flows of the steps that follow. The model is closed and its tables are current.
+        Collective."""
         stored, half = self._read(sim)
         if self.start is None:
             self.start = stored
@@ -60,7 +61,7 @@ class Budget(ABC, Generic[M, N]):
         self.running = True
 
     def pause(self, sim: M) -> None:
-        """Something else than a step is about to change the model. Collective."""
+        """Stop booking before something other than a step changes the model. Collective."""
         self.left, half = self._read(sim)
         booked = self._booked(sim)
         for name in half:
@@ -68,7 +69,7 @@ class Budget(ABC, Generic[M, N]):
         self.running = False
 
     def now(self, sim: M) -> Reading[N]:
-        """The account at this moment. What has changed since a pause is booked later. Collective."""
+        """Return the budget at this moment. Changes since a pause are booked later. Collective."""
         if self.running:
             stored, half = self._read(sim)
             booked = self._booked(sim)

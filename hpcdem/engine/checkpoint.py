@@ -1,4 +1,4 @@
-"""The state of a model to a file and back: what is the same for all physics."""
+"""Save the state of a model to a file and restore it: the part that all physics share."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Contents = tuple[Mapping[str, Any], Mapping[str, Table]]
 
 
 def save(model: Model, path: Path | str, contents: Callable[[], Contents]) -> None:
-    """Write what contents() returns: the state as JSON values, and tables. Reads only: a run that saves continues
-    exactly like one that does not. Collective."""
+    """Write the result of contents(): the state as JSON values, and tables. The model is only read, so a run that saves
+    continues exactly like one that does not. Collective."""
     began = time.perf_counter()
     with model.timers("checkpoint"):
         checkpoint.write(path, *contents(), model.comm)
@@ -31,8 +31,8 @@ def save(model: Model, path: Path | str, contents: Callable[[], Contents]) -> No
 def read(
     comm: Comm, path: Path | str, kind: str | None, what: str, whole: Callable[[str], bool] = lambda table: False
 ) -> tuple[dict[str, Any], checkpoint.Tables]:
-    """The state in a checkpoint of this kind, and its tables, see `io.checkpoint.read`. Collective. what: its name in
-    messages. CommandError if the file is missing, foreign or damaged."""
+    """Read the state and the tables of a checkpoint of this kind, see `io.checkpoint.read`. what: its name in messages.
+    Raises CommandError if the file is missing, damaged or of another program. Collective."""
     try:
         state, tables = checkpoint.read(path, comm, whole)
     except HpcdemError as problem:
@@ -49,13 +49,14 @@ def take_newest(
     take: Callable[[Path], dict[str, Any]],
     fatal: type[CommandError],
 ) -> tuple[Path, dict[str, Any]] | None:
-    """The newest complete checkpoint among the .sav files of some folders, and what take(path) returned for it; None if
-    without one. before: that of this time of the model [s] or the last one before it; UsageError without one.
-    Collective.
+    """Restore the newest complete checkpoint among the .sav files of some folders.
 
-    The newest is the one that is farthest in the script, then that of the latest step: clocks may go wrong. What an
-    earlier run left in a folder does not count. A file that take refuses (CommandError, but for those that are fatal)
-    is named in the log, and the one before it is tried.
+    Returns its path and the result of take(path), or None if the folders contain no checkpoint. before: model time [s];
+    the last checkpoint at or before it is used, and its absence raises UsageError. Collective.
+
+    The newest checkpoint is the one farthest in the script, then the one of the latest step, because clocks may be
+    wrong. Checkpoints that an earlier run left in a folder do not count. A file that take refuses (CommandError, unless
+    fatal) is named in the log, and the previous one is tried.
     """
     comm, log = model.comm, model.log
     found, damaged = newest_first(folders, before) if comm.rank == 0 else ([], [])

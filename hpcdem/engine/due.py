@@ -1,4 +1,4 @@
-"""What happens between steps: tasks that are due at some of them, and answers to what the outside asks for."""
+"""Work between steps: tasks that are due at certain steps, and responses to signals and limits."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from hpcdem.engine.model import Model
 
 
 def after(step: int, every: int, origin: int = 0) -> int:
-    """The first step after this one that is a multiple of `every` from the origin on."""
+    """Return the first step after this one that is a multiple of `every`, counted from the origin."""
     return origin + ((step - origin) // every + 1) * every
 
 
 @dataclass
 class Task:
-    """Something to do at the steps origin + k * every, k > 0, and at the step `also`."""
+    """A task that is due at the steps origin + k * every, k > 0, and at the step `also`."""
 
     every: int
     origin: int
@@ -24,23 +24,26 @@ class Task:
     also: int = -1
 
     def next_after(self, step: int) -> int:
-        """The first step after `step` at which it is due."""
+        """Return the first step after `step` at which the task is due."""
         regular = after(step, self.every, self.origin)
         return min(regular, self.also) if self.also > step else regular
 
     def due_at(self, step: int) -> bool:
-        """Whether it is due at this step."""
+        """Whether the task is due at this step."""
         return self.next_after(step - 1) == step
 
 
 def first_after(step: int, tasks: Iterable[Task]) -> int:
-    """The first step after `step` at which one of them is due."""
+    """Return the first step after `step` at which one of the tasks is due."""
     return min(task.next_after(step) for task in tasks)
 
 
 def answer(model: Model, request: int, save: Callable[[bool], Path], how: Callable[[Path], str]) -> None:
-    """A signal or the time limit requests a checkpoint, perhaps also the end of the run. save: writes one and returns
-    its path, automatic or not; how: the command that resumes from it. StoppedWithCheckpoint. Collective."""
+    """Respond to a signal or time limit that requests a checkpoint and perhaps the end of the run.
+
+    save: writes a checkpoint, automatic or not, and returns its path; how: the command that resumes from it. Raises
+    StoppedWithCheckpoint if the run ends. Collective.
+    """
     stop, log, step = model.stop, model.log, model.clock.step
     what = stop.decide(request)
     if what == "none":

@@ -1,13 +1,13 @@
-"""A model of any physics: its step, and the rebuild of its lists. The page on which the method can be read.
+"""A model of any physics: its step and the rebuild of its lists. Read this page to understand the method.
 
-A rank owns rows (particles, elements) that lie in its strip of the model, and what they remember. A model is either
-*closed* (sorted, ghosts in place, lists built: ready to step) or *open* (owned rows and their histories only: free to
-be changed). Commands that change who is there open it; the next step closes it again. A rebuild in mid-run is the same
-two moves. Everything that decides the order of arithmetic comes from global values and is part of the state, see
-`rebuild.RebuildState`.
+A rank owns the rows (particles, elements) that lie in its strip of the model, with their histories. A model is either
+*closed* (sorted, with ghosts and lists: ready to step) or *open* (owned rows and their histories only: free to be
+changed). Commands that add or remove rows open it; the next step closes it again. A rebuild during a run consists of
+the same two moves. Everything that determines the order of arithmetic comes from global values and is part of the
+state, see `rebuild.RebuildState`.
 
-What a physics brings are the phases, which have their names below: `_begin_step`, `_move_rows`, `_moved`,
-`_check_rebuild`, `_end_step`; `_choose_reach`, `_share_out`, `_store`, `_build_lists`.
+A physics implements the phases that are declared below: `_begin_step`, `_move_rows`, `_moved`, `_check_rebuild`,
+`_end_step`; `_choose_reach`, `_share_out`, `_store`, `_build_lists`.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ FRESH, LISTS, STORAGE = 0, 1, 2
 
 
 class Histories(Protocol):
-    """What rows remember: entries rows (m, v) f8, of which each has some, one row after the other."""
+    """Histories of rows: entries (m, v) f8 in sequence, of which each row has a certain number."""
 
     rows: np.ndarray
 
     def counts(self) -> np.ndarray:
-        """Entries of each row (n,)."""
+        """Number of entries of each row (n,)."""
         ...
 
     def take(self, order: np.ndarray) -> Self:
-        """Those of the rows in `order`."""
+        """Return the histories of the rows in `order`."""
         ...
 
     def joined(self, counts: np.ndarray, rows: np.ndarray) -> Self:
-        """With more rows behind, which have so many entries each."""
+        """Append rows that have so many entries each."""
         ...
 
 
@@ -57,10 +57,12 @@ H = TypeVar("H", bound=Histories)
 
 
 class Model(ABC):
-    """comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never
-    stopped); balance_on: borders follow the load. A subclass has `clear`, which makes it empty and calls `restart`.
+    """comm: halo.comm; threads: per rank; outdir: folder of results; log and stop: see runtime (None: no log, no stop
+    requests); balance_on: strip boundaries follow the load. A subclass has `clear`, which empties it and calls
+    `restart`.
 
-    closed: ready to step; rebuilds: how often lists were built; halo: the exchange of ghosts, while it is closed."""
+    closed: ready to step; rebuilds: number of rebuilds of the lists; halo: the exchange of ghosts of a closed model.
+    """
 
     rebuild_state: RebuildState
     closed: bool
@@ -86,7 +88,7 @@ class Model(ABC):
         """Collective: loads or compiles those of a kind, see `session.KINDS`."""
 
     def restart(self) -> None:
-        """Back to step 0, open, with the first ownership."""
+        """Return to step 0: open, with the first ownership."""
         self.release()
         self.clock = Clock()
         self.ownership = Ownership(self.comm, self.balance_on)
@@ -94,19 +96,19 @@ class Model(ABC):
         self.closed = False
 
     def release(self) -> None:
-        """Give back what MPI holds for this simulation. Not collective."""
+        """Free what MPI holds for this simulation. Not collective."""
         if self.halo is not None:
             self.halo.close()
         self.halo = None
 
     def count(self, n: int) -> int:
-        """Sum of an integer over the ranks. Collective."""
+        """Sum an integer over the ranks. Collective."""
         return int(self.comm.sum_into(np.array([n], dtype=np.int64))[0])
 
     # ---- one step ------------------------------------------------------------------------------------------------
 
     def step(self) -> int:
-        """Advance everything by one dt. The same text for every physics, on one rank and on a thousand.
+        """Advance everything by one dt. The code is the same for every physics and any number of ranks.
 
         Returns the external request (0: none; else see runtime.stop_requests), agreed by all ranks.
         """
@@ -136,7 +138,7 @@ class Model(ABC):
         return request
 
     def advance(self, steps: int) -> int:
-        """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""
+        """Take up to `steps` steps, fewer if there is an external request. Returns the request (0: none)."""
         request = done = 0
         try:
             while done < steps and not request:
@@ -149,7 +151,7 @@ class Model(ABC):
 
     @abstractmethod
     def _begin_step(self) -> None:
-        """What comes before anything moves. The model is closed."""
+        """Do what must precede the motion. The model is closed."""
 
     @abstractmethod
     def _move_rows(self, first: int, last: int) -> None:
@@ -157,19 +159,21 @@ class Model(ABC):
 
     @abstractmethod
     def _moved(self) -> None:
-        """All rows have moved. Not collective."""
+        """Called after all rows have moved. Not collective."""
 
     @abstractmethod
     def _check_rebuild(self, glance: bool = False) -> tuple[int, int]:
-        """How far has anyone gone since the lists were built? Sets the step of the next check. glance: between two
-        checks; it becomes one if somebody has sped up so much that the next might come too late, else nothing changes.
+        """Measure the largest displacement since the last rebuild and set the step of the next check.
 
-        Returns what is outdated (FRESH, LISTS, STORAGE) and the request from outside. Only global maxima enter.
+        glance: a quick check between two checks; it becomes a full check if a row has accelerated so much that the next
+        one might be too late, and changes nothing otherwise.
+
+        Returns what is outdated (FRESH, LISTS, STORAGE) and the external request. Depends on global maxima only.
         """
 
     @abstractmethod
     def _end_step(self, outdated: int) -> None:
-        """Everything has moved, ghosts too: what is outdated is made again, and whatever else acts in a step."""
+        """Renew what is outdated after all rows and ghosts have moved, and apply the rest of a step."""
 
     # ---- from open to closed -------------------------------------------------------------------------------------
 
@@ -178,8 +182,8 @@ class Model(ABC):
         self._close(frozen=True)
 
     def _close(self, frozen: bool = False) -> None:
-        """Order, owners, ghosts and lists at the present positions. frozen: keep the rebuild state as it is (restart).
-        Collective."""
+        """Find order, owners, ghosts and lists at the present positions. frozen: keep the rebuild state unchanged
+        (restart). Collective."""
         with self.timers("neighbour"):
             cell = self._choose_reach(frozen)
         cell, number = self._share_out(cell)
@@ -194,20 +198,20 @@ class Model(ABC):
 
     @abstractmethod
     def _choose_reach(self, frozen: bool) -> np.ndarray:
-        """Skin and side of cells for the next lists, from global values only, unless they are frozen. Returns the cells
+        """Choose skin and cell size of the next lists from global values, unless they are frozen. Returns the cells
         (n,) i8 of the rows held here."""
 
     @abstractmethod
     def _share_out(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Every row goes to the owner of its column. Returns cells and ids (n,) i8 of those that are owned now."""
+        """Send every row to the owner of its column. Returns cells and ids (n,) i8 of the rows owned now."""
 
     @abstractmethod
     def _store(self, order: np.ndarray, cell: np.ndarray) -> None:
-        """Owned rows in this order, with the ghosts around them; cell (n,) i8: in the new order."""
+        """Store owned rows in this order, with their ghosts; cell (n,) i8: in the new order."""
 
     @abstractmethod
     def _build_lists(self, order: np.ndarray, cell: np.ndarray, frozen: bool) -> None:
-        """Lists and tables of the kernels."""
+        """Build the lists and the tables of the kernels."""
 
     def _send_home(
         self,
@@ -219,9 +223,12 @@ class Model(ABC):
         least: int = 1,
         left: Callable[[np.ndarray, np.ndarray], object] = lambda leave, to: None,
     ) -> tuple[np.ndarray, H, Sequence[np.ndarray]]:
-        """Move borders if it pays, then send rows of the tables (n, w) f8, and what they remember, to the owners of
-        their columns. room, cost, least: see `Ownership.renew`; left: receives the destinations. Returns cells,
-        histories and tables of the rows that are owned now. Collective."""
+        """Move strip boundaries if that pays, then send rows of the tables (n, w) f8 and their histories to the owners
+        of their columns.
+
+        room, cost, least: see `Ownership.renew`; left: receives the destinations. Returns cells, histories and tables
+        of the rows owned now. Collective.
+        """
         with self.timers("balance"):
             self.ownership.renew(
                 columns(cell), self.rebuild_state.side, self.clock.step, self.timers.seconds(), room, cost, least
@@ -247,6 +254,7 @@ class Model(ABC):
             return owned[0].view(np.int64)[:, 0].copy(), histories.take(stay).joined(counts, entries), owned[1:]
 
     def _connect(self, rows: np.ndarray, order: np.ndarray, cell: np.ndarray, columns: int = 1) -> np.ndarray:
-        """Storage of rows[order] with ghosts, kept fresh by a new halo; columns: of each neighbour. Collective."""
+        """Make the storage of rows[order] with ghosts, which a new halo keeps current; columns: copied from each
+        neighbour. Collective."""
         storage, self.halo = connect(self.comm, rows, order, cell, self.ownership.borders, self.threads, columns)
         return storage

@@ -1,4 +1,4 @@
-"""When lists have to be built again: what that depends on in every physics, and the steps between two checks."""
+"""When lists must be rebuilt: the state on which this depends in every physics, and the steps between two checks."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ class CheckInterval:
     pace: int = 1
 
     def passed(self) -> int:
-        """One step more; what is due at it: UNSEEN, AT_A_GLANCE or CHECK."""
+        """Count one step. Returns what is due at it: UNSEEN, AT_A_GLANCE or CHECK."""
         self.countdown = left = self.countdown - 1
         return CHECK if left <= 0 else UNSEEN if left % GLANCE else AT_A_GLANCE
 
     def is_too_late(self, room: float, stride: float) -> bool:
-        """Whether so much room [m] is used up at this stride [m] per step before the next glance or check."""
+        """Whether a margin [m] is used up before the next glance or check at this stride [m] per step."""
         return stride * min(GLANCE, self.countdown) > room
 
     def wait(self, *limits: float) -> None:
-        """The next check comes after at most so many steps, at least one, and at most twice the last wait."""
+        """Schedule the next check after at most so many steps, at least one, and at most twice the last interval."""
         self.pace = self.countdown = max(1, int(min(LONGEST_WAIT, 2 * self.pace, *limits)))
 
     def soon(self) -> None:
-        """Check at the next step: speeds or the time step were changed by a command."""
+        """Schedule a check at the next step, because a command changed speeds or the time step."""
         self.countdown = self.pace = 1
 
 
 @dataclass
 class RebuildState(CheckInterval):
-    """What the next rebuild depends on; from global values only, part of every checkpoint.
+    """State that determines the next rebuild; from global values only, part of every checkpoint.
 
-    side of the cells [m]; skin: buffer of the search [m], skin_factor: over a length of the model; age of the lists in
-    steps; late: lists that came late.
+    side of the cells [m]; skin: buffer of the search [m]; skin_factor: the skin relative to a length of the model; age
+    of the lists in steps; late: number of lists that were rebuilt late.
     """
 
     side: float = 0.0
@@ -51,7 +51,7 @@ class RebuildState(CheckInterval):
     late: int = 0
 
     def adapt_skin(self, narrow: float, wide: float, short: int, long: int) -> None:
-        """Lists that lasted fewer steps than `short` call for the wide skin, more than `long` for the narrow one."""
+        """Choose the wide skin if the lists lasted fewer steps than `short`, the narrow one if more than `long`."""
         if 0 < self.age < short:
             self.skin_factor = wide
         elif self.age > long:

@@ -1,9 +1,9 @@
 """The communicator of several ranks, over mpi4py.
 
-MPI libraries wait by spinning, which is the fastest way while every rank has a core of its own. With more ranks than
-cores on a host, a spinning rank keeps the core from the one it waits for, and a step takes milliseconds instead of
-microseconds. There `MpiComm` asks and sleeps in turn; only calls that do not block make that possible, so all of its
-operations are built on them.
+MPI libraries wait by spinning, which is fastest while every rank has its own core. With more ranks than cores on a
+host, a spinning rank keeps the core from the rank it waits for, and a step takes milliseconds instead of microseconds.
+In that case `MpiComm` polls and sleeps in turn. Only non-blocking calls allow this, so all operations are built on
+them.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ NAP = 2e-5
 
 
 class MpiComm(Comm):
-    """Operations of `SerialComm` over an mpi4py communicator. of: of which it is a part, with the same cores."""
+    """Operations of `SerialComm` over an mpi4py communicator. of: the communicator of which it is a part, with the same
+    cores."""
 
     def __init__(self, mpi: Any, of: MpiComm | None = None) -> None:
         from mpi4py import MPI
@@ -131,9 +132,12 @@ class MpiComm(Comm):
         return int(before[0]) if self.rank else 0
 
     def exchange(self, parcels: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-        """Nobody knows who sends to it. So a rank takes what comes until its own parcels have been received, enters a
-        barrier that does not block, and keeps receiving until all have arrived: then no message is in transit
-        (Hoefler, Siebert & Lumsdaine 2010, NBX). A rank may be a call ahead of another, hence two tags in turn."""
+        """Exchange messages although no rank knows who sends to it.
+
+        A rank receives until its own messages have arrived, enters a non-blocking barrier, and keeps receiving until
+        all ranks have entered it: then no message is in transit (Hoefler, Siebert & Lumsdaine 2010, NBX). A rank may be
+        one call ahead of another, so two tags alternate.
+        """
         from mpi4py import MPI
 
         mpi, tag, status = self.mpi, PARCELS + self._exchanges % 2, MPI.Status()
@@ -165,7 +169,7 @@ class MpiComm(Comm):
 
 
 def _more_ranks_than_cores(mpi: Any, host: Any) -> bool:
-    """Whether any host has more ranks than cores that they may use between them; host: the ranks of this one."""
+    """Whether any host has more ranks than cores that they may use; host: communicator of the ranks of this host."""
     from mpi4py import MPI
 
     mine = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set(range(os.cpu_count() or 1))

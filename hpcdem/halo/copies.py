@@ -1,5 +1,4 @@
-"""Copies of numbered rows that other ranks own, wherever these are: found once, renewed by messages to those ranks
-alone."""
+"""Copies of numbered rows that other ranks own: found once, then renewed by messages to their owners only."""
 
 from __future__ import annotations
 
@@ -12,18 +11,18 @@ COPIES = 31
 
 
 def _home(comm: Comm, numbers: np.ndarray, total: int) -> np.ndarray:
-    """The rank that keeps the address of each number (n,): equal parts of all numbers."""
+    """Return the rank that stores the address of each number (n,): equal parts of all numbers."""
     return numbers * comm.size // max(total, 1)
 
 
 def moved(
     comm: Comm, total: int, had: np.ndarray, rows: np.ndarray, mine: np.ndarray, wanted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows that go over to new owners. Collective.
+    """Move rows to new owners. Collective.
 
-    had (n,), rows (n, k): numbers below `total` that this rank had, with their rows; mine (m,): those that it owns now,
-    each on one rank; wanted (w,): of which it needs copies. Returns the rows of `mine` (m, k), zero for those that
-    nobody had, and the ranks that own `wanted` (w,).
+    had (n,), rows (n, k): numbers below `total` that this rank had, with their rows; mine (m,): numbers that it owns
+    now, each on one rank; wanted (w,): numbers of which it needs copies. Returns the rows of `mine` (m, k), zero for
+    rows that no rank had, and the ranks that own `wanted` (w,).
     """
     _, number, values = comm.to_ranks(_home(comm, had, total), had, rows)
     source, asked = comm.to_ranks(_home(comm, mine, total), mine)
@@ -42,7 +41,7 @@ def moved(
 
 
 def _answered(comm: Comm, target: np.ndarray, source: np.ndarray, answers: np.ndarray) -> np.ndarray:
-    """Answers to the queries sent to the ranks `target`, in the order of the queries."""
+    """Return the answers to the queries sent to the ranks `target`, in the order of the queries."""
     _, came = comm.to_ranks(source, answers)
     out = np.empty_like(came)
     out[np.argsort(target, kind="stable")] = came
@@ -50,11 +49,11 @@ def _answered(comm: Comm, target: np.ndarray, source: np.ndarray, answers: np.nd
 
 
 class Copies:
-    """Rows first .. of a table (n, k) f8 that are copies of other ranks' rows."""
+    """Rows from `first` on of a table (n, k) f8, which are copies of rows of other ranks."""
 
     def __init__(self, comm: Comm, mine: np.ndarray, wanted: np.ndarray, owner: np.ndarray, table: np.ndarray) -> None:
-        """mine (m,): numbers of the first rows of the table, ascending; wanted (w,): those of the others, in the order
-        of their owners (w,). Collective."""
+        """mine (m,): numbers of the first rows of the table, ascending; wanted (w,): numbers of the other rows, in the
+        order of their owners (w,). Collective."""
         self.comm, self.table, self.requests = comm, table, []
         source, asked = comm.to_ranks(owner, wanted)
         self.rows = np.searchsorted(mine, asked)
@@ -70,14 +69,14 @@ class Copies:
                 self.requests.append(start(rows[first:last].reshape(-1).view(np.uint8), rank, COPIES))
 
     def refresh(self) -> None:
-        """The copies get the present rows of their owners. Collective among those concerned."""
+        """Copy the present rows of the owners. Collective among the ranks concerned."""
         if self.requests:
             self.parcel[:] = self.table[self.rows]
             self.comm.start_all(self.requests)
             self.comm.wait_all(self.requests)
 
     def close(self) -> None:
-        """Give the requests back to MPI."""
+        """Free the requests of MPI."""
         for request in self.requests:
             request.Free()
         self.requests = []

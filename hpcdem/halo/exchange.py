@@ -1,10 +1,10 @@
-"""Ghosts: copies of the neighbours' border columns.
+"""Ghosts: copies of the boundary columns of the neighbours.
 
 Three operations, after HOOMD-blue: *migrate* (ownership follows position; migrate.py), *connect* (choose and send
-ghosts) and *refresh* (every step: the same ghosts, new values). The first two happen only when the lists are rebuilt.
+ghosts) and *refresh* (every step: new values of the same ghosts). The first two happen only when the lists are rebuilt.
 
-Particles are sorted by column, so the border column is a contiguous piece of the particle rows and lands in a
-contiguous piece on the other side: the requests work on the rows themselves, nothing is packed.
+Particles are sorted by column. A boundary column is therefore a contiguous part of the rows, and arrives as a
+contiguous part on the other side: messages use the rows directly, without packing.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ BACK = 2
 class Halo:
     """The exchange with the two neighbours for one set of lists.
 
-    n_left, n_right: ghosts; first, last: owned rows sent to the left (the first `first`) and right (the last `last`).
-    border: these rows as ranges of owned particles, inside: the others. Who moves the border first and calls `start`
-    lets the messages travel while the inside is moved.
+    n_left, n_right: number of ghosts; first, last: number of owned rows sent to the left (the first ones) and to the
+    right (the last ones). border: these rows as ranges of owned particles; inside: the other rows. If the border moves
+    before `start`, the messages travel while the inside moves.
     """
 
     def __init__(self, comm: Comm, n_own: int, first: int, last: int) -> None:
@@ -56,7 +56,7 @@ class Halo:
         return rows[:a], rows[a : a + self.first], rows[b - self.last : b], rows[b:]
 
     def fill(self, rows: np.ndarray) -> None:
-        """Set the ghost rows of any storage-ordered array (n, ...) from their owners. Collective."""
+        """Set the ghost rows of any array in storage order (n, ...) from their owners. Collective."""
         if self.comm.mpi is None:
             return
         self._swap(*(_bytes(piece) for piece in self._pieces(rows)))
@@ -71,15 +71,15 @@ class Halo:
         )
 
     def add_ghost_field(self, rows: np.ndarray) -> None:
-        """From now on `refresh` renews the ghost rows of this array; its memory must stay where it is."""
+        """Include this array in `refresh`; its memory must not move."""
         self.requests += self._persistent(rows, 0)
 
     def add_late_ghost_field(self, rows: np.ndarray) -> None:
-        """From now on `refresh_more` renews the ghost rows of this array."""
+        """Include this array in `refresh_more`."""
         self.more += self._persistent(rows, BACK)
 
     def storage(self, rows: np.ndarray) -> np.ndarray:
-        """Storage with ghosts, renewed by `refresh`, for owned rows (n, w) in this order. Collective."""
+        """Make storage with ghosts, renewed by `refresh`, for owned rows (n, w) in this order. Collective."""
         out = aligned((self.n_left + self.n_own + self.n_right, rows.shape[1]))
         out[self.n_left : self.n_left + self.n_own] = rows
         self.fill(out)
@@ -103,28 +103,28 @@ class Halo:
         ]
 
     def start(self) -> None:
-        """Begin to renew the ghosts. Until `finish` the rows of `border` must not change, ghosts must not be read."""
+        """Begin to renew the ghosts. Until `finish`, rows of `border` must not change and ghosts must not be read."""
         if self.requests:
             self.comm.start_all(self.requests)
 
     def finish(self) -> None:
-        """Ghosts carry the owners' state of the moment of `start`; nothing comes out."""
+        """Wait until ghosts have the state that the owners had at `start`."""
         if self.requests:
             self.comm.wait_all(self.requests)
 
     def refresh(self) -> None:
-        """Both in one: ghosts carry the owners' present state."""
+        """Renew the ghosts: `start` and `finish` in one."""
         self.start()
         self.finish()
 
     def refresh_more(self) -> None:
-        """The ghost rows of the second array get the present ones of their owners."""
+        """Renew the ghost rows of the second array."""
         if self.more:
             self.comm.start_all(self.more)
             self.comm.wait_all(self.more)
 
     def close(self) -> None:
-        """Give the requests back to MPI."""
+        """Free the requests of MPI."""
         for request in self.requests + self.more:
             request.Free()
         self.requests, self.more = [], []
@@ -143,10 +143,10 @@ def connect(
     threads: int,
     columns: int = 1,
 ) -> tuple[np.ndarray, Halo]:
-    """Storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it fresh.
+    """Make the storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it current.
 
-    cell (n,) i8: cells of the owned particles in this order, ascending; columns: how many of each neighbour are copied.
-    Every rank but the first and the last has at least as many.
+    cell (n,) i8: cells of the owned particles in this order, ascending; columns: how many columns of each neighbour are
+    copied. Every rank except the first and the last has at least as many columns.
     """
     first = last = 0
     if comm.rank > 0:

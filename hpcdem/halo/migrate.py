@@ -1,4 +1,4 @@
-"""Migration: particles go to the rank that owns their column, and their contact histories go with them."""
+"""Migration: particles move, with their contact histories, to the rank that owns their column."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from hpcdem.core.comm import Comm
 
 
 class Migration:
-    """One change of ownership: of n particles on this rank those at `leave` (indices) go to the ranks `owner`.
+    """One change of ownership: of n particles on this rank, those at `leave` (indices) move to the ranks `owner`.
 
-    The new order on a rank is [stayed | arrived from rank 0, 1, ...]. leave: those that go, by destination, and
-    leave_to: their destinations. Nearly all go to the neighbours; to others when a border has jumped. What a migration
-    costs does not grow with the number of ranks.
+    The new order on a rank is [stayed | arrived from rank 0, 1, ...]. leave: particles that leave, by destination;
+    leave_to: their destinations. Nearly all move to the neighbours, to others if a strip boundary has jumped. The cost
+    of a migration does not grow with the number of ranks.
     """
 
     def __init__(self, comm: Comm, n: int, leave: np.ndarray, owner: np.ndarray) -> None:
@@ -24,7 +24,7 @@ class Migration:
         self.n = n
 
     def stay(self) -> np.ndarray:
-        """Indices of those that do not leave."""
+        """Indices of the particles that do not leave."""
         stays = np.ones(self.n, bool)
         stays[self.leave] = False
         return np.flatnonzero(stays)
@@ -52,29 +52,32 @@ class Migration:
 
 
 class Trail:
-    """Where particles have gone that left this rank, so that what is known of them elsewhere can go after them.
+    """Destinations of particles that left this rank, so that data about them on other ranks can follow.
 
-    Nothing is noted before `begin`, and nobody is followed.
+    Nothing is recorded before `begin`.
     """
 
     def __init__(self) -> None:
         self._left: list[tuple[np.ndarray, np.ndarray]] | None = None
 
     def begin(self) -> None:
-        """Note who leaves from now on."""
+        """Start to record departures."""
         self._left = []
 
     def note(self, gid: np.ndarray, owner: np.ndarray) -> None:
-        """Particles gid (n,) i8 go to the ranks owner (n,) i8."""
+        """Record that the particles gid (n,) i8 moved to the ranks owner (n,) i8."""
         if self._left is not None and len(gid):
             self._left.append((gid, owner))
 
     def follow(self, comm: Comm, mine: np.ndarray, gid: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Collective: of rows (n, ...) about the particles gid (n,) i8, which were here at the `begin`, those about
-        `mine` (m,) i8, the owned ones of now; gid, then the columns. Rows about particles that are gone are dropped.
+        """Send rows (n, ...) about the particles gid (n,) i8, which were here at `begin`, to their present owners.
+        Collective.
 
-        A particle that has left more than once is followed from rank to rank: where it went last from here it came
-        later than it was here, so the way ends.
+        Returns the rows about `mine` (m,) i8, the particles owned now: gid, then the columns. Rows about deleted
+        particles are dropped.
+
+        A particle that left more than once is followed from rank to rank. Its last departure from here is later than
+        its stay here, so the search ends.
         """
         if self._left is None:
             return tuple(column[:0] for column in (gid, *columns))

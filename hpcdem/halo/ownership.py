@@ -1,6 +1,6 @@
-"""Which rank owns which columns: the strip borders over the life of a model, and when they move.
+"""Which rank owns which columns: the strip boundaries during the life of a model, and when they move.
 
-Borders decide who computes, never what. That is why wall-clock timings may enter here, and only here.
+Boundaries determine which rank computes, never the result. Measured times may therefore enter here, and only here.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ MOST_COLUMNS = 1 << 24
 
 
 class Ownership:
-    """Strip borders (ranks + 1,) i8 in columns of width `side` [m]; none before the first `renew`.
+    """Strip boundaries (ranks + 1,) i8 in columns of width `side` [m]; none before the first `renew`.
 
-    balance_on: borders follow the measured load; otherwise they move only when asked to (`wanted`).
+    balance_on: boundaries follow the measured load; otherwise they move only on request (`wanted`).
     """
 
     def __init__(self, comm: Comm, balance_on: bool) -> None:
@@ -29,7 +29,7 @@ class Ownership:
         self._busy, self._step = 0.0, 0
 
     def owner_of(self, cx: np.ndarray) -> np.ndarray:
-        """Rank that owns each column index."""
+        """Return the rank that owns each column index."""
         return strips.owner_of(cx, self.borders)
 
     def renew(
@@ -42,12 +42,12 @@ class Ownership:
         cost: np.ndarray | float = 1.0,
         least: int = 1,
     ) -> None:
-        """Choose borders for particles (or elements) in columns cx (n,) i8 of this rank. Collective.
+        """Choose boundaries for particles (or elements) in columns cx (n,) i8 of this rank. Collective.
 
-        busy: seconds of own work of this rank so far; room: x range [m] in which particles may be, if known; cost:
-        (n,), if it is known that some cost more than others; least: columns of a rank.
-        UsageError when a new model has fewer columns than there are ranks. One that lost them on its way, or was
-        restored so, continues with waiting ranks.
+        busy: seconds of work of this rank so far; room: x range [m] of possible positions, if known; cost: (n,),
+        relative cost of each row, if known; least: smallest number of columns of a rank. Raises UsageError if a new
+        model has fewer columns than ranks. A model that lost columns later, or was restored with fewer, continues with
+        idle ranks.
         """
         first_time = not len(self.borders)
         if self.comm.size == 1:
@@ -77,9 +77,9 @@ class Ownership:
         self._busy, self._step = busy, step
 
     def _uneven(self, owned: float, step: int, busy: float) -> float | None:
-        """Relative cost of a particle of this rank if the load is uneven, else None. Collective when it is due.
+        """Return the relative cost of a particle of this rank if the load is uneven, else None. Collective when due.
 
-        owned: particles, by their cost.
+        owned: number of particles, weighted with their cost.
         """
         if not self.balance_on or step - self._step < balance.PATIENCE:
             return None
@@ -92,14 +92,15 @@ class Ownership:
         return balance.cost_per_particle(mine, owned, float(total[0]), float(total[1]))
 
     def _span(self, cx: np.ndarray) -> tuple[int, int]:
-        """First occupied column and number of columns to the last one, over all ranks; (0, 0) without particles."""
+        """Return the first occupied column and the number of columns up to the last, over all ranks; (0, 0) without
+        particles."""
         ends = np.array([-cx.min(), cx.max()] if len(cx) else [-strips.FARTHEST, -strips.FARTHEST])
         self.comm.max_into(ends)
         first, columns = -int(ends[0]), int(ends[1] + ends[0]) + 1
         return (first, columns) if columns > 0 else (0, 0)
 
     def _refuse_too_many_ranks(self, columns: int, room: tuple[float, float] | None) -> None:
-        """A rank without a column of its own in the whole model is a mistake of the launch."""
+        """Raise UsageError if a rank would never have a column: the job was started with too many ranks."""
         if room is not None:
             ends, _ = strips.cells(np.array(room), np.zeros(2), self.side)
             columns = max(columns, int(ends[1] - ends[0]) + 1)

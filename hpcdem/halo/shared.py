@@ -1,9 +1,9 @@
-"""What is equal on all ranks, held once per node of the machine.
+"""Data that are equal on all ranks, stored once per node of the machine.
 
-The first rank of a node computes it, and puts its large arrays into files in memory; the others map them. The files
-have no names: a job that is killed at any moment leaves none of them behind. Every rank may write to what it got: the
-pages it wrote to are its own from then on (copy on write), and nobody else sees them. So what is done alike on all
-ranks stays alike, and `share` makes one copy of it again.
+The first rank of a node computes them and puts large arrays into files in memory; the other ranks map these files. The
+files have no names, so a job that is killed at any moment leaves none behind. Every rank may write to its arrays: pages
+that it writes become private (copy on write). Equal operations on all ranks keep the data equal, and `share` makes one
+copy again.
 """
 
 from __future__ import annotations
@@ -30,10 +30,12 @@ FILES = 1 << 16
 
 
 class Nodes:
-    """The ranks of this node of the machine (host) and, on the first of them, the first ones of all nodes (leads, else
-    None): both halo.comm.MpiComm, which imports this.
+    """The ranks of this node of the machine (host) and, on the first of them, the first ranks of all nodes (leads, else
+    None); both are halo.comm.MpiComm, which imports this module.
 
-    folders: where files may be, in this order; notice: what a user should know of, said once by `warn`."""
+    folders: possible folders of the files, in order of preference; notice: a message for the user that `warn` prints
+    once.
+    """
 
     def __init__(self, host: Any, leads: Any, folders: tuple[str, ...] = ()) -> None:
         self.host, self.leads = host, leads
@@ -62,7 +64,8 @@ class Nodes:
         return made
 
     def _made(self, make: Callable[[], Any]) -> tuple[tuple[bytes, list[Any]], Exception | None]:
-        """The result of `make()`, or its error, as others can read it: all but the large arrays, and these."""
+        """Call make() and return its result, or its error, in two parts that others can read: everything except large
+        arrays, and the large arrays."""
         self._making = True
         try:
             return _packed((make(), None)), None
@@ -72,7 +75,7 @@ class Nodes:
             self._making = False
 
     def _handed_out(self, head: bytes, large: list[Any]) -> Any:
-        """An object shared by all ranks of the node."""
+        """Return an object that all ranks of the node share."""
         host = self.host
         if host.size == 1:
             return pickle.loads(head, buffers=large)
@@ -84,7 +87,7 @@ class Nodes:
         return pickle.loads(head, buffers=blocks)
 
     def _mapped(self, large: list[Any], sizes: list[int]) -> list[Any] | None:
-        """Arrays in memory of the node; None if there is no space for them."""
+        """Put arrays into memory of the node; None if the space is too small."""
         if not sizes:
             return []
         files = self._written(large) if self.host.rank == 0 else []
@@ -100,7 +103,7 @@ class Nodes:
         return None if failed else blocks
 
     def _written(self, large: list[Any]) -> list[int]:
-        """Open files with them, without names; none if no folder has space."""
+        """Write arrays to open files without names; None if no folder has enough space."""
         for folder in self.folders:
             files: list[int] = []
             try:
@@ -137,7 +140,7 @@ def _packed(thing: Any) -> tuple[bytes, list[Any]]:
 
 
 def _sendable(error: Exception) -> Exception:
-    """The error, or one with its message, if it cannot be sent."""
+    """Return the error, or one with its message if it cannot be pickled."""
     with contextlib.suppress(Exception):
         pickle.loads(pickle.dumps(error))
         return error
@@ -168,13 +171,13 @@ def _map(path: str, identity: tuple[int, int], size: int) -> mmap.mmap:
 
 
 def _broadcast(comm: Any, block: np.ndarray) -> np.ndarray:
-    """The bytes of its first rank, on all ranks of a communicator: into the block where it is not that of the first."""
+    """Send the bytes of the first rank to all ranks of a communicator, into the block of each."""
     for at in range(0, len(block), PIECE):
         comm.wait(comm.mpi.Ibcast(block[at : at + PIECE], 0))
     return block
 
 
 def _sent(leads: Any, head: bytes, large: list[Any]) -> tuple[bytes, list[Any]]:
-    """What the first rank of all has."""
+    """Return the value of the first rank on all ranks."""
     head, sizes = leads.bcast((head, [len(one) for one in large]))
     return head, [_broadcast(leads, one) for one in large or [np.empty(size, np.uint8) for size in sizes]]
