@@ -1,4 +1,4 @@
-"""Names of before, which act and warn."""
+"""Deprecated names, which work and warn."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def renamed(old: str, new: str) -> Callable[..., Any]:
-    """A method `old` that calls the method `new` and warns."""
+    """Make a method `old` that warns and calls the method `new`."""
 
     def method(self: Any, *args: Any, **options: Any) -> Any:
         warnings.warn(f"{old} of {type(self).__name__} is deprecated: use {new}", DeprecationWarning, stacklevel=2)

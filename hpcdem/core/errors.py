@@ -56,23 +56,23 @@ class UnknownNameError(ScriptError, KeyError):
 
 
 class CommandError(HpcdemError):
-    """A command was given values that make no sense; the script language adds file and line."""
+    """A command received values that make no sense; the script language adds file and line."""
 
     exit_code = EXIT_USAGE
 
 
 class PhysicsError(HpcdemError):
-    """The state stopped making sense: a number is not finite, or a particle moves too far in one step."""
+    """The state became invalid: a number is not finite, or a particle moves too far in one step."""
 
 
 class EquilibriumError(HpcdemError):
-    """Steps do not reach the required equilibrium."""
+    """The steps do not reach the required equilibrium."""
 
     exit_code = EXIT_UNBALANCED
 
 
 class StoppedWithCheckpoint(BaseException):
-    """The run stopped on request and left a checkpoint. No error that a script could deal with: its `except
-    Exception` lets it pass, as it does KeyboardInterrupt."""
+    """The run stopped on request after writing a checkpoint. It is no error that a script could handle: like
+    KeyboardInterrupt, it passes `except Exception`."""
 
     exit_code = EXIT_CHECKPOINT

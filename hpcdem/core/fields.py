@@ -1,10 +1,10 @@
-"""Every quantity a particle carries: where it is stored, its unit, its meaning. Allocation, halo, checkpoint, frames
-and the Python API all read this table; a new field is one new row.
+"""Every quantity of a particle: where it is stored, its unit, its meaning. Allocation, halo, checkpoints, frames and
+the Python API all read this table; a new field is one new row.
 
-A particle is two rows of eight 8-byte words, one cache line each. The *hot* row is what a contact needs of its
-partner, so it is what travels in the halo every step. The *cold* row stays with the owner.
-Integers are stored as int64 bits in the same rows. Physics that a model is given (physics/particle_physics.py) bring
-more columns: they stand in a third row, which has as many as there are, and travels in the halo too.
+A particle is two rows of eight 8-byte words, one cache line each. The *hot* row contains what a contact needs of its
+partner, and is sent to neighbours every step. The *cold* row stays with the owner. Integers are stored as int64 bits in
+the same rows. Added physics (physics/particle_physics.py) store more columns in a third row, which is also sent to
+neighbours.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ BOX_IDS = {"bottom": 100, "right": 101, "top": 102, "left": 103}
 
 
 def sides_of_box(ids: Iterable[int]) -> set[int]:
-    """Which of the walls in a file are those of BOX: BOX_IDS; frames of earlier versions have -1 to -4 for them."""
+    """Return which walls of a file are those of BOX: BOX_IDS, or -1 to -4 in frames of earlier versions."""
     found = {int(i) for i in ids}
     old = {i for i in found if i < 0}
     return old or (set(BOX_IDS.values()) if found.issuperset(BOX_IDS.values()) else set())
@@ -81,6 +81,6 @@ PER_METRE = {"N/m": "N", "J/m": "J", "N m/m": "N m", "m2/s": "m3/s", "kg/m": "kg
 
 
 def unit_in(unit: str, dim: int, content: bool = False) -> str:
-    """A unit of the plane in so many dimensions of space; content: m2 is a volume of fluid there."""
+    """Convert a unit of the plane to the given number of dimensions; content: m2 is a volume of fluid there."""
     units = {**PER_METRE, "m2": "m3"} if content else PER_METRE
     return units.get(unit, unit) if dim == 3 else unit

@@ -1,4 +1,4 @@
-"""What tables no longer need goes back to the system."""
+"""Returns memory of freed tables to the system."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def _trim() -> Any:
 
 
 def give_back() -> None:
-    """Free memory of this process to the system, some milliseconds. The GNU C library keeps what was freed, once tables
-    of megabytes were: up to a half of what a model of blocks needs while it is made."""
+    """Return free memory of this process to the system; takes some milliseconds. The GNU C library keeps freed memory
+    once tables of megabytes were freed: up to half of what a model of blocks needs while it is made."""
     trim = _trim()
     if trim is not None:
         trim(0)

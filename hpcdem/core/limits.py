@@ -1,7 +1,7 @@
-"""Sizes and places that a model can have, and what is refused because it is surely a slip.
+"""Sizes and positions that a model can have; others are rejected as obvious mistakes.
 
-The language asks here while it reads a script, the commands ask again with the numbers of the moment; so both say the
-same. All lengths in metres.
+The language checks them while it reads a script, the commands check them again with the values at run time, so both
+give the same message. All lengths in metres.
 """
 
 from __future__ import annotations

@@ -37,8 +37,8 @@ EYES = {
 
 
 class Section(NamedTuple):
-    """A plane that cuts a body: a point of it [m], its normal, whether the part on the side of the normal is taken away
-    (else the part towards the eye), and whether the cut alone is shown."""
+    """A plane that cuts a body: a point on it [m], its normal, whether the part on the side of the normal is removed
+    (else the part towards the viewer), and whether only the cut is shown."""
 
     point: tuple[float, float, float]
     normal: tuple[float, float, float]
@@ -47,7 +47,7 @@ class Section(NamedTuple):
 
 
 def eye_of(text: str) -> tuple[float, float, float]:
-    """Direction from the model to the eye: one of EYES, or three numbers. ValueError for what is neither."""
+    """Parse the direction from the model to the viewer: one of EYES, or three numbers. Raises ValueError."""
     if text in EYES:
         return EYES[text]
     found = _numbers(text)
@@ -57,9 +57,9 @@ def eye_of(text: str) -> tuple[float, float, float]:
 
 
 def section_of(text: str) -> Section:
-    """A plane: x=1.5 (also y, z), of which the part towards the eye is taken away; x<1.5 or x>1.5, which says what
-    stays; or a point and the normal into the part that is taken away, px,py,pz,nx,ny,nz. After the word slice the cut
-    alone is shown. ValueError."""
+    """Parse a plane: x=1.5 (also y, z) removes the part towards the viewer; x<1.5 or x>1.5 states which part remains;
+    px,py,pz,nx,ny,nz gives a point and the normal into the removed part. After the word slice only the cut is shown.
+    Raises ValueError."""
     before, _, after = text.strip().partition(" ")
     if before == "slice":
         return section_of(after)._replace(alone=True)
@@ -80,7 +80,7 @@ def section_of(text: str) -> Section:
 
 
 def _numbers(text: str) -> list[float]:
-    """Finite numbers with commas between them; none if there is anything else."""
+    """Parse finite numbers separated by commas; empty if the text has anything else."""
     try:
         found = [float(word) for word in text.split(",")]
     except ValueError:

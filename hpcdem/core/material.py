@@ -1,7 +1,7 @@
-"""What discs are made of, each property once.
+"""Properties of discs, each declared once.
 
-PROP and INI of the language, the same in Python, their checks, the table that kernels read, checkpoints and columns of
-frames follow from it.
+PROP and INI of the language, their Python forms, their checks, the table that kernels read, checkpoints and columns of
+frames follow from this table.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Property(NamedTuple):
 
     @property
     def range(self) -> str:
-        """Its values in words."""
+        """Describe the range of values in words."""
         if self.low == -math.inf:
             return self.noun
         if self.high == math.inf:
@@ -41,7 +41,7 @@ class Property(NamedTuple):
         return f"{self.noun} {f'above {self.low:g}, at most' if self.above else f'from {self.low:g} to'} {self.high:g}"
 
     def allows(self, value: float) -> bool:
-        """Whether it may have this value."""
+        """Whether the property may have this value."""
         return self.low <= value <= self.high and not (self.above and value == self.low)
 
 
@@ -75,7 +75,7 @@ PROPERTIES: Mapping[str, Property] = {
 
 
 def checked(given: Mapping[str, Any]) -> dict[str, float]:
-    """Those that are given, each within its range."""
+    """Return the given properties after checking their ranges."""
     values = {name: value for name, value in given.items() if value is not None}
     for name, value in values.items():
         if name not in PROPERTIES:

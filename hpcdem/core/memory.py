@@ -22,7 +22,7 @@ def aligned(shape: tuple[int, ...]) -> np.ndarray:
 
 
 def sparse_zeros(shape: int | tuple[int, ...], dtype: Any = np.float64) -> np.ndarray:
-    """Zeros that take memory where they are written to only, page by page: for tables that most models leave alone.
+    """Zeros that use memory only where they are written, page by page: for tables that most models do not use.
     numpy.zeros cuts tables of up to 32 MB out of memory that was used before, and writes the zeros."""
     shape = (shape,) if isinstance(shape, int) else shape
     count = math.prod(shape)

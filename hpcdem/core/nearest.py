@@ -1,4 +1,4 @@
-"""Did you mean ...? The known word that is most like the one that was read."""
+"""Suggestions: the known word that is most similar to an unknown one."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 
 
 def quoted(names: Iterable[str], none: str = "none so far") -> str:
-    """``'a', 'b'``, what there is, for a message."""
+    """List the available words for a message: ``'a', 'b'``."""
     return ", ".join(f"'{name}'" for name in names) or none
 
 
 def hint(word: str, known: Iterable[str]) -> str:
-    """``; did you mean 'xmove'?`` or nothing, to be put into a message."""
+    """Return ``; did you mean 'xmove'?`` for a message, or nothing."""
     best = nearest(word, known)
     return f"; did you mean '{best}'?" if best else ""

@@ -1,4 +1,4 @@
-"""Files that a run of particles writes at intervals: what the language, its checks and the loop know of each kind.
+"""Files that a run of particles writes at intervals: the one table of kinds for the language, its checks and the loop.
 
 A new kind is a row here, a field of its name in `physics.dem.settings.Settings`, and a method `write_NAME` of
 `commands.dem.output.Snapshot`.
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Output:
-    """what: it is; files: their names, <step> has ten digits, a frame before the first step of a command ends in _ini;
-    size: bytes per particle, measured on a settled and bonded bed of 1255 particles (about 2.5 contacts each);
+    """what: description; files: their names, <step> has ten digits, and a frame before the first step of a command ends
+    in _ini; size: bytes per particle, measured on a settled and bonded bed of 1255 particles (about 2.5 contacts each);
     sources: of the option of SET and of that of IMPLE, see `lang.zdem.table`."""
 
     what: str

@@ -1,4 +1,4 @@
-"""Where a user's program is."""
+"""Line of the user's program that is being executed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ PACKAGE = str(Path(__file__).resolve().parent.parent)
 
 
 def place() -> tuple[str, int]:
-    """File and line of the user's program that is being executed."""
+    """Return file and line of the user's program that is being executed."""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
         frame = frame.f_back

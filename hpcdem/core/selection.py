@@ -35,7 +35,7 @@ class Expression:
     program: tuple[float | str, ...]
 
     def __str__(self) -> str:
-        """As messages show it."""
+        """The selection as messages print it."""
         return f"'{self.text if len(self.text) <= 40 else self.text[:37] + '...'}'"
 
     def value(self, extents: Mapping[str, float]) -> float:
@@ -74,7 +74,7 @@ Particles: TypeAlias = Mapping[str, Any]
 
 
 def number(value: Value, extents: Mapping[str, float]) -> float:
-    """`value` itself, or what it stands for with these extents."""
+    """Return `value` itself, or evaluate its expression with these extents."""
     return value.value(extents) if isinstance(value, Expression) else value
 
 
@@ -138,8 +138,8 @@ class Interval(Selection):
 class Polygon(Selection):
     """Centres inside a polygon by the even-odd rule; corners ((x, y), ...) in either orientation.
 
-    Like an interval it owns its lower and left border and not its upper and right one: where two polygons share an
-    edge, every centre belongs to exactly one of them.
+    Like an interval, it includes its lower and left boundary and excludes its upper and right one: where two polygons
+    share an edge, every centre belongs to exactly one of them.
     """
 
     corners: tuple[tuple[Value, Value], ...]
@@ -225,7 +225,7 @@ class Chain(Selection):
 
 
 def _sides(first: Selection, second: Selection) -> bool:
-    """Whether these are the two sides of a rectangle."""
+    """Whether these two intervals are the sides of a rectangle."""
     both = isinstance(first, Interval) and isinstance(second, Interval)
     return both and first.axis != second.axis  # type: ignore[attr-defined]
 

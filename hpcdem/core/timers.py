@@ -1,4 +1,4 @@
-"""Where the time goes: one stopwatch per stage, cheap enough for every stage of every step.
+"""Time of each stage: one stopwatch per stage, cheap enough for every stage of every step.
 
 ::
 
@@ -7,8 +7,8 @@
         add_forces()
     timers.count(steps=1, particles=n_own)
 
-Stages lie side by side: the same stage must not be entered twice at once, and a stage inside another would be
-counted in both, unless the outer one is entered by `around`.
+A stage must not be entered twice at once. A stage inside another is counted in both, unless the outer one is entered by
+`around`.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class Timers:
 
     @contextmanager
     def around(self, name: str) -> Iterator[None]:
-        """A stage that may hold others: what they take is theirs, the rest is its own."""
+        """A stage that may contain others: their time is subtracted from its own."""
         began, inner = perf_counter_ns(), sum(w.ns for w in self.watches.values())
         try:
             yield
@@ -122,12 +122,12 @@ class Timers:
             watch.calls += 1
 
     def count(self, steps: int, particles: int) -> None:
-        """This rank moved `particles` particles of its own by `steps` steps."""
+        """Record that this rank advanced `particles` of its own particles by `steps` steps."""
         self.steps += steps
         self.particle_steps += steps * particles
 
     def seconds(self, *names: str) -> float:
-        """Time this rank spent in the stages [s]; in all of its own work when no name is given."""
+        """Return the time of this rank in the named stages [s]; without names, in all its own work."""
         if names:
             return sum(self.watches[n].seconds for n in names if n in self.watches)
         return sum(w.seconds for n, w in self.watches.items() if n.rpartition(": ")[2] not in WAITING)

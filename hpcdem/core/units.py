@@ -1,7 +1,7 @@
-"""Units that a user says to work in: their names on what is written, and which values are plausible in them.
+"""Units that a model declares: their names in output, and plausible ranges of values in them.
 
-Equations hold in any consistent system; nothing here changes a value. A system is known by the sizes of its units of
-length, mass and time; ranges of plausible values are declared in SI, one row of KINDS per kind.
+Equations hold in any consistent system of units; nothing here changes a value. A system is defined by the sizes of its
+units of length, mass and time. Plausible ranges are declared in SI, one row of KINDS per kind of quantity.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ CHOICES = {"si": "SI", "mm-mpa-s": "mm-MPa-s", "km-mpa-s": "km-MPa-s"}
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of quantity. unit: in SI; powers: of length, mass, time; low, high: magnitudes in SI beyond which a value
-    is checked (0 never is); usual: in SI, which of several units that could be meant is the likeliest; meant:
-    units that values are often left in, with their sizes in SI; names: of properties that it is for, () for all of
-    this unit that no other row names."""
+    """A kind of quantity. unit: in SI; powers: of length, mass, time; low, high: magnitudes in SI outside which a value
+    is questioned (0 never is); usual: typical value in SI, which decides between several units that could be meant;
+    meant: units in which values are often left by mistake, with their sizes in SI; names: properties of this kind, ()
+    for all of this unit that no other row names."""
 
     name: str
     unit: str
@@ -91,7 +91,7 @@ _ALSO = {"kg/m3 or kg/m2": "kg/m3"}
 
 
 def system(name: str) -> System:
-    """The system of this name, upper or lower case. CommandError lists those there are."""
+    """Return the system of this name, in upper or lower case. CommandError lists the known ones."""
     if not isinstance(name, str) or name.lower() not in SYSTEMS:
         raise CommandError(f"units: expected one of {', '.join(CHOICES.values())}, got {name}")
     return SYSTEMS[name.lower()]
@@ -108,17 +108,17 @@ def declared(name: str) -> str:
 
 
 def kind_of(name: str, unit: str) -> Kind | None:
-    """The kind of a property, None if nothing is declared of it."""
+    """Return the kind of a property, None if no kind is declared for it."""
     unit, name = _ALSO.get(unit, unit), name.replace("-", "_")
     rows = [kind for kind in KINDS if kind.unit == unit and (name in kind.names or not kind.names)]
     return min(rows, key=lambda kind: not kind.names, default=None)
 
 
 def doubt(where: System, name: str, unit: str, value: float) -> str:
-    """Warning about a value of a property given in these units, "" if it is plausible.
+    """Return a warning about a value of a property given in these units, "" if it is plausible.
 
-    Of the units that would make it plausible that of SI counts first, then the one that brings it nearest to what is
-    usual.
+    Of the units that would make it plausible, SI is suggested first, then the unit that brings it nearest to the usual
+    value.
     """
     kind = kind_of(name, unit)
     if kind is None or value == 0.0 or not math.isfinite(value):
@@ -214,8 +214,8 @@ COLDEST = 173.0
 
 
 def on_bar(low: float, high: float, unit: str) -> tuple[float, str]:
-    """Size and printed name of the unit in which a bar of colours, or an axis, from `low` to `high` [SI] is read:
-    numbers at its ticks are neither very long nor very small. What has no unit with prefixes takes a power of ten."""
+    """Size and printed name of the unit for a colour bar or an axis from `low` to `high` [SI], such that the numbers at
+    its ticks are neither long nor small. A quantity whose unit has no prefixes gets a power of ten."""
     largest = max(abs(low), abs(high))
     size, name = scale(largest, unit)
     part = largest / size

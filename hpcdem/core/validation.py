@@ -1,4 +1,4 @@
-"""What a table of named values got wrong, in our words: those of the validator never reach a user."""
+"""Messages about wrong values in a table of named values, in our words instead of those of the validator."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PATTERNS = {"#": "a colour such as #d0562a"}
 
 
 def expected(error: Mapping[str, Any]) -> str:
-    """What would have been right, of an entry of pydantic's `ValidationError.errors()`: "a number", "at most 1"."""
+    """Describe the expected value of an entry of pydantic's `ValidationError.errors()`: "a number", "at most 1"."""
     kind, context = str(error["type"]), error.get("ctx", {})
     if kind in _EXPECTED:
         return _EXPECTED[kind].format(**context)
@@ -35,11 +35,11 @@ def expected(error: Mapping[str, Any]) -> str:
 
 
 def message(error: Mapping[str, Any]) -> str:
-    """The sentence of a rule of ours ("limits: 1 is not below 1"), "" for what the validator itself refused."""
+    """Return the sentence of a rule of ours ("limits: 1 is not below 1"), "" for what the validator itself rejected."""
     return str(error["msg"]).removeprefix("Value error, ") if error["type"] == "value_error" else ""
 
 
 def kind_of(value: Any) -> str:
-    """What a value is, as messages call it: "a list", "names and values"."""
+    """Describe the kind of a value for messages: "a list", "names and values"."""
     names = {str: "text", bool: "true or false", int: "a whole number", float: "a number", type(None): "nothing"}
     return "names and values" if isinstance(value, Mapping) else names.get(type(value), "a list")

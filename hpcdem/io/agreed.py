@@ -1,7 +1,7 @@
-"""Files that are either whole or not there, and work of rank 0 whose result or error all ranks get.
+"""Files that are either complete or absent, and work of rank 0 whose result or error all ranks receive.
 
-All functions that take a communicator are collective. Only rank 0 touches the folder; what goes wrong there is raised
-on every rank, in one sentence that names file and cause, and whatever stood under the name before is left as it was.
+All functions that take a communicator are collective. Only rank 0 uses the folder. An error there is raised on every
+rank, in one sentence that names file and cause, and an earlier file of that name is kept.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ _T = TypeVar("_T")
 
 @contextmanager
 def atomic_path(path: str | os.PathLike, comm: Comm = SerialComm()) -> Iterator[str]:  # noqa: B008
-    """Collective. Hands out ``path.tmp``; when the body is done on all ranks, that file takes the name `path`.
+    """Provide ``path.tmp``; when all ranks have left the body, that file gets the name `path`. Collective.
 
-    An OSError or HpcdemError on any rank removes the temporary file and raises HpcdemError on all ranks. The body
-    must not leave other ranks waiting in an exchange: raise only after the last one (see `RootFile`).
+    An OSError or HpcdemError on any rank removes the temporary file and raises HpcdemError on all ranks. The body must
+    not leave other ranks waiting in an exchange: raise only after the last one (see `RootFile`).
     """
     path = os.fspath(path)
     temporary = path + ".tmp"
@@ -53,7 +53,7 @@ def atomic_path(path: str | os.PathLike, comm: Comm = SerialComm()) -> Iterator[
 
 
 def on_first(comm: Comm, action: Callable[[], _T]) -> _T:
-    """Collective: what `action` gives on rank 0, on all ranks; its HpcdemError or OSError too."""
+    """Call `action` on rank 0 and return its result, or raise its HpcdemError or OSError, on all ranks. Collective."""
     result, error = None, None
     if comm.rank == 0:
         try:
@@ -69,7 +69,7 @@ def on_first(comm: Comm, action: Callable[[], _T]) -> _T:
 
 
 def make_folder(path: str | os.PathLike, comm: Comm) -> None:
-    """Collective: the folder exists afterwards on all ranks. Raises HpcdemError."""
+    """Create the folder unless it exists; afterwards all ranks see it. Raises HpcdemError. Collective."""
     error = None
     if comm.rank == 0:
         try:

@@ -1,4 +1,4 @@
-"""What every picture of a frame needs to know: the part of the plane to show, its unit, and where the ticks go."""
+"""Axes of pictures of frames: the part of the plane shown, its unit, and the positions of ticks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEAST = 5
 
 @dataclass(frozen=True)
 class Ticks:
-    """Places of major and minor ticks along one axis, in its unit."""
+    """Positions of major and minor ticks along one axis, in its unit."""
 
     major: list[float]
     minor: list[float]
@@ -54,7 +54,7 @@ class View:
 
     @property
     def unit(self) -> tuple[float, str]:
-        """Length in metres and name of the axes' unit; in declared units that one."""
+        """Length in metres and name of the unit of the axes; the declared unit if the model declares one."""
         if self.system:
             return 1.0, label(self.system, "m")
         longer = max(self.width, self.height)
@@ -88,10 +88,10 @@ class View:
 
 
 def view(frame: Frame, extent: tuple[float, float, float, float] | None = None) -> View:
-    """The view of a frame whose tables are whole, or whose particles have the given extent.
+    """Choose the view of a frame whose tables are complete, or whose particles have the given extent.
 
-    With a BOX: the BOX and all walls (no particle leaves them). Otherwise the walls and the particles.
-    extent: left, right, bottom, top of all particles [m], for a frame of which this rank holds a part.
+    With a BOX: the BOX and all walls, as no particle leaves them. Otherwise the walls and the particles. extent: left,
+    right, bottom, top of all particles [m], for a frame of which this rank holds a part.
     """
     points = [np.asarray(frame.walls[p], dtype=float).reshape(-1, 2) for p in ("p1", "p2") if p in frame.walls]
     box = [float(frame.settings.get(k, "nan")) for k in ("left", "right", "bottom", "height")]
@@ -152,7 +152,7 @@ def _multiples(low: float, high: float, step: float) -> list[float]:
 
 
 def bar_ticks(low: float, high: float, log: bool = False) -> list[tuple[float, str]]:
-    """Places from `low` to `high`, and what is written there: LEAST at least, in round steps."""
+    """Positions of at least LEAST ticks from `low` in round steps, and their labels."""
     if log:
         for parts in ((1.0,), (1.0, 2.0, 5.0), tuple(map(float, range(1, 10)))):
             decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
@@ -168,5 +168,5 @@ def bar_ticks(low: float, high: float, log: bool = False) -> list[tuple[float, s
 
 
 def number(value: float) -> str:
-    """The shortest text of a tick's number."""
+    """The shortest text for the number of a tick."""
     return f"{value:.6g}" if abs(value) > 1e-9 else "0"

@@ -1,8 +1,8 @@
-"""Files that are written during the run.
+"""Files that a thread writes while the run continues.
 
-A writer that is handed a `Deliveries` gives rank 0's part of the work to a thread: bytes that are ready to be written,
-the flush to the disk and the new name. All that needs other ranks is done by then, so the thread never touches MPI, and
-of Python it needs little: its time goes by inside the operating system, with the interpreter free for the step loop.
+A writer that receives a `Deliveries` gives the work of rank 0 to a thread: writing bytes, flushing them to the disk,
+and renaming the file. All work that needs other ranks is done before, so the thread never calls MPI. It spends its time
+inside the operating system, so the step loop keeps the Python interpreter.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROOM = 256 << 20
 
 
 class Delivered(Protocol):
-    """A file: what went wrong with it, if anything."""
+    """A file and its error, if any."""
 
     error: str | None
 
@@ -30,9 +30,9 @@ class _Job:
 
 
 class Deliveries:
-    """Files under way: a queue of tasks on rank 0, executed in sequence, from `go` on.
+    """Files in progress: a queue of tasks on rank 0, executed in sequence after `go`.
 
-    Which files are under way is known on all ranks (`expect`); errors reach all ranks by `look` and `settle`.
+    All ranks know which files are in progress (`expect`); `look` and `settle` raise their errors on all ranks.
     """
 
     def __init__(self, room: int = ROOM) -> None:
@@ -48,7 +48,7 @@ class Deliveries:
     # -- the line --------------------------------------------------------------------------------------------
 
     def put(self, task: Callable[[], None], size: int = 0) -> None:
-        """A task that holds `size` bytes until it is done; waits while more than the room would be held."""
+        """Add a task that holds `size` bytes until it is done; wait while the tasks would hold more than the limit."""
         with self._change:
             while self._waiting and self._waiting + size > self._room:
                 self._go()
@@ -57,8 +57,8 @@ class Deliveries:
             self._waiting += size
 
     def go(self) -> None:
-        """Begin with the tasks put so far. Held back until now, so that two threads do not fight for the interpreter
-        while there is more to hand over."""
+        """Start the tasks added so far. They are held back until then, so that two threads do not compete for the
+        interpreter."""
         with self._change:
             self._go()
 
@@ -95,7 +95,7 @@ class Deliveries:
                 self._change.notify_all()
 
     def entrust(self, write: Callable[[], None]) -> None:
-        """All work on a file that needs no other rank: `write` is called behind the back of the run."""
+        """Write a file that needs no other rank in the thread: it calls `write`."""
         job = _Job()
 
         def work() -> None:
@@ -110,7 +110,7 @@ class Deliveries:
     # -- files, as all ranks see them ------------------------------------------------------------------------
 
     def expect(self, file: Delivered | None) -> None:
-        """A file is under way; None on the ranks that do not write it. Collective."""
+        """Register a file in progress; None on the ranks that do not write it. Collective."""
         self._expected = True
         if file is not None:
             self._files.append(file)

@@ -1,4 +1,4 @@
-"""Time series as text: rows are appended as the run goes, each row begins with the step."""
+"""Time series as text: a run appends rows, each of which begins with the step."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from hpcdem.io.disk import explain, publish, remove
 
 
 def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: float | None, comm: Comm) -> None:
-    """Collective. Add rows to the file.
+    """Append rows to the file. Collective.
 
-    since: None to append; at the first call of a run the step it starts from: what the file has after that step is cut
-    off (0: it starts again). Raises HpcdemError on all ranks if it cannot be written.
+    since: None to append; at the first call of a run, the step at which it starts: later rows of the file are removed
+    (0: the file starts again). Raises HpcdemError on all ranks if the file cannot be written.
     """
     error = None
     if comm.rank == 0:
@@ -28,7 +28,7 @@ def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: fl
 
 
 def _cut(path: str | os.PathLike, header: str, since: float) -> None:
-    """Keep the rows up to a step. The last row may be a piece, as a full disk leaves it, and a piece of a number is a
+    """Keep the rows up to a step. The last row may be truncated, as by a full disk; part of a number would read as a
     smaller number."""
     kept = [header]
     if since > 0 and os.path.exists(path):

@@ -22,7 +22,8 @@ _CAUSES = {
 
 
 def explain(path: str | os.PathLike, error: BaseException, doing: str = "write") -> str:
-    """One sentence: what could not be done to which file, and why. Reads the errno inside HDF5's long messages too."""
+    """Describe in one sentence which operation on which file failed, and why. Finds the errno in HDF5's long messages
+    too."""
     number = error.errno if isinstance(error, OSError) else None
     if number is None and (found := re.search(r"errno = (\d+)", str(error))):
         number = int(found[1])
@@ -43,7 +44,7 @@ def publish(temporary: str, path: str) -> None:
 
 
 def to_disk(path: str) -> None:
-    """What was written to a file survives a loss of power from now on."""
+    """Flush a file, so that its content survives a loss of power."""
     handle = os.open(path, os.O_RDWR)
     try:
         os.fsync(handle)
@@ -52,7 +53,7 @@ def to_disk(path: str) -> None:
 
 
 def _folder_to_disk(path: str) -> None:
-    """Make the new name itself durable; not every file system can, and the file is good without."""
+    """Make a new name durable. Not every file system supports this; the file is valid without it."""
     with suppress(OSError):
         handle = os.open(os.path.dirname(path) or ".", os.O_RDONLY)
         try:
