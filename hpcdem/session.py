@@ -222,6 +222,7 @@ KINDS = {
     "energy": Kernels("commands.dem.warm_up", "with_energy", after=("",)),
     "clumps": Kernels("commands.dem.warm_up", "with_clumps", after=("",)),
     "restitution": Kernels("commands.dem.warm_up", "with_restitution", after=("",)),
+    "rolling": Kernels("commands.dem.warm_up", "with_rolling", after=("",)),
     "blocks": Kernels("commands.fdem.warm_up"),
     "coupled": Kernels("physics.coupling.warm_up", after=("energy",)),
     "bolts": Kernels("physics.bolts.warm_up"),

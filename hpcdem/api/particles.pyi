@@ -247,6 +247,7 @@ class ParticleCommands:
         parameter : properties that the law declares.
         properties : density [kg/m3], of discs of unit thickness [kg/m2]; fric; shear [Pa]; poiss; damp; kn, ks
             [N/m];
+            rfric, rdamp: coefficient of rolling resistance, damping over the critical one;
             xp, yp: pressures that push along x and y, on 2 R thickness of each particle [Pa].
         """
     def bond(

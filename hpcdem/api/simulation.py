@@ -188,6 +188,7 @@ class Simulation(ParticleCommands, BlockCommands):
         gravity: tuple[float, float] | None = None,
         lsm: float | None = None,
         restitution: float | None = None,
+        rolling: str | None = None,
         seed: int | None = None,
         gentry: float | None = None,
         thickness: float | None = None,
@@ -209,6 +210,7 @@ class Simulation(ParticleCommands, BlockCommands):
         dt, frac : time step [s]; or part of the critical time step.
         gravity : (gx, gy) [m/s2].
         lsm, restitution : damping of the old manual; coefficient of restitution of contacts, 0 to 1.
+        rolling : type of rolling resistance: "a" constant torque, "c" elastic-plastic spring and dashpot.
         seed, gentry : first number of random places; tries of GEN for each particle.
         thickness : of the model across the plane [m], for stress.
         wallside : "left" or "both": the sides of walls that push.

@@ -62,6 +62,13 @@ class Material(TypedDict, total=False):
     )]  # fmt: skip
     kn: Annotated[Value, Property("normal stiffness of the linear contact", "N/m", low=0.0)]
     ks: Annotated[Value, Property("shear stiffness of the linear contact", "N/m", low=0.0)]
+    rfric: Annotated[Value, Property(
+        "coefficient of rolling resistance: the torque is at most this times rolling radius and normal force", low=0.0,
+        high=10.0, default="0", source="X", in_frames=False,
+    )]  # fmt: skip
+    rdamp: Annotated[Value, Property(
+        "rolling dashpot over the critical one (SET rolling c)", low=0.0, default="0", source="X", in_frames=False,
+    )]  # fmt: skip
     xp: Annotated[Value, Property(
         "pressure on each particle along x: force = pressure 2 R thickness (SET thickness), until "
         "changed", "Pa", default="0", source="P", in_frames=False,

@@ -214,6 +214,7 @@ class Maker:
             self.perhaps(15, f"gentry {self.pick('3', '0.5', '40')}"), self.perhaps(15, f"stepbar {self.whole(7, 90)}"),
             self.perhaps(10, "thickness 3.0"), self.perhaps(10, "units", self.pick("SI", "mm-MPa-s")),
             self.perhaps(15, "restitution 0.7") if self.disk != "on" else "",  # there are no clumps then
+            self.perhaps(15, "rolling", self.pick("c", "a")),
         ]  # fmt: skip
         if any(more):
             self.add("SET", *more)
@@ -406,6 +407,8 @@ class Maker:
             self.perhaps(20, "damp 0.2"), self.perhaps(30, f"color {self.pick('blue', '3')}"),
             self.perhaps(30, self.group(self.pick("chosen", "bed"))),
         ]  # fmt: skip
+        if self.disk != "on":  # there are no clumps then
+            keys += [self.perhaps(20, "rfric 0.2"), self.perhaps(20, "rdamp 0.3")]
         if not self.accounts:
             push = number(1e-3 * self.stiffness)
             keys += [self.perhaps(15, f"xp {push}"), self.perhaps(15, f"yp -{push}")]
@@ -425,7 +428,7 @@ class Maker:
             wishes += [f"wall id {ident} {axis}stress"] * (ident in self.walls)
         wishes += ["xstrain wall 1|2"] * (1 in self.walls and 2 in self.walls)
         wishes += ["ystrain wall 0|1"] * (0 in self.walls and 1 in self.walls)
-        for ident in range(4, 4 + self.whole(1, 3)):
+        for ident in range(4, 4 + self.whole(2, 4)):
             self.add(f"HIST id {ident} interval {self.whole(5, 40)}, {self.pick(*wishes)}")
 
     def do_log(self) -> None:
@@ -451,7 +454,7 @@ class Maker:
                 f"wall id {ident} " in line or "strain wall" in line for line in self.lines if line.startswith("HIST")
             )
         ]
-        if free and self.chance(30):
+        if free:
             ident = self.pick(*free)
             del self.walls[ident]
             self.add(f"WALL id {ident} delete")
@@ -507,9 +510,10 @@ class Maker:
             self.add(f"CYC {self.pick(self.whole(10, 90), self.whole(10, 90), 0, 1)}")
 
 
-EVENTS = ("rain", "delete", "bond", "bond", "prop", "move_a_wall", "break", "fix", "set", "new_wall", "row", "ball",
-"export",
-          "save", "draw", "clumps", "join", "platens", "log")  # fmt: skip
+EVENTS = (
+    "rain", "delete", "bond", "bond", "prop", "move_a_wall", "delete_a_wall", "break", "fix", "set", "new_wall",
+    "row", "ball", "export", "save", "draw", "clumps", "join", "platens", "log",
+)  # fmt: skip
 
 
 @st.composite

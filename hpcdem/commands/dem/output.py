@@ -40,7 +40,9 @@ from hpcdem.runtime import launch, run_folder
 from hpcdem.runtime.progress import StepStatus
 
 WALL_COLUMNS = "step,time,wall,x1,y1,x2,y2,fx,fy"
-ENERGY_COLUMNS = ",".join(["step", "time", *budget.NAMES])
+OF_ROLLING = ("elastic_rolling", "loss_rolling")
+"""Columns of energy.csv of models with rolling resistance only."""
+ENERGY_COLUMNS = ",".join(["step", "time", *(name for name in budget.NAMES if name not in OF_ROLLING)])
 
 
 class Snapshot:
@@ -251,9 +253,10 @@ def warn_of_overlaps(sim: Simulation) -> None:
 def write_energy(sim: Simulation, _: Snapshot | None = None) -> None:
     """A row of `energy.csv`: the budget now."""
     with sim.timers("output"):
-        seen = sim.energy.look(sim)
-        of_physics = physics_energies(sim)
-        numbers = (repr(v) for v in (sim.clock.time, *dataclasses.astuple(seen), *of_physics.values()))
+        seen = dataclasses.asdict(sim.energy.look(sim))
+        of_rolling = {name: seen.pop(name) for name in OF_ROLLING}
+        of_physics = physics_energies(sim) | (of_rolling if sim.rolling is not None else {})
+        numbers = (repr(v) for v in (sim.clock.time, *seen.values(), *of_physics.values()))
         _append(sim, "energy.csv", ",".join([ENERGY_COLUMNS, *of_physics]), [",".join([str(sim.clock.step), *numbers])])
 
 
@@ -273,7 +276,7 @@ def tell_energy(sim: Simulation) -> None:
     values = {
         words: float(getattr(seen, name))
         for name, words in ENERGY_WORDS.items()
-        if name not in ("work_blocks", "loss_laws") or getattr(seen, name)
+        if name not in ("work_blocks", "loss_laws", *OF_ROLLING) or getattr(seen, name)
     } | of_physics
     sim.log.account("energy budget", "energy", "J", values, sim.settings.units)
     closing = with_prefix(seen.closing, "J", system=sim.settings.units)
@@ -291,6 +294,7 @@ ENERGY_WORDS = {
     "elastic_normal": "stored: contacts, normal",
     "elastic_shear": "stored: contacts, shear",
     "elastic_bonds": "stored: open bonds",
+    "elastic_rolling": "stored: rolling springs",
     "work_gravity": "work of gravity",
     "work_walls": "work of moving walls",
     "work_driven": "work on fixed particles",
@@ -301,6 +305,7 @@ ENERGY_WORDS = {
     "loss_opened": "lost when contacts opened",
     "loss_stiffness": "lost by change of shear stiffness",
     "loss_laws": "lost in pairs with a user law",
+    "loss_rolling": "lost by rolling resistance",
     "commands": "brought by commands",
     "box": "brought by leaving the BOX",
     "work_blocks": ACROSS,

@@ -12,7 +12,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import FIX_BITS
 from hpcdem.core.material import Material, checked
 from hpcdem.core.selection import Chain, Group, Selection, has_expressions
-from hpcdem.physics.dem import user_laws
+from hpcdem.physics.dem import rolling, user_laws
 from hpcdem.physics.dem.materials import OWN
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.dem.user_laws import LINEAR, PairLaw
@@ -75,6 +75,7 @@ def prop(
     between : the law is that of pairs of discs with these two laws; nothing else is set.
     parameter : properties that the law declares.
     properties : density [kg/m3], of discs of unit thickness [kg/m2]; fric; shear [Pa]; poiss; damp; kn, ks [N/m];
+        rfric, rdamp: coefficient of rolling resistance, damping over the critical one;
         xp, yp: pressures that push along x and y, on 2 R thickness of each particle [Pa].
     """
     if between:
@@ -97,6 +98,7 @@ def prop(
         )
     p = sim.particles
     which = chosen(sim, where)
+    rolling.begin(sim, given)
     if given:
         material = p["material"]
         mapping = sim.materials.changed(sim.used(material[which], sim.materials), **given)

@@ -27,7 +27,7 @@ NUMBERS: dict[str, tuple[type, Callable[[Any], bool], str]] = {
 """Their kind, what they must fulfil, and how that is reported."""
 STEPS = {"dt": "frac", "frac": "dt"}
 """Two ways to say the time step."""
-CHOICES = {"disk": tuple(SPHERES), "wallside": ("left", "both")}
+CHOICES = {"disk": tuple(SPHERES), "wallside": ("left", "both"), "rolling": ("a", "c")}
 
 
 def set_option(sim: Simulation, name: str, value: Any) -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from hpcdem.commands.dem import bonds, clumps, cycles, particles, properties, settings, walls
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.selection import Ids
+from hpcdem.numerics.exact_sum import BINS_SHAPE
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.kernels import laws
@@ -65,6 +68,18 @@ def with_restitution(threads: int = 1) -> None:
     cycles.prepare(sim)
     sim.step()
     sim.dashpots.fastest(sim)
+
+
+def with_rolling(threads: int = 1) -> None:
+    """The same for rolling resistance."""
+    sim = _model(threads)
+    properties.prop(sim, rfric=0.1)
+    cycles.prepare(sim)
+    sim.step()
+    diagnostics.highest_frequency(sim)
+    assert sim.rolling is not None
+    for book in (sim.rolling.book_lost, sim.rolling.book_stored):
+        book(sim, np.zeros(BINS_SHAPE, np.int64))
 
 
 def _model(threads: int) -> Simulation:

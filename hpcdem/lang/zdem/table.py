@@ -404,6 +404,9 @@ _SETTINGS = (
     Option("damp", "lattice-solid damping, force -v times this", kind=LSM, unit="N s/m", default="lsm 0", source="S"),
     Option("restitution", "coefficient of restitution of unbonded discs, with each other and with walls; 1: no "
            "loss", kind=RATIO, default="1", source="X"),
+    Option("rolling", "type of rolling resistance (PROP rfric): a, a torque of constant size against rolling; c, an "
+           "elastic-plastic spring and a dashpot", kind=Choice("a|c", "a or c", (("a", "a"), ("c", "c"))),
+           default="c", source="X"),
     _interval("stepbar", "steps between two lines of progress"),
     *(_interval(name, f"{one.what} at this interval of steps", one.sources[0]) for name, one in OUTPUTS.items()),
     _interval("energy", "steps between two rows of energy.csv, with the energy budget at the end", source="X"),

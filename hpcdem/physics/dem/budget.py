@@ -43,6 +43,7 @@ class Energy:
     elastic_normal: float
     elastic_shear: float
     elastic_bonds: float
+    elastic_rolling: float
     work_gravity: float
     work_walls: float
     work_driven: float
@@ -53,6 +54,7 @@ class Energy:
     loss_opened: float
     loss_stiffness: float
     loss_laws: float
+    loss_rolling: float
     commands: float
     box: float
     work_blocks: float
@@ -124,6 +126,8 @@ class Budget(engine.Budget[Simulation, int]):
                 sim.own_laws.loops.lost(
                     *_own_pairs(sim), self._bins, lists.u_made, self._shear, self._normal, self._memory, dt
                 )
+            if sim.rolling is not None:
+                sim.rolling.book_lost(sim, self._bins[energy.TURNED])
             _wall_losses(*_wall_slots(sim), self._wall_shear, self._wall_side, sim.wall_laws, n_mat, dt, self._bins)
 
     # ---- readings --------------------------------------------------------------------------------------------------
@@ -183,11 +187,15 @@ class Budget(engine.Budget[Simulation, int]):
             return {name: int(v, 16) if first else 0 for name, v in zip(names, numbers, strict=True)}
 
         accounts = list(state["accounts"])
-        if len(accounts) < len(FLOWS):  # in files of earlier versions
-            accounts.insert(energy.LAWS, "0x0")
-            accounts += ["0x0"] * (len(FLOWS) - len(accounts))
-        budget.accounts, budget.left = share(FLOWS, accounts), share(STORED, state["left"])
-        budget.start = None if state["start"] is None else share(STORED, state["start"])
+        for row in range(energy.LAWS if len(accounts) < len(FLOWS) - 1 else energy.TURNED, energy.FLOWS):
+            if len(accounts) < len(FLOWS):  # in files of earlier versions
+                accounts.insert(row, "0x0")
+        accounts += ["0x0"] * (len(FLOWS) - len(accounts))
+        left, start = (
+            [*(one or []), *["0x0"] * (len(STORED) - len(one or []))] for one in (state["left"], state["start"])
+        )
+        budget.accounts, budget.left = share(FLOWS, accounts), share(STORED, left)
+        budget.start = None if state["start"] is None else share(STORED, start)
         budget.running, budget.finite = state["running"], state["finite"]
         return budget
 
@@ -217,7 +225,7 @@ def stored_energy(sim: Simulation) -> float:
 
 
 def _stored_bins(sim: Simulation, whole_step: bool = True) -> np.ndarray:
-    """What the particles and contacts of this rank store (5, 2, 2112) i8; motion at the whole step or half before."""
+    """What the particles and contacts of this rank store (6, 2, 2112) i8; motion at the whole step or half before."""
     lists, p, s, b = sim.lists, sim.particles, sim.settings, sim.lists.blocks
     bins = np.zeros((energy.STORED, *BINS_SHAPE), np.int64)
     spheres, n_mat = mass.SPHERES[s.disk], len(sim.materials)
@@ -234,6 +242,8 @@ def _stored_bins(sim: Simulation, whole_step: bool = True) -> np.ndarray:
         energy.kinetic(0, c.hot, 0, *c.mine_as_block(), c.force, c.body, s.gx, s.gy, s.lsm, whole_step, bins)
     if sim.own_laws.loops is not None:
         sim.own_laws.loops.stored(*_own_pairs(sim), bins)
+    if sim.rolling is not None:
+        sim.rolling.book_stored(sim, bins[energy.ROLLING])
     _wall_energy(*_wall_slots(sim), sim.wall_laws, n_mat, bins)
     return bins
 

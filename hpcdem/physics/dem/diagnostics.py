@@ -165,6 +165,8 @@ def _stiffnesses(sim: Simulation) -> tuple[np.ndarray, float]:
         len(rows), contacts_of, rows[:, STIFFNESS].copy(), rows[:, OVERLAP].copy(), p.hot, p.ihot, lists.slot_row,
         lists.slot_wall, p.n_left, out,
     )  # fmt: skip
+    if sim.rolling is not None:
+        out = np.maximum(out, sim.rolling.rates(sim) * sim.body[:, MASS])
     return out, deepest
 
 
@@ -335,17 +337,18 @@ def _stiffness_times(sim: Simulation, u: np.ndarray, motion: np.ndarray, force: 
         rigid.motions_of_members(c.start, c.row, c.arm, u[len(p) :], motion)
     sim.halo.fill(motion)
     out = np.zeros_like(u)
+    turning, turning_at_walls = np.empty((2, 0)) if sim.rolling is None else sim.rolling.stiffnesses(sim)
     for t in range(lists.n_blocks):
         modes.pairs(
             t, p.hot, p.ihot, b.cut, b.lo, b.hi, b.poff, b.foff, lists.ptr, lists.partner, lists.bond, lists.u_made,
-            sim.pair_laws, sim.bond_laws, len(sim.materials), mass.SPHERES[sim.settings.disk], motion, force,
+            sim.pair_laws, sim.bond_laws, len(sim.materials), mass.SPHERES[sim.settings.disk], turning, motion, force,
         )  # fmt: skip
         first, last = b.foff[t] + b.cut[t] - b.lo[t], b.foff[t] + b.cut[t + 1] - b.lo[t]
         out[b.cut[t] - p.n_left : b.cut[t + 1] - p.n_left] = force[first:last]
     sim._wall_table[:, 0:2], sim._wall_table[:, 2:4] = sim.walls.p1, sim.walls.p2
     modes.walls(
         p.hot, p.ihot, sim._wall_table, lists.slot_row, lists.slot_wall, lists.slot_side, sim.wall_laws,
-        len(sim.materials), p.n_left, motion, out,
+        len(sim.materials), p.n_left, turning_at_walls, motion, out,
     )  # fmt: skip
     if sim.clumps:
         member = np.zeros_like(motion)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.memory import aligned
+from hpcdem.physics.dem import rolling
 from hpcdem.physics.dem.kernels import contacts, mass, motion, pair_forces
 from hpcdem.physics.dem.kernels import walls as wall_kernels
 
@@ -55,6 +56,10 @@ def refresh(sim: Any) -> None:
         from hpcdem.physics.dem.restitution import Dashpots  # brings kernels of their own
 
         sim.dashpots = Dashpots(sim)
+    sim.rolling = None
+    if rolling.columns(rows):
+        sim.prepare_kernels("rolling")
+        sim.rolling = rolling.Rolling(sim)
     for physics in sim.physics:
         physics.prepare(sim)
 

@@ -121,6 +121,8 @@ def tables_of(sim: Simulation) -> dict[str, Table]:
     wall_contacts = {
         "gid": owner[walls], "wall": -1 - hist.partner[walls], "fs": hist.fs[walls], "extra": hist.extra[walls],
     }  # fmt: skip
+    if not sim.own_laws:  # which walls do not follow
+        wall_contacts |= {f"{MEMORY}{k}": column.copy() for k, column in enumerate(hist.memory[walls].T)}
     return {
         "particles": to_slabs(sim.comm, ("gid",), columns),
         # A pair whose partners live on two ranks is remembered by both; the lower gid's owner writes it.
@@ -144,7 +146,7 @@ def add_physics(sim: Simulation, name: str, parameters: dict[str, Any]) -> None:
 
 
 MEMORY = "memory"
-"""Of the table of pairs: its columns of what contacts remember of a user law begin so."""
+"""Columns of what contacts remember of a user law or of rolling begin so, in the tables of pairs and wall contacts."""
 CLUMP_STATE = {
     "x": CLUMP_X, "y": CLUMP_Y, "vx": CLUMP_VX, "vy": CLUMP_VY, "spin": CLUMP_SPIN, "angle": CLUMP_ANGLE, "area": AREA,
     "inertia": MOMENT,
@@ -273,21 +275,22 @@ def histories(
 ) -> Histories:
     """What the particles of this rank remember, gid (n,) i8: ascending over all ranks. Collective.
 
-    pairs: each pair once, on any rank: gid < partner, fs, extra, bond, memory of a user law; walls: gid, wall,
-    fs, extra (see `Histories`).
+    pairs: each pair once, on any rank: gid < partner, fs, extra, bond, memory; walls: gid, wall, fs, extra,
+    memory (see `Histories`).
     """
     columns = sum(name.startswith(MEMORY) for name in pairs)
     memory = np.empty((len(pairs["gid"]), columns))
     for k in range(columns):
         memory[:, k] = pairs[f"{MEMORY}{k}"]
     none = np.zeros(len(walls["gid"]), np.int64)
+    at_walls = [walls.get(f"{MEMORY}{k}", np.zeros(len(none))) for k in range(columns)]
     owner = np.concatenate([pairs["gid"], pairs["partner"], walls["gid"]])
     entries = (
         np.concatenate([pairs["partner"], pairs["gid"], -1 - walls["wall"]]),
         np.concatenate([pairs["fs"], pairs["fs"], walls["fs"]]),
         np.concatenate([pairs["extra"], pairs["extra"], walls["extra"]]),
         np.concatenate([pairs["bond"], pairs["bond"], none]),
-        np.concatenate([memory, memory, np.zeros((len(none), columns))]),
+        np.concatenate([memory, memory, np.reshape(at_walls, (columns, len(none))).T]),
     )
     _, owner, partner, fs, extra, bond, memory = comm.to_ranks(holders(comm, gid, owner), owner, *entries)
     # Of each particle: pairs with higher ids, pairs with lower ones, walls.

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 class Settings:
     """SI units. Intervals are in steps, 0 is off. `dt` and `frac`: the one given last counts, the other is 0. gentry:
     attempts of GEN per particle requested, 0 while not set. thickness: of the model, for pressures and stresses.
-    units: that the user says to work in (core.units.SYSTEMS), "" none. restitution: 1 without dashpots."""
+    units: that the user says to work in (core.units.SYSTEMS), "" none. restitution: 1 without dashpots. rolling: type
+    of rolling resistance (rolling.py)."""
 
     dt: float = 0.0
     frac: float = 0.0
@@ -29,3 +30,4 @@ class Settings:
     thickness: float = 1.0
     units: str = ""
     restitution: float = 1.0
+    rolling: str = "c"

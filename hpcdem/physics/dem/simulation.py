@@ -21,7 +21,7 @@ from hpcdem.core.fields import CLUMP, FIELDS, FX, TORQUE, WIDTH
 from hpcdem.core.memory import aligned, take_rows
 from hpcdem.engine.model import FRESH, STORAGE, Model
 from hpcdem.halo.migrate import Trail
-from hpcdem.physics.dem import guards, loops, missed, reach
+from hpcdem.physics.dem import guards, loops, missed, reach, rolling
 from hpcdem.physics.dem.clumps import Clumps
 from hpcdem.physics.dem.kernels import contacts, fast, motion, neighbours
 from hpcdem.physics.dem.kernels.fast import Fast
@@ -153,6 +153,7 @@ class Simulation(Model):
         self._named: set[int] = set()
         self.energy: Any = None
         self.dashpots: Any = None  # restitution.Dashpots, while SET restitution is below 1
+        self.rolling: rolling.Rolling | None = None  # while PROP rfric is above 0
         self.own_laws = ModelLaws()  # of the user; materials say which discs have them
         self.own_table: np.ndarray | None = None
         self.stamp = 1  # evaluations of forces, for the memory of these laws
@@ -225,6 +226,8 @@ class Simulation(Model):
             self._wall_forces(lists.n_blocks, *self._wall_args)
         if self.dashpots is not None:
             self.dashpots.push(self)
+        if self.rolling is not None:
+            self.rolling.push()
         if len(self._pushed):
             lists.force[self._pushed, :2] += self._push
         if self.moves_as_one:
@@ -357,7 +360,7 @@ class Simulation(Model):
     def _share_out(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         p, box = self.particles, self.walls.box()
         cell, self.hist, (hot, cold, more, *rigid) = self._send_home(
-            cell, self.hist.resized(self.own_laws.memory),
+            cell, self.hist.resized(self.own_laws.memory or rolling.columns(self.materials.rows)),
             [p.hot, p.cold, p.more, *([] if p.rigid is None else [p.rigid])], None if box is None else box[:2],
             least=self.rebuild_state.columns, left=lambda leave, to: self.trail.note(p["gid"][leave], to),
         )  # fmt: skip

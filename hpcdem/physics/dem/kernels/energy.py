@@ -37,13 +37,13 @@ from hpcdem.physics.dem.kernels.walls import (
     wall_state,
 )  # fmt: skip
 
-# Flows [J], the rows of bins (10, 2, 2112): work done on the model, then what it loses; LAWS: in pairs with a law of
-# the user (user_pairs.py).
-GRAVITY, WALLS, DRIVEN, FRICTION, LOCAL, LATTICE, BONDS, OPENED, STIFFNESS, LAWS = range(10)
-FLOWS = 10
-# What is stored [J], rows of bins (5, 2, 2112).
-TRANSLATION, ROTATION, NORMAL, SHEAR, BONDED = range(5)
-STORED = 5
+# Flows [J], the rows of bins (11, 2, 2112): work done on the model, then what it loses; LAWS: in pairs with a law of
+# the user (user_pairs.py); TURNED: by rolling resistance (rolling.py).
+GRAVITY, WALLS, DRIVEN, FRICTION, LOCAL, LATTICE, BONDS, OPENED, STIFFNESS, LAWS, TURNED = range(11)
+FLOWS = 11
+# What is stored [J], rows of bins (6, 2, 2112).
+TRANSLATION, ROTATION, NORMAL, SHEAR, BONDED, ROLLING = range(6)
+STORED = 6
 
 
 @njit(cache=True, error_model="numpy")

@@ -14,7 +14,7 @@ U = np.uint64
 # Columns of an entry: partner gid (-1 - w for wall w) and bond type, as int64 bits, and two numbers.
 PARTNER, SHEAR, EXTRA, BOND = range(4)
 WIDTH = 4
-"""Of an entry; behind it stands the memory of a law of the user (user_pairs.py)."""
+"""Of an entry; behind it stands the memory of a law of the user (user_pairs.py), or of rolling (rolling.py)."""
 
 
 @dataclass
@@ -22,8 +22,8 @@ class Histories:
     """What contacts remember, per owned particle (CSR): the entries of particle c are rows[ptr[c] : ptr[c+1]].
 
     ptr (n + 1,) i8; rows (m, 4 + memory) f8: partner, shear force [N], a second number (overlap at bonding of a pair
-    [m], normal force of a law of the user [N]; side of a wall contact), bond type, memory of a law of the user. Both
-    partners of a pair carry it. The walls of a particle follow its pairs.
+    [m], normal force of a law of the user [N]; side of a wall contact), bond type, memory of a user law or of
+    rolling. Both partners of a pair carry it. The walls of a particle follow its pairs.
     """
 
     ptr: np.ndarray
@@ -144,7 +144,7 @@ def taken_out(lists: Any, ihot: np.ndarray, stamp: float) -> Histories:
     pairs = (lists.ptr, lists.row, lists.partner, lists.fs, lists.bond)
     (_count_blocks_threaded if threaded else _count_blocks)(
         n_blocks, totals, found, lists.n_left, b.cut, b.lo, b.poff, *pairs, lists.memory, stamp,
-        lists.wptr, lists.slot_row, lists.slot_fs, lists.slot_side, alive, count,
+        lists.wptr, lists.slot_row, lists.slot_fs, lists.slot_side, lists.slot_memory, alive, count,
     )  # fmt: skip
     ends = np.cumsum(totals)
     ptr = np.empty(lists.n_own + 1, np.int64)
@@ -152,8 +152,8 @@ def taken_out(lists: Any, ihot: np.ndarray, stamp: float) -> Histories:
     out = Histories(ptr, np.empty((int(ends[-1]), WIDTH + lists.memory.shape[1])))
     (_hand_out_blocks_threaded if threaded else _hand_out_blocks)(
         n_blocks, ends - totals, found, lists.n_left, ihot, b.cut, b.poff, *pairs, lists.u_made, lists.memory, stamp,
-        lists.wptr, lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side, alive, count, ptr,
-        out.rows, out.rows.view(np.int64),
+        lists.wptr, lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side, lists.slot_memory, alive, count,
+        ptr, out.rows, out.rows.view(np.int64),
     )  # fmt: skip
     return out
 
@@ -164,8 +164,8 @@ def taken_out(lists: Any, ihot: np.ndarray, stamp: float) -> Histories:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _count(
-    t, n_left, cut, lo, poff, ptr, row, partner, fs, bond, memory, stamp, wptr, slot_row, slot_fs, slot_side, alive,
-    count,
+    t, n_left, cut, lo, poff, ptr, row, partner, fs, bond, memory, stamp, wptr, slot_row, slot_fs, slot_side,
+    slot_memory, alive, count,
 ):  # fmt: skip
     """Entries per particle of block t. alive: the slots that remember something. Returns (entries, such slots)."""
     a, b = cut[t], cut[t + 1]
@@ -193,7 +193,7 @@ def _count(
             count[U(j - n_left)] += 1
             total += 1
     for k in range(wptr[t], wptr[t + 1]):
-        if slot_fs[k] != 0.0 or slot_side[k] != 0.0:
+        if slot_fs[k] != 0.0 or slot_side[k] != 0.0 or (slot_memory.shape[1] > 0 and slot_memory[k, 0] != 0.0):
             count[slot_row[k] - n_left] += 1
             total += 1
     return total, found
@@ -202,7 +202,7 @@ def _count(
 @njit(cache=True, nogil=True, error_model="numpy")
 def _hand_out(
     t, first, found, n_left, ihot, cut, poff, ptr, row, partner, fs, bond, u_made, memory, stamp,
-    wptr, slot_row, slot_wall, slot_fs, slot_side, alive, count, hptr, rows, bits,
+    wptr, slot_row, slot_wall, slot_fs, slot_side, slot_memory, alive, count, hptr, rows, bits,
 ):  # fmt: skip
     """Entries of the particles of block t, from entry `first` on."""
     a, b = cut[t], cut[t + 1]
@@ -236,12 +236,12 @@ def _hand_out(
                 for c in range(memory.shape[1]):
                     rows[q, WIDTH + c] = memory[k, c] if memory[k, 0] >= stamp else 0.0
     for k in range(wptr[t], wptr[t + 1]):
-        if slot_fs[k] != 0.0 or slot_side[k] != 0.0:
+        if slot_fs[k] != 0.0 or slot_side[k] != 0.0 or (slot_memory.shape[1] > 0 and slot_memory[k, 0] != 0.0):
             q = at[slot_row[k] - n_left]
             at[slot_row[k] - n_left] = q + 1
             bits[q, PARTNER], bits[q, BOND] = -1 - slot_wall[k], 0
             rows[q, SHEAR], rows[q, EXTRA] = slot_fs[k], slot_side[k]
-            rows[q, WIDTH:] = 0.0
+            rows[q, WIDTH:] = slot_memory[k]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -253,12 +253,12 @@ def _count_blocks(n_blocks, totals, found, *args):
 @njit(cache=True, parallel=True, error_model="numpy")
 def _count_blocks_threaded(
     n_blocks, totals, found, n_left, cut, lo, poff, ptr, row, partner, fs, bond, memory, stamp,
-    wptr, slot_row, slot_fs, slot_side, alive, count,
+    wptr, slot_row, slot_fs, slot_side, slot_memory, alive, count,
 ):  # fmt: skip
     for t in prange(n_blocks):
         totals[t], found[t] = _count(
             t, n_left, cut, lo, poff, ptr, row, partner, fs, bond, memory, stamp, wptr, slot_row, slot_fs, slot_side,
-            alive, count,
+            slot_memory, alive, count,
         )  # fmt: skip
 
 
@@ -271,10 +271,10 @@ def _hand_out_blocks(n_blocks, first, found, *args):
 @njit(cache=True, parallel=True, error_model="numpy")
 def _hand_out_blocks_threaded(
     n_blocks, first, found, n_left, ihot, cut, poff, ptr, row, partner, fs, bond, u_made, memory, stamp,
-    wptr, slot_row, slot_wall, slot_fs, slot_side, alive, count, hptr, rows, bits,
+    wptr, slot_row, slot_wall, slot_fs, slot_side, slot_memory, alive, count, hptr, rows, bits,
 ):  # fmt: skip
     for t in prange(n_blocks):
         _hand_out(
             t, first[t], found[t], n_left, ihot, cut, poff, ptr, row, partner, fs, bond, u_made, memory, stamp,
-            wptr, slot_row, slot_wall, slot_fs, slot_side, alive, count, hptr, rows, bits,
+            wptr, slot_row, slot_wall, slot_fs, slot_side, slot_memory, alive, count, hptr, rows, bits,
         )  # fmt: skip

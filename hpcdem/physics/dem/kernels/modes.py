@@ -47,12 +47,13 @@ def _spring(force, i, j, nx, ny, kn, ks, arm_i, arm_j, u, at_i, at_j):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def pairs(
-    t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, bond, u_made, pair_laws, bonds, n_mat, spheres, u, force
+    t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, bond, u_made, pair_laws, bonds, n_mat, spheres,
+    turning, u, force,
 ):  # fmt: skip
     """K u of the pairs of block t, into its rows of force (k, 3) f8, as in the force loop: the same terms in the same
     order for each owned particle on any number of blocks and ranks. u (n, 3) f8 per storage row.
 
-    Stiffnesses are those of contacts.stiffest.
+    Stiffnesses are those of contacts.stiffest; turning (slots,), or empty: of rolling [N m/rad].
     """
     shift, p = foff[t] - lo[t], poff[t] - lo[t]
     for r in range(foff[t], foff[t] + hi[t] - lo[t]):
@@ -66,11 +67,15 @@ def pairs(
             kn, ks = stiffest(i, j, bond[k], u_made[k], at, hot, ihot, pair_laws, bonds, n_mat, spheres)
             arm_i, arm_j = hot[i, RADIUS] - 0.5 * at.u, hot[j, RADIUS] - 0.5 * at.u
             _spring(force, i, j, at.nx, at.ny, kn, ks, arm_i, arm_j, u, shift + i, shift + j)
+            if len(turning) > 0:
+                torque = turning[k] * (u[i, 2] - u[j, 2])
+                force[shift + i, 2] += torque
+                force[shift + j, 2] -= torque
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def walls(hot, ihot, table, slot_row, slot_wall, slot_side, wall_laws, n_mat, n_left, u, out):
-    """Add K u of the contacts with walls to the owned particles, out (n_own, 3) f8."""
+def walls(hot, ihot, table, slot_row, slot_wall, slot_side, wall_laws, n_mat, n_left, turning, u, out):
+    """Add K u of the contacts with walls to the owned particles, out (n_own, 3) f8; turning: see `pairs`."""
     first = 0
     while first < len(slot_row):
         last = end_of_slots(slot_row, first, len(slot_row))
@@ -86,4 +91,6 @@ def walls(hot, ihot, table, slot_row, slot_wall, slot_side, wall_laws, n_mat, n_
             out[c, 0] += fn * nx - fs * ny
             out[c, 1] += fn * ny + fs * nx
             out[c, 2] += fs * arm
+            if len(turning) > 0:
+                out[c, 2] += turning[k] * u[i, 2]
         first = last

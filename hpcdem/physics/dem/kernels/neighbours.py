@@ -145,7 +145,7 @@ def _remember(begin, end, ihot, n_left, n_own, where, hptr, hrows, hbits, row, p
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made):
+def _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made, memory):
     """Keep the pairs of block t that are near or bonded. Returns slots, bonds (counted where the block owns the earlier
     partner), longest bonded distance squared."""
     begin = ptr[poff[t]]
@@ -162,6 +162,8 @@ def _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made):
             reach = hot[i, RADIUS] + hot[j, RADIUS] + skin
             bonded = bond[q] != 0
             row[k], partner[k], fs[k], bond[k], u_made[k] = i, j, fs[q], bond[q], u_made[q]
+            for m in range(memory.shape[1]):
+                memory[k, m] = memory[q, m]
             longest2 = max(longest2, d2 if bonded else 0.0)
             bonds_here += bonded & (i >= cut[t])
             k += bonded | (d2 <= reach * reach)
@@ -214,7 +216,7 @@ def _fill_near(
     _remember(begin, begin + n, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made, memory)
     if bond2 < 0.0:
         return n, 0, 0.0
-    return _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made)
+    return _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made, memory)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -242,9 +244,9 @@ class ContactLists:
     Built by `build`; `histories` hands back what the slots remember. All arrays are plain numpy for the kernels.
 
     Pair slots: row and partner (storage rows, row < partner), fs [N], bond (type), u_made [m] (of a law of the user its
-    normal force [N]) and memory of that law (slots, columns); row i of block t has the slots ptr[poff[t] + i - lo[t]]
-    up to the next; slots of a block follow each other. Wall slots: slot_row, slot_wall, slot_fs [N], slot_side, sorted
-    by row, then wall; block t has wptr[t] : wptr[t+1].
+    normal force [N]) and memory of that law or of rolling (slots, columns); row i of block t has the slots ptr[poff[t]
+    + i - lo[t]] up to the next; slots of a block follow each other. Wall slots: slot_row, slot_wall, slot_fs [N],
+    slot_side, slot_memory, sorted by row, then wall; block t has wptr[t] : wptr[t+1].
     """
 
     ptr: np.ndarray
@@ -259,6 +261,7 @@ class ContactLists:
     slot_wall: np.ndarray
     slot_fs: np.ndarray
     slot_side: np.ndarray
+    slot_memory: np.ndarray
     new_side: np.ndarray
     n_pairs: int
 

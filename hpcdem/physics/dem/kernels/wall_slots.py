@@ -29,14 +29,17 @@ def place(
     n = room = lists.n_own // 16 + 64
     while n >= room:
         room = n + 64
-        rows, which, fs, at_side = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room), np.empty(room)
+        rows, which, source = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
+        fs, at_side = np.empty(room), np.empty(room)
         n = _find(
             hot, cell, lists.n_left, lists.n_own, walls, side, largest, skin, memory, where,
-            hist.ptr, partner, remembered, extra, fast_rows, reach, rows, which, fs, at_side,
+            hist.ptr, partner, remembered, extra, fast_rows, reach, rows, which, fs, at_side, source,
         )  # fmt: skip
     lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side = (
         column[:n].copy() for column in (rows, which, fs, at_side)
     )
+    lists.slot_memory = np.zeros((n, hist.memory.shape[1]))
+    lists.slot_memory[source[:n] >= 0] = hist.memory[source[:n][source[:n] >= 0]]
     lists.new_side = np.zeros(n)
     lists.wptr = np.searchsorted(lists.slot_row, lists.blocks.cut).astype(np.int64)
 
@@ -87,10 +90,10 @@ def _is_near(wall, x, y, reach):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _find(
     hot, cell, n_left, n_own, walls, side, largest, skin, memory, where, hptr, hpartner, hfs, hextra,
-    fast_rows, fast_reach, slot_row, slot_wall, slot_fs, slot_side,
+    fast_rows, fast_reach, slot_row, slot_wall, slot_fs, slot_side, source,
 ):  # fmt: skip
     """Owned particles within R + skin of a wall (of fast ones half the skin is their reach), or with a history there,
-    sorted by row then wall.
+    sorted by row then wall. source: entry of the history, -1 without one.
 
     Returns the number of slots needed; slots past the end of the arrays are counted only.
     """
@@ -140,7 +143,7 @@ def _find(
                 if known < 0 and not ((is_fast or begin[w] <= i < end[w]) and _is_near(walls[w], x, y, reach)):
                     continue
                 if n < len(slot_row):
-                    slot_row[n], slot_wall[n] = i, w
+                    slot_row[n], slot_wall[n], source[n] = i, w, known
                     slot_fs[n] = hfs[known] if known >= 0 else 0.0
                     slot_side[n] = hextra[known] if known >= 0 else 0.0
                 n += 1

@@ -1,0 +1,113 @@
+"""PROP rfric: rolling resistance in the contacts of discs with each other and with walls (kernels/rolling.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.core.fields import RADIUS
+from hpcdem.physics.dem.kernels import mass, rolling
+from hpcdem.physics.dem.kernels.motion import INERTIA, KICK_SPIN, MASS
+
+CONSTANT, SPRING = "a", "c"
+"""Types of Ai et al. 2011, as SET rolling names them."""
+
+
+def columns(materials: np.ndarray) -> int:
+    """Columns that contacts of discs of these materials remember; 0 without rolling resistance."""
+    return rolling.WIDTH if (materials["rfric"] > 0.0).any() else 0
+
+
+def begin(sim: Any, given: Mapping[str, float]) -> None:
+    """Open the model if it gets rolling resistance with these properties: contacts begin to remember. Collective."""
+    if given.get("rfric") and not columns(sim.materials.rows):
+        sim.open_model()
+
+
+class Rolling:
+    """Of a closed model (physics.dem.simulation.Simulation), as its tables are."""
+
+    def __init__(self, sim: Any) -> None:
+        """Collective. CommandError for a model with contacts that would not follow."""
+        _refuse(sim)
+        p, lists, rows, s = sim.particles, sim.lists, sim.materials.rows, sim.settings
+        b, n_mat, spheres = lists.blocks, len(rows), mass.SPHERES[s.disk]
+        of = np.stack([rows["rfric"], rows["rdamp"]], axis=1)
+        of_pairs = np.minimum(of[:, None], of[None]).reshape(-1, 2)
+        inverse = np.zeros(len(p.hot))
+        body, radius = sim.body, p.hot[p.owned, RADIUS]
+        turns = body[:, KICK_SPIN] != 0.0
+        at_touch = body[:, INERTIA] + body[:, MASS] * radius * radius
+        inverse[p.owned] = np.divide(1.0, at_touch, out=np.zeros(len(body)), where=turns)
+        sim.halo.fill(inverse)
+        self.lost, self.lost_at_walls = np.zeros(len(lists.row)), np.zeros(len(lists.slot_row))
+        self._torques: Any = rolling.torques if lists.n_blocks == 1 else rolling.torques_threaded
+        self._args = (
+            lists.n_blocks, p.hot, p.ihot, b.cut, b.lo, b.poff, b.foff, lists.ptr, lists.partner, lists.bond,
+            lists.memory, sim.pair_laws, of_pairs, lists.wptr, sim._wall_table, lists.slot_row, lists.slot_wall,
+            lists.slot_side, lists.slot_memory, sim.wall_laws, of, n_mat, inverse, sim.clock.dt,
+            s.rolling == CONSTANT, spheres, float(sim.stamp), lists.force, self.lost, self.lost_at_walls,
+        )  # fmt: skip
+        self._of, self._of_pairs = of, of_pairs
+
+    def push(self) -> None:
+        """Add the torques at the present places and spins."""
+        self._torques(*self._args)
+
+    def book_lost(self, sim: Any, bins: np.ndarray) -> None:
+        """Add what was lost in the last step to exact bins."""
+        self._book(sim, self.lost, self.lost_at_walls, bins)
+
+    def book_stored(self, sim: Any, bins: np.ndarray) -> None:
+        """Add what the springs store to exact bins."""
+        pairs, walls = (memory[:, rolling.STORED].copy() for memory in (sim.lists.memory, sim.lists.slot_memory))
+        self._book(sim, pairs, walls, bins)
+
+    def _book(self, sim: Any, of_slots: np.ndarray, of_walls: np.ndarray, bins: np.ndarray) -> None:
+        lists, b = sim.lists, sim.lists.blocks
+        rolling.book(lists.n_blocks, b.cut, b.lo, b.poff, lists.ptr, of_slots, of_walls, bins)
+
+    def stiffnesses(self, sim: Any) -> tuple[np.ndarray, np.ndarray]:
+        """kr of the pair slots and of the wall slots [N m/rad]; 0 where discs do not touch, and of type A."""
+        lists, p, b = sim.lists, sim.particles, sim.lists.blocks
+        pairs, walls = np.zeros(len(lists.row)), np.zeros(len(lists.slot_row))
+        if sim.settings.rolling == CONSTANT:
+            return pairs, walls
+        n_mat, spheres = len(sim.materials), mass.SPHERES[sim.settings.disk]
+        for t in range(lists.n_blocks):
+            rolling.stiffnesses(
+                t, p.hot, p.ihot, b.cut, b.lo, b.poff, lists.ptr, lists.partner, lists.bond, sim.pair_laws,
+                self._of_pairs, n_mat, spheres, pairs,
+            )  # fmt: skip
+        rolling.stiffnesses_at_walls(
+            p.hot, p.ihot, sim._wall_table, lists.slot_row, lists.slot_wall, lists.slot_side, sim.wall_laws, self._of,
+            n_mat, spheres, walls,
+        )  # fmt: skip
+        return pairs, walls
+
+    def rates(self, sim: Any) -> np.ndarray:
+        """Sum of kr / I of the contacts of the owned particles (n_own,) [1/s2]."""
+        lists, b, n_left = sim.lists, sim.lists.blocks, sim.particles.n_left
+        pairs, walls = self.stiffnesses(sim)
+        total = np.zeros(len(sim.body))
+        np.add.at(total, lists.slot_row - n_left, walls)
+        for t, (row, partner, first, last) in enumerate(lists.pieces()):
+            kr = pairs[lists.ptr[b.poff[t]] :][: len(row)]
+            for of in (row, partner):
+                mine = (of >= first) & (of < last)
+                np.add.at(total, of[mine] - n_left, kr[mine])
+        return np.divide(total, sim.body[:, INERTIA], out=np.zeros(len(total)), where=sim.body[:, KICK_SPIN] != 0.0)
+
+
+def _refuse(sim: Any) -> None:
+    others = {
+        "clumps, whose shape resists rolling": bool(sim.clumps),
+        "a user law, whose normal stiffness is not known": bool(sim.own_laws),
+        "contacts with blocks, which have their own law": sim.coupled,
+    }
+    for what, there in others.items():
+        if there:
+            raise CommandError(f"PROP rfric (rolling resistance) does not support {what}; PROP rfric 0 removes it")
