@@ -33,9 +33,9 @@ _WORDS = {
 
 
 def arguments(command: Command, given: Mapping[str, Any], ranged: bool = False, dim: int = 2) -> dict[str, Any]:
-    """Those of a command without models, by the names of Python; what is None is left out. ranged: it has a range; dim:
-    dimensions of the model. ValueError names the one that is wrong, CommandError a value that no model could make
-    right."""
+    """Check and convert the arguments of a command without models, by their Python names; None is omitted. ranged: the
+    command has a range; dim: dimensions of the model. Raises ValueError with the name of the wrong argument,
+    CommandError for a value that no model could accept."""
     _there(command.name, command.dims, dim)
     options = (*command.leading, *command.options)
     found = _read(options, given, command.name, dim)
@@ -72,7 +72,7 @@ def _there(word: str, dims: tuple[int, ...], dim: int) -> None:
 
 
 def _known(given: dict[str, Any]) -> dict[str, Any]:
-    """Without arrays, whose values were checked one by one."""
+    """Remove arrays, whose values were checked one by one."""
     return {name: value for name, value in given.items() if not isinstance(value, np.ndarray)}
 
 
@@ -120,7 +120,8 @@ def _option(options: tuple[Option, ...], name: str, of: str) -> Option:
 
 
 def _values(option: Option, given: Any, name: str, dim: int) -> Any:
-    """What follows a keyword in a script: one value, a tuple of several, or a dict where more words may follow."""
+    """Return what follows a keyword in a script: one value, a tuple of several, or a dict where more words may
+    follow."""
     if option.more:
         parts = given if isinstance(given, dict) and "value" in given else {"value": given}
         more = {word: value for word, value in parts.items() if word != "value"}

@@ -314,7 +314,7 @@ class Output(Words):
 
 @commands
 class BlockCommands(Clocks):
-    """What a `Simulation` has of blocks. The model of blocks is made when it is first used."""
+    """The methods of a `Simulation` for blocks. The model of blocks is made on first use."""
 
     geometry: Geometry
     mesh: Mesh

@@ -2574,7 +2574,7 @@ class Output(Words):
         """
 
 class BlockCommands(Clocks):
-    """What a `Simulation` has of blocks. The model of blocks is made when it is first used."""
+    """The methods of a `Simulation` for blocks. The model of blocks is made on first use."""
     geometry: Geometry
     mesh: Mesh
     elements: Elements

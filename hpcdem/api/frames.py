@@ -26,7 +26,7 @@ MAIN = ("particles", "elements")
 
 
 class Looks(TypedDict, total=False):
-    """How the objects of a picture look: words of a layer of a view (docs/view.md)."""
+    """Appearance of the objects of a picture: words of a layer of a view (docs/view.md)."""
 
     limits: tuple[float, float]
     log: bool

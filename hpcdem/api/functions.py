@@ -45,7 +45,7 @@ Kind = TypeVar("Kind", bound=type)
 
 
 def color_number(color: str | int | None) -> Any:
-    """Of a name or number; CommandError for others."""
+    """Return the number of a colour given by name or number; CommandError for others."""
     if color is None or (isinstance(color, int) and color in COLORS.values()):
         return color
     if isinstance(color, str) and color.lower() in COLORS:
@@ -83,8 +83,8 @@ def selection(where: str | Selection | None) -> Selection | None:
 
 @dataclass(frozen=True)
 class Taken:
-    """How a method takes what a function calls so. type: in a signature, in the words of `hpcdem.api.types`; make: the
-    value for the function, from the simulation and what was given."""
+    """How a method accepts an argument of a function. type: in a signature, in the words of `hpcdem.api.types`; make:
+    converts the given value for the function, from the simulation and the value."""
 
     type: str
     make: Callable[[Any, Any], Any]
@@ -133,13 +133,13 @@ class Function:
 
     @functools.cached_property
     def taken(self) -> dict[str, Taken]:
-        """How arguments of the function are taken, if not as they are."""
+        """Conversions of arguments of the function that are not passed unchanged."""
         known = {**TAKEN, "file": self.file}
         return {one.name: known[key] for one in self.own for key in (one.name, one.annotation) if key in known}
 
     @functools.cached_property
     def parameters(self) -> list[Parameter]:
-        """As a method has them."""
+        """Parameters of the method."""
         own = {one.name: replaced(one, self.taken.get(one.name)) for one in self.own}
         if not self.order:
             return list(own.values())

@@ -54,7 +54,7 @@ class Argument:
 
     @property
     def annotation(self) -> str:
-        """Its type, and None where that is its default."""
+        """Type of the argument, with None where that is its default."""
         return f"{self.type} | None" if self.default is None and not self.type.endswith("None") else self.type
 
 
@@ -81,7 +81,7 @@ def _one(option: Option) -> str:
 
 
 def _item(option: Option) -> str:
-    """One of several values with words after it: a tuple in their order, as long as is needed or longer."""
+    """Convert one of several values that words follow: a tuple in their order, as long as needed or longer."""
     first = [_one(option)] if option.values else []
     parts = [*first, *map(_one, option.more)]
     least = len(first) + sum(word.required for word in option.more)
@@ -131,7 +131,7 @@ class Row:
 
     @functools.cached_property
     def arguments(self) -> list[Argument]:
-        """As a method has them."""
+        """Arguments of the method."""
         there = {one.name: one for one in self._all()}
         found = []
         for name, mark, default in tokens(self.order):
@@ -173,7 +173,7 @@ class Row:
         return Argument(name, kind, default, Parameter.KEYWORD_ONLY, option, word, self._text(one))
 
     def _text(self, option: Option) -> str:
-        """What the docstring says of an argument."""
+        """Describe an argument for the docstring."""
         unit = f" [{option.unit}]" if option.unit not in ("", "1") else ""
         space = DIMENSIONS.get(option.dims, "") if self.row.dims == (2, 3) else ""
         default = {"'default'": "", "off": "", "on": "True"}.get(option.default, option.default)
@@ -187,7 +187,7 @@ class Row:
         return text
 
     def packed(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """What a method was given, by the names of the table."""
+        """Return the arguments of a method call by the names of the table."""
         found: dict[str, Any] = {}
         more: dict[str, dict[str, Any]] = {}
         known = {one.name: one for one in self.arguments}
@@ -361,7 +361,7 @@ def _told(method: Callable[..., Any]) -> Callable[..., Any]:
 def dressed(
     call: Callable[..., Any], owner: type, name: str, made_by: Any, parameters: list[Parameter], returned: str = "None"
 ) -> Callable[..., Any]:
-    """With name, signature and text of a method. made_by: its row, whose docstring it has."""
+    """Give a method its name, signature and docstring. made_by: its row, which has the docstring."""
     own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
     call.__name__, call.__qualname__, call.__module__ = name, f"{owner.__qualname__}.{name}", owner.__module__
     call.__doc__ = made_by.docstring
@@ -373,7 +373,7 @@ def dressed(
 
 
 def _docstring(summary: str, rows: list[tuple[str, str]]) -> str:
-    """In the style of numpy."""
+    """Make the docstring in numpy style."""
     lines = [
         summary,
         *(["", "Parameters", "----------"] if rows else []),
@@ -410,8 +410,8 @@ def _wrapped(line: str) -> list[str]:
 def bound(
     parameters: list[Parameter], values: tuple[Any, ...], options: Mapping[str, Any], loose: bool = False
 ) -> dict[str, Any]:
-    """What a call gives, by the names of the parameters. TypeError in the words of Python; loose: names beyond them are
-    given, too."""
+    """Return the arguments of a call by the names of the parameters. Raises TypeError in the words of Python; loose:
+    further names are accepted too."""
     placed = [one for one in parameters if one.kind is Parameter.POSITIONAL_OR_KEYWORD]
     rest = next((one for one in parameters if one.kind is Parameter.VAR_POSITIONAL), None)
     found = {one.name: value for one, value in zip(placed, values)}

@@ -1,5 +1,6 @@
-"""What methods of blocks stand on: the way to a command, objects with their quantities, and the methods that do more
-than hand their arguments to a command."""
+"""Base classes of methods for blocks: how a method calls a command, objects with their quantities, and methods that do
+more than pass arguments to a command.
+"""
 
 from __future__ import annotations
 
@@ -107,7 +108,7 @@ class Objects(Words):
 
 @commands
 class Conditioned(Objects):
-    """With conditions that can be taken back."""
+    """Objects with conditions that can be removed."""
 
     def remove_boundary(self, *conditions: str, where: Where = None) -> None:
         """Take boundary conditions back, all of them. conditions: only these, as the command ... boundary of PCDC calls
@@ -194,7 +195,7 @@ class Moved(Conditioned):
 
 @commands
 class GroupedElsewhere(Objects):
-    """With the groups of other objects. grouped: what these are called."""
+    """Objects that use the groups of other objects. grouped: name of those objects."""
 
     grouped = ""
 
@@ -316,8 +317,7 @@ class Clocks(Words, Accounts):
         start_time: float | None = None,
         time_step: float | None = None,
     ) -> None:
-        """What the clock of a part shows now, from when `run_time` counts, and its time step [s]; parts: see
-        `cycle_option`."""
+        """Set the clock of a part, the origin of `run_time`, and its time step [s]; parts: see `cycle_option`."""
         self._of_part("model reset", part, current_time=current_time, start_time=start_time, time_step=time_step)
 
     def tell_time(self, part: str) -> None:
@@ -334,7 +334,7 @@ class Clocks(Words, Accounts):
 
     @property
     def solved(self) -> Solved:
-        """How the last `solve` ended: reason, ratio (NaN if nobody looked), steps. Empty before the first."""
+        """Outcome of the last `solve`: reason, ratio (NaN if it was not computed), steps. Empty before the first."""
         return cast(Solved, dict(self._do.project().solved))
 
     @property

@@ -11,7 +11,7 @@ from hpcdem.api.types import File, Selected
 from hpcdem.core.material import Material
 
 class ParticleCommands:
-    """What a `Simulation` has of particles."""
+    """The methods of a `Simulation` for particles."""
     def box(
         self,
         left: float,

@@ -1,4 +1,4 @@
-"""How mistakes of a user's program are reported."""
+"""Errors in a user's program, reported with its file and line."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def spelt(options: dict[str, Any], names: Collection[str]) -> dict[str, Any]:
 def carried_out(
     at: tuple[str, int], name: str, make: Callable[[], Any], advice: str = HELP, names: Collection[str] = ()
 ) -> Any:
-    """What `make` returns. Errors of a command leave with file and line of the program; values of a wrong kind too.
-    names: arguments of the method, of which the nearest is named where one is mistyped."""
+    """Return the result of `make`. Errors of a command, and values of a wrong type, get file and line of the program.
+    names: arguments of the method, of which the nearest is suggested for a mistyped one."""
     session.refuse_after_stop()
     try:
         return make()
@@ -61,7 +61,7 @@ def carried_out(
 
 
 def _wrong(text: str, names: Collection[str]) -> str:
-    """What Python says of a call, shorter, and with the argument that was meant."""
+    """Shorten Python's message about a call, and suggest the argument that was meant."""
     if (found := _UNKNOWN.search(text)) and names:
         return f"there is no argument '{found[1]}'{hint(found[1], names)}; there is {', '.join(names)}"
     return _OWN_NAME.sub("", text)

@@ -140,17 +140,17 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @staticmethod
     def _untouched(engine: Engine) -> bool:
-        """There is nothing of particles yet. Collective."""
+        """Whether the model has no particles, walls or settings of particles yet. Collective."""
         return engine.clock.step == 0 and len(engine.walls) == 0 and engine.count(len(engine.particles)) == 0
 
     @property
     def _only_blocks(self) -> bool:
-        """There are blocks and no particles. Collective."""
+        """Whether the model has blocks and no particles. Collective."""
         return self._project is not None and (self._engine is None or self._untouched(self._engine))
 
     @property
     def _clock(self) -> Any:
-        """Of the particles; of the blocks where there are no particles. Collective."""
+        """The clock of the particles, or of the blocks in a model without particles. Collective."""
         return self._project.blocks.clock if self._project is not None and self._only_blocks else self.engine.clock
 
     def __enter__(self) -> Simulation:
@@ -509,7 +509,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @property
     def count(self) -> int:
-        """Particles on all ranks."""
+        """Number of particles on all ranks."""
         return self._asked(("count",), lambda: int(self.engine.count(len(self.engine.particles))))
 
     @property
@@ -742,7 +742,7 @@ class Simulation(ParticleCommands, BlockCommands):
         return f"<Simulation: step {clock.step}, {clock.time:.6g} s, {', '.join(bodies)}>"
 
     def _repr_html_(self) -> str:
-        """Of a notebook: the line of `repr` and a picture of what there is."""
+        """For notebooks: the line of `repr` and a picture of the model."""
         try:
             picture = self.frame().picture()
         except HpcdemError:  # nothing there yet, or several ranks
@@ -832,7 +832,7 @@ class Particles(Group):
 
     @property
     def count(self) -> int:
-        """How many there are on all ranks."""
+        """Number of particles on all ranks."""
         return self._sim.count
 
     def __len__(self) -> int:
@@ -858,12 +858,12 @@ class Bonds(Group):
 
     @property
     def left(self) -> int:
-        """How many hold."""
+        """Number of intact bonds."""
         return self._sim.bonds_left
 
     @property
     def broken(self) -> tuple[int, int]:
-        """How many broke so far, in tension and in shear."""
+        """Number of bonds broken so far, in tension and in shear."""
         return self._sim.bonds_broken
 
 

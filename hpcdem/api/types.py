@@ -35,7 +35,8 @@ class Piece(TypedDict, total=False):
 
 
 class Solved(TypedDict, total=False):
-    """How `solve` ended: why, unbalanced over all forces (NaN if nobody looked), steps. Empty before the first."""
+    """Outcome of `solve`: reason, unbalanced over all forces (NaN if it was not computed), steps. Empty before the
+    first."""
 
     reason: str
     ratio: float

@@ -87,7 +87,7 @@ def main() -> NoReturn:
 
 
 def read_options(words: list[str]) -> Options:
-    """Of `hpcdem SCRIPT ...` and `hpcdem resume ...`; prints and leaves for what is not understood."""
+    """Parse the options of `hpcdem SCRIPT ...` and `hpcdem resume ...`; print an error and exit if they are wrong."""
     if words[:1] == ["resume"]:
         return resumed_options(read_command_line(resume, "hpcdem resume", words[1:]))
     return Options(**read_command_line(hpcdem, "hpcdem", words))

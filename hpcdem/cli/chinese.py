@@ -56,7 +56,7 @@ def _of_a_case(text: str) -> str | None:
 
 
 def _of_cases(text: str) -> str | None:
-    """What the programs of ready-made models say, with the titles of these; None of other programs."""
+    """Texts of the programs of ready-made models, with their titles; None of other programs."""
 
     def line(found: re.Match[str]) -> str:
         title = known("case", found[2]) or known("help", found[2])
@@ -69,7 +69,7 @@ def _of_cases(text: str) -> str | None:
 
 
 def help_page(command: click.Command, program: str) -> str:
-    """What `--help` prints."""
+    """The text that `--help` prints."""
     page = translated(command).get_help(click.Context(command, info_name=program, max_content_width=110))
     page = page.replace("Show this message and exit.", in_chinese("Show this message and exit."))
     for head, chinese in HEADS.items():

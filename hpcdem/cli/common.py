@@ -1,4 +1,4 @@
-"""What all programs share: reading a command line, starting the ranks, ending together."""
+"""Parts that all programs share: parsing a command line, starting the ranks, ending together."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from hpcdem.session import Session, enter
 
 
 class Talk(Protocol):
-    """What carries out texts, of either language."""
+    """Executes texts of either language."""
 
     def carry_out(self, text: str, name: str = "") -> bool:
         """Carry out a text, or the script `name`; whether there was a command in it. HpcdemError."""

@@ -145,7 +145,7 @@ def frames_of(options: dict[str, Any], log: Log) -> list[Path]:
 
 
 def plan(options: dict[str, Any], log: Log, scratch: Path | None = None) -> list[ViewJob]:
-    """What is to be drawn: one view, one place and one range of colours for all. Raises HpcdemError."""
+    """Plan the pictures: one view, one folder and one range of colours for all. Raises HpcdemError."""
     from hpcdem.core.errors import UsageError
     from hpcdem.post.series import ViewJob
     from hpcdem.post.view.model import save_view
@@ -177,7 +177,7 @@ def plan(options: dict[str, Any], log: Log, scratch: Path | None = None) -> list
 
 
 def _for_film(paper: Paper) -> Paper:
-    """At most 1920 pixels wide."""
+    """Limit the width to 1920 pixels."""
     from dataclasses import replace
 
     return replace(paper, dpi=min(paper.dpi, 1920.0 * 2.54 / paper.page))

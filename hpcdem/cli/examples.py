@@ -41,7 +41,7 @@ def start(words: list[str]) -> NoReturn:
 
 
 def folder() -> Path:
-    """Where the examples are."""
+    """Return the folder of the examples."""
     for place in PLACES:
         if place.is_dir():
             return place

@@ -80,7 +80,7 @@ def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
 
 
 def request(options: dict[str, Any], curve: Grading) -> Request:
-    """What the options ask for. Raises CommandError."""
+    """Convert the options to a request. Raises CommandError."""
     from hpcdem.pre.specimen import Request
 
     number = options["number"]

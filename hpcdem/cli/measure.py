@@ -109,7 +109,7 @@ def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
 
 
 def request(options: dict[str, Any]) -> Any:
-    """What the options ask for. Raises UsageError."""
+    """Convert the options to a request. Raises UsageError."""
     from hpcdem.core.errors import UsageError
     from hpcdem.lang.zdem.table import COLORS
     from hpcdem.post.measure.scene import Request

@@ -161,7 +161,7 @@ IN_PLANE = ("show", "xmin", "xmax", "ymin", "ymax")
 
 
 def jobs_in_space(files: list[Path], options: dict[str, Any], scratch: Path) -> list[ViewJob]:
-    """What is to be drawn of frames of bodies in space: what has happened to them, as at the end of a run."""
+    """Pictures of bodies in space: displacement, cracks and strain, as at the end of a run."""
     from hpcdem.cli.draw import common
     from hpcdem.core.errors import UsageError
     from hpcdem.post.series import ViewJob
@@ -180,7 +180,7 @@ def jobs_in_space(files: list[Path], options: dict[str, Any], scratch: Path) -> 
 
 
 def jobs_of_blocks(files: list[Path], options: dict[str, Any], scratch: Path) -> Sequence[Job | ViewJob]:
-    """What is to be drawn of frames of blocks: one view and one range of stress and of strain for all."""
+    """Pictures of blocks: one view and one range of stress and of strain for all."""
     from hpcdem.io.axes import View
     from hpcdem.io.vtkhdf_mesh import read_mesh_frame
     from hpcdem.post import blocks

@@ -51,7 +51,7 @@ class Formats(click.ParamType):
 
 
 class Numbers(click.ParamType):
-    """So many numbers with commas between them, or one of `words`."""
+    """A fixed number of numbers separated by commas, or one of `words`."""
 
     name = "numbers"
 
@@ -134,7 +134,7 @@ def looks(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def processes(options: dict[str, Any]) -> int:
-    """How many processes draw at a time."""
+    """Number of drawing processes."""
     return launch.cores() if options["max_workers"] is None else max(1, int(options["max_workers"]))
 
 
@@ -177,7 +177,7 @@ def style_of(options: dict[str, Any], folder: Path, page: float, dpi: float) -> 
 
 
 def common_view(files: Sequence[Path], style: Style) -> View:
-    """One view that contains what each of these frames would show alone."""
+    """Return one view that contains the views of all these frames."""
     from hpcdem.io.axes import View
     from hpcdem.io.frames import read_frame
     from hpcdem.post.plots import seen_of

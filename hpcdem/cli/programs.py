@@ -65,7 +65,7 @@ hpcdem --help lists all commands and options."""
 
 
 def suggestion(word: str) -> str:
-    """What to add to a message that `word` is no script, and no command if it looks like one."""
+    """Suggest a command for a `word` that is no script, if it resembles one."""
     if "." in word or "/" in word:
         path = Path(word)
         there = [one.name for one in path.parent.glob("*") if one.suffix in (".py", ".sc")]

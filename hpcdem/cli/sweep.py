@@ -236,7 +236,7 @@ def _as_typed(path: Path, key: str, value: Any) -> Iterator[str]:
 
 
 def _values(path: Path, name: str, value: Any) -> str | Sequence[Any]:
-    """Of a parameter in a file: a word as on the command line, a number, or a list."""
+    """Values of a parameter in a file: a word as on the command line, a number, or a list."""
     if isinstance(value, (str, list)):
         if isinstance(value, list) and any(isinstance(one, (dict, list)) for one in value):
             raise UsageError(f"{path}: {name}: expected a list of numbers or words")

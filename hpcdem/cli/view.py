@@ -33,7 +33,8 @@ def view(**options: Any) -> None:
 
 
 def desk_of(options: dict[str, Any]) -> Desk | None:
-    """What --run opens: scripts of the folder of SCRIPT, else of this folder; results go to DIR, else to data there."""
+    """Find what --run opens: scripts of the folder of SCRIPT, else of the current folder; results go to DIR, else to
+    data there."""
     if options["script"] is None:
         if options["threads"] != 1:
             raise UsageError("-j requires --run (threads of its console)")

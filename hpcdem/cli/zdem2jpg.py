@@ -45,7 +45,8 @@ def zdem2jpg(**options: Any) -> None:
 
 
 def of_field(options: dict[str, Any], files: list[Path]) -> Layer | None:
-    """What colours the particles, with one range for all frames. Raises HpcdemError for a field that is not there."""
+    """Choose the field that colours the particles, with one range for all frames. Raises HpcdemError for an unknown
+    field."""
     from hpcdem.core.errors import UsageError
     from hpcdem.post.view.model import ModelView, view_of
     from hpcdem.post.view.moment import read_moment

@@ -1,4 +1,4 @@
-"""What kind of script is it? All kinds end in .py, so the content decides; .sc is always PCDC."""
+"""Detects the kind of a script. All kinds end in .py, so the content decides; .sc is always PCDC."""
 
 from __future__ import annotations
 

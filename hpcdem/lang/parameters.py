@@ -26,7 +26,8 @@ _OWN_NAMES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef, a
 
 @dataclass(frozen=True)
 class Parameter:
-    """What a script sets. line: counted from 1; begin, end: of the literal in the bytes of its line (UTF-8)."""
+    """A parameter that a script assigns. line: counted from 1; begin, end: of the literal in the bytes of its line
+    (UTF-8)."""
 
     name: str
     value: Value
@@ -124,7 +125,7 @@ def _of_zdem(script: parser.Script, text: bytes) -> Iterator[Parameter]:
 
 
 def _at(text: bytes, token: lexer.Token, name: str, value: Value) -> Parameter:
-    """Where a word stands, in bytes."""
+    """Position of a word, in bytes."""
     line = _ENDS.split(text)[2 * (token.line - 1)]
     code = lexer.COMMENT.split(line, maxsplit=1)[0].decode()
     begin = len(code[: token.column - 1].encode())

@@ -247,8 +247,8 @@ def start(
     final_frame: bool = False,
     initial_frame: bool = True,
 ) -> None:
-    """What every command that steps particles begins with: sim.progress, the account of energy, the `_ini` frame.
-    steps: None if their number is not known beforehand. The model is ready to step. Collective."""
+    """Begin a command that steps particles: sim.progress, the energy budget, the `_ini` frame. steps: None if their
+    number is unknown. The model is ready to step. Collective."""
     if sim.settings.energy > 0 and sim.energy is None:
         sim.prepare_kernels("energy")
         sim.energy = Budget()
@@ -402,7 +402,7 @@ class Due:
         return first_after(self.sim.clock.step, [*self._tasks, *_calls(self.sim)])
 
     def finish(self) -> None:
-        """At the end of a command of which the end was not known: the report that is due then. Collective."""
+        """Write the final report of a command whose end was not known in advance. Collective."""
         sim, progress = self.sim, self.sim.progress
         assert progress is not None
         step, first = sim.clock.step, progress["first"]

@@ -181,7 +181,7 @@ HISTORIES = {
 
 
 def followed(sim: Simulation) -> dict[str, tuple[str, Callable[[Simulation], float]]]:
-    """What HIST can follow in this model: HISTORIES, and the diagnostics of its physics."""
+    """Quantities that HIST can record in this model: HISTORIES, and the diagnostics of its physics."""
     return HISTORIES | {name: what for physics in sim.physics for name, what in physics.diagnostics().items()}
 
 
@@ -233,7 +233,7 @@ DEEP = 0.5
 
 
 def warn_of_overlaps(sim: Simulation) -> None:
-    """One line about contacts with an overlap beyond half the smaller radius, once per command: their number and the
+    """Warn once per command about contacts with an overlap beyond half the smaller radius: their number and the
     deepest. Collective."""
     key = f"overlaps since step {sim.progress['first'] if sim.progress is not None else sim.clock.step}"
     if sim.comm.bcast(sim.log.has_warned(key)):
@@ -315,7 +315,7 @@ ENERGY_WORDS = {
 
 
 def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus:
-    """What a progress line tells. Collective."""
+    """Quantities of a progress line. Collective."""
     clock, seen = sim.clock, diagnostics.survey(sim)
     tension, shear = sim.broken()
     if seen.deepest > DEEP and sim.log is not None:
@@ -361,7 +361,7 @@ def close_histories(sim: Simulation) -> None:
 
 
 def finish(sim: Simulation) -> None:
-    """At STOP: the last line of histories, and the curves requested by PLOT, `hist_<y>_vs_<x>.txt` and `.png`."""
+    """At STOP, write the last line of histories, and the curves requested by PLOT, `hist_<y>_vs_<x>.txt` and `.png`."""
     close_histories(sim)
     for y, x in sim.plots:
         missing = [i for i in (y, x) if i not in sim.history_wishes]

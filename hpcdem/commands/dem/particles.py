@@ -292,7 +292,7 @@ def export(sim: Simulation, file: Path | str, group: bool = False, where: Select
 
 
 def check_circles(comm: Comm, rows: np.ndarray) -> None:
-    """As limits.check_circle, for (n, 3) rows x, y, r of all ranks. Collective."""
+    """Check (n, 3) rows x, y, r of all ranks with limits.check_circle. Collective."""
 
     def worst(of: np.ndarray) -> np.ndarray:
         if not len(of):

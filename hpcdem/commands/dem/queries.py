@@ -1,4 +1,4 @@
-"""What a program can ask of particles."""
+"""Quantities of particles that a program can query."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def warm_up(threads: int = 1) -> None:
 
 
 def with_energy(threads: int = 1) -> None:
-    """The same for the account of energy."""
+    """Compile the kernels of the energy budget."""
     sim = _model(threads)
     sim.energy = Budget()
     sim.energy.begin(sim)
@@ -51,7 +51,7 @@ def with_energy(threads: int = 1) -> None:
 
 
 def with_clumps(threads: int = 1) -> None:
-    """The same for clumps."""
+    """Compile the kernels of clumps."""
     sim = _model(threads)
     clumps.join(sim, Ids(4, 6))
     cycles.prepare(sim)
@@ -62,7 +62,7 @@ def with_clumps(threads: int = 1) -> None:
 
 
 def with_restitution(threads: int = 1) -> None:
-    """The same for the dashpots of SET restitution."""
+    """Compile the kernels of the dashpots of SET restitution."""
     sim = _model(threads)
     settings.set_option(sim, "restitution", 0.5)
     cycles.prepare(sim)

@@ -320,7 +320,7 @@ def table(
 
 
 def from_now(project: Project, now: float, given: Mapping[str, Any]) -> dict[str, Any]:
-    """What conditions are given at this time [s]: tables that begin with it in place of relative ones."""
+    """Replace relative tables of conditions by tables that begin at this time [s]."""
     return {name: _begun(project, now, value) for name, value in given.items()}
 
 

@@ -152,7 +152,7 @@ def _restored(project: Project, path: Path, begins: bool = False) -> dict[str, A
 
 
 def _state(project: Project) -> dict[str, Any]:
-    """What the project holds beside the simulation, as JSON values."""
+    """The state of a project apart from the simulation, as JSON values."""
     return {
         "format": FORMAT,
         "dim": project.dim,

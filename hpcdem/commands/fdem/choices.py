@@ -73,7 +73,7 @@ def places(project: Project, kind: str) -> np.ndarray:
 
 
 def _why(objects: _Objects, where: g.Range) -> str:
-    """What it chose was removed, or which of several terms is fulfilled by nothing at all."""
+    """Explain why a range is empty: its objects were removed, or which of its terms selects nothing."""
     if not objects.null_too and objects.kind not in g.SUPPORTS and not objects.project.alive.all():
         gone = int(_Objects(objects.project, objects.kind, True).all_of(where).sum())
         if gone:
@@ -317,11 +317,11 @@ class _Objects:
         return ((at >= low - slack) & (at <= high + slack)).all(axis=1)
 
     def _slack(self, part: float = NEAR) -> float:
-        """Of places [m]."""
+        """Tolerance of positions [m]."""
         return part * float(np.ptp(self.mesh.points, axis=0).max())
 
     def _sized(self, low: float, high: float) -> np.ndarray:
-        """By the area of elements, in space of faces."""
+        """Select by the area of elements, or of faces in three dimensions."""
         wanted = {2: g.ELEMENT, 3: g.FACE}[self.mesh.dim]
         if self.kind != wanted:
             raise CommandError(f"area selects {wanted}s in {self.mesh.dim} dimensions, not {self.kind}s")
@@ -398,8 +398,8 @@ class _Objects:
         return np.isin(self.numbers, self.edges.faces[rows[rows >= 0]])
 
     def _solid(self, layer: str) -> np.ndarray:
-        """In space: elements whose centre is inside of a solid of the layer; nodes, and faces with all points, on the
-        surface of one."""
+        """Select in three dimensions: elements whose centre is inside a solid of the layer; nodes, and faces with all
+        points, on the surface of one."""
         if layer in self.mesh.layers and self.kind != g.ELEMENT:
             if self.now:
                 raise CommandError(f"{self.kind}s on '{layer}' are known in the mesh only: omit present")

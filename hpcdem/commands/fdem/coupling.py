@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 
 def couple(project: Project, particles: Simulation, friction: float | None = None, dt: float = 0.0) -> Coupled:
-    """From now on both are stepped together. friction: largest one between discs and faces; dt [s]: time step of both,
-    0: as said for one of them, else the smaller of the stable ones. Collective."""
+    """Couple particles and blocks, so that they step together. friction: largest coefficient between discs and faces;
+    dt [s]: time step of both, 0: the assigned one of either, else the smaller stable one. Collective."""
     from hpcdem.commands.dem import cycles
     from hpcdem.physics.coupling.model import Coupled
 

@@ -46,8 +46,8 @@ def face_condition(
     environment: Number | None = None,
     where: Range | None = None,
 ) -> None:
-    """What comes in through faces, or goes to an environment of this value; without a coefficient with that of the
-    elements. Without a range: all faces on the surface of the model."""
+    """Prescribe the inflow through faces, or exchange with an environment of this value; without a coefficient that of
+    the elements is used. Without a range: all faces on the surface of the model."""
     every = {"flux": flux, "transfer": transfer, "environment": environment}
     given: dict[str, Any] = {word: value for word, value in every.items() if value is not None}
     if not given:
@@ -83,5 +83,5 @@ def clock(
 
 
 def account(project: Project, name: str) -> dict[str, float]:
-    """What was given, is stored and gone, see `Diffusing.account`. Collective."""
+    """Return the budget of the field: given, stored and lost, see `Diffusing.account`. Collective."""
     return dict(of(project, name).account())

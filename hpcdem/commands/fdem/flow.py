@@ -105,7 +105,7 @@ def condition(
 
 
 def _level(project: Project, point: Sequence[float]) -> float:
-    """How high a point [m] lies, against gravity."""
+    """Return the height of a point [m], against gravity."""
     if len(point) != project.dim:
         raise CommandError(f"flow-surface: a point of {project.dim} numbers is needed, got {len(point)}")
     o = project.blocks.options
@@ -154,8 +154,8 @@ def stage(
     time: float | None = None,
     limit: float | None = None,
 ) -> None:
-    """One more stage of a well: a rate [m2/s] up to a pressure (limit [Pa]), a pressure [Pa], or shut in; time: of flow
-    that it takes [s], None: no end."""
+    """Add a stage of a well: a rate [m2/s] up to a pressure (limit [Pa]), a pressure [Pa], or shut in; time: duration
+    in flow time [s], None: no end."""
     given = {w.RATE: rate, w.PRESSURE: pressure, w.SHUT: 0.0 if shut_in else None}
     chosen = {does: value for does, value in given.items() if value is not None}
     if len(chosen) != 1:

@@ -1,5 +1,6 @@
-"""What frames of blocks hold besides elements and joints: contacts of elements, conditions of nodes and faces, flow
-nodes. A table of each, with a row for each of them."""
+"""Tables of frames of blocks besides elements and joints: contacts of elements, conditions of nodes and faces, flow
+nodes; one row per object.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ from hpcdem.physics.heat.model import Heat
 
 
 def tables(blocks: Blocks) -> dict[str, Table]:
-    """By name, in ascending order of numbers; without those that have no rows. Collective."""
+    """Return the tables by name, in ascending order of numbers, without empty ones. Collective."""
     made = {
         CONTACTS: _slabs(blocks, ("element_1", "element_2"), _contacts(blocks)),
         NODE_CONDITIONS: _slabs(
@@ -73,8 +74,8 @@ def _contacts(blocks: Blocks) -> Columns | None:
 
 
 def _places(blocks: Blocks, numbers: np.ndarray, lead: np.ndarray | None = None) -> Columns:
-    """Where points are now [m], on all ranks; NaN of those without an element. lead (n,): the corner where a side of it
-    is requested, else -1. Collective."""
+    """Return the present positions of points [m], on all ranks; NaN for points without an element. lead (n,): the
+    corner if the position of one side is requested, else -1. Collective."""
     names = [f"position_{axis}" for axis in "xyz"[: blocks.dim]]
     columns = {name: np.empty(len(numbers)) for name in names}
     sided = numbers if lead is None else np.where(lead >= 0, sides.SIDE + lead, numbers)

@@ -70,7 +70,7 @@ def settle(project: Project) -> None:
 
 
 def _particles_just_wrote(project: Project) -> bool:
-    """What is under way is a frame of this step, of the particles beside the blocks."""
+    """Whether the particles of a coupled model have just written the frame of this step."""
     both = project.coupled
     return both is not None and both.particles.last_frame == (both.particles.clock.step, False)
 
@@ -232,8 +232,8 @@ def _of_mesh(project: Project) -> MeshFrame:
 
 
 def frame(project: Project, sound: bool = True) -> MeshFrame:
-    """What is written at this moment; sound: with what elements do to each other and what acts on them; before all
-    elements have a model the mesh alone. Collective."""
+    """Collect the quantities of a frame; sound: with forces between elements and on them; only the mesh before all
+    elements have a model. Collective."""
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
     if len(readiness.bare(blocks)):
         return _of_mesh(project)

@@ -397,8 +397,7 @@ def add_nodes(project: Project, points: Sequence[tuple[float, ...]]) -> None:
 
 
 def add_element(project: Project, corners: Sequence[int]) -> None:
-    """One more element by the numbers of its nodes, in any sense of turning: a triangle or quad, in space a
-    tetrahedron."""
+    """Add an element by the numbers of its nodes, in either orientation: a triangle or quad, in space a tetrahedron."""
     project.refuse_in_use("elements are added")
     known = np.empty((0, project.dim)) if project.mesh is None else project.mesh.points
     points = np.concatenate([known, np.array(project.added[0], np.float64).reshape(-1, project.dim)])

@@ -22,7 +22,7 @@ _P = TypeVar("_P", bound=SurfaceLoad)
 
 
 def needed(project: Project, physics: type[_P], use: bool = True) -> _P:
-    """That of the model; CommandError without one. use: see `Project.ready`."""
+    """Return this physics of the model; CommandError without one. use: see `Project.ready`."""
     found = physics.there(project.ready(use=use))
     if found is None:
         raise CommandError(LACKS[physics])
@@ -31,7 +31,7 @@ def needed(project: Project, physics: type[_P], use: bool = True) -> _P:
 
 @contextmanager
 def begun(project: Project, physics: type[_P]) -> Iterator[_P]:
-    """That of the model, or a new one, which is removed again if what follows is refused."""
+    """Return this physics of the model, or a new one, which is removed again if the command is rejected."""
     blocks = project.ready()
     known, found = physics.there(blocks), physics.of(blocks)
     try:

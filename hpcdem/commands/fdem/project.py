@@ -1,4 +1,4 @@
-"""What a script of blocks has at hand: the simulation, geometry layers, the mesh, groups, what is recorded."""
+"""The project of a script of blocks: the simulation, geometry layers, the mesh, groups, and records."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Project:
 
     @property
     def count(self) -> int:
-        """Of steps, for what happens every so many: in a static run with creep of creep steps."""
+        """Count steps for periodic tasks: creep steps in a static run with creep."""
         return self.blocks.creep.steps if "creep" in (self.progress or {}) else self.step
 
     def refuse_inside(self, what: str) -> None:
@@ -143,7 +143,7 @@ class Project:
     # ---- the mesh ------------------------------------------------------------------------------------------------
 
     def add_mesh(self, mesh: Mesh) -> None:
-        """One more body. CommandError if models or conditions were assigned to the mesh already."""
+        """Add a body. CommandError if models or conditions were assigned to the mesh already."""
         self.refuse_in_use("all bodies are meshed")
         self.take_added()
         if mesh.dim != self.dim:
@@ -181,7 +181,7 @@ class Project:
         old, parent, n = before.cells.reshape(-1), np.repeat(made.parent, 4), len(mesh.points)
 
         def sides(numbers: np.ndarray) -> np.ndarray:
-            """Where these sides (sides.py) are now."""
+            """Present positions of these sides (sides.py)."""
             corner = numbers - SIDE
             corner = corner[number[old[corner]] >= 0]
             return SIDE + np.flatnonzero(
@@ -201,7 +201,7 @@ class Project:
         edges = self.edges()
 
         def faces(numbers: np.ndarray, joints: bool) -> np.ndarray:
-            """Where these faces, or joints, are now."""
+            """Present positions of these faces or joints."""
             points, of = made.moved.faces(before.face_points(numbers))
             at = mesh.find_edges(edges, points)
             good = (at >= 0) & (edges.inner[at] | ~np.bool_(joints))

@@ -1,4 +1,4 @@
-"""What Python in a script can ask of the model: numbers of objects, values, sums."""
+"""Quantities that Python in a script can query: numbers of objects, values, sums."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _of_flow(project: Project, kind: str, name: str, where: Range | None) -> np.
 
 
 def wells(project: Project) -> dict[str, dict[str, float]]:
-    """By name what wells have now (physics.flow.wells.QUANTITIES); empty without fluid."""
+    """Return the present quantities of wells by name (physics.flow.wells.QUANTITIES); empty without fluid."""
     flow = Flow.there(project.ready(use=False))
     return {} if flow is None else {
         well.name: {name: flow.well_value(well.name, name) for name in OF_WELLS} for well in flow.wells
@@ -75,7 +75,7 @@ def fluid(project: Project) -> dict[str, float]:
 
 
 def fluid_energies(project: Project) -> dict[str, float]:
-    """Of blocks and fluid in implicit steps [J/m], see `Flow.energies`. Collective."""
+    """Energies of blocks and fluid in implicit steps [J/m], see `Flow.energies`. Collective."""
     return needed(project, Flow, use=False).energies()
 
 

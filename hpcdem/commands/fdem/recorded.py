@@ -1,4 +1,4 @@
-"""What histories can follow of each kind of object, with its unit: the language reads it as well."""
+"""Quantities that histories can record for each kind of object, with units; the language reads this table too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a model of blocks records: a history, a chart and its curves."""
+"""Records of a model of blocks: a history, a chart and its curves."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ class History:
 
     @property
     def waits(self) -> bool:
-        """Its record of this step comes with the forces of the next one."""
+        """Whether the record of this step needs the forces of the next one."""
         return self._waits is not None
 
     def record(self, blocks: Blocks, goes_on: bool) -> None:

@@ -48,7 +48,7 @@ QUIET_SECONDS = 10.0
 
 
 def step(project: Project, steps: int) -> None:
-    """So many steps."""
+    """Take so many steps."""
     _run(project, f"step {steps}", steps, None, None, command=("step", {"steps": steps}))
 
 
@@ -124,7 +124,7 @@ def solve(
 
 
 def _warn_of_end(project: Project, reason: str, found: float, bare: bool) -> None:
-    """What may not be the end that was meant. bare: no aim was given."""
+    """Warn about an end that may be unintended. bare: the command gave no target."""
     if project.log is None:
         return
     if reason == "ratio" and not project.dynamic:
@@ -319,7 +319,7 @@ def _explicit_is_cheaper(project: Project, flow: Flow, time: float, dt: float | 
 
 
 def _flow_by_steps(project: Project, flow: Flow, time: float) -> None:
-    """So much flow time [s] by explicit steps."""
+    """Advance the flow by so much flow time [s] with explicit steps."""
     o = project.blocks.options
     if o.mechanical and not o.dynamic:
         step(project, costs.cycles(flow, time))
@@ -372,7 +372,7 @@ def _where(project: Project) -> str:
 
 
 def _write_due(project: Project) -> None:
-    """What is due at this step."""
+    """Write what is due at this step."""
     histories.record(project)
     cracks.record(project)
     frames.write_due(project)
@@ -389,7 +389,7 @@ def _check_creep(project: Project, time: float, cycles: int | None = None) -> No
 
 
 def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, Any]) -> None:
-    """So much creep time [s] passes, each creep step by linear equations."""
+    """Advance creep by so much creep time [s]; each creep step solves linear equations."""
     if project.dynamic:
         raise CommandError("elastic with time is for static runs: use model option dynamic off first")
     _check_creep(project, time)
@@ -506,7 +506,7 @@ def _run(
 def _advance(
     project: Project, name: str, first: int, last: float, end: float, ratio: float | None
 ) -> tuple[str, float, Watch]:
-    """To step `last` or model time `end` [s], whichever is first; see `_run`."""
+    """Step to step `last` or model time `end` [s], whichever is first; see `_run`."""
     blocks, clock, progress = project.blocks, project.blocks.clock, project.progress
     assert progress is not None
     # A checkpoint of a version that did not watch has none.
@@ -555,7 +555,7 @@ def _advance(
 
 
 def _to(project: Project, steps: int) -> int:
-    """So many steps; a request of a function, if there was one. What was recorded is written before an error leaves."""
+    """Take so many steps; return the request of a function, if any. Records are written before an error is raised."""
     try:
         return coupling.advance(project, steps)
     except (EquilibriumError, PhysicsError):
@@ -566,7 +566,7 @@ def _to(project: Project, steps: int) -> int:
 
 
 def _no_equilibrium(project: Project, watch: Watch, reason: str, ratio: float, found: float) -> str:
-    """What is reported of a failed run, with the body that slides away. Collective."""
+    """Describe a run that failed to converge, with the body that slides away. Collective."""
     step = project.step
     why = {
         "limit": f"after {step - watch.began} steps, the limit",
@@ -650,8 +650,8 @@ def _onwards(project: Project, path: Path) -> str:
 
 
 class _Report:
-    """What the log says of a run: a line at its beginning, one every QUIET_SECONDS, one at its end. Of a line of the
-    script that runs again and again, as in a loop, it speaks every QUIET_SECONDS only."""
+    """Log of a run: a line at its beginning, one every QUIET_SECONDS, one at its end. A line of the script that runs
+    repeatedly, as in a loop, reports every QUIET_SECONDS only."""
 
     def __init__(self, project: Project, name: str, last: float) -> None:
         self.project, self.name, self.last = project, name, last

@@ -1,4 +1,4 @@
-"""What is written and told at the end of a run of blocks: histories, energy, the table of stages, the last figure."""
+"""Output at the end of a run of blocks: histories, energy, the table of stages, the last figure."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def _tell_fields(project: Project) -> None:
 
 
 def _tell_both(project: Project) -> None:
-    """What went across the contacts of discs and faces, and how both accounts add up. Collective."""
+    """Report the exchange through contacts of discs and faces, and the sum of both energy budgets. Collective."""
     both, log = project.coupled, project.log
     if both is None or project.continues is not None or not both.accounted:
         return

@@ -1,6 +1,6 @@
-"""What commands make of their values alone, without a model: also when a line is read (lang/pcdc/trial.py).
+"""Conversions of values of commands that need no model: also used when a line is read (lang/pcdc/trial.py).
 
-Nothing here imports kernels: a script is read and checked without the second that they take.
+This module imports no kernels, so a script is checked without the second that they take to load.
 """
 
 from __future__ import annotations

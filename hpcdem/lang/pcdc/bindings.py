@@ -1,5 +1,6 @@
-"""How a command of a script comes to its function of `hpcdem.commands.fdem`: the row of the table names it (`does`),
-and it takes the arguments under their names. Here is what more there is to convert."""
+"""How a command of a script calls its function of `hpcdem.commands.fdem`: the row of the table names the function
+(`does`), which receives the arguments under their names. This module contains the further conversions.
+"""
 
 from __future__ import annotations
 
@@ -87,7 +88,7 @@ class Call:
         return {argument(option.name): True if left_out else self._plain(value)}
 
     def properties(self) -> dict[str, Any]:
-        """Those of a model, tables and functions by their names."""
+        """Convert the properties of a model, tables and functions by their names."""
         given = {argument(name): self._plain(value) for name, value in self["properties"].items() if name != "np"}
         return with_parameters(given)
 
@@ -103,7 +104,7 @@ class Call:
 
 
 def argument(name: str) -> str:
-    """What functions call a word of the language."""
+    """Name of the argument of functions for a word of the language."""
     return "set_name" if name == "set" else SHORT.get(name) or python(name)
 
 
@@ -209,7 +210,7 @@ CONVERTERS: dict[str, Callable[[Call], None]] = {}
 
 
 def converter(function: Callable[[Call], None]) -> Callable[[Call], None]:
-    """One of them, under its name."""
+    """Register a conversion under its name."""
     CONVERTERS[function.__name__] = function
     return function
 
@@ -250,7 +251,7 @@ def patch(call: Call) -> None:
 
 @converter
 def initial_stress(call: Call) -> None:
-    """By component."""
+    """Convert initial stress by component."""
     given = {name.removeprefix("stress-"): one for name, one in call.arguments.items()}
     stress, gradient = (
         {name: one[word] for name, one in given.items() if word in one} for word in ("value", "gradient")
@@ -273,7 +274,7 @@ def _removed(call: Call, *conditions: Model) -> list[bool]:
 
 @converter
 def free_nodes(call: Call) -> None:
-    """Of the physics whose conditions they are."""
+    """Release conditions of nodes of the physics to which they belong."""
     of_blocks = zip(("motion", "force", "constraint"), _removed(call, VELOCITY, FORCE, MOVE))
     if kinds := [kind for kind, removed in of_blocks if removed]:
         fdem.assignments.remove_node_conditions(call.project, call.where, kinds)
@@ -292,7 +293,7 @@ def _free_of_fields(call: Call, conditions: Mapping[str, Model]) -> None:
 
 @converter
 def free_faces(call: Call) -> None:
-    """Of the physics whose conditions they are."""
+    """Release conditions of faces of the physics to which they belong."""
     stress, heat = _removed(call, STRESS, CONST_HEAT)
     if stress:
         fdem.assignments.remove_face_conditions(call.project, call.where)
@@ -303,7 +304,7 @@ def free_faces(call: Call) -> None:
 
 @converter
 def free_bolt_nodes(call: Call) -> None:
-    """Of the components that the conditions prescribe."""
+    """Release the components that the conditions prescribe."""
     motion, force = _removed(call, BOLT_VELOCITY, BOLT_FORCE)
     stems = () if motion and force else ("does", "at") if motion else ("force",)
     fdem.supports.remove_conditions(call.project, g.BOLT_NODE, call.where, stems)
@@ -311,7 +312,7 @@ def free_bolt_nodes(call: Call) -> None:
 
 @converter
 def initial_nodes(call: Call) -> None:
-    """Of the physics whose values they are."""
+    """Assign initial values of nodes of the physics to which they belong."""
     if "velocity" in call.arguments:
         fdem.assignments.initial_velocity(call.project, call["velocity"], call.where)
     axes = "xyz"[: call.project.dim]
@@ -330,7 +331,7 @@ def initial_nodes(call: Call) -> None:
 
 @converter
 def initial_fluid(call: Call) -> None:
-    """How much, and how warm."""
+    """Assign initial pressure or saturation, and temperature."""
     if "flow-node-saturation" in call.arguments:
         fdem.flow.initial(call.project, saturation=call["flow-node-saturation"], where=call.where)
     if "flow-node-temperature" in call.arguments:
@@ -406,7 +407,7 @@ def table(call: Call) -> None:
 
 @converter
 def solve(call: Call) -> None:
-    """By steps, or one of the physics at once."""
+    """Solve by steps, or one of the physics with implicit steps."""
     part = next((word for word in ("elastic", "hydraulic", "thermal") if word in call.arguments), "")
     getattr(fdem.steps, f"solve_{part}" if part else "solve")(call.project, **call.given(part))
 

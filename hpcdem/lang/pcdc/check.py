@@ -1,4 +1,4 @@
-"""What is known of a script without running it."""
+"""What `hpcdem --check` finds out about a script without running it."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def packages(script: Source) -> None:
 
 
 def missing_packages(script: Source) -> dict[str, Statement]:
-    """What is reported of each missing package, with the first statement that needs it."""
+    """Report each missing package, with the first statement that needs it."""
     missing: dict[str, Statement] = {}
     for statement in script.statements:
         needs, file = NEEDED.get(statement.command.name), statement.arguments.get("file")
@@ -96,7 +96,7 @@ def _in_one(messages: list[str]) -> str:
 
 
 def summary(text: str, file: str) -> str:
-    """What hpcdem --check says: how many commands of which kind, and names that are used but made nowhere."""
+    """The report of hpcdem --check: number of commands of each kind, and names that are used but never made."""
     script = read(text, file)
     counts = Counter(statement.command.name for statement in script.statements)
     lines = [f"{file}: {len(script.statements)} commands read, nothing was executed"]
@@ -146,7 +146,7 @@ _MAKES_MESHES = ("mesh create", "mesh import", "mesh equilateral", "mesh patch",
 
 
 def _elements(statement: Statement) -> int:
-    """How many a line makes; -1: nobody knows yet."""
+    """Number of elements that a line makes; -1 if unknown."""
     name, given = statement.command.name, statement.arguments
     cells = {"mesh structured": given.get("cells"), "element create brick": given.get("n")}.get(name)
     if cells is None:

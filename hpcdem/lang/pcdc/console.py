@@ -126,5 +126,5 @@ def _statements(python: str) -> int:
 
 
 def _words(line: str) -> list[str] | None:
-    """What a command that was begun may continue with; None for Python."""
+    """Words that may continue an unfinished command; None for Python."""
     return candidates(line) if line.lstrip().startswith("pcdc ") else None

@@ -199,7 +199,7 @@ class Interpreter:
     # ---- one command ---------------------------------------------------------------------------------------------
 
     def _carry_out(self, index: int, *values: Any) -> None:
-        """What a command of the script is in its Python text."""
+        """The function by which the Python text of a script executes a command."""
         self._refuse_after_stop()
         statement = self.statements[index]
         try:
@@ -278,7 +278,8 @@ class Interpreter:
         return self.journal is not None and not self.journal.lost
 
     def look(self, make: Callable[[], Any], together: str = "") -> Any:
-        """What the script asks of the model. together: the question, if all ranks must ask it at the same time."""
+        """Answer a query of the script about the model. together: the query, if all ranks must make it at the same
+        time."""
         journal = self.journal
 
         def ask() -> Any:
@@ -300,7 +301,7 @@ class Interpreter:
         return self._placed(lambda: journal.ask(_checksum(told), make, again, fails_again))
 
     def ask_alone(self, told: tuple[Any, ...], make: Callable[[], Any], again: bool) -> Any:
-        """What this rank sees of its particles, see Journal.ask_alone."""
+        """Query particles of this rank only, see Journal.ask_alone."""
         journal, alone = self.journal, self.project.comm.size == 1
         if journal is None:
             return make()
@@ -320,7 +321,7 @@ class Interpreter:
         return self.journal is None or self.journal.keeps_calls
 
     def _placed(self, make: Callable[[], Any]) -> Any:
-        """What `make` returns; the line of the script, if it takes another way there."""
+        """Return the result of `make`; if the script takes another branch there, raise with its line."""
         self._refuse_after_stop()
         try:
             return make()
@@ -339,7 +340,7 @@ class Interpreter:
         return error
 
     def _place_in_script(self) -> dict[str, Any] | None:
-        """What a checkpoint shall hold so that `run` can resume from it; None in a conversation."""
+        """The position in the script that a checkpoint stores, so that `run` can resume; None in a console."""
         if self.journal is None:
             return None
         source = next(iter(self.sources.values()))
@@ -400,7 +401,7 @@ class Interpreter:
     # ---- names ---------------------------------------------------------------------------------------------------
 
     def _names(self) -> dict[str, Any]:
-        """What a checkpoint holds of the script's names."""
+        """The names of the script that a checkpoint stores."""
         found, left_out = names.collected(self.namespace, self.sources)
         for why in left_out:
             if self.project.log is not None:

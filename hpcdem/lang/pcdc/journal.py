@@ -57,7 +57,7 @@ class Journal:
     # ---- while a script runs -------------------------------------------------------------------------------------
 
     def note(self, *entry: Any) -> None:
-        """One more entry."""
+        """Add an entry."""
         self._bytes += ENTRY + sum(len(part) for part in entry[1:2] if isinstance(part, str))
         if not self.lost and self._bytes > MOST:
             self.lost = True
@@ -74,7 +74,7 @@ class Journal:
             self.note(ERROR, type(error).__name__, "", 0, str(error))
 
     def look(self, make: Callable[[], Any]) -> Any:
-        """What `make` returns, or returned the first time."""
+        """Return the result of `make`, or the recorded one when replaying."""
         if self.replays:
             self._fail_again()
             if self._past[self._at][0] != LOOK:
@@ -172,7 +172,7 @@ class Journal:
 
     @property
     def replays(self) -> bool:
-        """What happens now has happened before."""
+        """Whether the journal still replays recorded entries."""
         if self.failure is not None:
             raise self.failure
         return self._at < len(self._past)

@@ -70,7 +70,7 @@ class Kind:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """What a table that stands for it can be over; z in space only."""
+        """Quantities over which a table for this value can be given; z only in space."""
         there = {
             PLASTIC_STRAIN: self.softens,
             **dict.fromkeys(range(TEMPERATURE, len(AXES)), self.temperature_dependent),
@@ -95,7 +95,7 @@ class Unfit(ValueError):
 
 
 class TooLarge(Unfit):
-    """It would be of this kind, but is larger than any number of a model."""
+    """The value has the right kind but is larger than any number of a model."""
 
 
 def number(low: float = -math.inf, high: float = math.inf, above: bool = False) -> Callable[[Any], float]:

@@ -1,4 +1,4 @@
-"""One ``pcdc`` line as words, numbers, texts, vectors and Python expressions in square brackets."""
+"""Splits a ``pcdc`` line into words, numbers, texts, vectors and Python expressions in square brackets."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def short(text: str, longest: int = 60) -> str:
 
 
 class LexicalError(ValueError):
-    """What cannot be a token; the message says what was read and what was expected."""
+    """Text that is no token; the message states what was read and what was expected."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def _number(text: str) -> Number:
 
 
 def _vector(line: str, at: int) -> tuple[Vector, int]:
-    """From the opening bracket."""
+    """Read a vector from its opening bracket."""
     start, items = at, []
     at += 1
     while True:
@@ -188,7 +188,7 @@ def _vector(line: str, at: int) -> tuple[Vector, int]:
 
 
 def _text(line: str, at: int) -> tuple[Text, int]:
-    """From the opening quote. ``[[`` and ``]]`` stand for brackets, ``[...]`` for an expression."""
+    """Read a text from its opening quote. ``[[`` and ``]]`` stand for brackets, ``[...]`` for an expression."""
     quote, start = line[at], at
     parts: list[str | Escape] = []
     at += 1

@@ -1,4 +1,4 @@
-"""From the words of a ``pcdc`` line to a statement. What may be written comes from `table`."""
+"""Converts the words of a ``pcdc`` line to a statement. The grammar comes from `table`."""
 
 from __future__ import annotations
 
@@ -242,7 +242,7 @@ class _Line:
             raise ValueError(f"'{self.context}' lacks {_joined(missing)}")
 
     def complete(self, model: Model, given: dict[str, Any]) -> None:
-        """One of the sets of properties that can stand for each other, or any property at all, must be there."""
+        """Check that one of the alternative sets of properties, or any property at all, is given."""
         if model.any_of and not given:
             raise ValueError(f"'{self.context}' needs at least one of {_joined(o.name for o in model.options)}")
         if model.one_of and not any(all(name in given for name in names) for names in model.one_of):
@@ -252,8 +252,8 @@ class _Line:
     # ---- values
 
     def values(self, option: Option) -> Any:
-        """What follows a keyword: one value, a tuple of several, or a dict where keywords of its own may follow, each
-        once: the second is one of the command."""
+        """Read what follows a keyword: one value, a tuple of several, or a dict if keywords of its own may follow, each
+        once; a second occurrence belongs to the command."""
         self.refuse_elsewhere(option.keyword, option.dims)
         read = []
         for kind in option.values:
@@ -332,7 +332,7 @@ class _Line:
         return kinds.read_value(kind, token, what, self.expressions)
 
     def _varied(self, token: Word, kind: kinds.Kind) -> Any:
-        """What follows ``table`` or ``field`` instead of a property."""
+        """Read what follows ``table`` or ``field`` in place of a number."""
         if matching(token.text, [_FIELD]):
             return _later(Drawn, self.one(kinds.STRING, _FIELD))
         name = self.one(kinds.STRING, _TABLE)

@@ -151,7 +151,7 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
 
 
 def _implicit(arguments: Mapping[str, Any], part: str) -> None:
-    """Of model solve, by implicit steps of fluid or heat."""
+    """Rules of model solve by implicit steps of fluid or heat."""
     others = arguments.keys() - {part, "time", "dt", "steady", "solver", *(["auto"] if part == "hydraulic" else [])}
     if others:
         raise ValueError(f"{part} does not accept {min(others)}")

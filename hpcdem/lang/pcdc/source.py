@@ -103,7 +103,7 @@ def read(text: str, file: str = "script", first: int = 0, table: Table = PCDC, d
 
 
 def _dimensions(statement: Statement, before: int | None) -> int | None:
-    """Of the model after a command; None: not known."""
+    """Dimensions of the model after a command; None: unknown."""
     if statement.command.name == "model restore":
         return None
     if statement.command.name != "model new":

@@ -1,4 +1,4 @@
-"""One command of a script, as read."""
+"""One parsed command of a script."""
 
 from __future__ import annotations
 

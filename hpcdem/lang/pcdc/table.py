@@ -108,7 +108,7 @@ class Option:
 
     @property
     def name(self) -> str:
-        """The key of its value in a statement."""
+        """Key of the value in a statement."""
         return self.keyword.name
 
 
@@ -174,12 +174,12 @@ class Command:
 
     @cached_property
     def ways(self) -> tuple[Way, ...]:
-        """Its words, and others that name it."""
+        """The words of the command and its alternative names."""
         return (Way(self, self.words), *(Way(self, _keywords(words), own=False) for words in self.also))
 
     @cached_property
     def name(self) -> str:
-        """Its words in full."""
+        """The words of the command in full."""
         return " ".join(word.name for word in self.words)
 
 
@@ -728,7 +728,7 @@ def _list_command(kind: str, notation: str) -> Command:
 
 
 def _properties(model: Model) -> tuple[Option, ...]:
-    """Those of a model, none of them compulsory, for commands that change some."""
+    """The properties of a model, all optional, for commands that change some."""
     return tuple(
         Option(o.notation, o.values, o.doc, o.unit, also=o.also, dims=tuple(d for d in o.dims if d in model.dims),
                refused=o.refused)

@@ -132,7 +132,7 @@ def hyphened(text: str) -> str:
 
 
 def _given(arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Those that are known and the same everywhere at all times, under the names of Python."""
+    """Arguments that are known when the line is read, under their Python names."""
     return {
         python(name): value
         for name, value in arguments.items()

@@ -23,10 +23,10 @@ _VECTORS = ("position", "displacement", "velocity", "reaction")
 
 
 class Accounts:
-    """What blocks tell of themselves now, in scripts and in Python programs."""
+    """Quantities of blocks at this moment, for scripts and Python programs."""
 
     def _now(self, ask: Callable[[Any], Any]) -> Any:
-        """What a function says of the project. Collective."""
+        """Evaluate a function of the project. Collective."""
         raise NotImplementedError
 
     @property

@@ -145,7 +145,7 @@ def _named(statements: Sequence[Statement], runs: Sequence[Run], outdir: Path | 
 
 
 def _folder(statements: Sequence[Statement], outdir: Path | None = None) -> str:
-    """Where the results go, as the user would say it."""
+    """The folder of the results, as the user would write it."""
     named = next((s.get("outdir") for s in reversed(statements) if s.get("outdir")), None)
     return str(named or outdir or "data")
 

@@ -140,7 +140,7 @@ class _Follower:
             self._move(s)
 
     def _wall(self, s: Statement) -> None:
-        """Its middle and velocity along x."""
+        """Middle of a wall and its velocity along x."""
         name = s.get("id")
         if s.get("delete"):
             self.walls.pop(name, None)

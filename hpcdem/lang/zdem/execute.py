@@ -32,7 +32,7 @@ def refuse_unexecuted(statements: Sequence[Statement]) -> None:
 
 
 def tell_warnings(script: Script, sim: Any) -> None:
-    """What the parser read otherwise than it is written, into the log."""
+    """Log the places where the parser read something other than written."""
     if getattr(sim, "log", None) is not None:
         for statement in script.statements:
             for warning in statement.warnings:
@@ -213,7 +213,7 @@ def check_same_beginning(script: Script, saved_text: str, position: int) -> None
 
 
 class _Call:
-    """One statement on its way to a command: its arguments with expressions resolved and file names made complete."""
+    """One statement for its command: arguments with expressions resolved and complete file names."""
 
     def __init__(self, interpreter: Interpreter, sim: Any, statement: Statement) -> None:
         self.sim, self.statement = sim, statement
@@ -232,7 +232,7 @@ class _Call:
                 self.arguments[name] = tuple(number(bound, extents) for bound in value)
 
     def given(self, *names: str) -> dict[str, Any]:
-        """Those of these arguments that the line has, as keyword arguments; all of them if no name is given."""
+        """Return those of these arguments that the line contains, as keyword arguments; all if no name is given."""
         return {name: value for name, value in self.arguments.items() if not names or name in names}
 
     def path(self) -> str:

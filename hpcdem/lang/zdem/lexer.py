@@ -28,7 +28,7 @@ LARGEST_WHOLE = 2**53
 
 @dataclass(frozen=True)
 class Token:
-    """One word of a line: as written, where it starts (lines and columns count from 1)."""
+    """One word of a line: its text and position (lines and columns count from 1)."""
 
     text: str
     line: int

@@ -36,7 +36,7 @@ class Script:
 
     @property
     def directory(self) -> Path:
-        """Where the script lies: file names in it are relative to this."""
+        """Folder of the script, to which file names in it are relative."""
         return Path(self.file).parent
 
 
@@ -397,7 +397,7 @@ class _LineParser:
                 return found
 
     def either(self, kind: t.Kind, name: str, number: int) -> list[Token]:
-        """So many words with | between them, blanks around it or not; the tokens carry the words alone."""
+        """So many words separated by |, with or without blanks; the tokens contain the words alone."""
         pieces: list[Token] = []
         bars = 0
         while True:
