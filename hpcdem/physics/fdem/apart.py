@@ -49,7 +49,8 @@ def check(sim: State, local: Local, error: type[Exception]) -> None:
 
 
 def _rows(sim: State, local: Local) -> np.ndarray:
-    """Of this rank's joints that slide (n, 3): slip or opening over the size, lower face, slip or opening [m]."""
+    """Rows of sliding joints of this rank (n, 3): slip or opening over the size of the joint, lower face, slip or
+    opening [m]."""
     slots = np.flatnonzero(local.slot_state[: local.slots] > BROKEN)
     if not len(slots):
         return np.empty((0, 3))

@@ -346,7 +346,7 @@ class Assignments(Settings):
         return values
 
     def _spread(self, on: str, of: np.ndarray, name: str, value: Value) -> np.ndarray:
-        """One number for each object."""
+        """Expand a value to one number for each object."""
         if isinstance(value, Over):
             if value.table not in self.tables:
                 self._value(name, value.table)
@@ -413,7 +413,7 @@ def _follows_field(value: Value) -> bool:
 
 
 def _differs(value: Value) -> bool:
-    """From object to object."""
+    """Whether a value differs from object to object."""
     return isinstance(value, Drawn) or (isinstance(value, Over) and value.axis < PLASTIC_STRAIN)
 
 

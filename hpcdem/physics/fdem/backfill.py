@@ -52,9 +52,9 @@ def _laplacian(points: np.ndarray, rows: np.ndarray) -> csr_array:
 
 
 def depth(one: np.ndarray, other: np.ndarray) -> float:
-    """How far two convex polygons (n, 2), counter-clockwise, or two tetrahedra (4, 3) reach into each other [m]; not
-    positive if they do not: the least way that parts them, over the normals of all sides, in space over what is normal
-    to an edge of each, too."""
+    """Depth [m] to which two convex polygons (n, 2), counter-clockwise, or two tetrahedra (4, 3) overlap; not positive
+    if they do not overlap. It is the shortest displacement that separates them, over the normals of all sides, and in
+    space also over the normals of pairs of edges."""
     least = np.inf
     for a, b in ((one, other), (other, one)):
         at, normal = _outwards(a)

@@ -144,7 +144,7 @@ class Budget(engine.Budget["Blocks", float]):
     # ---- state on disk ---------------------------------------------------------------------------------------------
 
     def state(self, sim: Blocks) -> dict[str, Any]:
-        """As JSON values; the columns of the elements are saved with them. Collective."""
+        """The budget as JSON values; columns of the elements are saved with the elements. Collective."""
         return {
             "accounts": self.accounts, "commands": self.commands, "start": self.start, "left": self.left,
             "running": self.running, "heat": self.heat, "of_joints": self.of_joints, "by_heat": self.by_heat,

@@ -225,8 +225,8 @@ def special_nodes(number, n_left, n_own, corner_special, node, begin, low, local
 def place_nodes(
     corner_of, start, one, member, where, cells, width, force_width, stride, mass, begin, corner, place, again, out_mass
 ):
-    """Where the corners of special nodes lie: in the forces (n, force_width), in v (n, width), a second time in v, or
-    -1; stride: words from one corner of a row to the next.
+    """Find the positions of the corners of special nodes in the tables: in the forces (n, force_width), in v (n,
+    width), a second position in v, or -1; stride: words from one corner of a row to the next.
 
     Returns a corner whose element is not held by this rank, or -1.
     """

@@ -59,8 +59,8 @@ class Relaxation:
 
 
 class Conditions(InitialStress):
-    """What nodes and faces are made to do. Methods that assign raise CommandError, alike on all ranks, and change
-    nothing then."""
+    """Conditions of nodes and faces. Methods that assign raise CommandError, alike on all ranks, and then change
+    nothing."""
 
     def clear_conditions(self) -> None:
         """Nothing is prescribed."""
@@ -241,8 +241,8 @@ class Conditions(InitialStress):
                 self.corner_row[others[self.corner_row[others] == row]] = new
 
     def _checked(self, one: NodeCondition | Sequence[NodeCondition], at: np.ndarray) -> NodeCondition:
-        """What this condition, or those of one node, come to. CommandError, with the place of the first of these
-        corners, if no motion fulfils them."""
+        """Combine this condition, or those of one node. CommandError, with the position of the first of these corners,
+        if no motion satisfies them."""
         try:
             one = one if isinstance(one, NodeCondition) else node_conditions.together(one, self.dim)
             return node_conditions.acting(one, self.dim)
@@ -255,7 +255,7 @@ class Conditions(InitialStress):
             ) from None
 
     def acting(self) -> list[NodeCondition]:
-        """What rows of conditions come to, by row (`rows_of_nodes`). Not to be changed."""
+        """Combined conditions by row (`rows_of_nodes`). Read-only."""
         if self._acting is None:
             self._acting = [node_conditions.acting(one, self.dim) for one in self.conditions]
             self._of_sides: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
@@ -313,7 +313,7 @@ class Conditions(InitialStress):
         return nodes, rows, part
 
     def _shares(self, corners: np.ndarray, axis: str, one: NodeCondition) -> int:
-        """How many of these corners share the force that a node has along an axis."""
+        """Number of these corners that share the force of a node along an axis."""
         rows = [self.conditions[row] for row in self.corner_row[corners].tolist()]
         wanted = getattr(one, f"force_{axis}"), getattr(one, f"side_{axis}")
         return sum((getattr(of, f"force_{axis}"), getattr(of, f"side_{axis}")) == wanted for of in rows)
@@ -448,7 +448,7 @@ class Conditions(InitialStress):
         return np.array([[self._now(getattr(one, name), time) for name in names] for one in self.loads])
 
     def stressed(self, faces: np.ndarray) -> np.ndarray:
-        """Those of these faces (k,) on which a stress is prescribed, bool: the total of what acts there."""
+        """Whether a stress is prescribed on each of these faces (k,) bool, counting all loads there."""
         names = ("normal", "dip", *COMPONENTS[self.dim])
         rows = [any(getattr(one, name) != 0.0 for name in names) for one in self.loads]
         return np.array(rows)[self.load_row[faces]]

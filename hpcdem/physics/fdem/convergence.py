@@ -31,7 +31,7 @@ LIMIT_STATIC, LIMIT_DYNAMIC = 1_000_000, 10_000_000
 
 @dataclass(frozen=True)
 class Solved:
-    """How `solve` ended. ratio: unbalanced over contributing forces at the last look, NaN if nobody looked;
+    """Outcome of `solve`. ratio: unbalanced over contributing forces at the last evaluation, NaN if there was none;
     reason: "ratio", "cycles", "time", "request" (a signal or limit asked to stop); without equilibrium "no progress" or
     "limit", see `Watch`."""
 

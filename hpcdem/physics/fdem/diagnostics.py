@@ -1,4 +1,6 @@
-"""What can be asked of a model of blocks: quantities by number, forces, contacts, events, balance. Changes nothing."""
+"""Quantities of a model of blocks that can be queried: quantities by number, forces, contacts, events, equilibrium.
+Nothing here changes the model.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,8 @@ from hpcdem.physics.fields import FIELDS, kinds
 
 @dataclass(frozen=True)
 class Quantity:
-    """One quantity that can be requested by number: what it belongs to (element, node, joint), unit, meaning; framed:
-    it stands in frames; dims: dimensions of space in which it is there. Units are those of the plane, see `unit_of`."""
+    """A quantity that can be queried by number: kind of object (element, node, joint), unit, meaning; framed: frames
+    contain it; dims: dimensions of models that have it. Units are those of two dimensions, see `unit_of`."""
 
     on: str
     unit: str
@@ -290,7 +292,7 @@ def leads_of(sim: Blocks, numbers: np.ndarray) -> np.ndarray:
 
 
 def one_each(sim: Blocks, numbers: np.ndarray) -> np.ndarray:
-    """One number for each point of these nodes, ascending by point: of several sides the lowest that is there. Not
+    """One number for each point of these nodes, ascending by point; of several sides, the lowest that is present. Not
     collective."""
     if not sides.are_there(numbers):
         return numbers
@@ -351,8 +353,8 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
 
 
 def _plastic_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarray]:
-    """What elements remember of yielding; zero for those that never had a model that yields. They yield now if they
-    did in the last step or do at the present positions."""
+    """Plastic state of elements; zero if an element never had a model that yields. An element yields now if it did in
+    the last step or does at the present positions."""
     if "plastic" in sim.cold:
         memory = sim.local.yielding.columns(some)
     else:
@@ -373,7 +375,7 @@ def _plastic_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndar
 
 
 def _creep_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarray]:
-    """What elements remember of creep, at the present positions; zero for those that never had a model that creeps."""
+    """Creep state of elements at the present positions; zero if an element never had a model that creeps."""
     components = COMPONENTS[3] if sim.dim == 3 else ("xx", "yy", "xy")
     strains, lost = np.zeros((sim.n_own, 2 * len(components))), np.zeros(sim.n_own)
     if "creep" in sim.cold:
@@ -524,8 +526,8 @@ def _gaps(sim: Blocks, lower: np.ndarray) -> np.ndarray:
 
 
 def _places_of(sim: Blocks, corners: np.ndarray) -> np.ndarray:
-    """Where these corners (element * 4 + k) of elements that are there are now, one more axis: dim [m]; of other ranks
-    too. Collective."""
+    """Present positions of these corners (element * 4 + k) of present elements, one more axis: dim [m]; also of other
+    ranks. Collective."""
     row, dim = sim.where[corners // 4], sim.dim
     at = sim.stride * (corners % 4)[..., None] + np.arange(dim)
     found = sim.x[row[..., None], at]
@@ -554,8 +556,8 @@ def _last_events(sim: Blocks, lower: np.ndarray, broken: np.ndarray) -> dict[str
 
 
 def homes(sim: Blocks, at: np.ndarray | None = None) -> np.ndarray:
-    """Where displacement is zero: (n_own, 8), in space (n_own, 16), corners [m], in the order of the owned elements; or
-    of some of them. Not collective."""
+    """Positions of zero displacement: (n_own, 8), in space (n_own, 16), corners [m], in the order of the owned
+    elements; or of some of them. Not collective."""
     some = slice(None) if at is None else at
     if "home" in sim.cold:
         return sim.cold["home"][some]

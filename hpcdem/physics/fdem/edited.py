@@ -1,4 +1,6 @@
-"""What commands change in a model of blocks that may have moved: its definition, and what follows from the change."""
+"""The part of a model of blocks that commands change after it has moved: its definition, and the consequences of a
+change.
+"""
 
 from __future__ import annotations
 
@@ -158,6 +160,6 @@ class Edited(State):
         return [name for name in self.tables if name in used or any(load.uses_table(name) for load in others)]
 
     def changing_tables(self) -> list[str]:
-        """Those of which later values are others than that of now."""
+        """Tables whose later values differ from the present one."""
         now = self.time_now()
         return [name for name in self.tables_over_time() if self.tables[name].changes_after(now)]

@@ -86,8 +86,8 @@ SOLVERS = ("auto", "direct", "petsc")
 
 @dataclass(frozen=True)
 class Balanced:
-    """How `solve_elastic` ended. ratio: unbalanced over contributing forces; iterations, factors: of Newton's
-    method; unknowns: components that could move; solver: who solved the linear systems; increments of the loads."""
+    """Outcome of `solve_elastic`. ratio: unbalanced over contributing forces; iterations, factors: of Newton's method;
+    unknowns: components free to move; solver: solver of the linear systems; increments of the loads."""
 
     ratio: float
     iterations: int
@@ -99,8 +99,9 @@ class Balanced:
 
 @dataclass
 class _Balance:
-    """What Newton's method came to: positions (nn, dim), unbalanced over all forces, iterations, factors, joints past
-    their peak; error: why this is no balance, "" if it is; ratios: on the way; total: sum of forces [N/m]."""
+    """Outcome of Newton's method: positions (nn, dim), unbalanced over all forces, iterations, factors, joints past
+    their peak; error: why there is no equilibrium, "" if there is; ratios: during the iterations; total: sum of forces
+    [N/m]."""
 
     x: np.ndarray
     ratio: float
@@ -114,8 +115,8 @@ class _Balance:
 
 @dataclass
 class Nodes:
-    """Of all nodes, on all ranks: the lowest corner (nn,), its point and rank; position and velocity (nn, dim). Nodes
-    of which nothing is left have corner -1."""
+    """All nodes, on all ranks: the lowest corner (nn,), its point and rank; position and velocity (nn, dim). Nodes
+    without elements have corner -1."""
 
     lead: np.ndarray
     point: np.ndarray
@@ -221,7 +222,7 @@ class Memory:
 
     @staticmethod
     def of(sim: Blocks) -> Memory:
-        """Of a closed model. Not collective."""
+        """Collect the nodes of a closed model. Not collective."""
         cold = {name: values.copy() for name, values in sim.cold.items() if name in ("plastic", "softening")}
         number, histories = sim.number[sim.owned].copy(), sim.local.histories(transfer=False)
         owner = number[histories.owners()]
@@ -326,8 +327,8 @@ def refuse_changing_tables(sim: Blocks, what: str) -> None:
 
 
 def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of a row of conditions: free ways (1) and others (0), the ways as columns, movement per unit of time. point: one
-    to which they apply, for messages."""
+    """Degrees of freedom of a row of conditions: free directions (1) and others (0), the directions as columns,
+    movement per unit of time. point: one to which they apply, for messages."""
     if sim.dim == 2:
         does, at, kind = one[[moving.DOES_X, moving.DOES_Y]], one[[moving.AT_X, moving.AT_Y]], one[moving.CONSTRAINT]
         along = one[[moving.WAY_X, moving.WAY_Y]]

@@ -26,7 +26,8 @@ class Footprint(NamedTuple):
 
 
 def expected(elements: int, dim: int, ranks: int, here: int) -> Footprint:
-    """Of a model of so many elements, evenly distributed over so many ranks, `here` of them on a node."""
+    """Estimate the memory of a model of so many elements, evenly distributed over so many ranks, `here` of them on a
+    node."""
     own, shared = elements * OWN[dim] / ranks, elements * NODE[dim]
     most = max(here * REBUILDING * own, elements * MAKING)
     return Footprint(EMPTY + own, EMPTY + REBUILDING * own, shared, here * EMPTY + shared + most)

@@ -65,7 +65,7 @@ class Groups:
         return self.sets[set_name]
 
     def state(self) -> dict[str, dict[str, list[list[int]]]]:
-        """As JSON values: every group as runs [first, last] of numbers."""
+        """The groups as JSON values: each as runs [first, last] of numbers."""
         return {s: {name: runs(numbers) for name, numbers in of.items()} for s, of in self.sets.items()}
 
     @staticmethod
@@ -124,7 +124,8 @@ class Ids:
 
 @dataclass(frozen=True)
 class Span:
-    """From low to high along an axis, 0: x, 1: y, in the mesh. Elements: their centre; faces and joints: both ends."""
+    """Objects from low to high along an axis of the mesh, 0: x, 1: y. Elements are tested by their centre, faces and
+    joints by both ends."""
 
     axis: int
     low: float
@@ -185,7 +186,7 @@ class Crossed:
 
 @dataclass(frozen=True)
 class Not:
-    """What a term does not hold for."""
+    """Objects that a term does not select."""
 
     term: Term
 

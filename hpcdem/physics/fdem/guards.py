@@ -1,4 +1,4 @@
-"""What must not happen to elements, and which they are when it does: moving too far, turning inside out."""
+"""Stops a run when elements move too far or turn inside out, and names them."""
 
 from __future__ import annotations
 

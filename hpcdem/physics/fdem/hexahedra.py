@@ -21,7 +21,7 @@ half does not have."""
 
 
 def _upright(parts: list[tuple[int, ...]]) -> np.ndarray:
-    """The same tetrahedra of a cube, with positive volumes."""
+    """Reorder the tetrahedra of a cube so that their volumes are positive."""
     cube = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
     out = np.array(parts) - 1
     for part in out:
@@ -107,8 +107,8 @@ def corner_parts(points: np.ndarray, cells: np.ndarray, hexes: np.ndarray) -> tu
 
 
 def places(cells: np.ndarray, hexes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the corners of hexahedra are: (n, 8) the first corner (4 tetrahedron + k, of the six) at each of them, and
-    (n, 24) which corner of the hexahedron each corner of its tetrahedra is."""
+    """Find the corners of hexahedra: (n, 8) the first corner (4 tetrahedron + k, of the six) at each of them, and (n,
+    24) the corner of the hexahedron at each corner of its tetrahedra."""
     own = cells[hexes[:, 8, None] + np.arange(PARTS)].reshape(len(hexes), 4 * PARTS)
     same = own[:, None, :] == hexes[:, :8, None]
     return np.argmax(same, axis=2), np.argmax(same, axis=1)

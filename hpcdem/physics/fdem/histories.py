@@ -35,7 +35,7 @@ class Histories:
 
     @staticmethod
     def of(n: int, owner: np.ndarray, rows: np.ndarray) -> Histories:
-        """From rows and the element (0 .. n - 1) each belongs to, in any order."""
+        """Make histories from rows and the element (0 .. n - 1) of each, in any order."""
         key = rows.view(np.int64)[:, KEY]
         order = np.lexsort((key, owner))
         ptr = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=n)))).astype(np.int64)
@@ -54,7 +54,7 @@ class Histories:
         return self.rows.view(np.int64)[:, KEY]
 
     def take(self, which: np.ndarray) -> Histories:
-        """Those of the elements `which`, in that order."""
+        """Histories of the elements `which`, in that order."""
         counts = self.counts()[which]
         if not len(self.rows):
             return Histories.empty(len(which))
@@ -63,27 +63,27 @@ class Histories:
         return Histories(np.concatenate(([0], ends)).astype(np.int64), self.rows[at])
 
     def joined(self, counts: np.ndarray, rows: np.ndarray) -> Histories:
-        """With more elements behind."""
+        """Append the histories of more elements."""
         ends = self.ptr[-1] + np.cumsum(counts)
         return Histories(
             np.concatenate([self.ptr, ends]).astype(np.int64), np.ascontiguousarray(np.concatenate([self.rows, rows]))
         )
 
     def keep(self, rows: np.ndarray) -> Histories:
-        """Those rows (m,) bool alone."""
+        """Keep the flagged rows (m,) bool."""
         owner = self.owners()[rows]
         ptr = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=len(self.ptr) - 1))))
         return Histories(ptr.astype(np.int64), np.ascontiguousarray(self.rows[rows]))
 
     def without_partners(self, gone: np.ndarray, dim: int) -> Histories:
-        """Without contacts with elements flagged in `gone` (ne,); dim: dimensions of space."""
+        """Remove contacts with elements flagged in `gone` (ne,); dim: dimensions of space."""
         key = self.keys()
         other = np.where(key >= 0, key // (8 if dim == 3 else 4), 0)
         return self.keep((key < 0) | ~gone[other])
 
     def without_joints(self, number: np.ndarray, forget: np.ndarray) -> Histories:
-        """Without the joints on faces flagged in `forget` (4 ne,); number (n,): the elements. Those that slide forget
-        that they are torn: stresses depend on the rest."""
+        """Remove the joints on faces flagged in `forget` (4 ne,); number (n,): the elements. Sliding joints lose only
+        the mark that they are torn: stresses depend on the rest."""
         key = self.keys()
         face = 4 * number[self.owners()] + np.where(key < 0, -1 - key, 0)
         chosen, state = (key < 0) & forget[face], self.rows[:, STATE]

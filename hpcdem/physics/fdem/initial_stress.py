@@ -50,7 +50,7 @@ class InitialStress(Assignments):
         self, at: np.ndarray, xx: float, yy: float, xy: float, zz: float | None,
         gradient: Mapping[str, tuple[float, ...]] | None, xz: float, yz: float,
     ) -> np.ndarray:  # fmt: skip
-        """What `initial_stress` says of elements (n,), (n, 4) or (n, 6) [Pa]."""
+        """Convert the argument of `initial_stress` to values of elements (n,), (n, 4) or (n, 6) [Pa]."""
         mesh = self._mesh()
         names = COMPONENTS[mesh.dim]
         if mesh.dim == 2 and (xz != 0.0 or yz != 0.0):

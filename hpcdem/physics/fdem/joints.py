@@ -94,8 +94,8 @@ class JointTables:
     # ---- made at a rebuild ---------------------------------------------------------------------------------------
 
     def _make_joint_laws(self) -> None:
-        """Their tables; joints that follow temperature have a row of their own on each side, behind those of the
-        properties."""
+        """Make the tables of joint laws. Joints whose properties follow temperature have their own row on each side,
+        after the rows of the properties."""
         rows = self.sim.joint_rows
         warm = [rows.column(temperature_table(name)) > 0.0 for name in _BY_TEMPERATURE]
         self.slots_by_temperature = np.flatnonzero(np.any(warm, axis=0)[self.slot_kind])
@@ -254,7 +254,7 @@ class JointTables:
         return (corner, force) if self.sides is None else self.sides.shared(slots, corner, force)
 
     def stored_in_joints(self) -> np.ndarray:
-        """What the joints of the owned elements give back when they are unloaded, half to each side (n_own,) [J/m], in
+        """Energy that the joints of owned elements would release on unloading, half to each side (n_own,) [J/m], in
         space [J]."""
         out, slots = np.zeros(self.sim.n_own), np.flatnonzero(self.slot_state[: self.slots] != NONE)
         for which, joints in self.joints(slots):
@@ -265,7 +265,7 @@ class JointTables:
 
     @contextmanager
     def joints_kept(self) -> Iterator[None]:
-        """What joints remember is afterwards what it was."""
+        """Restore the histories of joints afterwards."""
         columns = self.slot_law, self.slot_state, self.head, self.follow, self.tally
         kept = [column.copy() for column in columns]
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing

@@ -76,7 +76,7 @@ class Loads:
         return quiet[:0]
 
     def _place(self) -> None:
-        """Where edges begin in x, and their corners in v."""
+        """Find the start of edges in x, and their corners in v."""
         sim, row = self.sim, self.element + self.sim.owned.start
         self._edge = row * sim.x.shape[1] + 2 * self.ends[:, 0]
         self._a, self._b = self.corner.T.copy()
@@ -84,7 +84,7 @@ class Loads:
         self._quiet_place = row[self.quiet, None] * sim.v.shape[1] + 2 * self.ends[self.quiet]
 
     def _make_relaxations(self, stride: int) -> bool:
-        """What elements that were removed left behind at corners that are owned; whether there is some."""
+        """Collect the forces that removed elements left at owned corners; return whether there are any."""
         sim, own = self.sim, self.sim.owned
         parts = [one for one in sim.relaxations if not sim.has_ended(one)]
         corner = np.concatenate([one.corner for one in parts] or [np.empty(0, np.int64)])

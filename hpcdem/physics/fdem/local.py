@@ -97,12 +97,12 @@ class Local(JointTables):
 
     @cached_property
     def shapes(self) -> Shapes:
-        """What contact needs to know of the elements held here, by storage row."""
+        """Shapes of the elements held here that contact needs, by storage row."""
         return Shapes(self.sim, self.sim.number)
 
     @cached_property
     def kinds(self) -> Kinds:
-        """What tells properties of faces in contact apart."""
+        """Rows that distinguish the contact properties of faces."""
         return Kinds.of(self.sim)
 
     # ---- tables --------------------------------------------------------------------------------------------------
@@ -204,7 +204,7 @@ class Local(JointTables):
         self.masses.forget()
 
     def _set_kicks(self, dt: float) -> None:
-        """What moves corners that are alone."""
+        """Set the acceleration factors of corners that are nodes by themselves."""
         triangles = self.triangle_rows[: self.count]
         alone = ~self.nodes.special[triangles - self.sim.n_left][:, :3]
         with np.errstate(divide="ignore"):
@@ -392,9 +392,9 @@ class Local(JointTables):
     # ---- what is extracted from the tables ---------------------------------------------------------------------------
 
     def histories(self, transfer: bool) -> Histories:
-        """What joints and contacts of the owned elements remember.
+        """Histories of joints and contacts of the owned elements.
 
-        transfer: joints that are broken are left out; their friction is handed over to the contacts that follow them.
+        transfer: omit broken joints; their friction is transferred to the contacts that replace them.
         """
         parts = [self._joint_histories(transfer), self.pairs.histories(self.sim)]
         if transfer:

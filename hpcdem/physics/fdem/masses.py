@@ -25,14 +25,15 @@ if TYPE_CHECKING:
 
 
 def quarters(sim: State, number: np.ndarray) -> np.ndarray:
-    """Of the mass of each of these tetrahedra (n, 4) [kg], also where six of them store a hexahedron."""
+    """Quarter of the mass of each of these tetrahedra (n, 4) [kg], also where six of them store a hexahedron."""
     mesh, mass = sim.reference, np.zeros((len(number), 4))
     space.masses(number, mesh.points, mesh.cells, sim.element_row, element_table(sim), mass)
     return mass
 
 
 class Masses:
-    """Of the `Local` that makes it. true (n, 4) [kg/m], in space [kg]; of_motion (n, 4): those that the motion sees."""
+    """Masses of the `Local` that makes them. true (n, 4) [kg/m], in space [kg]; of_motion (n, 4): masses in the
+    equation of motion."""
 
     def __init__(self, local: Any) -> None:
         self.local, self.sim = local, local.sim
@@ -54,10 +55,10 @@ class Masses:
         return self._of_motion
 
     def forget(self) -> None:
-        """Those that are not needed before the next time they are set."""
+        """Free the masses that are not needed before they are set again."""
 
     def alike(self) -> bool:
-        """One table as long as nothing is added to the masses: only static runs and mass scaling do."""
+        """Share one table while nothing is added to the masses: only static runs and mass scaling add to them."""
         o = self.sim.options
         return o.dynamic and o.mechanical and o.mass_scaling == 0.0
 
@@ -102,7 +103,7 @@ class Masses:
         return masses / (0.25 * 1.25 * (1.0 + ALPHA))
 
     def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
-        """Of this rank's elements, see `limits.time_step`."""
+        """Stable time step of the elements of this rank, see `limits.time_step`."""
         o, local = self.sim.options, self.local
         triangles, quads = local.solids.blocks
         return limits.time_step(
@@ -191,7 +192,7 @@ class MassesSpace(Masses):
         return self._of_motion if len(self._of_motion) else self.true
 
     def forget(self) -> None:
-        """Steps have no need of them, but for the account of energy."""
+        """Free the masses, which steps do not need, unless the energy budget does."""
         if self.alike() and self.sim.budget is None:
             self._of_motion = np.empty((0, 4))
 

@@ -228,7 +228,7 @@ class Mesh:
 
     @property
     def _of(self) -> Any:
-        """What is done with elements of these dimensions, by the same names."""
+        """The module with the functions for elements of these dimensions."""
         return CONNECTIVITY[self.dim]
 
     @property
@@ -337,7 +337,7 @@ def crack_rows(mesh: Mesh, edges: Edges) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Names:
-    """What messages call a point and an element of the mesh."""
+    """Names of a point and an element of the mesh in messages."""
 
     point: Callable[[int], str] = str
     element: Callable[[int], str] = str

@@ -1,4 +1,4 @@
-"""Where elements lie, for their order and their owners."""
+"""Centres of elements, which determine their order and their owners."""
 
 from __future__ import annotations
 

@@ -21,7 +21,8 @@ from hpcdem.physics.fdem.properties import Rows
 
 
 class Moduli(NamedTuple):
-    """Of the rows of element models [Pa]: K_n, G, lambda, lambda + 2 G; normal: columns of the stresses that count."""
+    """Moduli of the rows of element models [Pa]: K_n, G, lambda, lambda + 2 G; normal: columns of the normal stresses
+    that count."""
 
     bulk: np.ndarray
     shear: np.ndarray
@@ -31,7 +32,7 @@ class Moduli(NamedTuple):
 
 
 def moduli(rows: Rows, plane_stress: bool) -> Moduli:
-    """Those of the models of elements that were given; zero where missing."""
+    """Compute the moduli of the models of elements; zero where a model is missing."""
     bulk, shear = (np.array(rows.column(name)) for name in ("bulk", "shear"))
     if not plane_stress:
         return Moduli(bulk, shear, bulk - 2.0 / 3.0 * shear, bulk + 4.0 / 3.0 * shear, [0, 1, 3])

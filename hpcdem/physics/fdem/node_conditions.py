@@ -58,12 +58,12 @@ class NodeCondition:
     damp: float = -1.0
 
     def motion(self, axis: str) -> str:
-        """Of a component that is prescribed, in words."""
+        """Describe a prescribed component."""
         kind = "velocity" if getattr(self, f"does_{axis}") == moving.VELOCITY else "acceleration"
         return f"{kind}-{axis} {_told(getattr(self, f'at_{axis}'))}"
 
     def push(self, axis: str) -> str:
-        """Of a force, in words."""
+        """Describe a force."""
         return f"force-{axis} {_told(getattr(self, f'force_{axis}'))}"
 
 
@@ -127,8 +127,8 @@ def _unit(vector: np.ndarray) -> tuple[float, ...]:
 
 
 def acting(one: NodeCondition, dim: int) -> NodeCondition:
-    """What a node with this condition does: components that are prescribed, or a constraint, or both where they do not
-    touch each other. Contradiction if no motion fulfils it."""
+    """Components that a node with this condition prescribes, or its constraint, or both if they do not affect each
+    other. Raises Contradiction if no motion satisfies them."""
     axes = "xyz"[:dim]
     given = [axis for axis in axes if getattr(one, f"does_{axis}") != moving.FREE]
     if one.constraint == moving.UNBOUND or not given:
@@ -146,7 +146,7 @@ def _constraint(one: NodeCondition) -> str:
 
 
 def _moved(one: NodeCondition, values: dict[str, tuple[int, Number]], keep: bool = False) -> NodeCondition:
-    """With these components (kind, value) prescribed and no others; keep: the constraint too."""
+    """The condition with these components (kind, value) prescribed and no others; keep: keep the constraint too."""
     changes: dict[str, Any] = {}
     for axis in "xyz":
         changes[f"does_{axis}"], changes[f"at_{axis}"] = values.get(axis, (moving.FREE, 0.0))
@@ -226,7 +226,7 @@ def _in_a_plane(one: NodeCondition, given: list[str]) -> NodeCondition:
 
 
 def as_before(one: NodeCondition, dim: int) -> NodeCondition:
-    """Of files of versions in which a constraint came before all else: what acted then."""
+    """Conditions of files of versions in which a constraint preceded all others: what acted then."""
     try:
         acting(one, dim)
     except Contradiction:
@@ -239,7 +239,7 @@ def as_before(one: NodeCondition, dim: int) -> NodeCondition:
 
 
 def together(rows: Sequence[NodeCondition], dim: int) -> NodeCondition:
-    """What the conditions of its corners come to at one node; Contradiction if no motion fulfils them."""
+    """Combine the conditions of the corners of one node. Raises Contradiction if no motion satisfies them."""
     found, kind, way = NodeCondition(), moving.UNBOUND, (0.0, 0.0)
     for k, axis in enumerate("xyz"[:dim]):
         motion = _latest([one for one in rows if getattr(one, f"does_{axis}") != moving.FREE], 1 << k)
@@ -257,5 +257,5 @@ def together(rows: Sequence[NodeCondition], dim: int) -> NodeCondition:
 
 
 def _latest(assigned: list[NodeCondition], bit: int) -> list[NodeCondition]:
-    """Those that count: that are not older, else all."""
+    """Conditions that are not older than others, else all."""
     return [one for one in assigned if not one.older & bit] or assigned

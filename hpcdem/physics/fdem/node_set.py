@@ -84,8 +84,8 @@ class NodeSet:
         self.outside, self.felt = np.zeros((n, sim.dim)), np.zeros((n, 2 * sim.dim))
 
     def find_corners(self, mass: np.ndarray) -> int:
-        """Where their corners are, and their masses by those of corners (rows, 4). A corner whose element is not held
-        by this rank, or -1. Collective."""
+        """Find the corners of the nodes, and their masses from those of corners (rows, 4). Returns a corner whose
+        element is not held by this rank, or -1. Collective."""
         sim, own = self.sim, self.sim.owned
         lost = self._weigh(mass)
         rows = self.corner // self.width
@@ -102,7 +102,7 @@ class NodeSet:
         )  # fmt: skip
 
     def set_masses(self, mass: np.ndarray, dt: float) -> None:
-        """Their masses, by those of corners (rows, 4), and the time step [s]."""
+        """Set the masses of nodes from those of corners (rows, 4), and the time step [s]."""
         sim = self.sim
         self._weigh(mass)
         self.kick = dt / self.mass
@@ -149,7 +149,7 @@ class NodeSet:
 
     @cached_property
     def mine(self) -> np.ndarray:
-        """Those whose lowest corner is on an element of this rank, bool."""
+        """Whether the lowest corner of each node is on an element of this rank, bool."""
         row, own = self.sim.where[self.first_corners // 4], self.sim.owned
         return (row >= own.start) & (row < own.stop)
 

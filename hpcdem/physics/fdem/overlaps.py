@@ -32,8 +32,8 @@ NAMED = 5
 
 
 def check(sim: State, local: Local) -> None:
-    """At the first step of a new model: CommandError if bodies overlap and that was not requested. The model is closed.
-    Collective."""
+    """Check a new model at its first step: CommandError if bodies overlap and overlaps were not requested. The model is
+    closed. Collective."""
     o = sim.options
     if not o.collision:
         return
@@ -124,7 +124,7 @@ def _gathered(sim: State, rows: np.ndarray) -> np.ndarray:
 
 
 def _in_the_plane(sim: State, local: Local) -> np.ndarray:
-    """Those of this rank."""
+    """Overlaps of this rank in two dimensions."""
     mesh, own = sim.the_mesh(), sim.owned
     bodies = Bodies(sim, local, np.arange(len(sim.number)), inner=True)
     if not len(bodies.row):
@@ -145,7 +145,7 @@ def _in_the_plane(sim: State, local: Local) -> np.ndarray:
 
 
 def _in_space(sim: State) -> np.ndarray:
-    """Those of this rank."""
+    """Overlaps of this rank in three dimensions."""
     pairs, own = AllPairs(sim), sim.owned
     depth = pairs.depths(sim)
     row = pairs.face_row[pairs.first]

@@ -93,7 +93,7 @@ class Kinds(NamedTuple):
 
     @staticmethod
     def of(sim: State) -> Kinds:
-        """Of a model. Collective."""
+        """Collect the tables of a model. Collective."""
 
         def kind(rows: Rows, *names: str) -> np.ndarray:
             return np.unique(np.column_stack([rows.column(n) for n in names]), axis=0, return_inverse=True)[1].reshape(
@@ -220,7 +220,7 @@ class ElementTables(Protocol):
 
     @property
     def shapes(self) -> Shapes:
-        """Of the elements held here, by storage row."""
+        """Shapes of the elements held here, by storage row."""
 
     @property
     def kinds(self) -> Kinds:
@@ -416,7 +416,7 @@ class ContactPairs(Bodies):
             )  # fmt: skip
 
     def changed_by_forces(self) -> tuple[np.ndarray, ...]:
-        """What contacts remember, as far as computing forces changes it."""
+        """The part of the memory of contacts that the computation of forces changes."""
         return self.history, self.largest, self.touching
 
     def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -434,7 +434,8 @@ class ContactPairs(Bodies):
         return self.number[self.first[used]], self.number[self.second[used]], values
 
     def by_pairs(self, at: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of rows `at` (ascending) and values (n, c) of theirs: the first row of each pair, sums over its rows."""
+        """Reduce rows `at` (ascending) with values (n, c) to pairs: the first row of each pair, and sums over its
+        rows."""
         first, second = self.first[at], self.second[at]
         new = np.flatnonzero(np.diff(first, prepend=-1) | np.diff(second, prepend=-1))
         return (at, values) if len(new) == len(at) else (at[new], np.add.reduceat(values, new))
@@ -448,7 +449,7 @@ class ContactPairs(Bodies):
 
     @staticmethod
     def remembered(sim: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same from the histories of the owned elements."""
+        """Pairs from the histories of the owned elements."""
         at = np.flatnonzero(sim.histories.keys() >= 0)
         return ContactPairs.named(sim.number[sim.owned][sim.histories.owners()[at]], sim.histories.rows[at])
 
@@ -499,14 +500,14 @@ class ContactPairs(Bodies):
         )
 
     def parts(self, x: np.ndarray) -> np.ndarray:
-        """How deep pairs are in each other now, over an altitude (m,)."""
+        """Present depth of overlap of pairs over an altitude (m,)."""
         part = np.zeros(len(self))
         find = contact.parts if self.threads == 1 else contact.parts_threaded
         find(self.threads, self.first, self.second, self.x_place, x, self.table, self.touching, part)
         return part
 
     def depths_of(self, at: np.ndarray, x: np.ndarray, depth: np.ndarray) -> None:
-        """How deep the pairs `at` are [m], and where, into depth (n, 3)."""
+        """Write depth [m] and position of the overlap of the pairs `at` into depth (n, 3)."""
         contact.depths(self.first[at], self.second[at], self.free, self.x_place, x, depth)
 
     def histories(self, sim: State) -> tuple[np.ndarray, np.ndarray]:

@@ -279,14 +279,14 @@ class ContactSpace:
         )  # fmt: skip
 
     def parts(self, x: np.ndarray) -> np.ndarray:
-        """How deep pairs are in each other now, over an altitude (m,)."""
+        """Present depth of overlap of pairs over an altitude (m,)."""
         part = np.zeros(len(self))
         find = contact.parts if self.threads == 1 else contact.parts_threaded
         find(self.threads, self.first, self.second, self.corner, self.place, x, self.touching, part)
         return part
 
     def depths_of(self, at: np.ndarray, x: np.ndarray, depth: np.ndarray) -> None:
-        """How deep the pairs `at` are [m], and where, into depth (n, 4)."""
+        """Write depth [m] and position of the overlap of the pairs `at` into depth (n, 4)."""
         contact.depths(self.first[at], self.second[at], self.corner, self.place, x, depth)
 
     def add_to(self, force: np.ndarray) -> None:
@@ -295,7 +295,7 @@ class ContactSpace:
             contact.add(self.rows, self.pushed, force)
 
     def changed_by_forces(self) -> tuple[np.ndarray, ...]:
-        """What contacts remember, as far as computing forces changes it."""
+        """The part of the memory of contacts that the computation of forces changes."""
         return self.history, self.touching
 
     def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

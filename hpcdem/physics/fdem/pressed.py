@@ -71,7 +71,7 @@ def join(sim: Blocks, nodes: Nodes) -> np.ndarray:
 
 
 def part(sim: Blocks) -> None:
-    """What broken joints of a closed model remember is kept, and they are free faces. Collective."""
+    """Store the histories of broken joints of a closed model and make their faces free. Collective."""
     local = sim.local
     slots = np.flatnonzero(local.slot_state == BROKEN)
     if sim.comm.any(len(slots) > 0):

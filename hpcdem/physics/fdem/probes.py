@@ -45,7 +45,7 @@ class Probe(ABC):
 
     @abstractmethod
     def _mine(self, seen: Evaluation | Local | None) -> np.ndarray:
-        """What this rank has of it (k,), see `_at`."""
+        """The part (k,) on this rank, see `_at`."""
 
     def values(self, seen: Evaluation | Local | None = None) -> np.ndarray:
         """(n,) on all ranks; NaN for what is not there. seen: forces that are known already (of the storage in which

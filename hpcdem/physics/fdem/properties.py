@@ -22,7 +22,7 @@ ELEMENT, FACE, JOINT = "element", "element-face", "face-joint"
 
 @dataclass(frozen=True)
 class Property:
-    """One number of a model. default: None if it must be given (or follows from others, as `Model.derive` says)."""
+    """A number of a model. default: None if it must be given (or follows from others, as `Model.derive` states)."""
 
     name: str
     unit: str
@@ -66,8 +66,8 @@ class Property:
 
 @dataclass(frozen=True)
 class Model:
-    """What can be assigned to elements, faces or joints. derive: fills in what follows from the values given, which are
-    numbers or arrays; CommandError if one cannot be."""
+    """A model for elements, faces or joints. derive: computes further properties from the given values, which are
+    numbers or arrays; raises CommandError if that is impossible."""
 
     name: str
     on: str
@@ -120,8 +120,8 @@ class Model:
         return {one.name: float(values[one.name]) for one in self.properties}
 
     def complete_each(self, given: Mapping[str, float | np.ndarray], n: int) -> np.ndarray | None:
-        """The same for n objects at once, values being numbers or arrays (n,): (n, properties), or None if `complete`
-        refuses one of them."""
+        """Complete n objects at once, values being numbers or arrays (n,): (n, properties), or None if `complete`
+        rejects one of them."""
         values: dict[str, Any] = {}
         for name, value in given.items():
             one, each = self.property(name), np.broadcast_to(np.asarray(value, np.float64), (n,))
@@ -194,7 +194,7 @@ def softening_table(name: str) -> str:
 
 
 def temperature_table(name: str) -> str:
-    """The same of its table over temperature."""
+    """Name of the property that holds the table of a property over temperature."""
     return f"{name}_by_temperature"
 
 
@@ -530,7 +530,7 @@ class Rows:
         return self.rows[row][0]
 
     def column(self, name: str, default: float = 0.0) -> np.ndarray:
-        """One property of all rows (rows,), not to be changed; `default` where a row has none of this name."""
+        """Values of a property in all rows (rows,), read-only; `default` for rows without it."""
         known = self._columns.get((name, default), np.empty(0))
         if len(known) < len(self.rows):
             called = {m.name: m.called.get(name, name) for m in MODELS.values()}
@@ -545,7 +545,7 @@ class Rows:
         return known
 
     def state(self) -> list:
-        """As JSON values."""
+        """The rows as JSON values."""
         return [[name, list(numbers)] for name, numbers in self.rows]
 
     @staticmethod

@@ -144,7 +144,7 @@ def _replicated(table: str) -> bool:
 
 
 def without_particles(tables: checkpoint.Tables) -> checkpoint.Tables:
-    """Those of the blocks among the tables of a checkpoint of both."""
+    """Tables of the blocks in a checkpoint of particles and blocks."""
     others = checkpoint.OF_PARTICLES
     return {name: table for name, table in tables.items() if not name.startswith(others) and name != checkpoint.LINKS}
 

@@ -17,7 +17,7 @@ def are_there(numbers: np.ndarray) -> bool:
 
 
 def points(cells: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """Their points, ascending, each once."""
+    """Points of the sides, ascending and unique."""
     numbers = np.asarray(numbers, np.int64)
     if not are_there(numbers):
         return numbers

@@ -133,7 +133,7 @@ class Blocks(Edited):
     # ---- one step ------------------------------------------------------------------------------------------------
 
     def step(self) -> int:
-        """One step, see `Model.step`; what is open is closed before."""
+        """Take one step, see `Model.step`; an open model is closed before."""
         if not self.closed:
             self._close()
         self.check_start()
@@ -193,7 +193,7 @@ class Blocks(Edited):
             give_back()  # it looks at all elements, not only at those of the surface
 
     def _survey(self, places: np.ndarray, out: np.ndarray) -> None:
-        """How far the elements of this rank have gone from these places, and how fast they are, into out."""
+        """Measure the displacement of the elements of this rank from these positions, and their speed, into out."""
         if self.dim == 3:
             space.survey(self.x, self.v, places, self.n_left, self.n_own, out)
         else:
@@ -259,8 +259,7 @@ class Blocks(Edited):
 
     @contextmanager
     def one_moment(self) -> Iterator[None]:
-        """As long as this lasts the model is only read: forces and the energy budget are computed once, however
-        many ask for them."""
+        """A context in which the model is only read: forces and the energy budget are computed once for all queries."""
         self._known = {}
         try:
             yield
@@ -438,7 +437,7 @@ class Blocks(Edited):
         self._topology_stale = False
 
     def share_changes(self) -> None:
-        """Of what changed in place, alike on all ranks, there is one copy per node again. Collective."""
+        """Restore one copy per node of arrays that changed in place, alike on all ranks. Collective."""
         names = ("alive", "touches", "joint_row", "open", "broken", "_closed")
         self.closed_faces()
         for name, array in zip(names, self.per_node(lambda: [getattr(self, one) for one in names])):

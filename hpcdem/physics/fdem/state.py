@@ -162,7 +162,7 @@ class State(ModelDefinition, Model):
 
     @property
     def wide(self) -> bool:
-        """There are quads: rows of positions and velocities have twelve columns."""
+        """Whether there are quads: rows of positions and velocities then have twelve columns."""
         return self.x.shape[1] == 12
 
     @property

@@ -138,7 +138,7 @@ class Structure(SurfaceLoad):
         return closed(found, stored - self._stored_at_start - self.commands - self._brought(work))
 
     def _brought(self, work: Iterable[float]) -> float:
-        """What entries of work bring in, less what they take [J/m]."""
+        """Work that the flows named in entries bring in, less the work they take [J/m]."""
         return math.fsum(w if name.startswith("work_of") else -w for name, w in zip(self.flows, work, strict=True))
 
     def _accounted(self) -> float:
@@ -151,7 +151,7 @@ class Structure(SurfaceLoad):
 
     @contextmanager
     def _booked(self) -> Iterator[None]:
-        """What is changed here, and what follows from it, goes to `commands` of the account."""
+        """Book the changes made here, and their consequences, as `commands` of the budget."""
         before = self._accounted() if self._account is not None else 0.0
         yield
         self._arrange()
@@ -241,7 +241,7 @@ class Structure(SurfaceLoad):
         return np.array([otherwise, *(row[k] for row in self.rows)])[self.elements["row"]]
 
     def _conditions_at(self, time: float, middle: float) -> np.ndarray:
-        """What is prescribed (n, entries of a condition), forces at `time`, motion in the middle of a step."""
+        """Prescribed conditions (n, entries of a condition): forces at `time`, motion in the middle of a step."""
         tables = self.blocks.tables
         names = [one.name for one in fields(self.condition_type)]
 
@@ -255,7 +255,7 @@ class Structure(SurfaceLoad):
         return rows.reshape(-1, len(names))[row.reshape(-1)]
 
     def _time_before(self) -> float:
-        """What tables were read at before the step that the blocks have done."""
+        """Time at which tables were read before the last step of the blocks."""
         blocks = self.blocks
         if blocks.options.dynamic:
             return blocks.clock.time - blocks.clock.dt
@@ -270,7 +270,7 @@ class Structure(SurfaceLoad):
         return np.asarray(found if numbers is None else found[numbers], np.float64)
 
     def columns(self) -> dict[str, dict[str, np.ndarray]]:
-        """What frames hold: all quantities of "elements" and "nodes". Not collective."""
+        """Columns of frames: all quantities of "elements" and "nodes". Not collective."""
         return {
             table: {name: self.values(kind, name) for name in self._known(kind)}
             for table, kind in zip(("elements", "nodes"), self.parts, strict=True)
@@ -283,7 +283,7 @@ class Structure(SurfaceLoad):
             raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(known)}")
 
     def _known(self, kind: str) -> list[str]:
-        """What can be asked of them here: nothing along z in the plane."""
+        """Quantities that can be queried; none along z in two dimensions."""
         return [name for name in self.quantities[kind] if self.blocks.dim == 3 or not name.endswith("_z")]
 
     def work_done(self) -> float:

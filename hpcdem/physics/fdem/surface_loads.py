@@ -32,7 +32,8 @@ class SurfaceLoad(ABC):
 
     @property
     def keeps_time(self) -> bool:
-        """Where blocks are at rest time may pass by it: that of the first load that does so. Not collective."""
+        """Whether model time advances although the blocks are at rest; the first such load determines it. Not
+        collective."""
         return False
 
     @classmethod
@@ -56,7 +57,7 @@ class SurfaceLoad(ABC):
 
     @property
     def stays(self) -> bool:
-        """Its forces stay as they are while the static solve looks for equilibrium."""
+        """Whether its forces stay constant while the static solver iterates."""
         return False
 
     @abstractmethod

@@ -1,5 +1,6 @@
-"""What is there in a model of blocks, and what is connected: elements, open faces, joints, nodes. All of it by the
-numbers of the mesh, equal on all ranks."""
+"""Elements, open faces, joints and nodes of a model of blocks that are present, and their connections; by the numbers
+of the mesh, equal on all ranks.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +45,7 @@ class Topology:
     """Where their corners were then (n, 4, dim) [m]."""
 
     def clear_topology(self) -> None:
-        """There is no mesh."""
+        """Remove the mesh."""
         self.mesh = None
         self.born, self.birthplace = np.empty(0, np.int64), np.empty((0, 4, 2))
         self._reference: Mesh | None = None
@@ -91,7 +92,7 @@ class Topology:
         return self.mesh
 
     def _vector(self, what: str, given: Sequence[float]) -> np.ndarray:
-        """One number for each dimension of space. CommandError if there are others."""
+        """Check one number for each dimension of space. Raises CommandError."""
         if len(given) != self.dim:
             raise CommandError(f"{what}: a vector of {self.dim} numbers is needed, got {len(given)}")
         return finite(what, list(given))
@@ -252,7 +253,7 @@ class Topology:
 
 
 def place(at: np.ndarray) -> str:
-    """As messages say it."""
+    """A position in words for messages."""
     return f"({', '.join(f'{c:g}' for c in at)})"
 
 

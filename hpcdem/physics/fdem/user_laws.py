@@ -277,7 +277,7 @@ def numbers(sim: State) -> np.ndarray:
 
 
 def in_use(sim: State) -> list[UserLaw]:
-    """Those that elements have that are there."""
+    """User laws of present elements."""
     found = np.unique(numbers(sim)[sim.alive])
     return [law for k, law in enumerate(of_rows(sim.element_rows)) if 1 + k in found]
 
@@ -337,7 +337,7 @@ def _kinds(sim: State, law: UserLaw, some: np.ndarray | None = None) -> list[str
 
 
 def compile_loops(sim: State) -> None:
-    """Those over elements of the kinds that have laws, where they are not compiled yet. Collective."""
+    """Compile the loops over elements of the kinds that have user laws, unless compiled already. Collective."""
     laws = of_rows(sim.element_rows)
     number = numbers(sim) if laws else np.empty(0, np.int64)
     for k, law in enumerate(laws):
@@ -372,7 +372,7 @@ def quantities(sim: State) -> list[str]:
 
 
 def unit(name: str) -> str:
-    """Of such a quantity."""
+    """Unit of such a quantity."""
     laws = [law for law in MODELS.values() if isinstance(law, UserLaw)]
     return next(state.unit for law in reversed(laws) for state in law.states if OF_LAW + state.name == name)
 

@@ -46,7 +46,7 @@ def warm_up(threads: int = 1) -> None:
 
 
 def tangent(threads: int = 1) -> None:
-    """Those of the static solve."""
+    """Compile the kernels of the static solver."""
     for mesh in _meshes():
         sim = _jointed(mesh, threads)
         sim.close_model()
@@ -54,7 +54,7 @@ def tangent(threads: int = 1) -> None:
 
 
 def six_nodes(threads: int = 1) -> None:
-    """Those of six-node triangles."""
+    """Compile the kernels of six-node triangles."""
     mesh = Mesh.of([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)], SIX_NODE_TRIANGLE.cells,
                    macros=[[0, 1, 2, 3, 4, 5, 0]])  # fmt: skip
     sim = _jointed(mesh, threads)
@@ -64,7 +64,7 @@ def six_nodes(threads: int = 1) -> None:
 
 
 def yielding(threads: int = 1) -> None:
-    """Those of elements that yield."""
+    """Compile the kernels of elements that yield."""
     for mesh in _meshes():
         sim = _weak(mesh, threads)
         convergence.advance(sim, 2)
@@ -73,7 +73,7 @@ def yielding(threads: int = 1) -> None:
 
 
 def plastic_tangent(threads: int = 1) -> None:
-    """Those of their static solve."""
+    """Compile the kernels of the static solver for elements that yield."""
     for mesh in _meshes():
         equilibrium.tangent(_weak(mesh, threads))
 
@@ -93,7 +93,7 @@ def _meshes() -> list[Mesh]:
 
 
 def _jointed(mesh: Mesh, threads: int) -> Blocks:
-    """With joints, contact, conditions and accounts; not closed."""
+    """A model with joints, contact, conditions and budgets; open."""
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
     sim.option(overlap="keep")
@@ -123,13 +123,13 @@ def _weak(mesh: Mesh, threads: int) -> Blocks:
 
 
 def creeping(threads: int = 1) -> None:
-    """Those of elements that creep: triangles in motion, then in a static creep step."""
+    """Compile the kernels of elements that creep: triangles in motion, then in a static creep step."""
     for mesh in _meshes():
         _creep(mesh, threads)
 
 
 def _creep(mesh: Mesh, threads: int) -> None:
-    """In motion, then in a static creep step."""
+    """Step in motion, then in a static creep step."""
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_burgers", {**ROCK, "kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
@@ -159,7 +159,7 @@ def _in_space(threads: int, law: str, properties: dict[str, Value]) -> Blocks:
 
 
 def yielding_in_space(threads: int = 1) -> None:
-    """Those of tetrahedra that yield."""
+    """Compile the kernels of tetrahedra that yield."""
     sim = _in_space(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
     sim.table("c", [(0.0, 1.0), (1.0, 0.0)])
     sim.element_property([0], {"cohesion": Over("c", PLASTIC_STRAIN)})
@@ -170,7 +170,7 @@ def yielding_in_space(threads: int = 1) -> None:
 
 
 def creeping_in_space(threads: int = 1) -> None:
-    """Those of tetrahedra that creep."""
+    """Compile the kernels of tetrahedra that creep."""
     sim = _in_space(threads, "mech_burgers", {"kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
     sim.initial_stress(None, yy=1e3)
     creep.switch(sim, True)
@@ -180,7 +180,7 @@ def creeping_in_space(threads: int = 1) -> None:
 
 
 def tangent_in_space(threads: int = 1) -> None:
-    """Those of the static solve of tetrahedra: with joints, of which one is past its peak, and yielding."""
+    """Compile the kernels of the static solver for tetrahedra, with joints, one of them past its peak, and yielding."""
     sim = _in_space(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
     sim.initial_stress(None, yy=1e3)
     sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
@@ -189,7 +189,7 @@ def tangent_in_space(threads: int = 1) -> None:
 
 
 def hexahedra(threads: int = 1) -> None:
-    """Those of hexahedra: two that touch in motion, at rest, and their tangent."""
+    """Compile the kernels of hexahedra: two in contact in motion, at rest, and their tangent."""
     points = [(x, y, z) for z in (0.0, 1.0, 1.001, 2.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(Mesh.of_hexes(points, [range(8), range(8, 16)]))
@@ -213,7 +213,7 @@ def _hexahedron(threads: int, law: str, properties: dict[str, Value]) -> Blocks:
 
 
 def yielding_hexahedra(threads: int = 1) -> None:
-    """Those of hexahedra that yield, and their tangent."""
+    """Compile the kernels of hexahedra that yield, and their tangent."""
     sim = _hexahedron(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
     sim.table("c", [(0.0, 1.0), (1.0, 0.0)])
     sim.element_property(None, {"cohesion": Over("c", PLASTIC_STRAIN)})
@@ -225,7 +225,7 @@ def yielding_hexahedra(threads: int = 1) -> None:
 
 
 def creeping_hexahedra(threads: int = 1) -> None:
-    """Those of hexahedra that creep, in motion and in a static creep step."""
+    """Compile the kernels of hexahedra that creep, in motion and in a static creep step."""
     sim = _hexahedron(threads, "mech_burgers", {"kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
     creep.switch(sim, True)
     convergence.advance(sim, 2)
@@ -240,7 +240,7 @@ def creeping_hexahedra(threads: int = 1) -> None:
 
 
 def jointed_hexahedra(threads: int = 1) -> None:
-    """Those of joints between hexahedra, which are torn apart; and their tangent."""
+    """Compile the kernels of joints between hexahedra, which are torn apart, and their tangent."""
     points = [(x, y, z) for z in (0.0, 1.0, 2.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(Mesh.of_hexes(points, [range(8), range(4, 12)]))
@@ -255,7 +255,7 @@ def jointed_hexahedra(threads: int = 1) -> None:
 
 
 def in_space(threads: int = 1) -> None:
-    """Those of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
+    """Compile the kernels of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
     sim = _in_space(threads, "mech_iso_elastic", {})
     sim.face_model([0], "contact_mohr_coulomb", {"penalty_normal": 1e10})
     sim.initial_stress(None, yy=1e3)

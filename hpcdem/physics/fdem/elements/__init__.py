@@ -1,1 +1,1 @@
-"""What elements are made of: kinds, parts, strains, volumes; all that a law of elements needs to know of them."""
+"""Elements: kinds, parts, strains, volumes; everything that a law of elements needs to know about them."""

@@ -68,7 +68,7 @@ class ElementBlock:
             self.stiff = self.c.copy()
 
     def stiffen(self, at: np.ndarray, ratio: np.ndarray) -> None:
-        """In `stiff` the elements `at` are so many times as stiff."""
+        """Multiply the stiffness `stiff` of the elements `at`."""
         self.set_apart()
         self.stiff[np.ix_(at, self.moduli)] *= ratio[:, None]
         self.stiffer = np.ones(self.count) if self.stiffer is None else self.stiffer
@@ -113,7 +113,7 @@ class ElementBlock:
         self.elastic, self.uncrept, self.initial = (np.zeros_like(self.s0) for _ in range(3))
 
     def histories(self, memory: np.ndarray, width: int) -> np.ndarray:
-        """What their parts remember (count, parts, width), of the rows of owned elements."""
+        """Return the state variables of their parts (count, parts, width) from the rows of owned elements."""
         part = np.arange(len(self.kind.parts))
         rows = memory.reshape(len(memory), memory.shape[1] // width, width)  # a rank may own none
         return rows[self.stored[:, :1] + part // self.kind.in_row, part % self.kind.in_row]

@@ -26,7 +26,7 @@ def creep_table(rows: Rows) -> np.ndarray:
 
 
 class Creeping:
-    """Of the elements in `blocks`. some: elements of the model remember that they have crept; table: `creep_table`."""
+    """Creep of the elements in `blocks`. some: an element of the model has crept; table: `creep_table`."""
 
     def __init__(self, sim: State, blocks: Sequence[ElementBlock]) -> None:
         self.sim, self.blocks, self.some = sim, blocks, "creep" in sim.cold
@@ -57,8 +57,8 @@ class Creeping:
         self.creep(self.sim.cold["creep"], [of.s0 for of in self.blocks], keep=True)
 
     def crept(self, s0: Sequence[np.ndarray] | None = None) -> np.ndarray:
-        """What elements remember of creep after that of this moment, which the next forces will see; the stress without
-        strain s0 of the blocks becomes that after it. The model stays as it is."""
+        """Compute the creep state that the next forces will use, and the stress without strain s0 of the blocks after
+        it, without changing the model."""
         memory = self.sim.cold["creep"].copy()
         if self.now:
             self.creep(memory, [of.s0.copy() for of in self.blocks] if s0 is None else s0, keep=True)
@@ -82,14 +82,14 @@ class Creeping:
         return found
 
     def lost(self) -> np.ndarray:
-        """What owned elements have lost by creep (n_own,) [J], in the plane [J/m]."""
+        """Energy dissipated by creep of owned elements (n_own,) [J], in the plane [J/m]."""
         memory, found = self.crept(), np.zeros(self.sim.n_own)
         for of in self.blocks:
             of.share_out(of.histories(memory, self.sim.memory("creep"))[:, :, creep.LOST].sum(axis=1), found)
         return found
 
     def memory(self, memory: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """What the parts of elements that creep remember in memory (n, 10 or 16), and the rows (n,) of their models in
+        """Creep state of the parts of creeping elements in memory (n, 10 or 16), and the rows (n,) of their models in
         the table."""
         found = []
         for of in self.blocks:

@@ -117,8 +117,8 @@ class Kind:
         return found
 
     def places(self, cells: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where the corners of these (n, corners + 1) are: (n, corners) the first place (corners of cells * element +
-        k) at each of them, and (n, places) which corner each place is."""
+        """Find the corners of these (n, corners + 1): (n, corners) the first position (corners of cells * element + k)
+        at each of them, and (n, places) the corner at each position."""
         width = self.stored * cells.shape[1]
         own = cells[self.elements(table)].reshape(len(table), width)
         same = own[:, None, :] == table[:, : self.corners, None]
@@ -132,7 +132,7 @@ class Kind:
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Of stress and strain."""
+        """Number of components of stress and strain."""
         return PLANE if self.dim == 2 else SPACE
 
     @property

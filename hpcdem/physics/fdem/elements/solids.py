@@ -89,8 +89,8 @@ class Solids:
         self.yielding.follow_heat()
 
     def _find_stress_without_strain(self) -> bool:
-        """Of all elements: what was assigned, and what heat brings, less the part of plastic and creep strain.
-        Returns whether heat brings any."""
+        """Compute the stress without strain of all elements: initial stress plus thermal stress, less the part of
+        plastic and creep strain. Returns whether there is thermal stress."""
         sim, heat = self.sim, self.sim.surface_loads.eigenstress(self.sim)
         self.laws.take_heat(heat)
         if heat is None and not (self.heated or self.remembers or self.laws.some) and sim.stress0 is None:
@@ -136,7 +136,7 @@ class Solids:
             self.laws.update(sim.cold[user_laws.COLUMN], [of.s0 for of in self.blocks], every=every)
 
     def changing(self) -> list[np.ndarray]:
-        """What `move_on`, or the loop over forces, changes."""
+        """Arrays that `move_on`, or the loop over forces, changes."""
         sim, found = self.sim, list[np.ndarray]()
         if self.yielding.on:
             memory, s0, *rest = self.yielding.state()
@@ -196,7 +196,7 @@ class Solids:
         return more
 
     def other_energies(self) -> list[np.ndarray]:
-        """What else there is to add: of heat; not a number where a user law does not tell what it stores."""
+        """Further elastic energy: thermal; NaN where a user law declares no stored energy."""
         found = [self._energy_of_heat()] if self.heated else []
         if self.laws.some:
             of_users = user_laws.numbers(self.sim)[self.sim.number[self.sim.owned]] > 0

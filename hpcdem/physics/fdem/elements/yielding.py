@@ -57,8 +57,8 @@ def strength_tables(rows: Rows, of: np.ndarray, tables: list[Table], history: np
 
 
 class Yielding:
-    """Of the elements in `blocks`. some: elements of the model remember that they have yielded; on: some can yield, and
-    do not have to be elastic now; strength, table: see strength.py and `yield_table`."""
+    """Plasticity of the elements in `blocks`. some: an element of the model has yielded; on: some can yield and are not
+    forced to be elastic now; strength, table: see strength.py and `yield_table`."""
 
     strength: strength.Strength
     table: np.ndarray
@@ -127,7 +127,7 @@ class Yielding:
             self.on = on
 
     def state(self) -> Flow:
-        """What flow changes."""
+        """Arrays that plastic flow changes."""
         return self.sim.cold["plastic"], [of.s0 for of in self.blocks], self.table, self.strength.history
 
     def flow(self, step: int, state: Flow | None = None, every: bool = True) -> None:
@@ -145,8 +145,8 @@ class Yielding:
                 )  # fmt: skip
 
     def flowed(self) -> tuple[np.ndarray, list[np.ndarray]]:
-        """What elements remember of yielding and the stresses without strain of the blocks [Pa] after the flow of this
-        moment, which the next forces will see: copies."""
+        """Compute the plastic state and the stress without strain [Pa] of the blocks that the next forces will use:
+        copies."""
         memory, s0, table, history = self.state()
         after = memory.copy(), [one.copy() for one in s0], table.copy(), history.copy()
         if self.on:
@@ -154,8 +154,8 @@ class Yielding:
         return after[0], after[1]
 
     def beyond(self, stress: np.ndarray) -> np.ndarray:
-        """By how much [Pa] this stress of owned elements (n_own, 4 or 6), before they flow from it, is outside their
-        strength, the larger of shear and tension, negative: inside (n_own,)."""
+        """Distance [Pa] of the stress of owned elements (n_own, 4 or 6), before plastic flow, outside their strength:
+        the larger of shear and tension, negative inside (n_own,)."""
         whole, row = np.zeros((len(stress), 6)), np.zeros(self.sim.n_own, np.int64)
         whole[:, : stress.shape[1]] = stress
         low, _, high = principal(whole[:, [0, 2, 4, 2, 1, 5, 4, 5, 3]].reshape(-1, 3, 3))[0].T

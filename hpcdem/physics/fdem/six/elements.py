@@ -106,7 +106,7 @@ class SixNodes:
         return np.asarray(np.linalg.eigvalsh(self._stiffness(c, True) * scale[:, :, None] * scale[:, None, :])[:, -1])
 
     def pieces(self) -> Pieces:
-        """Their stiffness at the present positions."""
+        """Stiffness at the present positions."""
         return Pieces(self.number, self.nodes, self._stiffness(self.c, not self.sim.options.large_strain))
 
     def _stiffness(self, c: np.ndarray, small: bool) -> np.ndarray:
