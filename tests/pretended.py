@@ -6,7 +6,7 @@ import pickle
 import queue
 import sys
 import threading
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -45,11 +45,11 @@ class Mailboxes:
         self.ranks, self.rank, self.counts = ranks, rank, counts
 
     def Recv_init(self, buffer: np.ndarray, source: int, tag: int) -> Request:
-        mailbox = self.ranks.mail[source, self.rank, tag] if source >= 0 else None
+        mailbox = self.ranks.mailbox(source, self.rank, tag) if source >= 0 else None
         return Request(mailbox, buffer, False, self.counts)
 
     def Send_init(self, buffer: np.ndarray, dest: int, tag: int) -> Request:
-        mailbox = self.ranks.mail[self.rank, dest, tag] if dest >= 0 else None
+        mailbox = self.ranks.mailbox(self.rank, dest, tag) if dest >= 0 else None
         return Request(mailbox, buffer, True, self.counts)
 
     def Irecv(self, buffer: np.ndarray, source: int, tag: int) -> Request:
@@ -164,7 +164,11 @@ class Ranks:
         self.size = size
         self.table: list[Any] = [None] * size
         self.meet = threading.Barrier(size)
-        self.mail: dict[tuple[int, int, int], queue.SimpleQueue] = defaultdict(queue.SimpleQueue)
+        self.mail: dict[tuple[int, int, int], queue.SimpleQueue] = {}
+
+    def mailbox(self, source: int, dest: int, tag: int) -> queue.SimpleQueue:
+        """That of messages from one rank to another; sender and receiver may be the first to ask at the same time."""
+        return self.mail.setdefault((source, dest, tag), queue.SimpleQueue())
 
     def run(self, program: Callable[[Pretended], Any]) -> list[Any]:
         """What the program returns on every rank. The first error of a rank ends all and comes out here."""

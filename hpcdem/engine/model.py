@@ -19,7 +19,6 @@ from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 
-from hpcdem.core.cells import columns
 from hpcdem.core.clock import Clock
 from hpcdem.core.comm import Comm, SerialComm
 from hpcdem.core.errors import HpcdemError
@@ -230,12 +229,11 @@ class Model(ABC):
         of the rows owned now. Collective.
         """
         with self.timers("balance"):
-            self.ownership.renew(
-                columns(cell), self.rebuild_state.side, self.clock.step, self.timers.seconds(), room, cost, least
-            )
+            owners, side = self.ownership, self.rebuild_state.side
+            owners.renew(owners.places(cell), side, self.clock.step, self.timers.seconds(), room, cost, least)
         with self.timers("migrate"):
-            leave = strips.strays(cell, self.ownership.borders, self.comm.rank) if self.comm.size > 1 else cell[:0]
-            migration = Migration(self.comm, len(cell), leave, self.ownership.owner_of(columns(cell[leave])))
+            leave = owners.strays(cell)
+            migration = Migration(self.comm, len(cell), leave, owners.owner_of(owners.places(cell[leave])))
             leave = migration.leave
             left(leave, migration.leave_to)
             rows, leaving = [cell.view(np.float64)[:, None], *tables], histories.take(leave)
@@ -253,8 +251,11 @@ class Model(ABC):
                 at += part.shape[1]
             return owned[0].view(np.int64)[:, 0].copy(), histories.take(stay).joined(counts, entries), owned[1:]
 
-    def _connect(self, rows: np.ndarray, order: np.ndarray, cell: np.ndarray, columns: int = 1) -> np.ndarray:
-        """Make the storage of rows[order] with ghosts, which a new halo keeps current; columns: copied from each
-        neighbour. Collective."""
-        storage, self.halo = connect(self.comm, rows, order, cell, self.ownership.borders, self.threads, columns)
+    def _connect(
+        self, rows: np.ndarray, order: np.ndarray, cell: np.ndarray, columns: int = 1, boxes: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Make the storage of rows[order] with ghosts, which a new halo keeps current; columns, boxes: which rows of
+        neighbours are copied, see `Ownership.sends`. Collective."""
+        sends = self.ownership.sends(cell, columns, boxes)
+        storage, self.halo = connect(self.comm, rows, order, sends, self.threads)
         return storage

@@ -1,82 +1,79 @@
-"""Ghosts: copies of the boundary columns of the neighbours.
+"""Ghosts: copies of rows of other ranks that lie within reach of one's own.
 
 Three operations, after HOOMD-blue: *migrate* (ownership follows position; migrate.py), *connect* (choose and send
 ghosts) and *refresh* (every step: new values of the same ghosts). The first two happen only when the lists are rebuilt.
 
-Particles are sorted by column. A boundary column is therefore a contiguous part of the rows, and arrives as a
-contiguous part on the other side: messages use the rows directly, without packing.
+Rows are in one global order, of which a rank owns a piece. The ghosts from each neighbour are therefore a contiguous
+part of the storage, before or after the owned rows, and messages arrive there directly. Where ranks own columns, the
+rows that a neighbour needs are contiguous too, and are sent directly; otherwise they are packed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from hpcdem.core.cells import COLUMN
 from hpcdem.core.comm import Comm
 from hpcdem.core.memory import aligned, take_rows
 
-TO_LEFT, TO_RIGHT = 11, 12
-BACK = 2
-"""Added to the tags of a second table of rows."""
+ROWS = 11
+"""Tag of messages."""
+BACK = 1
+"""Added to the tag for a second table of rows."""
+
+Sends = dict[int, slice | np.ndarray]
+"""Owned rows by the rank that gets them: a range, or ascending indices."""
 
 
 class Halo:
-    """The exchange with the two neighbours for one set of lists.
+    """The exchange with neighbours for one set of lists.
 
-    n_left, n_right: number of ghosts; first, last: number of owned rows sent to the left (the first ones) and to the
-    right (the last ones). border: these rows as ranges of owned particles; inside: the other rows. If the border moves
-    before `start`, the messages travel while the inside moves.
+    n_left, n_right: number of ghosts before and after the owned rows. border: rows that are sent, as ranges of owned
+    rows; inside: the other rows. If the border moves before `start`, the messages travel while the inside moves.
     """
 
-    def __init__(self, comm: Comm, n_own: int, first: int, last: int) -> None:
-        self.comm, self.n_own, self.first, self.last = comm, n_own, first, last
+    def __init__(self, comm: Comm, n_own: int, sends: Sends) -> None:
+        """sends: rows for each rank with which this one exchanges ghosts, by ascending rank. Both ranks list each
+        other; either may send nothing. Collective among them."""
+        self.comm, self.n_own = comm, n_own
         self.requests: list = []
         self.more: list = []
-        # Owned particles first : last that others wait for, in up to two pieces, and the rest between them.
-        first, last = min(first, n_own), min(last, n_own)
-        if first + last >= n_own:
-            self.border, self.inside = [(0, n_own)] if first + last > 0 else [], (0, 0 if first + last else n_own)
-        else:
-            self.border = [piece for piece in ((0, first), (n_own - last, n_own)) if piece[0] < piece[1]]
-            self.inside = (first, n_own - last)
-        self.n_left = self.n_right = 0
-        if comm.mpi is None:
-            return
-        from mpi4py import MPI
-
-        self.left = comm.rank - 1 if comm.rank > 0 else MPI.PROC_NULL
-        self.right = comm.rank + 1 if comm.rank + 1 < comm.size else MPI.PROC_NULL
-        counts = np.zeros(2, np.int64)
-        out = np.array([first, last], np.int64)
-        self._swap(counts[0:1], out[0:1], out[1:2], counts[1:2])
-        self.n_left, self.n_right = int(counts[0]), int(counts[1])
-
-    def _pieces(self, rows: np.ndarray) -> tuple:
-        a, b = self.n_left, self.n_left + self.n_own
-        return rows[:a], rows[a : a + self.first], rows[b - self.last : b], rows[b:]
+        self._packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self._more_packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self.border, self.inside = _border(n_own, sends)
+        counts = np.array([_length(rows) for rows in sends.values()], np.int64)
+        arriving = np.zeros_like(counts)
+        if comm.mpi is not None:
+            self._swap((rank, arriving[k : k + 1], counts[k : k + 1]) for k, rank in enumerate(sends))
+        before = np.array(list(sends), np.int64) < comm.rank
+        self.n_left, self.n_right = int(arriving[before].sum()), int(arriving[~before].sum())
+        ends = np.cumsum(arriving) + np.where(before, 0, n_own)
+        self._pieces = [
+            (rank, slice(int(end - count), int(end)), _shifted(rows, self.n_left))
+            for (rank, rows), end, count in zip(sends.items(), ends, arriving)
+            if count or _length(rows)
+        ]
 
     def fill(self, rows: np.ndarray) -> None:
         """Set the ghost rows of any array in storage order (n, ...) from their owners. Collective."""
-        if self.comm.mpi is None:
-            return
-        self._swap(*(_bytes(piece) for piece in self._pieces(rows)))
+        if self._pieces:
+            self._swap((rank, _bytes(rows[to]), _bytes(rows[sent])) for rank, to, sent in self._pieces)
 
-    def _swap(self, from_left: np.ndarray, to_left: np.ndarray, to_right: np.ndarray, from_right: np.ndarray) -> None:
-        mpi = self.comm.mpi
-        self.comm.wait(
-            mpi.Irecv(from_left, self.left, TO_RIGHT),
-            mpi.Irecv(from_right, self.right, TO_LEFT),
-            mpi.Isend(to_left, self.left, TO_LEFT),
-            mpi.Isend(to_right, self.right, TO_RIGHT),
-        )
+    def _swap(self, parts: Iterable[tuple[int, np.ndarray, np.ndarray]]) -> None:
+        """Exchange messages with ranks; parts: (rank, received, sent)."""
+        mpi, requests = self.comm.mpi, []
+        for rank, comes, goes in parts:
+            requests += [mpi.Irecv(comes, rank, ROWS), mpi.Isend(goes, rank, ROWS)]
+        self.comm.wait_all(requests)
 
     def add_ghost_field(self, rows: np.ndarray) -> None:
         """Include this array in `refresh`; its memory must not move."""
-        self.requests += self._persistent(rows, 0)
+        self._persistent(rows, ROWS, self.requests, self._packed)
 
     def add_late_ghost_field(self, rows: np.ndarray) -> None:
         """Include this array in `refresh_more`."""
-        self.more += self._persistent(rows, BACK)
+        self._persistent(rows, ROWS + BACK, self.more, self._more_packed)
 
     def storage(self, rows: np.ndarray) -> np.ndarray:
         """Make storage with ghosts, renewed by `refresh`, for owned rows (n, w) in this order. Collective."""
@@ -86,25 +83,20 @@ class Halo:
         self.add_ghost_field(out)
         return out
 
-    def _persistent(self, rows: np.ndarray, shift: int) -> list:
-        if self.comm.mpi is None:
-            return []
-        from_left, to_left, to_right, from_right = self._pieces(rows)
+    def _persistent(self, rows: np.ndarray, tag: int, requests: list, packed: list) -> None:
         mpi = self.comm.mpi
-        return [
-            start(_bytes(piece), peer, tag + shift)
-            for piece, start, peer, tag in (
-                (from_left, mpi.Recv_init, self.left, TO_RIGHT),
-                (from_right, mpi.Recv_init, self.right, TO_LEFT),
-                (to_left, mpi.Send_init, self.left, TO_LEFT),
-                (to_right, mpi.Send_init, self.right, TO_RIGHT),
-            )
-            if len(piece)
-        ]
+        for rank, to, sent in self._pieces:
+            parcel = rows[sent]
+            if not isinstance(sent, slice):
+                packed.append((rows, sent, parcel))
+            for piece, start in ((rows[to], mpi.Recv_init), (parcel, mpi.Send_init)):
+                if len(piece):
+                    requests.append(start(_bytes(piece), rank, tag))
 
     def start(self) -> None:
         """Begin to renew the ghosts. Until `finish`, rows of `border` must not change and ghosts must not be read."""
         if self.requests:
+            _pack(self._packed)
             self.comm.start_all(self.requests)
 
     def finish(self) -> None:
@@ -120,6 +112,7 @@ class Halo:
     def refresh_more(self) -> None:
         """Renew the ghost rows of the second array."""
         if self.more:
+            _pack(self._more_packed)
             self.comm.start_all(self.more)
             self.comm.wait_all(self.more)
 
@@ -128,32 +121,45 @@ class Halo:
         for request in self.requests + self.more:
             request.Free()
         self.requests, self.more = [], []
+        self._packed, self._more_packed = [], []
 
 
 def _bytes(rows: np.ndarray) -> np.ndarray:
     return rows.reshape(-1).view(np.uint8)
 
 
-def connect(
-    comm: Comm,
-    hot: np.ndarray,
-    order: np.ndarray,
-    cell: np.ndarray,
-    borders: np.ndarray,
-    threads: int,
-    columns: int = 1,
-) -> tuple[np.ndarray, Halo]:
-    """Make the storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it current.
+def _pack(tables: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
+    for rows, which, parcel in tables:
+        take_rows(rows, which, parcel)
 
-    cell (n,) i8: cells of the owned particles in this order, ascending; columns: how many columns of each neighbour are
-    copied. Every rank except the first and the last has at least as many columns.
-    """
-    first = last = 0
-    if comm.rank > 0:
-        first = int(np.searchsorted(cell, (int(borders[comm.rank]) + columns) * COLUMN - COLUMN // 2))
-    if comm.rank + 1 < comm.size:
-        last = len(cell) - int(np.searchsorted(cell, (int(borders[comm.rank + 1]) - columns) * COLUMN - COLUMN // 2))
-    halo = Halo(comm, len(order), first, last)
+
+def _length(rows: slice | np.ndarray) -> int:
+    return rows.stop - rows.start if isinstance(rows, slice) else len(rows)
+
+
+def _shifted(rows: slice | np.ndarray, by: int) -> slice | np.ndarray:
+    return slice(rows.start + by, rows.stop + by) if isinstance(rows, slice) else rows + by
+
+
+def _border(n: int, sends: Sends) -> tuple[list[tuple[int, int]], tuple[int, int]]:
+    """Return the rows that are sent as up to two ranges, and the range between them; all rows if they are scattered."""
+    first, last = 0, n
+    for rows in sends.values():
+        if not isinstance(rows, slice):
+            first = n if len(rows) else first
+        elif rows.start == 0:
+            first = max(first, rows.stop)
+        else:
+            last = min(last, rows.start)
+    if first >= last:
+        return ([(0, n)], (0, 0)) if n else ([], (0, 0))
+    return [piece for piece in ((0, first), (last, n)) if piece[0] < piece[1]], (first, last)
+
+
+def connect(comm: Comm, hot: np.ndarray, order: np.ndarray, sends: Sends, threads: int) -> tuple[np.ndarray, Halo]:
+    """Make the storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it current; sends: of
+    these rows, see `Halo`."""
+    halo = Halo(comm, len(order), sends)
     storage = aligned((halo.n_left + len(order) + halo.n_right, hot.shape[1]))
     take_rows(hot, order, storage[halo.n_left : halo.n_left + len(order)], threads)
     halo.fill(storage)

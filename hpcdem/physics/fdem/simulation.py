@@ -18,13 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.core.cells import keys
 from hpcdem.core.errors import PhysicsError
 from hpcdem.core.heap import give_back
 from hpcdem.core.memory import aligned
 from hpcdem.engine.model import FRESH, LISTS, STORAGE
 from hpcdem.engine.rebuild import LONGEST_WAIT
-from hpcdem.halo.ownership import Ownership
+from hpcdem.halo.ownership import Curve, Ownership
 from hpcdem.physics.fdem import (
     apart,
     breaks,
@@ -38,7 +37,7 @@ from hpcdem.physics.fdem import (
 )
 from hpcdem.physics.fdem.edited import Edited
 from hpcdem.physics.fdem.histories import Histories
-from hpcdem.physics.fdem.kernels import elements, space, tets
+from hpcdem.physics.fdem.kernels import detect_space, elements, space, tets
 from hpcdem.physics.fdem.kernels.strength import HISTORY as STRENGTH_HISTORY
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.local_space import LocalSpace
@@ -106,7 +105,7 @@ class Blocks(Edited):
         self.surface_loads.mesh_replaced()
         self.closed = False
         self.rebuild_state = ListState()
-        self.ownership = Ownership(self.comm, self.balance_on)
+        self.ownership = (Curve if mesh.dim == 3 else Ownership)(self.comm, self.balance_on)
         self.event_rows = []
         self._topology_stale = True
         self._longest = 0.0
@@ -383,13 +382,15 @@ class Blocks(Edited):
         middle, radius = middles(self)
         of_loads = 0.0 if frozen else self.surface_loads.reach(self, middle)
         radius = float(self.comm.max_into(np.array([radius]))[0])
+        self._apart = rebuild_state.side
         if not frozen:
             rebuild_state.skin = self._skin()
             room = ROOM * self.mean_edge if self.options.collision else 0.0
+            self._apart = max(room, self._longest, of_loads) * (1.0 + 1e-9)
             needed = max(2.0 * radius, self._longest, of_loads) * (1.0 + 1e-9) + room
             if not needed <= rebuild_state.side <= 1.2 * needed:
                 rebuild_state.side = 1.05 * needed
-        return (space.keys if self.dim == 3 else keys)(middle, rebuild_state.side)
+        return self.ownership.cells(middle, rebuild_state.side)
 
     def _share_out(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         cell, self.histories, (number, self.x, self.v, *cold) = self._send_home(
@@ -403,7 +404,7 @@ class Blocks(Edited):
         self.histories = self.histories.take(order)
         self.cold = {name: values[order] for name, values in self.cold.items()}
         number, v = self.number[order], self.v[order]
-        self.x = self._connect(np.ascontiguousarray(self.x), order, cell)
+        self.x = self._connect(np.ascontiguousarray(self.x), order, cell, boxes=self._boxes(order))
         halo = self.halo
         self.n_left, self.n_own = halo.n_left, len(order)
         n = len(self.x)
@@ -418,6 +419,25 @@ class Blocks(Edited):
         if self.options.collision:
             halo.add_ghost_field(self.v)
         self.where[self.number] = np.arange(n)
+
+    def _boxes(self, order: np.ndarray) -> np.ndarray | None:
+        """Boxes (n, 6) [m] of the elements in this order, in the plane None: those of elements that one rank must hold
+        overlap. Middles lie in boxes, so boxes of partners of a joint are not farther apart than these."""
+        if self.dim == 2 or self.comm.size == 1:
+            return None
+        boxes = np.empty((len(order), 6))
+        detect_space.boxes(tets.ROW * order[:, None] + tets.STRIDE * np.arange(4), self.x, self._apart, boxes)
+        mesh = self.the_mesh()
+        if len(mesh.macros):  # all parts of one go together
+            of = mesh.macro_of()[self.number[order]]
+            some = np.flatnonzero(of >= 0)
+            which = np.unique(of[some], return_inverse=True)[1]
+            whole = np.full((len(some), 6), np.inf)
+            boxes[:, 3:] *= -1.0
+            np.minimum.at(whole, which, boxes[some])
+            boxes[some] = whole[which]
+            boxes[:, 3:] *= -1.0
+        return boxes
 
     def _build_lists(self, order: np.ndarray, cell: np.ndarray, frozen: bool) -> None:
         self.local = self._tables()(self)

@@ -11,7 +11,6 @@ import math
 import numpy as np
 from numba import njit, prange
 
-from hpcdem.core.cells import COLUMN, index
 from hpcdem.numerics.lanes import U
 from hpcdem.physics.fdem.kernels import laws
 from hpcdem.physics.fdem.kernels.limits import corner_step
@@ -132,22 +131,6 @@ def volume(x):
     wx, wy, wz = x[8] - x[0], x[9] - x[1], x[10] - x[2]
     tx, ty, tz = x[12] - x[0], x[13] - x[1], x[14] - x[2]
     return ((uy * wz - uz * wy) * tx + (uz * wx - ux * wz) * ty + (ux * wy - uy * wx) * tz) / 6.0
-
-
-SLAB = 1 << 15
-"""Cubes of a slab along z; those farther off count as the last."""
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def keys(points, side):
-    """Keys (n,) i8 of cubes (core/cells.py) of points (n, 3) [m]: rows of a slab are (from y) * 2^15 + (from z)."""
-    out = np.empty(len(points), np.int64)
-    half = SLAB // 2
-    for i in range(len(points)):
-        j = min(max(index(points[i, 1], side), -half), half - 1)
-        k = min(max(index(points[i, 2], side), -half), half - 1)
-        out[i] = index(points[i, 0], side) * COLUMN + j * SLAB + k
-    return out
 
 
 # ---- nodes ---------------------------------------------------------------------------------------------------------

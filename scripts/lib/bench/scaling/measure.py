@@ -320,8 +320,8 @@ def exchange(comm: Any, rows: int) -> Any:
     from hpcdem.core.memory import aligned
     from hpcdem.halo.exchange import Halo
 
-    first, last = (rows if comm.rank > 0 else 0), (rows if comm.rank + 1 < comm.size else 0)
-    halo = Halo(comm, 2 * rows, first, last)
+    pieces = {comm.rank - 1: slice(0, rows), comm.rank + 1: slice(rows, 2 * rows)}
+    halo = Halo(comm, 2 * rows, {rank: piece for rank, piece in pieces.items() if 0 <= rank < comm.size})
     table = aligned((halo.n_left + 2 * rows + halo.n_right, 8))
     table[:] = 0.0
     halo.add_ghost_field(table)

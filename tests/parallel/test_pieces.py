@@ -1,0 +1,154 @@
+"""Blocks in space on pretended ranks that own pieces of a curve: the same bits as on one, wherever it is cut."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hpcdem.core.comm import SerialComm
+from hpcdem.core.errors import UsageError
+from hpcdem.halo.exchange import Halo
+from hpcdem.halo.ownership import Curve
+from hpcdem.physics.fdem import changes, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
+from tests.blocks.models import COHESIVE
+from tests.pretended import Pretended, Ranks
+from tests.space.support import ROCK, box
+
+STEPS = 12
+"""Before a checkpoint, and again after it."""
+WEAK = {
+    "tensile_strength": 1e3, "cohesion": 3e3, "friction": 30.0, "gf1": 0.05, "gf2": 0.1, "penalty_normal": 1e9,
+    "penalty_shear": 1e9,
+}  # fmt: skip
+
+
+def shattering(comm: Any) -> Blocks:
+    """A cube with a joint on each face, torn from a corner."""
+    sim = Blocks(comm)
+    sim.take_mesh(box((5, 4, 4), (1.0, 0.8, 0.8), shaken=0.2))
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e8, "damp_factor": 0.1, "friction": 30.0})
+    sim.joint_model(None, COHESIVE, WEAK)
+    changes.set_velocity(sim, np.arange(60), 6.0, 2.0, 6.0)
+    return sim
+
+
+def run(sim: Blocks, steps: int) -> dict[int, tuple[bytes, bytes]]:
+    """Positions and velocities of the owned elements by their numbers; storage is made again on the way."""
+    for step in range(steps):
+        sim.step()
+        if step % 5 == 3:
+            sim.rebuild()
+    own = sim.owned
+    return {
+        number: (x.tobytes(), v.tobytes()) for number, x, v in zip(sim.number[own].tolist(), sim.x[own], sim.v[own])
+    }
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path, dict]:
+    """After `STEPS`, the checkpoint of then, and after as many more."""
+    sim, path = shattering(SerialComm()), tmp_path_factory.mktemp("pieces") / "half.sav"
+    half = run(sim, STEPS)
+    saved_state.save(sim, path)
+    end = run(sim, STEPS)
+    assert len(sim.event_rows) > 50
+    return half, path, end
+
+
+@pytest.fixture
+def any_cuts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each time storage is made the curve is cut at other cells, and some ranks own nothing."""
+    renew = Curve.renew
+
+    def elsewhere(self: Curve, place: np.ndarray, side: float, step: int, *more: Any) -> None:
+        renew(self, place, side, step, *more)
+        cells = np.unique(np.concatenate(self.comm.allgather(np.unique(place))))
+        cuts = np.sort(np.random.default_rng(step).choice(cells, self.comm.size - 1))
+        cuts[2:4] = cuts[2]
+        self.borders = np.concatenate([cells[:1], cuts, cells[-1:] + 1])
+
+    monkeypatch.setattr(Curve, "renew", elsewhere)
+
+
+def together(parts: list[dict]) -> dict:
+    assert sum(map(len, parts)) == len({number for part in parts for number in part})
+    return {number: row for part in parts for number, row in part.items()}
+
+
+def test_pieces_of_the_curve_come_to_the_same_bits(alone: tuple[dict, Path, dict]) -> None:
+    parts = Ranks(6).run(lambda comm: run(shattering(comm), STEPS))
+    assert together(parts) == alone[0] and min(map(len, parts)) > 0
+
+
+def test_cuts_that_jump_and_ranks_that_own_nothing_change_no_bit(
+    alone: tuple[dict, Path, dict], any_cuts: None
+) -> None:
+    parts = Ranks(7).run(lambda comm: run(shattering(comm), STEPS))
+    assert together(parts) == alone[0] and not parts[3]
+
+
+def test_a_checkpoint_resumes_on_pieces(alone: tuple[dict, Path, dict], any_cuts: None) -> None:
+    def resumed(comm: Pretended) -> dict:
+        sim = Blocks(comm)
+        saved_state.restore(sim, alone[1])
+        return run(sim, STEPS)
+
+    assert together(Ranks(5).run(resumed)) == alone[2]
+
+
+def test_ghosts_are_those_near_the_piece() -> None:
+    """A long bar: ranks in its middle exchange ghosts with few others, and hold a part of it only."""
+
+    def held(comm: Pretended) -> tuple[int, int, int]:
+        sim = Blocks(comm)
+        sim.take_mesh(box((40, 2, 2), (20.0, 1.0, 1.0)))
+        changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+        sim.close_model()
+        return sim.n_own, len(sim.number) - sim.n_own, len({rank for rank, *_ in sim.halo._pieces})
+
+    for own, ghosts, neighbours in Ranks(8).run(held):
+        assert 40 < own < 160 and 0 < ghosts < 160 and 1 <= neighbours <= 3
+
+
+def test_more_ranks_than_cells_are_refused() -> None:
+    def first(comm: Pretended) -> str:
+        with pytest.raises(UsageError) as error:
+            sim = Blocks(comm)
+            sim.take_mesh(box((1, 1, 1), (1.0, 1.0, 1.0)))
+            changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+            sim.close_model()
+        return str(error.value)
+
+    assert all("9 ranks are too many" in text and "at most" in text for text in Ranks(9).run(first))
+
+
+def test_rows_go_to_several_neighbours() -> None:
+    """Scattered rows for one neighbour and a range for the next, none for a third."""
+    sends = {
+        0: {1: np.array([0, 2]), 2: slice(0, 0)},
+        1: {0: slice(0, 1), 2: slice(1, 3)},
+        2: {0: np.array([1]), 1: np.array([0, 1, 2])},
+    }
+
+    def filled(comm: Pretended) -> list[list[float]]:
+        halo = Halo(comm, 3, sends[comm.rank])
+        rows = halo.storage(100.0 * comm.rank + np.arange(6.0).reshape(3, 2))
+        numbers = np.full(len(rows), -1)
+        numbers[halo.n_left :][:3] = 10 * comm.rank + np.arange(3)
+        halo.fill(numbers)
+        before = rows[:, 1].tolist()
+        rows[halo.n_left :][:3] += 1000.0
+        halo.refresh()
+        assert rows[:, 1].tolist() == [value + 1000.0 for value in before]
+        waited = sorted({row for first, last in halo.border for row in range(first, last)})
+        assert not set(waited) & set(range(*halo.inside))
+        halo.close()
+        return numbers.tolist()
+
+    assert Ranks(3).run(filled) == [
+        [0, 1, 2, 10, 21], [0, 2, 10, 11, 12, 20, 21, 22], [11, 12, 20, 21, 22]
+    ]  # fmt: skip
