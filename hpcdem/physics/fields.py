@@ -39,7 +39,7 @@ class Kind:
 
     @property
     def word(self) -> str:
-        """Its model in scripts."""
+        """Name of its model in scripts."""
         return self.model.name.replace("_", "-")
 
     @property
@@ -53,7 +53,7 @@ class Kind:
         return f"{self.name}-flux-boundary-condition"
 
     def load_type(self) -> type[Any]:
-        """Its class; the import brings numba and kernels."""
+        """Import its class, with numba and kernels."""
         return getattr(importlib.import_module(f"hpcdem.physics.{self.name}.model"), self.load)
 
 

@@ -1,4 +1,6 @@
-"""Where the nodes of a bolt are, and in which elements: functions of the present mesh, in the plane and in space."""
+"""Positions of the nodes of a bolt, and the elements that contain them: functions of the present mesh, in the plane and
+in space.
+"""
 
 from __future__ import annotations
 
@@ -35,14 +37,14 @@ def checked(points: Sequence[Sequence[float]], dim: int) -> np.ndarray:
 
 
 def lengths(ways: np.ndarray) -> np.ndarray:
-    """Of vectors (n, 2 or 3)."""
+    """Lengths of vectors (n, 2 or 3)."""
     found: np.ndarray = np.hypot.reduce(ways, axis=1)
     return found
 
 
 def parts(span: float, segments: int | None, length: float | None) -> int:
-    """Of a straight part of a bolt [m]: so many segments, or ones no longer than length [m]. CommandError if they are
-    too many."""
+    """Divide a straight part of a bolt [m] into so many segments, or into segments no longer than length [m].
+    CommandError if there are too many."""
     wanted = float(segments) if segments is not None else span / float(length or span)
     if not wanted <= MOST:
         size = f"segments {segments}" if segments is not None else f"length {length:g}"

@@ -185,7 +185,7 @@ class Bolts(Structure):
         blocks.changed()
 
     def _check_spacing(self, elements: np.ndarray, spacing: float) -> None:
-        """One bolt has one spacing from the beginning: what it carries is divided by it."""
+        """Check that a bolt keeps its spacing, by which its forces are divided."""
         bar, first = self.nodes["bar"], self.first
         known = self.elements["row"] > 0
         others = known & np.isin(bar[first], bar[first[elements]]) & (self._column("spacing") != spacing)
@@ -233,7 +233,8 @@ class Bolts(Structure):
         return bars["state"].copy()
 
     def columns(self) -> dict[str, dict[str, np.ndarray]]:
-        """What frames hold: "nodes" with the number of their bolt, "elements" with their first node. Not collective."""
+        """Columns of frames: "nodes" with the number of their bolt, "elements" with their first node. Not
+        collective."""
         found = super().columns()
         return {
             "nodes": {"bolt": self.nodes["bar"].copy(), **found["nodes"]},

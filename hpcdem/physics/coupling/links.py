@@ -32,7 +32,7 @@ TO_DISCS, TO_FACES = 41, 42
 
 @dataclass
 class Touching:
-    """What contacts remember: of the disc gid (n,) i8 with the face (n,) i8 the friction (n,) [N]."""
+    """Memory of contacts: of the disc gid (n,) i8 with the face (n,) i8, the friction force (n,) [N]."""
 
     gid: np.ndarray
     face: np.ndarray
@@ -203,7 +203,7 @@ class Link:
                 self.slot_on[slot], self.slot_fs[slot] = True, friction
 
     def touching(self) -> Touching:
-        """What the contacts that touch remember, those of discs of this rank."""
+        """Memory of the contacts of discs of this rank."""
         on = self.slot_on
         return Touching(self.slot_gid[on], self.slot_number[on], self.slot_fs[on])
 
@@ -314,7 +314,7 @@ class Link:
 
 
 def _runs(ranks: np.ndarray) -> dict[int, slice]:
-    """Where each rank stands in an ascending list."""
+    """Begin of each rank in an ascending list."""
     found, first, number = np.unique(ranks, return_index=True, return_counts=True)
     return {rank: slice(a, a + n) for rank, a, n in zip(found.tolist(), first.tolist(), number.tolist())}
 

@@ -39,7 +39,7 @@ class Work:
         return math.fsum(self.both.contacts()["energy"])
 
     def step_done(self) -> None:
-        """One step was booked: bins are emptied long before they are full."""
+        """Record that a step was booked: bins are emptied long before they are full."""
         self._booked += 1
         if self._booked >= EMPTIED:
             self.empty()
@@ -71,7 +71,7 @@ class Work:
             )
 
     def empty(self) -> None:
-        """What was booked in the steps since then, to the accounts."""
+        """Move what was booked since the last call to the accounts."""
         if not self._booked:
             return
         self._booked = 0
@@ -107,11 +107,11 @@ class Work:
         return [sum(part[side] for part in parts) for side in (ON_DISCS, ON_FACES)]
 
     def state(self) -> dict[str, Any]:
-        """As JSON values. Collective."""
+        """The work as JSON values. Collective."""
         return {"done": [hex(v) for v in self._sums()], "start": self.start}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """From `state`; rank 0 takes the work of all."""
+        """Restore from `state`; rank 0 receives the work of all."""
         self._done = [int(v, 16) if self.both.comm.rank == 0 else 0 for v in state["done"]]
         self.start = state["start"]
         self._bins[:] = 0

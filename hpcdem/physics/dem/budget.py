@@ -164,7 +164,7 @@ class Budget(engine.Budget[Simulation, int]):
     # ---- checkpoints -----------------------------------------------------------------------------------------------
 
     def state(self, sim: Simulation) -> dict[str, Any]:
-        """As JSON values; whole integers, so nothing is rounded. Collective."""
+        """The budget as JSON values; whole integers, so nothing is rounded. Collective."""
         self._empty()
         accounts, left, start = (
             [hex(v) for v in _summed(sim, list(part.values()))]
@@ -225,7 +225,8 @@ def stored_energy(sim: Simulation) -> float:
 
 
 def _stored_bins(sim: Simulation, whole_step: bool = True) -> np.ndarray:
-    """What the particles and contacts of this rank store (6, 2, 2112) i8; motion at the whole step or half before."""
+    """Energy stored in particles and contacts of this rank (5, 2, 2112) i8; motion at the whole step or half a step
+    before."""
     lists, p, s, b = sim.lists, sim.particles, sim.settings, sim.lists.blocks
     bins = np.zeros((energy.STORED, *BINS_SHAPE), np.int64)
     spheres, n_mat = mass.SPHERES[s.disk], len(sim.materials)

@@ -161,7 +161,7 @@ class Clumps:
         return p.rigid
 
     def forget(self, number: int, p: Particles) -> None:
-        """So many clumps went; the model is open."""
+        """Remove so many clumps; the model is open."""
         self.number -= number
         if not self:
             self.reach, p.rigid = 0.0, None

@@ -1,4 +1,5 @@
-"""What can be asked of a simulation, which stays as it is: contacts, wall forces, energy, critical time step, frames.
+"""Quantities of a simulation that can be queried without changing it: contacts, wall forces, energy, critical time
+step, frames.
 
 Sums that are written to files are exact (order-free), so that files do not depend on the rank count.
 """
@@ -118,7 +119,7 @@ class Totals:
 
 
 def survey(sim: Simulation) -> Totals:
-    """One look at all particles and contacts. Sums are exact. Collective."""
+    """Evaluate all particles and contacts once. Sums are exact. Collective."""
     p, lists, comm, s = sim.particles, sim.lists, sim.comm, sim.settings
     bins = np.zeros((2, *BINS_SHAPE), np.int64)
     counts = np.array([len(p), 0], np.int64)

@@ -1,4 +1,4 @@
-"""What must not happen to particles, and who they are when it does: leaving the BOX, running away, losing a number."""
+"""Stops a run when particles leave the BOX, move too far or are not finite, and names them."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""How far the next lists of particles reach: skin, side of cells, and particles fast enough for a reach of their own.
+"""Reach of the next lists of particles: skin, side of cells, and particles fast enough for their own reach.
 
-All of it follows from global values and the clock alone, so lists are equal on any number of ranks.
+It depends on global values and the clock only, so lists are equal on any number of ranks.
 """
 
 from __future__ import annotations

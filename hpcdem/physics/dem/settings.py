@@ -1,4 +1,4 @@
-"""What the SET command sets."""
+"""Settings of the SET command."""
 
 from __future__ import annotations
 

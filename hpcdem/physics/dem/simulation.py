@@ -57,10 +57,10 @@ class ParticlePhysics(Protocol):
     energies: ClassVar[tuple[str, ...]]
 
     def parameters(self) -> dict[str, float]:
-        """What it was made with, for checkpoints."""
+        """Parameters of the constructor, for checkpoints."""
 
     def diagnostics(self) -> Mapping[str, tuple[str, Callable[[Simulation], float]]]:
-        """What HIST can follow: unit and function of the simulation (collective) by name."""
+        """Quantities that HIST can record: unit and function of the simulation (collective) by name."""
 
     def prepare(self, sim: Simulation) -> None:
         """Lists, masses or settings are others. Collective."""

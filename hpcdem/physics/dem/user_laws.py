@@ -133,7 +133,7 @@ class PairLaw:
 
     @property
     def properties(self) -> tuple[PairProperty, ...]:
-        """Those of its own."""
+        """Properties that the law declares."""
         return self.declared.properties
 
     @property
@@ -192,7 +192,7 @@ class ModelLaws:
 
     @property
     def titles(self) -> str:
-        """Of all laws, for messages."""
+        """Titles of all laws, for messages."""
         return ", ".join(law.title for law in self.laws)
 
     def unaccounted(self) -> str:
@@ -200,7 +200,7 @@ class ModelLaws:
         return next((law.title for law in self.laws if law.declared.energy is None), "")
 
     def number(self, name: str) -> int:
-        """Of the law with a full name; 0 if the model does not have it."""
+        """Number of the law with a full name; 0 if the model does not have it."""
         return next((k for k, law in enumerate(self.laws, 1) if law.name == name), 0)
 
     def named(self, title: str) -> int:
@@ -221,7 +221,7 @@ class ModelLaws:
         return HERTZ if material["hertz"] else LINEAR
 
     def add(self, law: PairLaw, sim: Model) -> int:
-        """Its number, which is a new one if need be. Collective."""
+        """Return the number of a law, a new one if necessary. Collective."""
         if not self.number(law.name):
             if len(self.laws) == MOST_LAWS:
                 raise CommandError(f"a model can have at most {MOST_LAWS} user laws, and has that many")
@@ -246,7 +246,7 @@ class ModelLaws:
         return out
 
     def mixed(self, materials: np.ndarray) -> bool:
-        """Whether there are pairs of materials without a common law."""
+        """Whether some pairs of materials have no common law."""
         return bool(np.isnan(self.which(materials)).any())
 
     def which(self, materials: np.ndarray) -> np.ndarray:
@@ -288,7 +288,7 @@ class ModelLaws:
         return (one | one.T).reshape(-1)
 
     def state(self) -> dict[str, Any]:
-        """As JSON values."""
+        """The laws as JSON values."""
         between = [[*pair, number, list(values)] for pair, (number, values) in self.between.items()]
         return {"names": [law.name for law in self.laws], "between": between}
 

@@ -1,1 +1,1 @@
-"""What fields on blocks share: heat in elements, fluid in joints, proppant in it, moisture of soil."""
+"""What fields on blocks share: heat in elements, fluid in joints, proppant in fluid, moisture of soil."""

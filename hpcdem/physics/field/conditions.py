@@ -1,5 +1,6 @@
-"""What commands say of a field that diffuses in elements: its properties, values at nodes, conditions of nodes and
-faces, and the account of what came and went. All of it is known to all ranks by the numbers of the mesh."""
+"""Assignments of a field that diffuses in elements: its properties, values at nodes, conditions of nodes and faces, and
+the budget. All of it is known to all ranks by the numbers of the mesh.
+"""
 
 from __future__ import annotations
 
@@ -67,11 +68,11 @@ class Conditions(Assigned, Field):
 
     @abstractmethod
     def _capacities(self) -> np.ndarray:
-        """By rows (rows + 1,), per mass of the elements."""
+        """Capacities by rows (rows + 1,), per mass of the elements."""
 
     @abstractmethod
     def _conductivities(self, elements: np.ndarray) -> np.ndarray:
-        """Of elements (n,): xx, yy, xy (n, 3), in space zz, xz, yz besides (n, 6), which do not count in the plane."""
+        """Conductivities of elements (n,): xx, yy, xy (n, 3), in space also zz, xz, yz (n, 6)."""
 
     @property
     def _transfers(self) -> np.ndarray:
@@ -226,14 +227,14 @@ class Conditions(Assigned, Field):
         return self.held
 
     def _content(self) -> float:
-        """What is in all elements, above the zero of the scale, by the capacities of their columns."""
+        """Content of all elements, above the zero of the scale, by the capacities of their columns."""
         cold = self.blocks.cold
         return exact_sum((cold[self.capacities] * cold[self.quantity]).reshape(-1), self.blocks.comm)
 
     def account(self) -> dict[str, float]:
-        """What there was since there is a model: given by conditions, brought by commands (initial values, changes of
-        capacity), stored in elements, above the zero of the scale, removed with elements; closing: what does not add
-        up, relative: that over the largest."""
+        """Budget since the model was made: given by conditions, added by commands (initial values, changes of
+        capacity), stored in elements above the zero of the scale, removed with elements; closing: the error; relative:
+        the error over the largest entry."""
         self.blocks.close_model()
         found = {"given": self._sum(self._booked(), self.accounts["given"]), "commands": self.accounts["commands"],
                  "stored": self._content(), **self._stored_besides(), "removed": self.accounts["removed"]}  # fmt: skip

@@ -75,7 +75,7 @@ class Diffusing(Conditions):
         return self.on
 
     def find_contacts(self) -> None:
-        """Where it crosses from surface to surface now; the model is closed. Not collective."""
+        """Find where the field crosses from surface to surface now; the model is closed. Not collective."""
 
     def clock(self, on: bool | None = None, steps: int | None = None, dt: float | None = None) -> None:
         """Whether it flows; sub-steps of a cycle, 0: as many as are needed; their length [s], 0: by the clock of the
@@ -173,8 +173,8 @@ class Diffusing(Conditions):
         return next(pace, self) is self
 
     def _tell_obtuse(self) -> None:
-        """Where flat angles make it flow from low to high: values of explicit steps may leave the range of those around
-        them. Rank 0 alone."""
+        """Warn where obtuse angles give negative conductance: values of explicit steps may leave the range of their
+        neighbours. Rank 0 only."""
         blocks = self.blocks
         if self._told_obtuse or blocks.log is None:
             return
@@ -242,7 +242,7 @@ class Diffusing(Conditions):
         return 1
 
     def _given(self) -> tuple[float, ...]:
-        """What the length of a sub-step follows from, beside the limit."""
+        """Everything except the limit that determines the length of a sub-step."""
         return (*map(float, self._given_clock()), self._cycle_time(), self._limit)
 
     def _find_step(self) -> None:
@@ -361,7 +361,7 @@ class Diffusing(Conditions):
         """Sub-steps are done."""
 
     def _own_corners(self) -> tuple[int, int]:
-        """From where to where this rank's corners lie in t, flat."""
+        """Range of this rank's corners in t, flat."""
         width, own = self.t.shape[1], self.blocks.owned
         return width * own.start, width * own.stop
 
@@ -370,8 +370,8 @@ class Diffusing(Conditions):
         return np.array([assigned.now(self.blocks.tables, one, time) for one in self.prescribed[1:]], np.float64)
 
     def inflow(self, time: float, dt: float) -> np.ndarray:
-        """What flows (n, w) to the corners of the elements held here, per second, with the conditions of faces of a
-        time of the field; what these bring in dt [s] is booked. Collective where it comes from elsewhere too."""
+        """Compute the inflow (n, w) to the corners of the elements held here, per second, with the conditions of faces
+        at a time of the field; book what they bring in dt [s]. Collective if the field also flows in from elsewhere."""
         t, q, given = (part.reshape(-1) for part in (self.t, self._q, self.blocks.cold[self.given]))
         self.conduction.conduct(t, q)
         self.exposed.add_inflow(time, dt, *self._own_corners(), t, q, given)

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FaceCondition:
-    """Of faces: flux into the element [W/m2]; environment: temperature around it [K], None: none; transfer: heat
-    transfer coefficient to it [W/(m2 K)], None: that of the element. Of other fields what corresponds to them."""
+    """Condition of faces: flux into the element [W/m2]; environment: temperature around it [K], None: none; transfer:
+    heat transfer coefficient to it [W/(m2 K)], None: that of the element. Other fields use the corresponding
+    quantities."""
 
     flux: Number = 0.0
     transfer: float | None = None

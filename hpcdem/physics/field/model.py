@@ -1,5 +1,6 @@
-"""What every field on blocks has: properties and conditions by numbers of the mesh, a clock, an account, nodes that go
-from rank to rank."""
+"""Base of every field on blocks: properties and conditions by numbers of the mesh, a clock, a budget, nodes that move
+between ranks.
+"""
 
 from __future__ import annotations
 
@@ -101,7 +102,7 @@ class Assigned:
         return np.array([0.0, *(row[k] for row in self.rows)])
 
     def constant(self, name: str) -> float:
-        """One that all have alike. Not collective."""
+        """Whether all objects have the same value. Not collective."""
         return self.rows[self.row[np.argmax(self.row > 0)] - 1][self._names.index(name)]
 
     def _saved_properties(self) -> list[list[float | None]]:
@@ -185,7 +186,7 @@ class Travelling(ABC):
             self._copies = None
 
     def saved_rows(self) -> Tables:
-        """What this rank's nodes hold."""
+        """State of this rank's nodes."""
         held = {name: np.ascontiguousarray(self._column(name)) for name in self.columns}
         return {self.of_nodes: {"number": self.number, **held}}
 
@@ -271,6 +272,6 @@ class Field(SurfaceLoad):
         return found if found < most else -1
 
     def _gravity(self) -> list[float]:
-        """By components [m/s2]."""
+        """Components of gravity [m/s2]."""
         o = self.blocks.options
         return [o.gx, o.gy, o.gz][: self.blocks.dim]

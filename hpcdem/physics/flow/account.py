@@ -11,7 +11,7 @@ what they give back; fracture: lost by joints; outside: gravity and loads on the
 
 
 def closed(entries: dict[str, float]) -> dict[str, float]:
-    """With closing: pumped + outside - all others but pushed, and relative: that over the largest."""
+    """Add closing: pumped + outside - all others except pushed, and relative: closing over the largest entry."""
     taken = ("leaked", "viscous", "fluid", "strain", "joints", "fracture")
     closing = entries["pumped"] + entries["outside"] - sum(entries[name] for name in taken)
     return with_closing(entries, closing)

@@ -1,5 +1,6 @@
-"""What commands say of the fluid: channels and their properties, conditions of flow nodes, wells and their stages. All
-of it is known to all ranks by the numbers of the mesh."""
+"""Assignments of fluid: channels and their properties, conditions of flow nodes, wells and their stages. All of it is
+known to all ranks by the numbers of the mesh.
+"""
 
 from __future__ import annotations
 
@@ -93,11 +94,11 @@ class FlowAssignments(Assigned, Field):
         return self._network
 
     def numbers(self, kind: str) -> np.ndarray:
-        """Of all flow nodes or channels, ascending. Not collective."""
+        """Numbers of all flow nodes or channels, ascending. Not collective."""
         return self.network.nodes if kind == FLOW_NODE else self.network.channels
 
     def flow_nodes(self, points: np.ndarray | None) -> np.ndarray:
-        """Those of these points (None: all) that are flow nodes."""
+        """Return those of these points (None: all) that are flow nodes."""
         there = self.network.there
         if not len(self.network.channels):
             raise CommandError("there are no channels yet: assign face-joint c-model hydraulic-porous-medium first")

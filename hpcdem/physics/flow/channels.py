@@ -170,8 +170,8 @@ class Channels(Travelling, FlowAssignments):
         return local
 
     def _find_sides(self) -> None:
-        """Where both faces of this rank's channels are, and their laws. PhysicsError on all ranks if one of them does
-        not hold both. Collective."""
+        """Find both faces of this rank's channels, and their laws. PhysicsError on all ranks if a rank does not hold
+        both. Collective."""
         blocks, faces = self.blocks, self.channels_here
         other = blocks.partner[faces]
         lost = faces[(blocks.where[faces // 4] < 0) | (blocks.where[other // 4] < 0)][:1]
@@ -186,7 +186,7 @@ class Channels(Travelling, FlowAssignments):
         self._law = np.repeat((self.row[faces] - 1).astype(np.int64), LINKS[blocks.dim])
 
     def _begins(self, corner: np.ndarray) -> np.ndarray:
-        """Where corners, element * 4 + k, begin in x, flat."""
+        """Start of corners, element * 4 + k, in x, flat."""
         return self.blocks.where[corner // 4] * self.blocks.x.shape[1] + self.blocks.local.stride * (corner % 4)
 
     def _book_gone(self, gone: np.ndarray) -> None:
@@ -297,8 +297,8 @@ class Channels(Travelling, FlowAssignments):
         return self.carried / (self.sub_steps * self.dt)
 
     def leaked(self) -> np.ndarray:
-        """What each of this rank's nodes (n,) lost to the rock in the last cycle [m2], where `carried` is kept; nothing
-        where flow is switched off. Not collective."""
+        """Leak-off of each of this rank's nodes (n,) to the rock in the last cycle [m2], if `carried` is kept; nothing
+        while flow is switched off. Not collective."""
         nodes = self.nodes[:, kernels.LEAKED]
         if self.carried is None or not self.blocks.options.hydraulic or len(self._leaked_before) != len(nodes):
             return np.zeros(len(nodes))
@@ -319,7 +319,7 @@ class Channels(Travelling, FlowAssignments):
         return self._ends, self._begin, self._channel, self._side
 
     def apertures(self) -> np.ndarray:
-        """Of this rank's channels [m]. Not to be changed. Not collective."""
+        """Apertures of this rank's channels [m], read-only. Not collective."""
         return self.channel_table[:: LINKS[self.blocks.dim], kernels.APERTURE]
 
     def fluxes(self) -> np.ndarray:

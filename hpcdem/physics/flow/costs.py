@@ -1,5 +1,6 @@
-"""What a time of flow costs by explicit and by implicit steps: estimates, for one core, that do not depend on where and
-on how many ranks they are made (a choice that follows measured times could not be repeated)."""
+"""Costs of explicit and implicit steps of flow: estimates for one core that do not depend on the machine or the number
+of ranks (a choice by measured times could not be repeated).
+"""
 
 from __future__ import annotations
 

@@ -167,7 +167,8 @@ class Coupled(System):
         self.solver.close()
 
     def cost(self, time: float) -> Cost:
-        """Of so much flow time [s]. CommandError for conditions that implicit steps do not know. Collective."""
+        """Estimate the cost of so much flow time [s]. CommandError for conditions that implicit steps do not support.
+        Collective."""
         self.sim.close_model()
         self._take_nodes()
         kept = self._of_joints()
@@ -178,7 +179,7 @@ class Coupled(System):
     # ---- time steps ----------------------------------------------------------------------------------------------
 
     def advance(self, end: float) -> None:
-        """One time step, at most to this flow time [s]."""
+        """Take one time step, at most to this flow time [s]."""
         flow = self.flow
         change = min((well.next_change(flow.time) for well in flow.wells), default=math.inf)
         left = min(end, change) - flow.time

@@ -27,7 +27,7 @@ POINTS = 5
 
 
 def stored(sim: Blocks) -> tuple[float, float]:
-    """In elements and in joints now [J/m], in space [J]. Collective."""
+    """Energy stored in elements and in joints now [J/m], in space [J]. Collective."""
     return exact_sum(sim.local.stresses()[1], sim.comm), exact_sum(sim.local.stored_in_joints(), sim.comm)
 
 

@@ -234,7 +234,7 @@ class Fluid:
             self.flow.slurry.show(self.packs(self.volume if volume is None else volume)[0, self.held_rows])
 
     def balance(self, step: Step, u: np.ndarray, x: np.ndarray) -> Balance:
-        """What the nodes lack at these variables (n,) and positions of the blocks' nodes (nn, dim)."""
+        """Residual of the nodes at these variables (n,) and positions of the blocks' nodes (nn, dim)."""
         table = self.table_at(x)
         if self.thicken is not None:
             self.thicken(self.ends, table)
@@ -357,7 +357,7 @@ class Fluid:
         return given
 
     def _note_well(self, well: Well, rows: np.ndarray, step: Step, state: np.ndarray, came: float) -> None:
-        """What a well did in a step."""
+        """Record the action of a well in a step."""
         well.pressure = float(state[rows[np.argmax(state[rows, kernels.E])], kernels.P])
         well.rate = came / step.dt
         well.injected += came

@@ -128,7 +128,7 @@ class Flow(Values):
     # ---- the clock ---------------------------------------------------------------------------------------------------
 
     def _given(self) -> list[float]:
-        """What the length of a sub-step follows from, beside the channels."""
+        """Everything except the channels that determines the length of a sub-step."""
         o = self.blocks.options
         switches = [float(o.mechanical), float(o.dynamic), float(o.flow_every), float(o.flow_steps), o.flow_dt]
         return [*switches, *self._gravity(), self.blocks.clock.dt if o.mechanical else 0.0]
@@ -259,7 +259,7 @@ class Flow(Values):
         self._refresh()
 
     def _pump(self, before: float) -> None:
-        """What wells did since then."""
+        """Apply the wells since the last call."""
         there = self.network.there
         points = [well.points[there[well.points]] for well in self.wells]
         at = np.concatenate(points)

@@ -18,7 +18,8 @@ from hpcdem.physics.fdem.mesh import Mesh
 
 @dataclass(frozen=True)
 class Shape:
-    """What channels are. links: corners between which fluid goes; facing: which corner of the other face faces each."""
+    """Geometry of channels. links: corners between which fluid flows; facing: the corner of the other face opposite
+    each."""
 
     links: tuple[tuple[int, int], ...]
     facing: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""One sub-step of flow, written plainly: the oracle of the kernels."""
+"""One sub-step of flow in plain form: the reference for tests of the kernels."""
 
 from __future__ import annotations
 

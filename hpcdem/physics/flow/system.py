@@ -42,7 +42,7 @@ class Found:
 
 @dataclass
 class Count:
-    """Of a run: time steps, those that were cut, iterations, factors."""
+    """Counts of a run: time steps, repeated steps, iterations, factorisations."""
 
     steps: int = 0
     cut: int = 0
@@ -53,7 +53,7 @@ class Count:
 
 
 class System:
-    """Of blocks, if they move, and their fluid. Methods are collective."""
+    """Equations of the blocks, if they move, and of their fluid. Methods are collective."""
 
     fluid: Fluid
     solver: Direct | Petsc | Condensed
@@ -98,7 +98,7 @@ class System:
         return n * (2 if self.moves and slurry is not None and slurry.packs(lambda mine: mine) is not None else 1)
 
     def _unknowns(self) -> Unknowns:
-        """Those of the blocks, then the variable of each flow node, and of its pack."""
+        """Unknowns of the blocks, then the variable of each flow node and of its pack."""
         of, n, blocks, dim = self.of_blocks, self._of_fluid(), len(self.x), self.sim.dim
         number = np.full((blocks + n, dim), -1, np.int64)
         number[:blocks] = of.number
@@ -133,7 +133,7 @@ class System:
         return made
 
     def _condenses(self) -> bool:
-        """What is unknown is mostly that of elements."""
+        """Whether most unknowns are those of elements."""
         return self.moves and Condensed.suits(self.unknowns, self._of_joints())
 
     def _of_joints(self) -> np.ndarray:

@@ -15,7 +15,7 @@ from hpcdem.physics.flow.network import LINKS, SHAPES, normals
 
 @dataclass
 class Tangent:
-    """Of the fluid of a model."""
+    """Tangent of the fluid of a model."""
 
     of: Fluid
 

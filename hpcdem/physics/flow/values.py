@@ -1,4 +1,4 @@
-"""What can be asked of flow nodes and channels."""
+"""Quantities of flow nodes and channels that can be queried."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Values(Faces):
         return self._on_all_ranks(found[numbers])
 
     def link_flows(self) -> np.ndarray:
-        """What flows at this moment along the links (l,) of all channels [m2/s], on all ranks."""
+        """Present flow along the links (l,) of all channels [m2/s], on all ranks."""
         blocks, links = self.blocks, LINKS[self.blocks.dim]
         blocks.close_model()
         self._find_flows(0.0)

@@ -41,8 +41,8 @@ class Stage:
 
 @dataclass(frozen=True)
 class Asked:
-    """What a well does in an implicit step: the pressure at its highest node [Pa], or None and an amount [m2]
-    (negative: drawn) that leads to no more than a limit [Pa]."""
+    """Action of a well in an implicit step: the pressure at its highest node [Pa], or None and an amount [m2]
+    (negative: withdrawn) that respects a limit [Pa]."""
 
     pressure: float | None
     amount: float
@@ -63,8 +63,7 @@ class Well:
     wall: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
 
     def add(self, stage: Stage, now: float) -> None:
-        """One more stage, after the others; one without an end that has begun ends now. CommandError if one would
-        never act."""
+        """Append a stage; a stage without an end that has begun ends now. CommandError if a stage would never act."""
         begin = max(now, self.stages[-1].end if self.stages else now)
         if self.stages and math.isinf(begin):
             last = self.stages[-1]
@@ -77,7 +76,7 @@ class Well:
         self.stages.append(replace(stage, begin=begin, end=begin + stage.end))
 
     def number(self, time: float) -> int:
-        """Of the stage that is on just before a time of flow, from 1; 0: none."""
+        """Number of the stage that is active just before a flow time, from 1; 0: none."""
         return next((k for k, one in enumerate(self.stages, 1) if one.begin < time <= one.end), 0)
 
     def will_act(self, time: float) -> bool:
@@ -98,7 +97,7 @@ class Well:
         return amount, min((one.limit for one in rates), default=math.inf)
 
     def asked(self, before: float, after: float, value: Callable[[Number, float], float]) -> Asked:
-        """What it does in an implicit step, in which no stage ends."""
+        """Action in an implicit step, in which no stage ends."""
         number = self.number(0.5 * (before + after))
         if number and (one := self.stages[number - 1]).does == PRESSURE:
             return Asked(value(one.value, after), 0.0, math.inf)
@@ -142,7 +141,7 @@ class Well:
         return found
 
     def saved(self) -> dict[str, Any]:
-        """As JSON values."""
+        """The well as JSON values."""
         stages = [{**asdict(one), "end": _json(one.end), "limit": _json(one.limit)} for one in self.stages]
         return {**vars(self), "points": self.points.tolist(), "wall": self.wall.tolist(), "stages": stages}
 

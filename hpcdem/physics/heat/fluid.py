@@ -201,7 +201,7 @@ class FluidHeat(Assigned, Travelling):
 
     @property
     def links(self) -> int:
-        """Of each channel."""
+        """Links of each channel."""
         return LINKS[self.blocks.dim]
 
     def walls(self, channels: np.ndarray) -> np.ndarray:
@@ -236,7 +236,7 @@ class FluidHeat(Assigned, Travelling):
         self._refresh()
 
     def add_to_limit(self, corner: np.ndarray) -> None:
-        """What walls pass on at most at corners (flat) per degree [W/(m K)]. Not collective."""
+        """Add the largest heat that walls can pass to corners (flat) per degree [W/(m K)]. Not collective."""
         there = self._walls >= 0
         np.add.at(corner, self._walls[there], np.repeat(self._exchange, 4)[there.reshape(-1)])
 
@@ -343,7 +343,7 @@ class FluidHeat(Assigned, Travelling):
     # ---- state on disk -------------------------------------------------------------------------------------------
 
     def saved_state(self) -> dict[str, Any]:
-        """As JSON values."""
+        """State as JSON values."""
         return {"rows": self._saved_properties(), "rho_c": self.rho_c}
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:

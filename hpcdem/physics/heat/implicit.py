@@ -67,7 +67,7 @@ class Implicit:
             self.solver = None
 
     def advance(self, dt: float) -> None:
-        """One step of dt [s]."""
+        """Take one step of dt [s]."""
         before = self._solve(dt)
         self.heat.time += dt
         self._settle(before)
@@ -227,7 +227,7 @@ class Implicit:
         self._made_for = made_for
 
     def _pieces(self, dt: float) -> list[Pieces]:
-        """Of the elements and the faces of this rank."""
+        """Matrix entries of the elements and faces of this rank."""
         sim, heat = self.sim, self.heat
         capacity, found = sim.cold[heat.capacities].reshape(-1), []
         for kind, number, corners, g in heat.conduction.by_kind():

@@ -43,7 +43,7 @@ class Fluid:
 
     @staticmethod
     def there(heat: Heat) -> Fluid | None:
-        """That of a closed model, None without heat in its fluid. Collective."""
+        """The fluid of a closed model; None if heat does not flow with fluid. Collective."""
         fluid = heat.flowing
         if fluid is None:
             return None
@@ -64,7 +64,7 @@ class Fluid:
         )  # fmt: skip
 
     def made_for(self) -> tuple[bytes, ...]:
-        """What the matrix follows from."""
+        """Everything that determines the matrix."""
         parts = (self.ends, self.q, self.conduct, self.exchange, self.walls, self.held, self.capacity)
         return tuple(one.tobytes() for one in parts)
 

@@ -164,7 +164,7 @@ class Heat(Diffusing):
         return self.column("transfer_coeficient")[self.row]
 
     def find_contacts(self) -> None:
-        """Where faces touch now, of pairs with an element of this rank; the model is closed. Not collective."""
+        """Find where faces touch now, for pairs with an element of this rank; the model is closed. Not collective."""
         self._passes, room = self.passes, 0
         while True:
             ends = 2 * self.blocks.dim
@@ -358,7 +358,7 @@ class Heat(Diffusing):
             blocks.cold[HEAT_OF_FRICTION] += out[blocks.owned]
 
     def _take_friction(self) -> None:
-        """What has come from friction flows in during this cycle, evenly."""
+        """Distribute the heat of friction evenly over this cycle."""
         if self._has_friction:
             friction_heat = self.blocks.cold[HEAT_OF_FRICTION]
             self.blocks.cold[self.given] += friction_heat

@@ -1,4 +1,4 @@
-"""What elements of liners provide, whatever they are: beams in the plane, flat shells in space."""
+"""Interface of the elements of liners: beams in the plane, flat shells in space."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Elements(ABC):
         """Columns of frames with the nodes of elements."""
 
     def largest_at_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Of values (m,) of elements, at each node (n,)."""
+        """Largest of the values (m,) of elements at each node (n,)."""
         out = np.zeros(len(self.liners))
         np.maximum.at(out, self.liners.elements["ends"].reshape(-1), np.repeat(values, self.corners))
         return out

@@ -210,7 +210,7 @@ class Liners(Structure):
         return self.kind.element_value(name)
 
     def columns(self) -> dict[str, dict[str, np.ndarray]]:
-        """What frames hold: "nodes" with the number of their liner, "elements" with their nodes. Not collective."""
+        """Columns of frames: "nodes" with the number of their liner, "elements" with their nodes. Not collective."""
         found = super().columns()
         return {
             "nodes": {"liner": self.nodes["liner"].copy(), **found["nodes"]},

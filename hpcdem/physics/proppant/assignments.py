@@ -1,5 +1,6 @@
-"""What commands say of proppant: which channels carry it, its properties, what comes in at nodes. All of it is known to
-all ranks by the numbers of the mesh."""
+"""Assignments of proppant: the channels that carry it, its properties, its inflow at nodes. All of it is known to all
+ranks by the numbers of the mesh.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +64,7 @@ class ProppantAssignments(Travelling, Field):
         self.blocks.changed()
 
     def _nodes(self, points: np.ndarray | None) -> np.ndarray:
-        """Those of these points (None: all) at which a channel ends that carries proppant."""
+        """Return those of these points (None: all) at the end of a channel that carries proppant."""
         network = self.flow.network
         asked = self.flow.flow_nodes(points)
         found = np.intersect1d(asked, network.corners[self.carries[network.channels]])

@@ -115,7 +115,7 @@ class Proppant(ProppantAssignments):
         return closed(found, found["came"] - found["stored"] - found["left"] - found["removed"])
 
     def speed(self) -> float:
-        """Of a single grain that settles [m/s], up if negative. Not collective."""
+        """Settling velocity of a single grain [m/s], upwards if negative. Not collective."""
         flow, v = self.flow, self.values
         law = settling.stokes if v["proppant_stokes"] > 0.0 else settling.terminal
         gravity = math.hypot(*self._gravity())
@@ -149,7 +149,7 @@ class Proppant(ProppantAssignments):
         self.state[:, kernels.PUSHES] = pushes
 
     def thicken(self, ends: np.ndarray, table: np.ndarray) -> None:
-        """What proppant does to the channels of this rank. Not collective."""
+        """Apply the effect of proppant to the channels of this rank. Not collective."""
         if self._held is self.flow.held:  # else rows are about to be found
             self._thicken(ends, self.state, table)
 
@@ -279,7 +279,7 @@ class Proppant(ProppantAssignments):
             flow.find_geometry()
 
     def _advance(self, dt: float) -> None:
-        """As long [s] as the fluid has flowed."""
+        """Advance by the time [s] for which the fluid has flowed."""
         flow, v, nodes, comm = self.flow, self.values, self.nodes, self.blocks.comm
         nodes[:, kernels.ROOM_BEFORE] = nodes[:, kernels.ROOM]
         self._find_rooms()
@@ -335,13 +335,13 @@ class Proppant(ProppantAssignments):
             )
 
     def _find_falls(self) -> None:
-        """How far down the channels of this rank go where they are now."""
+        """Find the vertical extent of this rank's channels at their present positions."""
         down = np.array(self._gravity())
         down /= max(float(np.sqrt((down * down).sum())), 1e-300)
         kernels.falls(*self.flow.sides, self.blocks.x, down, self._falls)
 
     def _sources(self, dt: float, count: int) -> None:
-        """What conditions bring or take in each sub-step of the owned nodes."""
+        """Inflow and outflow by conditions in each sub-step of the owned nodes."""
         flow, tables = self.flow, self.blocks.tables
         came = flow.nodes[:, flowing.GIVEN] - self.given
         self.given = flow.nodes[:, flowing.GIVEN].copy()
