@@ -239,16 +239,42 @@ class Geometry(Words):
         shortest : shorter pieces at the boundary are omitted [m] (in the plane; default: 0).
         seed : seed of the random numbers: each seed gives another network.
         """
-    def import_file(self, file: File, as_layer: str, dxf_layer: str | None = None, scale: float | None = None) -> None:
-        """Lines of a DXF file; in three dimensions the solids of a STEP or BREP file, or what the triangles of an STL
-        or DXF file (3DFACE) enclose.
+    def import_file(
+        self,
+        file: File,
+        as_layer: str,
+        dxf_layer: str | None = None,
+        scale: float | None = None,
+        *,
+        named: bool = False,
+        origin: Point | None = None,
+        to: Point | None = None,
+        line: tuple[Point, Point] | None = None,
+        legend: File | None = None,
+        attribute: str | None = None,
+        simplify: float | None = None,
+    ) -> None:
+        """Lines of a DXF file, or polygons and lines of a section: GeoJSON, shapefile, SVG, DXF, or an image with a
+        legend (docs/sections.md); in three dimensions the solids of a STEP or BREP file, or what the triangles of an
+        STL or DXF file (3DFACE) enclose.
 
         Parameters
         ----------
         file : name of the file.
         as_layer : name of the layer; a layer may hold several shapes.
         dxf_layer : only this layer of the file (default: all).
-        scale : metres in a unit of the file [m] (default: the unit given in STEP and DXF files, else 1).
+        scale : metres in a unit of the file [m] (default: the unit given in STEP, DXF and .prj files, else 1).
+        named : each name in the section becomes a layer, and as_layer the outline of all its polygons (in the
+            plane).
+        origin : point of the section, in its units, that is moved to `to` (in the plane; default: (0,0)).
+        to : position of the origin in the model [m] (in the plane; default: (0,0)).
+        line : two points of a map with heights, in its units: x is the distance along their line, y the height (in
+            the plane).
+        legend : of an image: file with lines colour, name (in the plane).
+        attribute : attribute whose value is the name (GeoJSON, shapefiles) (in the plane; default: name, layer,
+            unit, formation, label or id).
+        simplify : omits points of boundaries where triangles of less than half the square of this length disappear
+            [m] (in the plane).
         """
     def transform(
         self,
@@ -288,13 +314,27 @@ class Geometry(Words):
         way : where to [m].
         layer : names of layers (default: all).
         """
-    def export(self, layers: Sequence[str], file: File) -> None:
-        """In the plane: writes layers to a DXF file, in metres, each as a layer of its name.
+    def export(
+        self,
+        layers: Sequence[str],
+        file: File,
+        *,
+        scale: float | None = None,
+        origin: Point | None = None,
+        to: Point | None = None,
+        line: tuple[Point, Point] | None = None,
+    ) -> None:
+        """In the plane: writes layers to a DXF, GeoJSON or CSV file under their names: in metres, or in the coordinates
+        from which `geometry.import_file` with these options makes those of the model.
 
         Parameters
         ----------
         layers : names of the layers.
         file : name of the file, in the folder of the results.
+        scale : metres in a unit of the file [m] (default: 1).
+        origin : point of the section, in its units, that is moved to `to` (default: (0,0)).
+        to : position of the origin in the model [m] (default: (0,0)).
+        line : two points of a map with heights, in its units: x is the distance along their line, y the height.
         """
     def delete(self, *layers: str) -> None:
         """Delete layers; meshes created from them keep their edges.

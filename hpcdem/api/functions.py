@@ -94,6 +94,7 @@ TAKEN = {
     "where": Taken("Selected", lambda sim, where: selection(where)),
     "color": Taken("str | int", lambda sim, color: color_number(color)),
     "dofs": Taken("str", lambda sim, dofs: _degrees(dofs)),
+    "legend": Taken("File", lambda sim, file: None if file is None else sim._existing(file)),
     "num": Taken("int", lambda sim, num: int(num)),
     "list[float]": Taken("Iterable[float]", lambda sim, radii: _radii(radii)),
 }

@@ -20,6 +20,7 @@ class ParticleCommands:
     gen_grid = Function("particles.gen_grid")
     gline = Function("particles.gline", "p1 p2 rad cratio")
     load = Function("particles.load", alone=True)
+    section = Function("sections.section", "file")
     clump = Function("clumps.clump")
     join = Function("clumps.join", "where! group color")
     delete = Function("particles.delete")

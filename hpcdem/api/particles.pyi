@@ -167,6 +167,57 @@ class ParticleCommands:
         -------
         int : how many there are.
         """
+    def section(
+        self,
+        file: File,
+        *,
+        scale: float | None = None,
+        origin: tuple[float, float] = (0.0, 0.0),
+        to: tuple[float, float] = (0.0, 0.0),
+        line: tuple[tuple[float, float], tuple[float, float]] | None = None,
+        legend: File | None = None,
+        attribute: str | None = None,
+        only: Sequence[str] | str = (),
+        rad: Sequence[float] | float | None = None,
+        porosity: float | None = None,
+        cut: bool = False,
+        ebmod: float | None = None,
+        gbmod: float | None = None,
+        tstrength: float | None = None,
+        sstrength: float | None = None,
+        n_bond: float | None = None,
+        s_bond: float | None = None,
+        where: Selected = None,
+    ) -> int:
+        """SECTION: use the polygons or the lines of a file .geojson, .json, .shp, .svg, .dxf or of an image.
+
+        Without further words, particles with their centres in a polygon get its name as group, and its attributes
+        that are
+        properties (density, fric, kn, ...) or color; later polygons of the file cover earlier ones. With rad, the
+        polygons
+        are filled with new particles. With cut, bonds that cross a line are removed; with bond properties they get
+        these.
+
+        Parameters
+        ----------
+        file : the section.
+        scale : metres in a unit of the file; left out, as the file says, else 1.
+        origin, to : point of the file, in its units, and where it is in the model [m].
+        line : two points of a map, in its units: x is the distance along the line through them, y the height (z).
+        legend : of an image: a file with lines colour, name.
+        attribute : whose value is the name, of GeoJSON and shapefiles; left out, name, layer, unit, ... or id.
+        only : names of the polygons and lines that are used; left out, all.
+        rad : radii of new particles that are drawn from [m].
+        porosity : of the filled polygons; 0.2.
+        cut : remove the bonds that cross a line.
+        ebmod, gbmod, tstrength, sstrength : of elastic bonds that cross a line [Pa].
+        n_bond, s_bond : of contact bonds that cross a line [N].
+        where : the particles, of new ones none; of a bond both.
+
+        Returns
+        -------
+        int : how many particles got a group or are new, or how many bonds changed.
+        """
     def clump(
         self,
         file: File,
@@ -290,9 +341,14 @@ class ParticleCommands:
         -------
         int : how many are new.
         """
-    def break_bonds(self, where: Selected = None) -> int:
+    def break_bonds(self, where: Selected = None, across: Sequence[np.ndarray] | None = None) -> int:
         """BOND break: remove the bonds with both ends in `where`; how many. Shear forces stay, limited by friction from
         then on.
+
+        Parameters
+        ----------
+        where : particles; both of a pair are among them.
+        across : lines, of points (n, 2) [m]: only bonds that cross one of them; left out, all.
         """
     def fix(self, *dofs: str, where: Selected = None) -> None:
         """FIX: these of "x", "y", "spin" keep the velocity they have."""

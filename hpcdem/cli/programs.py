@@ -40,6 +40,7 @@ GROUPS: dict[str, tuple[Program, ...]] = {
     "Make": (
         Program("case", "[NAME]", "write the script of a ready-made model", "case"),
         Program("examples", "[NAME]", "list the examples, or copy one to this folder", "examples"),
+        Program("section", "FILE", "inspect or convert a geological section, extract horizons", "section", looks=True),
         Program("grade", "FILE", "generate grains from a grading curve", "grade_page"),
     ),
     "Manage": (

@@ -29,6 +29,10 @@ COLOURS = {
 }
 """Colours of fields, and their names in matplotlib. blue-red and orange-violet, white in their middle, are for values
 of both signs. The colour-blind can read all but yellow-green, spectral and rainbow."""
+NUMBERS = {
+    "lg": 0, "green": 1, "yellow": 2, "red": 3, "white": 4, "black": 5, "mg": 6, "blue": 7, "gb": 8, "violet": 9,
+}  # fmt: skip
+"""Names and numbers of the colours of particles (ZDEM manual, chapter 9)."""
 EYES = {
     "+x": (1.0, 0.0, 0.0), "-x": (-1.0, 0.0, 0.0), "+y": (0.0, 1.0, 0.0), "-y": (0.0, -1.0, 0.0),
     "+z": (0.0, 0.0, 1.0), "-z": (0.0, 0.0, -1.0), "iso": (1.0, -1.0, 1.0),

@@ -134,28 +134,33 @@ class Interval(Selection):
         return inside
 
 
-@dataclass(frozen=True)
-class Polygon(Selection):
-    """Centres inside a polygon by the even-odd rule; corners ((x, y), ...) in either orientation.
+def even_odd(rings: Sequence[np.ndarray], x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Which points (n,) are inside rings of corners (m, 2), by the even-odd rule.
 
-    Like an interval, it includes its lower and left boundary and excludes its upper and right one: where two polygons
-    share an edge, every centre belongs to exactly one of them.
+    Like an interval, an area includes its lower and left boundary and excludes its upper and right one: where two areas
+    share an edge, every point belongs to exactly one of them.
     """
-
-    corners: tuple[tuple[Value, Value], ...]
-
-    def mask(self, p: Particles) -> np.ndarray:
-        x, y = p["x"], p["y"]
-        inside = np.zeros(np.shape(x), dtype=bool)
-        for (xa, ya), (xb, yb) in zip(self.corners, self.corners[1:] + self.corners[:1]):
-            low, high = sorted([(_plain(ya), _plain(xa)), (_plain(yb), _plain(xb))])
-            (y0, x0), (y1, x1) = low, high
+    inside = np.zeros(np.shape(x), dtype=bool)
+    for ring in rings:
+        for (xa, ya), (xb, yb) in zip(ring.tolist(), np.roll(ring, -1, axis=0).tolist()):
+            (y0, x0), (y1, x1) = sorted([(ya, xa), (yb, xb)])
             # A ray to +x crosses the edge if the edge spans the centre's height and lies to its right. The sign of a
             # cross product needs no division; lower end first makes it the same number for both neighbours.
             spans = (y0 <= y) & (y < y1)
             right = (x1 - x0) * (y - y0) - (x - x0) * (y1 - y0) > 0.0
             inside ^= spans & right
-        return inside
+    return inside
+
+
+@dataclass(frozen=True)
+class Polygon(Selection):
+    """Centres inside a polygon by the even-odd rule; corners ((x, y), ...) in either orientation."""
+
+    corners: tuple[tuple[Value, Value], ...]
+
+    def mask(self, p: Particles) -> np.ndarray:
+        corners = np.array([(_plain(x), _plain(y)) for x, y in self.corners])
+        return even_odd([corners], p["x"], p["y"])
 
 
 @dataclass(frozen=True)

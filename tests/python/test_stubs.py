@@ -54,10 +54,10 @@ def test_a_method_of_particles_has_the_arguments_of_its_function(name: str) -> N
     for one, parameter in own.items():
         if {parameter.default, names[one].default} != {None, inspect.Parameter.empty} and name != "join":
             assert parameter.default == names[one].default, one
-        if one not in ("where", "color", "rad", "file", "dofs"):
+        if one not in ("where", "color", "rad", "file", "dofs", "legend"):
             kind = names[one].annotation
             assert parameter.annotation in (kind, f"{kind} | None")
-    assert not any(one in functions.TAKEN for one in own if one not in ("where", "color", "dofs", "num"))
+    assert not any(one in functions.TAKEN for one in own if one not in ("where", "color", "dofs", "num", "legend"))
 
 
 class Python:

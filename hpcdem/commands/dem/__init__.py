@@ -19,13 +19,14 @@ if TYPE_CHECKING:
         physics,
         properties,
         queries,
+        sections,
         settings,
         walls,
     )
 
 __all__ = [
-    "bonds", "checkpoints", "clumps", "cycles", "history", "particles", "physics", "properties", "queries", "settings",
-    "walls",
+    "bonds", "checkpoints", "clumps", "cycles", "history", "particles", "physics", "properties", "queries", "sections",
+    "settings", "walls",
 ]  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from hpcdem.core.selection import Selection
 from hpcdem.core.units import with_prefix
 from hpcdem.physics.dem.kernels import contacts, laws, mass
 from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.pre.section.crossing import crossing
 
 ELASTIC = ("ebmod", "gbmod", "tstrength", "sstrength")
 KEPT = (*ELASTIC, "rubber", "conserving")
@@ -222,19 +223,59 @@ def _warn_of_loose_bonds(sim: Simulation, ids: list[list[int]]) -> None:
         )
 
 
-def break_bonds(sim: Simulation, where: Selection | None = None) -> int:
+def break_bonds(sim: Simulation, where: Selection | None = None, across: Sequence[np.ndarray] | None = None) -> int:
     """BOND break: remove the bonds with both ends in `where`; how many. Shear forces stay, limited by friction from
-    then on."""
+    then on.
+
+    Parameters
+    ----------
+    where : particles; both of a pair are among them.
+    across : lines, of points (n, 2) [m]: only bonds that cross one of them; left out, all.
+    """
     sim.close_model()
     lists = sim.lists
-    which = _flags_with_ghosts(sim, where)
-    gone = sum(
-        contacts.break_bonds(t, lists.blocks, lists.ptr, lists.partner, lists.bond, which)
-        for t in range(lists.n_blocks)
-    )
+    if across is None:
+        which = _flags_with_ghosts(sim, where)
+        gone = sum(
+            contacts.break_bonds(t, lists.blocks, lists.ptr, lists.partner, lists.bond, which)
+            for t in range(lists.n_blocks)
+        )
+    else:
+        slots, own = _across(sim, where, across)
+        lists.bond[slots] = 0
+        gone = int(own.sum())
     total = sim.count(gone)
     sim.bonds -= total
     return total
+
+
+def renew(sim: Simulation, where: Selection | None, across: Sequence[np.ndarray], **values: float | None) -> int:
+    """New properties of the bonds with both ends in `where` that cross one of the lines, of points (n, 2) [m]; those
+    that are left out stay. How many. values: as of `bond`."""
+    kind, given = _law_of([values.get(n) for n in ELASTIC], [values.get(n) for n in ("n_bond", "s_bond")])
+    sim.close_model()
+    slots, own = _across(sim, where, across)
+    renewed = _renewed(sim, kind, given)
+    lists = sim.lists
+    if len(slots):
+        lists.bond[slots] = renewed[lists.bond[slots]]
+    sim.tables_changed()
+    ends = np.zeros(len(sim.particles.hot), bool)
+    ends[lists.row[slots]] = ends[lists.partner[slots]] = True
+    _warn_of_overstretched(sim, ends)
+    return sim.count(int(own.sum()))
+
+
+def _across(sim: Simulation, where: Selection | None, lines: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Slots of the bonds with both ends in `where` that cross one of the lines, and which of them this rank counts."""
+    lists, p = sim.lists, sim.particles
+    which = _flags_with_ghosts(sim, where)
+    slots = _slots(lists)
+    slots = slots[(lists.bond[slots] != 0) & which[lists.row[slots]] & which[lists.partner[slots]]]
+    i, j = lists.row[slots], lists.partner[slots]
+    slots = slots[crossing(p.hot[i][:, [X, Y]], p.hot[j][:, [X, Y]], lines)]
+    row = lists.row[slots]
+    return slots, (row >= p.owned.start) & (row < p.owned.stop)
 
 
 def _flags_with_ghosts(sim: Simulation, where: Selection | None) -> np.ndarray:

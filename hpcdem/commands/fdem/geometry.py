@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,10 @@ from hpcdem.core.errors import CommandError
 from hpcdem.io.agreed import on_first
 from hpcdem.pre.mesh import cad, dxf, solids
 from hpcdem.pre.mesh import geometry as shapes
+from hpcdem.pre.section.check import outline
+from hpcdem.pre.section.read import read
+from hpcdem.pre.section.shapes import Placement, Section, Shape
+from hpcdem.pre.section.write import FORMATS, write
 
 if TYPE_CHECKING:  # brings kernels, and shapes are made when a script is read
     from hpcdem.commands.fdem.project import Project
@@ -66,14 +71,48 @@ def _polygons(project: Project, layer: str) -> list[solids.Polygon]:
 
 
 def import_file(
-    project: Project, file: str, as_layer: str = DEFAULT_LAYER, dxf_layer: str | None = None, scale: float | None = None
+    project: Project,
+    file: str,
+    as_layer: str = DEFAULT_LAYER,
+    dxf_layer: str | None = None,
+    scale: float | None = None,
+    named: bool = False,
+    origin: Vector = (0.0, 0.0),
+    to: Vector = (0.0, 0.0),
+    line: tuple[Vector, Vector] | None = None,
+    legend: str | None = None,
+    attribute: str | None = None,
+    simplify: float = 0.0,
 ) -> None:
-    """The lines of a DXF file, or of one of its layers; in space the solids of a STEP or BREP file, or what the
-    triangles of an STL or DXF file enclose. scale: metres in a unit of the file; None: as the file says, else 1.
-    Collective."""
+    """The lines of a DXF file, or of one of its layers, or of a section in another format; in space the solids of a
+    STEP or BREP file, or what the triangles of an STL or DXF file enclose. Collective.
+
+    scale: metres in a unit of the file; None: as the file says, else 1. Of sections: named: each name becomes a layer,
+    and as_layer the outline of all polygons; origin, to, line: see `Placement`; legend, attribute, simplify: see
+    `read`.
+    """
     path = project.to_read(file)
-    if project.dim == 3 and dxf_layer is not None and path.suffix.lower() != ".dxf":
-        raise CommandError(f"{path}: layers are of DXF files")
+    of_section = {
+        "named": named, "origin": tuple(origin) != (0.0, 0.0), "to": tuple(to) != (0.0, 0.0), "line": line is not None,
+        "legend": legend is not None, "attribute": attribute is not None, "simplify": bool(simplify),
+    }  # fmt: skip
+    given = [word for word, said in of_section.items() if said]
+    if project.dim == 3:
+        if given:
+            raise CommandError(f"{given[0]} of geometry import is for two dimensions")
+        if dxf_layer is not None and path.suffix.lower() != ".dxf":
+            raise CommandError(f"{path}: layers are of DXF files")
+    elif given or path.suffix.lower() != ".dxf":
+        if dxf_layer is not None and path.suffix.lower() != ".dxf":
+            raise CommandError(f"{path}: layers are of DXF files")
+        placement = Placement(
+            scale, _pair(origin), _pair(to), None if line is None else (_pair(line[0]), _pair(line[1]))
+        )
+        beside = None if legend is None else project.to_read(legend)
+        only = () if dxf_layer is None else (dxf_layer,)
+        found = project.comm.per_node(lambda: read(path, placement, beside, attribute, only, simplify), once=True)
+        _add_section(project, found, as_layer, named, path.name)
+        return
 
     def make() -> tuple[list[Any], list[str]]:
         notes: list[str] = []
@@ -81,7 +120,10 @@ def import_file(
             return cad.read(path, dxf_layer, scale, notes), notes
         drawing = dxf.opened(path)
         unit = dxf.metres(drawing, scale, notes)
-        found = dxf.curves(drawing, path, {dxf_layer} if dxf_layer else None)
+        left: Counter[tuple[str, str]] = Counter()
+        found = dxf.curves(drawing, path, {dxf_layer} if dxf_layer else None, notes_left=left)
+        if left:
+            notes.append("ignored: " + ", ".join(f"{n} {kind} of '{layer}'" for (kind, layer), n in left.items()))
         return [shapes.transformed(curve, scale=unit) for curves in found.values() for curve in curves], notes
 
     made, notes = project.comm.per_node(make, once=True)
@@ -96,6 +138,35 @@ def import_file(
         project.log.info(
             f"layer '{as_layer}': from ({first}) to ({last}) m; {path.name}: {'; '.join(notes) or 'in metres'}"
         )
+
+
+def _pair(at: Vector) -> tuple[float, float]:
+    if len(at) != 2:
+        raise CommandError(f"a point of a section has two coordinates, got {tuple(at)}")
+    return float(at[0]), float(at[1])
+
+
+def _add_section(project: Project, found: Section, as_layer: str, named: bool, file: str) -> None:
+    """Shapes of a section as curves of one layer; named: each in the layer of its name, and the outline of all polygons
+    in as_layer."""
+    if named:
+        names = dict.fromkeys(shape.name for shape in found.shapes)
+        taken = [name for name in names if name in project.layers or (name == as_layer and found.polygons)]
+        if taken:
+            raise CommandError(f"{file} has the name '{taken[0]}', which is a layer already; choose another as-layer")
+        for shape in found.shapes:
+            project.layers.add(shape.name, *shape.rings)
+        if found.polygons:
+            project.layers.add(as_layer, *outline(found, file))
+    else:
+        project.layers.add(as_layer, *(ring for shape in found.shapes for ring in shape.rings))
+    if project.log is not None:
+        layers = ", ".join(f"'{name}'" for name in (*([as_layer] if found.polygons else []), *names)) if named else ""
+        project.log.info(f"{file}: " + (f"layers {layers}" if named else f"layer '{as_layer}'"))
+        for note in found.notes:
+            project.log.info(f"{file}: {note}")
+        for warning in found.warnings:
+            project.log.warn(f"{file}: {warning}")
 
 
 def transform(
@@ -137,14 +208,32 @@ def _transformed(one: Any, **how: Any) -> Any:
     return (shapes if isinstance(one, shapes.Curve) else solids).transformed(one, **how)
 
 
-def export(project: Project, layers: Sequence[str], file: str) -> None:
-    """Write layers to a DXF file in the folder of the results, each as a layer of its name, in metres. Collective."""
-    if not file.lower().endswith(".dxf"):
-        raise CommandError(f"'{file}': layers are exported to files *.dxf")
+def export(
+    project: Project,
+    layers: Sequence[str],
+    file: str,
+    scale: float = 1.0,
+    origin: Vector = (0.0, 0.0),
+    to: Vector = (0.0, 0.0),
+    line: tuple[Vector, Vector] | None = None,
+) -> None:
+    """Write layers to a DXF, GeoJSON or CSV file in the folder of the results, under their names. In metres, or with
+    scale, origin, to and line in the coordinates from which `import_file` makes those of the model. Collective."""
+    if not file.lower().endswith(FORMATS):
+        raise CommandError(f"'{file}': layers are exported to files *.dxf, *.geojson or *.csv")
+    placement = Placement(scale, _pair(origin), _pair(to), None if line is None else (_pair(line[0]), _pair(line[1])))
+    own = placement != Placement(1.0)
     wanted = {layer: project.layers[layer] for layer in dict.fromkeys(layers)}
+    made = [Shape(name, (curve,), curve.closed) for name, curves in wanted.items() for curve in curves]
+    points = [shape.name for shape in made if not shape.rings[0].segments]
+    if points and not (file.lower().endswith(".dxf") and not own):
+        raise CommandError(f"layer '{points[0]}' has single points; export them to a .dxf file in metres")
     project.folder()
     path = project.to_write(project.result(file))
-    on_first(project.comm, lambda: dxf.write(path, wanted))
+    if file.lower().endswith(".dxf") and not own:
+        on_first(project.comm, lambda: dxf.write(path, wanted))
+    else:
+        on_first(project.comm, lambda: write(path, made, placement))
 
 
 def delete(project: Project, layers: Sequence[str]) -> None:

@@ -984,6 +984,13 @@ _LENGTHS = (
     Option("great{est}", (POSITIVE,), "upper bound", "m", "none"),
 )
 
+_PLACEMENT = (
+    Option("origin", (VECTOR,), "point of the section, in its units, that is moved to `to`", "", "(0,0)", dims=PLANE),
+    Option("to", (VECTOR,), "position of the origin in the model", "m", "(0,0)", dims=PLANE),
+    Option("line", (VECTOR, VECTOR), "two points of a map with heights, in its units: x is the distance along their "
+           "line, y the height", dims=PLANE),
+)  # fmt: skip
+
 _GEOMETRY = (
     Command("geom{etry} c{reate} p{olyline}", "Straight lines from point to point.",
             ("pcdc geometry create polyline ([i],0) (0,[i]) as-layer ['line'+ str(i)]",),
@@ -1087,13 +1094,24 @@ _GEOMETRY = (
                      Option("about", (VECTOR,), "a point of it", "m", "(0,0,0)"),
                      Option("angle", (POSITIVE,), "right-handed, up to 360", "degrees", "360"), _LAYER), dims=SPACE,
             does="geometry.revolve"),
-    Command("geom{etry} imp{ort}", "Lines of a DXF file; in three dimensions the solids of a STEP or BREP file, or "
-            "what the triangles of an STL or DXF file (3DFACE) enclose.",
-            ("pcdc geometry import 'slope.dxf' as-layer 'slope'",),
+    Command("geom{etry} imp{ort}", "Lines of a DXF file, or polygons and lines of a section: GeoJSON, shapefile, SVG, "
+            "DXF, or an image with a legend (docs/sections.md); in three dimensions the solids of a STEP or BREP file, "
+            "or what the triangles of an STL or DXF file (3DFACE) enclose.",
+            ("pcdc geometry import 'slope.dxf' as-layer 'slope'",
+             "pcdc geometry import 'wedge.geojson' named as-layer 'outline'",
+             "pcdc geometry import 'wedge.png' legend 'wedge.txt' scale 12.5 simplify 25 named as-layer 'outline'"),
             (_leading("file", FILE, "name of the file"),),
             (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all"),
-             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "the unit given in STEP and DXF files, "
-                                                                               "else 1")),
+             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "the unit given in STEP, DXF and .prj "
+                                                                               "files, else 1"),
+             Option("named", (), "each name in the section becomes a layer, and as-layer the outline of all its "
+                                 "polygons", dims=PLANE),
+             *_PLACEMENT,
+             Option("legend", (FILE,), "of an image: file with lines colour, name", dims=PLANE),
+             Option("attribute", (STRING,), "attribute whose value is the name (GeoJSON, shapefiles)", "",
+                    "name, layer, unit, formation, label or id", dims=PLANE),
+             Option("simplify", (POSITIVE,), "omits points of boundaries where triangles of less than half the square "
+                                             "of this length disappear", "m", "off", dims=PLANE)),
             dims=BOTH, does="geometry.import_file"),
     Command("geom{etry} transf{orm}", "Moves, turns or scales a layer.",
             ("pcdc geometry transform 'hole' rotate 30 about (0,0) move (1,0)",),
@@ -1111,10 +1129,13 @@ _GEOMETRY = (
     Command("geom{etry} t{ranslate}", "Moves layers; without layer all of them.",
             ("pcdc geometry translate (10,0) layer 'hole' 'slope'",),
             (_leading("way", VECTOR, "where to", "m"),), (_SOME_LAYERS,), dims=BOTH, does="geometry.translate"),
-    Command("geom{etry} exp{ort}", "Writes layers to a DXF file, in metres, each as a layer of its name.",
-            ("pcdc geometry export 'hole' 'slope' file 'plan.dxf'",),
+    Command("geom{etry} exp{ort}", "Writes layers to a DXF, GeoJSON or CSV file under their names: in metres, or in "
+            "the coordinates from which geometry import with these options makes those of the model.",
+            ("pcdc geometry export 'hole' 'slope' file 'plan.dxf'",
+             "pcdc geometry export 'fault' file 'fault.geojson' origin (512300,0) to (0,100)"),
             (_leading("layers", STRINGS, "names of the layers"),),
-            (Option("f{ile}", (FILE,), "name of the file, in the folder of the results", required=True),),
+            (Option("f{ile}", (FILE,), "name of the file, in the folder of the results", required=True),
+             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1"), *_PLACEMENT),
             does="geometry.export"),
     Command("geom{etry} d{elete}", "Forgets layers.", ("pcdc geometry delete 'hole'", "pcdc geometry delete 'a' 'b'"),
             (_leading("layers", STRINGS, "names of the layers"),), dims=BOTH, does="geometry.delete"),

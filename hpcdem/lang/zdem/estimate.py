@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.commands import section_area
 from hpcdem.core import selection as sel
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.io.dat import is_frame, read_dat
@@ -29,7 +30,7 @@ the ZDEM manual, 0.943 to 0.956; linear: a bed of 250 000 disks of 0.1 to 0.3 mm
 FAILURES = 1000
 """Attempts without room in a row after which GEN gives up, unless SET gentry gives a number per particle requested."""
 
-MAKERS = ("RESTORE", "LOAD", "BALL", "GLINE", "GEN", "CLUMP")
+MAKERS = ("RESTORE", "LOAD", "BALL", "GLINE", "GEN", "CLUMP", "SECTION")
 
 Rectangle = tuple[float, float, float, float]
 """x1, x2, y1, y2 [m]."""
@@ -118,8 +119,8 @@ class _Follower:
                 made = self._stand(math.floor(math.hypot(x2 - x1, y2 - y1) / spacing + 1e-9) + 1)
             case "GEN":
                 made = self._gen(index, s)
-            case "CLUMP":
-                made = self._clumps(s)
+            case "CLUMP" | "SECTION":
+                made = self._clumps(s) if s.command == "CLUMP" else self._section(index, s)
             case "DEL":
                 self._delete(s.selection)
             case "SET":
@@ -178,6 +179,21 @@ class _Follower:
         place = min(x) - max(r), max(x) + max(r), min(y) - max(r), max(y) + max(r)
         self.falling.append(Layer(len(x), sum(math.pi * c * c for c in r), place))
         return len(x)
+
+    def _section(self, index: int, s: Statement) -> int | None:
+        """Discs of the porosity in the polygons, if the file is there."""
+        if not s.get("rad"):
+            return 0
+        area = _area_of_section(s, self.directory)
+        if area is None:
+            self.standing = None
+            return None
+        covered, place = area
+        n = covered * (1.0 - s.get("porosity", 0.2)) / (math.pi * float(np.mean(np.square(s.get("rad")))))
+        self.result.rough.add(index)
+        self.result.certain = False
+        self.falling.append(Layer(n, covered * (1.0 - s.get("porosity", 0.2)), place))
+        return round(n)
 
     # ---- GEN
 
@@ -322,6 +338,17 @@ def _rectangle(where: sel.Selection) -> Rectangle | None:
         low, high = bounds[term.axis]
         bounds[term.axis] = [max(low, float(term.low)), min(high, float(term.high))]  # type: ignore[arg-type]
     return (*bounds["x"], *bounds["y"])  # type: ignore[return-value]
+
+
+def _area_of_section(s: Statement, directory: Path) -> tuple[float, Rectangle] | None:
+    """Area of the polygons of a section [m2] and the rectangle about them; None without a readable file."""
+    path = find(directory, s.get("file"))
+    legend = find(directory, s.get("legend")) if s.get("legend") else None
+    words = {name: s.get(name) for name in ("scale", "origin", "to", "line", "attribute", "only") if s.get(name)}
+    try:
+        return section_area.of_polygons(path or s.get("file"), legend=legend, **words)
+    except HpcdemError:
+        return None
 
 
 def _discs(s: Statement, directory: Path) -> tuple[list[float], list[float], list[float]] | None:

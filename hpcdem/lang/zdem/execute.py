@@ -91,7 +91,7 @@ def refuse_escapes(script: Script, folder: Path) -> None:
             raise statement.error(
                 "user laws are never executed from a checkpoint; give the script: hpcdem SCRIPT --resume"
             )
-        for word in ("file", "outdir"):
+        for word in ("file", "outdir", "legend"):
             name = statement.get(word)
             if name and not any((script.directory / name).resolve().is_relative_to(root) for root in allowed):
                 raise statement.error(
@@ -239,13 +239,13 @@ class _Call:
         """The file of the line, beside the script unless it has a folder of its own from the root."""
         return str(self.directory / self.arguments["file"])
 
-    def existing(self) -> str:
+    def existing(self, word: str = "file") -> str:
         """A file to read: beside the script, then in ./data below it. Rank 0 looks, so that all ranks agree."""
         comm = getattr(self.sim, "comm", None)
-        found = find(self.directory, self.arguments["file"]) if comm is None or comm.rank == 0 else None
+        found = find(self.directory, self.arguments[word]) if comm is None or comm.rank == 0 else None
         found = comm.bcast(found) if comm is not None else found
         if found is None:
-            name = self.arguments["file"]
+            name = self.arguments[word]
             raise CommandError(f"there is no file {self.directory / name}, nor {self.directory / 'data' / name}")
         return found
 
@@ -258,6 +258,8 @@ def _by_name(call: _Call, does: str) -> None:
     given = call.given()
     if "file" in given:
         given["file"] = call.path() if call.statement.command in ("EXP", "SAV") else call.existing()
+    if "legend" in given:
+        given["legend"] = call.existing("legend")
     if call.row.ranged:
         given["where"] = call.where
     module, _, name = does.partition(".")

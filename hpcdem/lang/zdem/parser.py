@@ -396,8 +396,12 @@ class _LineParser:
             if len(after) < 2 or lexer.number(after[1]) is None or any(row.named(after[0].word) for row in self.words):
                 return found
 
-    def either(self, kind: t.Kind, name: str, number: int) -> list[Token]:
-        """So many words separated by |, with or without blanks; the tokens contain the words alone."""
+    def names(self, kind: t.Names, name: str) -> tuple[str, ...]:
+        return tuple(piece.text for piece in self.either(kind, name, None))
+
+    def either(self, kind: t.Kind, name: str, number: int | None) -> list[Token]:
+        """So many words (None: any number) separated by |, with or without blanks; the tokens contain the words
+        alone."""
         pieces: list[Token] = []
         bars = 0
         while True:
@@ -407,7 +411,7 @@ class _LineParser:
             after = self.peek()
             if len(pieces) > bars and (after is None or not after.text.startswith("|")):
                 break
-        if len(pieces) != number or bars != number - 1:
+        if number not in (None, len(pieces)) or bars != len(pieces) - 1:
             self.unexpected(token, f"{kind.meaning} for {name}")
         return pieces
 
@@ -462,6 +466,7 @@ _READERS: dict[type, Callable[[_LineParser, Any, str], Any]] = {
     t.File: _LineParser.file_name,
     t.Values: _LineParser.values,
     t.Choice: _LineParser.choice,
+    t.Names: _LineParser.names,
     t.Groups: _LineParser.groups,
     t.Laws: _LineParser.laws,
     t.WallIds: _LineParser.wall_ids,

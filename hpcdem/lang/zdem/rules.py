@@ -8,6 +8,7 @@ from typing import Any
 
 from hpcdem.core import limits
 from hpcdem.core.errors import CommandError, ScriptError
+from hpcdem.core.section_files import KNOWN, is_section
 from hpcdem.core.selection import has_expressions
 from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.statement import Statement
@@ -82,6 +83,21 @@ def _gline(s: Statement) -> None:
     if s.get("p1") == s.get("p2"):
         raise s.error("p1 and p2 are the same point; BALL makes a single particle")
     _within(s, limits.check_row, s.get("p1"), s.get("p2"), s.get("rad"), s.get("cratio", 1.0))
+
+
+def _section(s: Statement) -> None:
+    weak = [name for name in (*BOND_MODEL_1, *BOND_MODEL_2) if name in s.arguments]
+    acts = [name for name in ("rad", "cut") if name in s.arguments] + weak[:1]
+    if len(acts) > 1:
+        raise s.error(f"{acts[0]} and {acts[1]} exclude each other; use a line for each")
+    if weak and weak[-1] in BOND_MODEL_2 and weak[0] in BOND_MODEL_1:
+        raise s.error(f"{weak[0]} and {weak[-1]} belong to different bond models; a bond is of one model")
+    if "porosity" in s.arguments and "rad" not in s.arguments:
+        raise s.error("porosity is for polygons that are filled: give rad")
+    if "rad" in s.arguments and s.selection is not None:
+        raise s.error("RANGE selects existing particles, rad makes new ones; select polygons by only")
+    if not is_section(s.get("file")):
+        raise s.error(f"{s.get('file')}: unknown ending of a section; known: {KNOWN}")
 
 
 def _clump(s: Statement) -> None:
@@ -185,6 +201,7 @@ _RULES: dict[str, Callable[[Statement], None]] = {
     "GEN": _gen,
     "GLINE": _gline,
     "CLUMP": _clump,
+    "SECTION": _section,
     "PROP": _prop,
     "FIX": _degrees,
     "FREE": _degrees,

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+from hpcdem.core.looks import NUMBERS as COLORS
 from hpcdem.core.material import PROPERTIES
 from hpcdem.core.nearest import hint
 from hpcdem.core.outputs import OUTPUTS
@@ -28,21 +29,6 @@ SOURCES = {
     "P": "scripts, frames and readers in public repositories",
     "X": "extension of hpcdem",
 }
-
-COLORS = {
-    "lg": 0,
-    "green": 1,
-    "yellow": 2,
-    "red": 3,
-    "white": 4,
-    "black": 5,
-    "mg": 6,
-    "blue": 7,
-    "gb": 8,
-    "violet": 9,
-}
-"""Colour names and numbers (manual, chapter 9)."""
-
 
 # ---- kinds of values: how many words, of which sort ----------------------------------------------------------------
 
@@ -134,6 +120,11 @@ class File(Kind):
 
 
 @dataclass(frozen=True)
+class Names(Kind):
+    """Any number of names with | between them."""
+
+
+@dataclass(frozen=True)
 class Values(Kind):
     """Names, each with a number behind it; case is kept."""
 
@@ -195,6 +186,7 @@ OF_WALLS = WallIds("[wall] [id] <int>|<int>", "the ids of two walls with | betwe
 FILE = File("<file>", "a file name")
 LAW = File("<file.py:function>", "'file.py:function', or linear")
 OF_LAWS = Laws("<law>|<law>", "two laws with | between them, 'file.py:function', linear or hertz")
+NAMES = Names("<name>|<name>...", "names with | between them, blanks in them as _")
 VALUES = Values("<name> <float> ...", "names with a number each")
 
 
@@ -567,6 +559,44 @@ COMMANDS = (
             "CLUMP file gravel.clumps x 10.0 y 4.0 color yellow group gravel",
             "CLUMP group boulder RANGE id 10 14",
         ),
+    ),
+    Command(
+        "SECTION",
+        "Uses the polygons or lines of a section: GeoJSON, shapefile, SVG, DXF, or an image with a legend "
+        "(docs/sections.md). Particles with their centres in a polygon get its name as group (lower case, blanks as _) "
+        "and its attributes density, fric, kn, ks, shear, poiss, damp, hertz, color; later polygons of the file cover "
+        "earlier ones. With rad, fills the polygons with new particles instead. With cut, removes the bonds that cross "
+        "a line; with bond properties (as of PROP), changes them. The log reports unit, areas, overlaps, gaps and "
+        "ignored objects.",
+        source="X",
+        leading=(Option("file", "section file", kind=FILE, required=True, source="X"),),
+        options=(
+            Option("scale", "metres in a unit of the file", kind=POSITIVE, unit="m", default="the unit of the file, "
+                   "else 1", source="X"),
+            Option("origin", "point of the file, in its units, that is moved to `to`", kind=POINT, default="0 0",
+                   source="X"),
+            Option("to", "position of the origin in the model", kind=POINT, unit="m", default="0 0", source="X"),
+            Option("line", "two points of a map with heights, in its units: x is the distance along their line, y the "
+                   "height", kind=SEGMENT, source="X"),
+            Option("legend", "of an image: file with lines colour, name", kind=FILE, source="X"),
+            Option("attribute", "attribute whose value is the name (GeoJSON, shapefiles)", kind=FILE,
+                   default="name, layer, unit, formation, label or id", source="X"),
+            Option("only", "names of the polygons and lines that are used", kind=NAMES, default="all", source="X"),
+            Option("rad", "radii drawn at random, a repeated one more often", kind=RADII, unit="m", source="X"),
+            Option("porosity", "of the filled polygons, by area", kind=RATIO, default="0.2", source="X"),
+            Option("cut", "removes the bonds that cross a line", source="X"),
+            *(replace(option, required=False, source="X") for option in _PROPERTIES if option.name in (
+                "ebmod", "gbmod", "tstrength", "sstrength", "n_bond", "s_bond")),
+        ),
+        ranged=True,
+        example=(
+            "SECTION wedge.geojson rad discrete 60.0 80.0",
+            "SECTION wedge.svg scale 25.0 only sand|shale RANGE y 0.0 3000.0",
+            "SECTION faults.shp origin (512300.0 3481200.0) cut",
+            "SECTION wedge.dxf only f1 tstrength 1e5 sstrength 2e5",
+            "SECTION wedge.png scale 12.5 legend wedge.txt",
+        ),
+        does="sections.section",
     ),
     Command(
         "DEL",

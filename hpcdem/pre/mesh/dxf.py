@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -51,10 +52,11 @@ def metres(document: Any, scale: float | None, notes: list[str]) -> float:
     return taken
 
 
-def write(path: Path, layers: Mapping[str, Sequence[Curve]]) -> None:
-    """A drawing in metres of these curves, by layer. CommandError for a name that no layer of a drawing can have."""
+def write(path: Path, layers: Mapping[str, Sequence[Curve]], units: int = 6) -> None:
+    """A drawing of these curves, by layer; units: a code of UNITS, 0 none. CommandError for a name that no layer of a
+    drawing can have."""
     ezdxf = optional.ezdxf()
-    document = ezdxf.new("R2010", units=6)
+    document = ezdxf.new("R2010", units=units)
     space = document.modelspace()
     for name, curves in layers.items():
         if any(char in '<>/\\":;?*|=`,' for char in name):
@@ -82,11 +84,21 @@ def read_dxf(path: str | Path, only: set[str] | None = None) -> dict[str, list[C
     return curves(opened(path), path, only)
 
 
-def curves(document: Any, path: Path, only: set[str] | None = None) -> dict[str, list[Curve]]:
-    """Curves of an opened drawing by layer."""
+def curves(
+    document: Any,
+    path: Path,
+    only: set[str] | None = None,
+    dropped: Counter[tuple[str, str]] | None = None,
+    notes_left: Counter[tuple[str, str]] | None = None,
+) -> dict[str, list[Curve]]:
+    """Curves of an opened drawing by layer. notes_left: gets the number of notes by (kind, layer); dropped: that and
+    the number of unknown kinds, which are otherwise refused."""
     found: dict[str, list[Curve]] = {}
-    for entity, layer in flat(document.modelspace(), str(path)):
+    for entity, layer in flat(document.modelspace(), str(path), dropped=dropped if dropped is not None else notes_left):
         if only is not None and layer not in only:
+            continue
+        if dropped is not None and entity.dxftype() not in _READERS:
+            dropped[entity.dxftype(), layer] += 1
             continue
         where = f"{path}: {entity.dxftype()} (handle {entity.dxf.handle}, layer '{layer}')"
         try:
@@ -103,21 +115,25 @@ def curves(document: Any, path: Path, only: set[str] | None = None) -> dict[str,
     return found
 
 
-def flat(entities: Any, path: str, depth: int = 0, layer: str = "0") -> Iterator[tuple[Any, str]]:
+def flat(
+    entities: Any, path: str, depth: int = 0, layer: str = "0", dropped: Counter[tuple[str, str]] | None = None
+) -> Iterator[tuple[Any, str]]:
     """Entities with inserted blocks taken apart, and the layer of each: what is in layer 0 of a block is in that of the
-    insertion."""
+    insertion. dropped: gets the number of notes by (kind, layer)."""
     for entity in entities:
         kind = entity.dxftype()
-        if kind in NOTES:
-            continue
         own = str(entity.dxf.layer) if depth == 0 or str(entity.dxf.layer) != "0" else layer
+        if kind in NOTES:
+            if dropped is not None:
+                dropped[kind, own] += 1
+            continue
         if kind != "INSERT":
             yield entity, own
         elif depth > 16:
             raise HpcdemError(f"{path}: INSERT (handle {entity.dxf.handle}): more than 16 nested blocks")
         else:
             for one in entity.multi_insert() if entity.mcount > 1 else (entity,):  # rows and columns of a block
-                yield from flat(one.virtual_entities(), path, depth + 1, own)
+                yield from flat(one.virtual_entities(), path, depth + 1, own, dropped)
 
 
 def _curve(entity: Any, where: str) -> Curve:

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import ModuleType
 
 from hpcdem.core.errors import HpcdemError
+from hpcdem.core.section_files import IMAGES
 
 ROOT = Path(__file__).resolve().parents[3]
 EXTRA = f"{sys.executable} -m pip install " + (
@@ -80,6 +81,28 @@ def ezdxf() -> ModuleType:
     return _wanted("ezdxf", "Import of DXF drawings", load)
 
 
+def pyshp() -> ModuleType:
+    """The package pyshp, whose module is shapefile."""
+
+    def load() -> ModuleType:
+        import shapefile
+
+        return shapefile
+
+    return _wanted("shapefile", "Import of shapefiles", load, "pyshp")
+
+
+def svgelements() -> ModuleType:
+    """The package svgelements."""
+
+    def load() -> ModuleType:
+        import svgelements
+
+        return svgelements
+
+    return _wanted("svgelements", "Import of SVG drawings", load)
+
+
 OWN_READERS = (".msh", ".inp")
 """Mesh files that need no package."""
 
@@ -93,15 +116,25 @@ def of_mesh(file: str) -> tuple[Load, ...]:
 def of_drawing(file: str) -> tuple[Load, ...]:
     """What reads a drawing, or a file of bodies, of this name."""
     ending = Path(file).suffix.lower()
-    return (ezdxf,) if ending == ".dxf" else (gmsh,) if ending in (".step", ".stp", ".brep") else ()
+    return _OF_DRAWINGS.get(ending, ())
 
 
-def _wanted(name: str, what: str, load: Callable[[], ModuleType]) -> ModuleType:
+_OF_DRAWINGS: dict[str, tuple[Load, ...]] = {
+    ".dxf": (ezdxf,),
+    ".svg": (svgelements,),
+    ".shp": (pyshp,),
+    **dict.fromkeys((".step", ".stp", ".brep"), (gmsh,)),
+    **dict.fromkeys((".geojson", ".json", *IMAGES), (shapely,)),
+}
+
+
+def _wanted(name: str, what: str, load: Callable[[], ModuleType], package: str = "") -> ModuleType:
+    """package: the name of the package where it is not that of the module."""
     try:
         return load()
     except ModuleNotFoundError as error:
         lacks = "is not installed" if error.name == name else f"lacks {error.name}"
-        raise HpcdemError(f"{what} needs the package {name}, which {lacks}: {EXTRA}") from error
+        raise HpcdemError(f"{what} needs the package {package or name}, which {lacks}: {EXTRA}") from error
     except (ImportError, OSError) as error:
         # The gmsh wheel carries a program with windows and asks for libraries of the system.
         hint = f": libraries of the system are missing (Debian, Ubuntu: apt install {GMSH_LIBRARIES})"

@@ -18,6 +18,7 @@ from hpcdem.cli.measure import measure
 from hpcdem.cli.movie import movie
 from hpcdem.cli.resume import resume
 from hpcdem.cli.run import hpcdem
+from hpcdem.cli.section import section
 from hpcdem.cli.strain_stress import strain_stress
 from hpcdem.cli.sweep import report, sweep
 from hpcdem.cli.view import view
@@ -28,7 +29,8 @@ from scripts.lib.pages.markdown import escaped
 PROGRAMS: dict[str, click.Command] = {
     "hpcdem": hpcdem, "hpcdem resume": resume, "hpcdem info": info, "hpcdem -s": strain_stress,
     "hpcdem measure": measure, "hpcdem draw": draw, "hpcdem movie": movie, "hpcdem view": view, "hpcdem sweep": sweep,
-    "hpcdem sweep report": report, "hpcdem grade": grade, "hpcdem case": listing([]), "hpcdem examples": examples,
+    "hpcdem sweep report": report,
+    "hpcdem section": section, "hpcdem grade": grade, "hpcdem case": listing([]), "hpcdem examples": examples,
     "hpcdem console": console,
     "hpcdem warmup": warmup, "hpcdem doctor": doctor, "zdem2jpg": zdem2jpg, "zdemss": zdemss,
 }  # fmt: skip

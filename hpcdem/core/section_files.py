@@ -1,0 +1,14 @@
+"""Files of geological sections by their endings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+DRAWINGS = (".geojson", ".json", ".shp", ".svg", ".dxf")
+IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif", ".webp")
+KNOWN = ", ".join([*DRAWINGS, *IMAGES])
+
+
+def is_section(file: str | Path) -> bool:
+    """Whether the name ends like that of a section."""
+    return Path(file).suffix.lower() in (*DRAWINGS, *IMAGES)

@@ -1,0 +1,1 @@
+"""Geological sections: named polygons and lines with attributes, from drawings, maps and images, and out again."""
