@@ -36,6 +36,11 @@ if TYPE_CHECKING:
     "--smooth", is_flag=True, help="Strain fitted and averaged on the grid, not by the nearest neighbours of particles."
 )
 @click.option(
+    "--volume", type=click.Choice(("mean", "nearest", "page")), help="Volumetric strain of the nodes: mean change of "
+    "volume around each, over SIZE; that of the nearest particle; or the quantity on the pages of the manual, which is "
+    "no change of volume [mean].",
+)  # fmt: skip
+@click.option(
     "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
 )
 def strain_stress(**options: Any) -> None:
@@ -57,7 +62,7 @@ def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
             folder=Path(options["folder"]), size=options["size"], left_wall=options["leftwallid"],
             right_wall=options["rightwallid"], xmove=options["xmove"], ymove=options["ymove"],
             addball=options["addball"], delball=options["delball"], increment=options["increment"],
-            smooth=options["smooth"],
+            smooth=options["smooth"], volume=options["volume"],
             groups=tuple(options["groups"]),
         ),
     )  # fmt: skip

@@ -39,6 +39,9 @@ PARTICLE_FIELDS = (
 """Columns of the particles: pseudo stress p [Pa] (force moments over the particle's own volume), deformation gradient F
 since the first section in which the particle was (identity there), strains of F; whether it is fixed along x and y."""
 VERSION = 1
+MEAN, NEAREST, PAGE = VOLUMES = ("mean", "nearest", "page")
+"""How the volumetric strain of the nodes is made: mean of what lies around a node; that of the nearest particle; as
+the manual's pages draw it (`strain.page_volume`)."""
 
 
 @dataclass
@@ -46,7 +49,8 @@ class Section:
     """One frame. name: of its file, without suffix; size: grid spacing [m]; x (nx,), y (ny,): nodes [m]; fields: by
     UNITS, each (ny, nx); particles: by PARTICLE_FIELDS, each (n,), in the order of ids; surface (m, 2): line over the
     top [m]; walls: id, p1, p2, color; smooth: whether strains are means around each node, or those of the nearest
-    particle; average: length over which means are taken [m], 0: `size`."""
+    particle; average: length over which means are taken [m], 0: `size`; volume: how the volumetric strain of the nodes
+    is made, of VOLUMES."""
 
     name: str
     step: int
@@ -60,6 +64,7 @@ class Section:
     walls: dict[str, np.ndarray] = field(default_factory=dict)
     smooth: bool = True
     average: float = 0.0
+    volume: str = NEAREST
 
     def __post_init__(self) -> None:
         self.average = self.average or self.size
@@ -101,6 +106,7 @@ def write_section(section: Section, path: str | os.PathLike) -> Path:
     }
     arrays |= {"time": np.float64(section.time), "size": np.float64(section.size), "x": section.x, "y": section.y}
     arrays |= {"surface": section.surface, "smooth": np.bool_(section.smooth), "average": np.float64(section.average)}
+    arrays["volume"] = np.array(section.volume)
     arrays |= {f"field_{name}": values for name, values in section.fields.items()}
     arrays |= {f"particle_{name}": values for name, values in section.particles.items()}
     arrays |= {f"wall_{name}": values for name, values in section.walls.items()}
@@ -124,6 +130,7 @@ def read_section(path: str | os.PathLike) -> Section:
             str(arrays["name"]), int(arrays["step"]), float(arrays["time"]), float(arrays["size"]), arrays["x"],
             arrays["y"], part("field_"), part("particle_"), arrays["surface"], part("wall_"),
             bool(arrays.get("smooth", True)), float(arrays.get("average", 0.0)),
+            str(arrays.get("volume", NEAREST)),
         )  # fmt: skip
     except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise HpcdemError(f"{path} is not a section written by hpcdem -s: {error}") from None

@@ -28,7 +28,7 @@ from hpcdem.io.frame import Frame
 from hpcdem.io.frames import FrameFile, left_out, list_frames, read_frame
 from hpcdem.post import grid as grids
 from hpcdem.post import section_files, strain, stress
-from hpcdem.post.section import Section, write_section
+from hpcdem.post.section import MEAN, PAGE, Section, write_section
 from hpcdem.post.surface import bed, held_fast, surface
 
 QUIET_SECONDS = 2.0
@@ -37,6 +37,9 @@ INSIDE, AROUND = 2, 3
 """Of `solid_fraction`, in spacings."""
 STRESS_REACH = 1.5
 """Particles nearer to a node than this many SIZE count in its stress: as smooth as the manual's figures."""
+SPREAD = 0.8
+"""Standard deviation of the means of volumetric strain in units of SIZE. For SIZE = 1.5 diameters half of the amplitude
+remains at waves of 4.3 SIZE, where volumes by strain and by the area of each particle agree (docs/stress_strain.md)."""
 SUFFIXES = (".out", ".npz", ".vtkhdf")
 _T = TypeVar("_T")
 
@@ -47,7 +50,8 @@ class Options:
     particles are ignored; xmove, ymove [m]: added to all coordinates; addball, delball: whether particles may be
     added or deleted between frames; increment: strain since the frame before instead of since the first one; smooth:
     strain fitted around the nodes of the grid and averaged, instead of by the nearest neighbours of each particle;
-    groups: names of those whose particles count, all by default."""
+    volume: how the volumetric strain is made, of section.VOLUMES, MEAN by default; groups: names of those whose
+    particles count, all by default."""
 
     folder: Path
     size: float = 200.0
@@ -59,6 +63,7 @@ class Options:
     delball: bool = False
     increment: bool = False
     smooth: bool = False
+    volume: str | None = None
     groups: tuple[str, ...] = ()
 
 
@@ -67,6 +72,8 @@ def run(comm: Comm, log: Any, options: Options) -> Path:
     Raises HpcdemError (on all ranks) for frames that cannot be read or do not fit together."""
     if not (np.isfinite(options.size) and options.size > 0.0):
         raise UsageError(f"-g {options.size:g}: the spacing of the grid must be larger than 0")
+    if options.smooth and options.volume not in (None, MEAN):
+        raise UsageError(f"--volume {options.volume} cannot be combined with --smooth, which takes means on its grid")
     began = time.monotonic()
     frames = on_first(comm, lambda: _frames(options.folder, log))
     results = options.folder / "ss" / "data"
@@ -280,11 +287,12 @@ def packed(s: Snapshot) -> np.ndarray:
 
 class Link(NamedTuple):
     """From a frame to the next: rows (n,) of the later frame's particles among those of the earlier one, -1 for new
-    ones, and dF (m, 4) of the earlier one's; in both frames only those inside count. Fixed ones do not deform, and are
-    in no fit."""
+    ones; dF (m, 4) of the earlier one's and how far they moved (m, 2) [m]; in both frames only those inside count.
+    Fixed ones do not deform, and are in no fit."""
 
     rows: np.ndarray
     df: np.ndarray
+    moved: np.ndarray
 
 
 def link(earlier: Earlier, now: Snapshot, options: Options, sums: strain.Sums = grids.sums) -> Link:
@@ -314,30 +322,39 @@ def link(earlier: Earlier, now: Snapshot, options: Options, sums: strain.Sums = 
         df[row] = strain.increment(options.size, x, y, earlier.radius[row], u, v, sums)
     else:
         df[row] = strain.nearest(options.size, x, y, u, v)
+    moved = np.zeros((len(earlier.gid), 2))
+    moved[at[both]] = np.stack([now.x[both] - earlier.x[at[both]], now.y[both] - earlier.y[at[both]]], axis=1)
     place = np.cumsum(earlier.inside) - 1
-    return Link(np.where(both, place[at], -1)[now.inside], df[earlier.inside])
+    return Link(np.where(both, place[at], -1)[now.inside], df[earlier.inside], moved[earlier.inside])
 
 
 def carried(link: Link, f_earlier: np.ndarray | None) -> np.ndarray:
-    """(n, 4): F of the later frame's particles, identity for new ones; that of the pair alone without `f_earlier`."""
+    """(n, 6): F of the later frame's particles, identity for new ones, and their displacement [m]; those of the pair
+    alone without `f_earlier`."""
     old = link.rows >= 0
-    f = np.tile(strain.IDENTITY, (len(old), 1))
+    f = np.tile(NOTHING, (len(old), 1))
     k = link.rows[old]
-    f[old] = link.df[k] if f_earlier is None else strain.times(link.df[k], f_earlier[k])
+    f[old, :4] = link.df[k] if f_earlier is None else strain.times(link.df[k], f_earlier[k, :4])
+    f[old, 4:] = link.moved[k] if f_earlier is None else link.moved[k] + f_earlier[k, 4:]
     return f
+
+
+NOTHING = np.append(strain.IDENTITY, [0.0, 0.0])
+"""F and displacement before anything has happened."""
 
 
 # --- the section -----------------------------------------------------------------------------------------------
 
 
 def make_section(
-    s: Snapshot, f: np.ndarray, size: float, spacing: float = 0.0, smooth: bool = True, sums: strain.Sums = grids.sums
-) -> Section:
-    """Grid fields and particle columns of a frame; f (n, 4) of the particles inside.
+    s: Snapshot, f: np.ndarray, size: float, spacing: float = 0.0, smooth: bool = True, sums: strain.Sums = grids.sums,
+    volume: str = MEAN,
+) -> Section:  # fmt: skip
+    """Grid fields and particle columns of a frame; f (n, 6): F and displacement of the particles inside.
 
     Means are taken around nodes `size` apart [m]. With `smooth` these are the nodes of the section; otherwise its nodes
-    are `spacing` apart (a whole part of `size`), the stress is linear between the others, and the strains are those of
-    the nearest particle.
+    are `spacing` apart (a whole part of `size`), the stress is linear between the others, and strains are those of
+    the nearest particle; the volumetric one, with MEAN, is the mean of what lies around.
     """
     k = np.flatnonzero(s.inside)
     pseudo = s.moments[k] / s.volume[k, None]
@@ -345,7 +362,7 @@ def make_section(
         "gid": s.gid[k], "x": s.x[k], "y": s.y[k], "radius": s.radius[k], "color": s.color[k],
         "pxx": pseudo[:, 0], "pxy": 0.5 * (pseudo[:, 1] + pseudo[:, 2]), "pyy": pseudo[:, 3],
         "fxx": f[:, 0], "fxy": f[:, 1], "fyx": f[:, 2], "fyy": f[:, 3],
-        "volumetric": strain.volumetric(f), "distortional": strain.distortional(f), "fixed": s.fixed[k],
+        "volumetric": strain.volumetric(f[:, :4]), "distortional": strain.distortional(f[:, :4]), "fixed": s.fixed[k],
     }  # fmt: skip
     chosen = bed(*(particles[name] for name in ("x", "y", "radius", "fixed")))
     x, y, radius, ev, ed = (particles[name][chosen] for name in ("x", "y", "radius", "volumetric", "distortional"))
@@ -375,11 +392,18 @@ def make_section(
         material = grids.touched(grid, x, y, radius)
         some = np.flatnonzero(known)
         at = cKDTree(np.stack([x[some], y[some]], axis=1)).query(np.stack(nodes, axis=1)) if len(some) else None
+        if volume == PAGE:
+            u = f[chosen, 4:]
+            ev = strain.page_volume(size, x, y, *u.T)
         for name, v in (("volumetric", ev), ("distortional", ed)):
             fields[name] = np.full((grid.ny, grid.nx), np.nan)
             if at is not None:
                 close = at[0] < size
                 fields[name].flat[close] = v[some[at[1][close]]]
+                if name == "volumetric" and volume == MEAN:
+                    area = np.pi * radius[some] ** 2
+                    mean = strain.mean_volume(grid, x[some], y[some], area, v[some], SPREAD * size)
+                    fields[name].flat[close] = mean.flat[close]
     fields = {name: np.where(material, values, np.nan) for name, values in fields.items()}
     sxx, sxy, syy = (np.where(material, tensor[..., c], np.nan) for c in (0, 1, 2))
     mean, shear, angle = stress.principal(sxx, sxy, syy)
@@ -387,7 +411,8 @@ def make_section(
     top = held if held.any() else slice(None)
     line = surface(x[top], y[top], radius[top], size, 0.1 * size)
     return Section(
-        s.name, s.step, s.time, grid.size, grid.x, grid.y, fields, particles, line, s.walls, smooth, size
+        s.name, s.step, s.time, grid.size, grid.x, grid.y, fields, particles, line, s.walls, smooth, size,
+        MEAN if smooth else volume,
     )  # fmt: skip
 
 
@@ -444,7 +469,7 @@ class _Last(NamedTuple):
     """What rank 0 keeps of the last frame of a round: particles as `packed`, and F."""
 
     packed: np.ndarray = np.zeros((0, 5))
-    f: np.ndarray = np.zeros((0, 4))
+    f: np.ndarray = np.zeros((0, 6))
 
 
 def _round(
@@ -458,7 +483,7 @@ def _round(
     found = _each(comm, lambda: link(before, now, options, sums) if before and now else None)
 
     # F goes from rank to rank, and from the last one to rank 0, where the next round begins.
-    f, f_before = np.zeros((0, 4)), last.f
+    f, f_before = np.zeros((0, 6)), last.f
     for turn in range(comm.size):
         if comm.rank == turn and now:
             f = carried(found, None if options.increment else f_before) if found else _none(now)
@@ -467,7 +492,8 @@ def _round(
 
     def result() -> None:
         if now:
-            section = make_section(now, f, options.size, output.spacing, options.smooth, sums)
+            how = options.volume or MEAN
+            section = make_section(now, f, options.size, output.spacing, options.smooth, sums, how)
             _write(section, options, frames[0], output.folder)
 
     _each(comm, result)
@@ -476,7 +502,7 @@ def _round(
 
 def _none(now: Snapshot) -> np.ndarray:
     """F before anything has happened."""
-    return np.tile(strain.IDENTITY, (int(now.inside.sum()), 1))
+    return np.tile(NOTHING, (int(now.inside.sum()), 1))
 
 
 def _to_next(comm: Comm, rows: np.ndarray) -> np.ndarray:

@@ -198,3 +198,31 @@ def test_shared_columns_have_the_same_bits() -> None:
 def test_a_grid_beyond_all_measure_is_refused() -> None:
     with pytest.raises(HpcdemError, match="choose a larger one with -g"):
         grids.cover(0.1, np.array([0.0, 1e9]), np.array([0.0, 1e4]), np.ones(2))
+
+
+def test_a_mean_volume_keeps_what_the_formula_says() -> None:
+    """A uniform change exactly, also at the edges; of a wave of length L the part exp(-2 (pi s / L)^2)."""
+    rng = np.random.default_rng(1)
+    x, y = rng.uniform(0.0, 8000.0, 60000), rng.uniform(0.0, 2000.0, 60000)
+    grid = grids.cover(100.0, x, y, np.full(len(x), 50.0))
+    weight = rng.uniform(1.0, 3.0, len(x))
+    flat = strain.mean_volume(grid, x, y, weight, np.full(len(x), -3.0), 160.0)
+    assert flat[np.isfinite(flat)] == pytest.approx(-3.0, rel=1e-12) and np.isfinite(flat).mean() > 0.9
+    for length in (800.0, 1600.0):
+        wave = strain.mean_volume(grid, x, y, weight, 5.0 * np.sin(2.0 * np.pi * x / length), 160.0)
+        inner = wave[5:-5, 10:-10]
+        phase = np.sin(2.0 * np.pi * grid.x / length)[None, 10:-10] + 0.0 * inner
+        kept = float((inner * phase).sum() / (phase * phase).sum()) / 5.0
+        assert kept == pytest.approx(np.exp(-2.0 * (np.pi * 160.0 / length) ** 2), abs=0.03)
+
+
+@pytest.mark.parametrize("degrees", [25.0, -60.0])
+def test_what_the_pages_call_volumetric_strain_grows_by_rotation(degrees: float) -> None:
+    """A rigid rotation by a: 4 (1 - cos a), 37 % for 25 degrees; its volumetric strain is zero."""
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(0.0, 1000.0, (2, 300))
+    a = np.radians(degrees)
+    u = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) @ [x, y] - [x, y]
+    found = strain.page_volume(1e6, x + u[0], y + u[1], *u)
+    assert found == pytest.approx(400.0 * (1.0 - np.cos(a)), rel=1e-9)
+    assert strain.volumetric(strain.nearest(1e6, x, y, *u)) == pytest.approx(0.0, abs=1e-9)

@@ -97,6 +97,12 @@ def test_strain_adds_up_from_the_first_frame(frames: list[Frame], tmp_path: Path
             values = section.fields[name]
             np.testing.assert_allclose(values[np.isfinite(values)], value, atol=1e-9)
             assert np.isfinite(values).sum() > 100
+    # the pages' quantity: of the displacement since the first frame by the places of the present one
+    for section, f in zip(compute(folder, volume="page"), (np.eye(2), shear, turn @ shear)):
+        values = section.fields["volumetric"]
+        expected = 100.0 * (np.linalg.det(2.0 * np.eye(2) - np.linalg.inv(f)) - 1.0)
+        np.testing.assert_allclose(values[np.isfinite(values)], expected, atol=1e-8)
+        assert section.volume == "page" and not np.abs(section.particles["volumetric"]).max() > 1e-8
     increments = compute(folder, increment=True)
     p = increments[2].particles
     np.testing.assert_allclose([p["fxx"][7], p["fxy"][7]], [0.0, -1.0], atol=1e-11)
@@ -140,7 +146,7 @@ def test_sections_say_what_they_hold(frames: list[Frame], tmp_path: Path) -> Non
 def test_strain_on_the_grid_is_that_of_the_nearest_particle(frames: list[Frame], tmp_path: Path) -> None:
     """As sharp as the particles; --smooth takes means around nodes, and has less extreme values."""
     folder = write(tmp_path, frames[:2])
-    sharp, smooth = compute(folder)[1], compute(folder, smooth=True)[1]
+    sharp, smooth = compute(folder, volume="nearest")[1], compute(folder, smooth=True)[1]
     assert (smooth.size, smooth.average, smooth.smooth) == (200.0, 200.0, True)
     p = sharp.particles
     x, y = np.meshgrid(sharp.x, sharp.y)
@@ -159,6 +165,24 @@ def test_strain_on_the_grid_is_that_of_the_nearest_particle(frames: list[Frame],
     both = np.isfinite(mine) & np.isfinite(theirs)
     assert both.sum() > 200
     np.testing.assert_allclose(mine[both], theirs[both], rtol=1e-12)
+
+
+def test_volumetric_strain_is_the_mean_of_what_lies_around(frames: list[Frame], tmp_path: Path) -> None:
+    """Less scattered than that of the nearest particles, with the same mean; the distortion stays that of the nearest;
+    the particles keep their own."""
+    folder = write(tmp_path, frames[:2])
+    mean, nearest = compute(folder)[1], compute(folder, volume="nearest")[1]
+    a, b = mean.fields["volumetric"], nearest.fields["volumetric"]
+    assert (mean.volume, nearest.volume) == ("mean", "nearest")
+    assert (np.isfinite(a) == np.isfinite(b)).all() and np.nanstd(a) < 0.7 * np.nanstd(b)
+    assert np.nanmean(a) == pytest.approx(np.nanmean(b), abs=0.1)
+    np.testing.assert_array_equal(mean.fields["distortional"], nearest.fields["distortional"])
+    np.testing.assert_array_equal(mean.particles["volumetric"], nearest.particles["volumetric"])
+    back = read_section(write_section(mean, tmp_path / "section.npz"))
+    assert back.volume == "mean"
+    for volume in ("page", "nearest"):
+        with pytest.raises(UsageError, match=f"--volume {volume} cannot be combined with --smooth"):
+            compute(folder, smooth=True, volume=volume)
 
 
 @pytest.mark.parametrize("smooth", [False, True])
@@ -519,7 +543,7 @@ def test_the_command_line_is_that_of_the_manual() -> None:
     assert values == {
         "folder": Path("datass"), "size": 200.0, "addball": True, "delball": True, "leftwallid": None,
         "rightwallid": None, "xmove": -1000.0, "ymove": -1000.0, "increment": False, "smooth": False, "threads": 12,
-        "groups": [],
+        "groups": [], "volume": None,
     }  # fmt: skip
     for name in ("--strin-stres", "--strain-stress"):
         assert command.make_context("zdem", [name, "a", "--grid", "50", "--leftwallid", "0"]).params["leftwallid"] == 0

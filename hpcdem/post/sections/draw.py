@@ -9,7 +9,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from hpcdem.io.disk import explain
 from hpcdem.io.frames import FORMATS, earlier_stems, left_out
 from hpcdem.post.cpt import INVAR, INVAR2, VOLUME, ColourTable, read_cpt, stress_table
 from hpcdem.post.saved import save as save_figure
-from hpcdem.post.section import read_section
+from hpcdem.post.section import PAGE, read_section
 from hpcdem.post.sections import panels, survey
 from hpcdem.post.sections.files import write_grids, write_tables
 from hpcdem.post.sections.pages import Style, panels_of_a_page, section_page, series_page
@@ -60,6 +60,9 @@ def draw_folder(request: Request, comm: Comm, log: Any, workers: int = 1) -> Non
     Raises HpcdemError on all ranks."""
     ss = request.folder / "ss"
     files = _collective(comm, lambda: _of_this_run(request.folder, log))
+    if _collective(comm, lambda: read_section(files[-1]).volume) == PAGE:
+        kinds = (panels.PAGE_VOLUME if kind == panels.VOLUMETRIC else kind for kind in request.kinds)
+        request = replace(request, kinds=tuple(kinds))
     tables = _collective(comm, lambda: colour_tables(request))
     for table in {id(t): t for t in tables.values()}.values():
         for note in table.notes:
@@ -184,7 +187,7 @@ def colour_tables(request: Request) -> dict[str, ColourTable]:
         own = built_in.get(str(request.colormap).lower()) or read_cpt(request.colormap)
     stress = stress_table(request.maxstress)
     return {
-        panels.VOLUMETRIC.key: own or VOLUME,
+        panels.VOLUMETRIC.key: own or (INVAR2 if panels.PAGE_VOLUME in request.kinds else VOLUME),
         panels.DISTORTIONAL.key: own or INVAR2,
         panels.MEAN.key: stress,
         panels.SHEAR.key: stress,

@@ -18,6 +18,7 @@ from hpcdem.core.fields import sides_of_box
 from hpcdem.io.frame import Frame, Table
 from hpcdem.post import layers
 from hpcdem.post.cpt import ColourTable
+from hpcdem.post.section import MEAN as MEAN_VOLUME
 from hpcdem.post.section import Section
 
 INK = "#000000"
@@ -59,6 +60,8 @@ class Kind:
 
 DEFORMATION = Kind("deformation", "Deformation")
 VOLUMETRIC = Kind("volumetric", "Volumetric strain", "%", strain=True)
+PAGE_VOLUME = Kind("volumetric", "det(1 + ∂u/∂x) − 1", "", 100.0, strain=True)
+"""What the manual's pages draw as volumetric strain, with their colours."""
 DISTORTIONAL = Kind("distortional", "Distortional strain J\N{SUBSCRIPT TWO}", strain=True, squared=True)
 """The second invariant of the deviator, as the manual's pages draw it; the field is its root."""
 ROOT = Kind("distortional", "Distortional strain \N{SQUARE ROOT}J\N{SUBSCRIPT TWO}", strain=True)
@@ -113,7 +116,8 @@ def draw_field(section: Section, kind: Kind, ax: Any, table: ColourTable) -> Non
     if pixels is None:
         return
     strain = 1 if section.smooth else 0
-    shades = table.colours(kind.shown(pixels.values(section.fields[kind.key], strain if kind.strain else 1)))
+    sharp = kind.strain and not (kind.key == VOLUMETRIC.key and section.volume == MEAN_VOLUME)
+    shades = table.colours(kind.shown(pixels.values(section.fields[kind.key], strain if sharp else 1)))
     if not kind.strain:
         bands = np.abs(pixels.values(section.fields[DISTORTIONAL.key], strain))
         shades[bands > (SMOOTH_BAND if section.smooth else BAND)] *= SHADE
