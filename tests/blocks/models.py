@@ -502,7 +502,7 @@ MODELS = {
     "impact": Model(impact, result, much_breaks, slow=True),
     "six nodes": Model(six_nodes, result, much_breaks, slow=True),
     "mixed": Model(mixed, result, much_breaks, slow=True),
-    "flight": Model(flight, result, much_breaks, balance=False, come=10),
+    "flight": Model(flight, result, much_breaks, balance=False, come=10, steps=600, middle=301),
     "yielding": Model(yielding, result, much_yields, yield_more, come=10, slow=True),
     "obeying": Model(obeying, result, laws_act, obey_more, prepare=load_laws, steps=900, come=3, slow=True),
     "opening": Model(opening, result, a_hole_is_made, open_up, slow=True),

@@ -163,5 +163,5 @@ MODELS = {
     "shattering on discs": Both(drop, result, much_shatters, steps=1200, slow=True),
     "flying over discs": Both(partial(drop, speed=6.0), result, much_shatters, balance=False, steps=1200, slow=True),
     "yielding on discs": Both(partial(drop, yields=True), result, blocks_flow_and_fall_apart, steps=1200, slow=True),
-    "hit by clumps": Both(partial(drop, clumped=True), result, clumps_are_braked, steps=1200, middle=601, energy=False),
+    "hit by clumps": Both(partial(drop, clumped=True), result, clumps_are_braked, steps=720, middle=501, energy=False),
 }

@@ -124,17 +124,17 @@ def resting(sim: Blocks) -> None:
     flow.fill(np.flatnonzero(y < 0.3), pressure=2e3)
     sim.flow_clock(dt=1e-3)
     flow.drill("pump", np.flatnonzero((np.abs(y - 0.3) < 0.03) & (sim.mesh.points[:, 0] < 1.2)))
-    flow.stage("pump", RATE, 1e-3, 0.5005, 6e4)
+    flow.stage("pump", RATE, 1e-3, 0.2005, 6e4)
     flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
 
 
 def dig(sim: Blocks) -> None:
     """What happens to it."""
-    if sim.clock.step == 600:
+    if sim.clock.step == 250:
         changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] < 0.4), relax=150.0)
-    if sim.clock.step in (690, 720):  # fluid stays as it is meanwhile, over the checkpoint
-        sim.parts(hydraulic=sim.clock.step == 720)
-    if sim.clock.step == 900:
+    if sim.clock.step in (290, 320):  # fluid stays as it is meanwhile, over the checkpoint
+        sim.parts(hydraulic=sim.clock.step == 320)
+    if sim.clock.step == 450:
         sim.option(dynamic=True)
         sim.flow_clock(dt=0.0, every=2)
         Flow.of(sim).stage("pump", PRESSURE, 2e4, math.inf, math.inf)
@@ -168,9 +168,9 @@ def tearing(sim: Blocks) -> None:
 
 def more_in_space(sim: Blocks) -> None:
     """What happens to it."""
-    if sim.clock.step == 200:
+    if sim.clock.step == 100:
         changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 2] < 0.05)[3:9])
-    if sim.clock.step == 500:
+    if sim.clock.step == 250:
         Flow.of(sim).assign(np.flatnonzero(sim.joint_exists())[:60:3], {**WIDE, **LEAKS, "aperature_initial": 1e-4})
         sim.flow_clock(every=3)
 
@@ -263,8 +263,8 @@ def all_acts(found: Found) -> None:
 MODELS = {
     "bursting": Model(bursting, result, water_bursts, more, steps=1100, middle=703, slow=True),
     "pumped": Model(pumped, result, wells_pump, more, steps=1100, middle=703, slow=True),
-    "wet soil with bolts": Model(resting, all_of_it, all_acts, dig, steps=1100, middle=703),
+    "wet soil with bolts": Model(resting, all_of_it, all_acts, dig, steps=550, middle=303),
     "seeping": Model(seeping, result, water_moves, move, steps=1100, middle=703, slow=True),
-    "tearing in space": Model(tearing, result, it_tears, more_in_space, steps=900, middle=603, slow=True),
+    "tearing in space": Model(tearing, result, it_tears, more_in_space, steps=900, middle=303, slow=True),
     "seeping in space": Model(seeping_in_space, result, water_moves, move_in_space, steps=600, middle=303, slow=True),
 }

@@ -164,9 +164,9 @@ def slurry_on_in_space(sim: Blocks) -> None:
     """What happens to it."""
     sand_on_in_space(sim)
     heat = Heat.of(sim)
-    if sim.clock.step == 500:
+    if sim.clock.step == 250:
         heat.of_fluid().assign(None, WATER)
-    if sim.clock.step == 600:
+    if sim.clock.step == 300:
         heat.initial(np.flatnonzero(sim.node_exists())[5:30], 90.0)
         heat.of_fluid().adjust(None, {"second_order": 0.0})
 
@@ -251,7 +251,7 @@ MODELS = {
     "steaming": Model(steaming, of_water, it_steams, steaming_on, steps=1100, middle=703, slow=True),
     "hot slurry": Model(hot_slurry, of_slurry, it_bursts, slurry_on, steps=880, middle=503, slow=True),
     "hot slurry in space": Model(
-        hot_slurry_in_space, of_slurry, it_bursts_in_space, slurry_on_in_space, steps=700, middle=603
+        hot_slurry_in_space, of_slurry, it_bursts_in_space, slurry_on_in_space, steps=360, middle=303
     ),
     "warm clay": Model(warming, result, it_flows, move, steps=900, middle=503, slow=True),
 }

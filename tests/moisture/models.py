@@ -42,9 +42,9 @@ def drying(sim: Blocks) -> None:
 def more(sim: Blocks) -> None:
     """What happens to it."""
     moisture = Moisture.of(sim)
-    if sim.clock.step == 150:
+    if sim.clock.step == 100:
         changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 1] < 0.1)[3:9])
-    if sim.clock.step == 250:
+    if sim.clock.step == 170:
         moisture.adjust(np.flatnonzero(sim.alive)[:20], {"diffusivity": 2e-6})
         moisture.clock(steps=2)
 
@@ -65,4 +65,4 @@ def it_dries(found: Found) -> None:
     assert abs(found["energy_work_heat"]) > 1e3 and found["energy_relative"] < 1e-5
 
 
-MODELS = {"drying": Model(drying, result, it_dries, more, steps=400, middle=203)}
+MODELS = {"drying": Model(drying, result, it_dries, more, steps=230, middle=143)}

@@ -72,10 +72,10 @@ def sandy_in_space(sim: Blocks) -> None:
 def sand_on_in_space(sim: Blocks) -> None:
     """What happens to it."""
     more_in_space(sim)
-    if sim.clock.step == 400:
+    if sim.clock.step == 200:
         Proppant.of(sim).adjust({"proppant_concentration_limit": 0.33, "proppant_size": 5e-5})
-    if sim.clock.step in (700, 750):
-        sim.parts(proppant=sim.clock.step == 750)
+    if sim.clock.step in (330, 350):
+        sim.parts(proppant=sim.clock.step == 350)
 
 
 def muddy(sim: Blocks) -> None:
@@ -127,6 +127,6 @@ def mud_rises(found: Found) -> None:
 MODELS = {
     "bursting with sand": Model(sandy, result, sand_bursts, sand_on, steps=1100, middle=703, slow=True),
     "sand by wells": Model(sandy_wells, result, sand_moves, sand_on, steps=1100, middle=703, slow=True),
-    "sand in space": Model(sandy_in_space, result, sand_tears, sand_on_in_space, steps=900, middle=603, slow=True),
+    "sand in space": Model(sandy_in_space, result, sand_tears, sand_on_in_space, steps=900, middle=303, slow=True),
     "mud": Model(muddy, result, mud_rises, move, steps=1300, middle=703, slow=True),
 }
