@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
-from scipy.integrate import quad
+import scipy
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,9 @@ def _slopes() -> tuple[float, float, float]:
     def mean(
         reach: Callable[[float], float],
     ) -> float:  # of -(integral of steep from 0), weighted; reach(s): part of the weight beyond s
-        return -float(quad(lambda a: steep(math.sin(a)) * reach(math.sin(a)) * math.cos(a), 0.0, 0.5 * math.pi)[0])
+        return -float(
+            scipy.integrate.quad(lambda a: steep(math.sin(a)) * reach(math.sin(a)) * math.cos(a), 0.0, 0.5 * math.pi)[0]
+        )
 
     # Parts of the weights 2 / pi / sqrt(1 - s^2), 4 / pi sqrt(1 - s^2) and ln(...) / pi that lie beyond s.
     at_tip = mean(lambda s: 2.0 / math.pi * math.acos(s))

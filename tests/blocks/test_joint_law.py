@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+import scipy
 
 from hpcdem.numerics.lanes import CAPACITY, U
 from hpcdem.physics.fdem.joints import tables as joint_tables
@@ -87,7 +87,9 @@ def test_softening_has_the_specified_values():
     """f(1/4), f(1/2), f(3/4) as specified, f(0) = 1, f(1) = 0, and its integral."""
     for d, value in ((0.0, 1.0), (0.25, 0.587842), (0.5, 0.304138), (0.75, 0.150054), (1.0, 0.0)):
         assert joint_law.softening(d) == pytest.approx(value, abs=5e-7)
-    assert quad(joint_law.softening, 0.0, 1.0, epsabs=1e-12)[0] == pytest.approx(joint_law.SOFTENING_AREA, abs=1e-10)
+    assert scipy.integrate.quad(joint_law.softening, 0.0, 1.0, epsabs=1e-12)[0] == pytest.approx(
+        joint_law.SOFTENING_AREA, abs=1e-10
+    )
 
 
 def test_mode_1_area_is_the_fracture_energy():

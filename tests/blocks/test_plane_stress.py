@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import nnls
+import scipy
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium
@@ -62,7 +62,7 @@ def test_the_end_is_on_the_surface_and_what_flows_is_that_of_its_planes(rock):
                 assert (e11, e22, e12, e33) == (0.0, 0.0, 0.0, 0.0)
                 continue
             strain = np.array([e[1, 1], e[0, 0], e33])
-            rest = nnls(np.array(flows).T, strain)[1]
+            rest = scipy.optimize.nnls(np.array(flows).T, strain)[1]
             assert rest < 1e-6 * np.abs(strain).max()
             met.add((how, len(flows)))
     assert len(met) >= 2

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import meshio
 import numpy as np
 import pytest
 
@@ -39,6 +38,8 @@ def test_the_solution_with_viscosity(time: float, radius: float, opening: float)
 
 
 def test_the_mesh_of_a_sector(tmp_path) -> None:
+    import meshio
+
     file = tmp_path / "sector.vtu"
     penny_solutions.write_sector(str(file), 0.1, 1.0, 8.0, 30.0, 3, 1.4)
     mesh = meshio.read(file)

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy import stats
+import scipy
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.mesh import Mesh, check
@@ -38,7 +38,7 @@ def test_normals_after_fisher(kappa: float) -> None:
     assert cosine.mean() == pytest.approx(length, abs=CONFIDENCE * cosine.std() / math.sqrt(len(U)))
     if kappa:
         below = np.expm1(-kappa * (1.0 - cosine)) / np.expm1(-2.0 * kappa)
-        assert stats.kstest(1.0 - below, "uniform").pvalue > 1e-3
+        assert scipy.stats.kstest(1.0 - below, "uniform").pvalue > 1e-3
     turned = n - cosine[:, None] * poles.mean()
     assert np.linalg.norm(turned.mean(axis=0)) < CONFIDENCE * math.sqrt(2.0 / len(U))
 
@@ -84,7 +84,7 @@ def test_densities_hold_in_the_mean() -> None:
         error = np.std(found, ddof=1) / math.sqrt(len(found))
         assert np.mean(found) == pytest.approx(exact, abs=CONFIDENCE * error)
         assert error < 0.06 * exact
-    assert stats.poisson(64.0 * one.p30()).sf(64.0 * max(counts)) > 1e-4
+    assert scipy.stats.poisson(64.0 * one.p30()).sf(64.0 * max(counts)) > 1e-4
     p30 = DiscSet(one.poles, RADII, "p10", p10).p30()
     assert p30 == pytest.approx(one.p30(), rel=1e-6)
 

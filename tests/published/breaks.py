@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 
 def _pieces(x: np.ndarray, width: float, *values: np.ndarray) -> list[np.ndarray]:
@@ -50,10 +50,10 @@ def breaks(
     """
     at, u, v = _pieces(x, width, x, dx, dy)
     converging = (u[:-1] - u[1:]) / np.diff(at) > shortening
-    joined = ndimage.binary_closing(np.pad(converging, 2), np.ones(3))[2:-2] if len(converging) else converging
-    label, number = ndimage.label(joined)
+    joined = scipy.ndimage.binary_closing(np.pad(converging, 2), np.ones(3))[2:-2] if len(converging) else converging
+    label, number = scipy.ndimage.label(joined)
     found = []
-    for run in ndimage.find_objects(label, number):
+    for run in scipy.ndimage.find_objects(label, number):
         # A piece on the edge of the run may hold grains of both sides: compare the ones beyond.
         first, last = max(run[0].start - 1, 0), min(run[0].stop + 1, len(at) - 1)
         candidate = Break(float((at[first] + at[last]) / 2.0), float(u[first] - u[last]), float(v[first] - v[last]))

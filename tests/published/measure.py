@@ -4,8 +4,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
-from scipy.signal import find_peaks
+import scipy
 
 from hpcdem.io.frames import list_frames
 from hpcdem.post.measure import faults
@@ -53,9 +52,9 @@ def peaks(xs: np.ndarray, ys: np.ndarray, width: float, prominence: float) -> np
     """Places of the highs of a line after a running mean over `width`, each rising `prominence` above the lows that
     part it from higher ones."""
     at = np.arange(xs[0], xs[-1], width / 10.0)
-    smooth = ndimage.uniform_filter1d(np.interp(at, xs, ys), 10, mode="nearest")
+    smooth = scipy.ndimage.uniform_filter1d(np.interp(at, xs, ys), 10, mode="nearest")
     padded = np.concatenate([[smooth.min()], smooth, [smooth.min()]])  # highs at the ends count
-    found, _ = find_peaks(padded, prominence=prominence)
+    found, _ = scipy.signal.find_peaks(padded, prominence=prominence)
     return at[found - 1]
 
 

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+import scipy
 from scipy.spatial.transform import Rotation
 
 from hpcdem.physics.fdem import diagnostics, equilibrium
@@ -29,7 +29,7 @@ def rayleigh_speed() -> float:
         a, b = 1.0 - c * c / cp2, 1.0 - c * c / cs2
         return (1.0 + b) ** 2 - 4.0 * math.sqrt(a * b)
 
-    return float(brentq(gap, 0.5 * math.sqrt(cs2), 0.999 * math.sqrt(cs2)))
+    return float(scipy.optimize.brentq(gap, 0.5 * math.sqrt(cs2), 0.999 * math.sqrt(cs2)))
 
 
 @pytest.mark.parametrize("strained", [False, True])

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from hpcdem.post.layers import LAYERS, MOST_LABELS
 from hpcdem.post.plots import frame_figure
@@ -41,6 +40,8 @@ def test_bonds_are_coloured_by_the_sign_of_their_force() -> None:
 
 
 def test_ids_are_left_out_where_nobody_could_read_them() -> None:
+    from matplotlib.figure import Figure
+
     ax = Figure().add_subplot()
     LAYERS["bid"](make_frame(MOST_LABELS + 1), ax)
     assert not ax.texts

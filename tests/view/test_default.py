@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.text import Text
 
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
@@ -19,12 +18,19 @@ from hpcdem.page.viewer import Viewer
 from hpcdem.post.view.model import Layer, ModelView, read_view
 from hpcdem.post.view.moment import Moment, of_particles, read_moment
 from hpcdem.post.view.paper import figure_of
-from hpcdem.post.view.scene import PALE, chosen_rows, default_view, rgb, scene, shared
+from hpcdem.post.view.scene import PALE, Scene, chosen_rows, default_view, rgb, scene, shared
 from tests.view import frames
 from tests.view.test_bars import told
 from tests.view.test_pictures import run
 
 pytestmark = pytest.mark.figures
+
+
+def texts_of(shown: Scene) -> list[str]:
+    """All that is written on its page."""
+    from matplotlib.text import Text
+
+    return [text.get_text() for text in figure_of(shown).findobj(Text)]
 
 
 def unmoved(frame: MeshFrame, **columns: float) -> MeshFrame:
@@ -154,10 +160,9 @@ def test_an_arrow_says_how_long_a_value_is(tmp_path: Path):
     reference = shown.layers[0].reference
     assert reference is not None and reference.text == "velocity 5 m/s" and longest == pytest.approx(9.0)
     assert reference.length == pytest.approx(5.0 / 9.0 * 0.05 * 3.0)
-    texts = [text.get_text() for text in figure_of(shown).findobj(Text)]
+    texts = texts_of(shown)
     assert "velocity 5 m/s" in texts
-    assert "velocity 5 m/s" not in [t.get_text() for t in figure_of(scene(shown.moment, view.changed(legend=False)))
-                                    .findobj(Text)]  # fmt: skip
+    assert "velocity 5 m/s" not in texts_of(scene(shown.moment, view.changed(legend=False)))
     legend = told(Viewer(Sources([path])), {"view": view.model_dump(), "width": 60, "height": 60})
     assert legend["arrow"] == "velocity 5 m/s" and legend["part"] == pytest.approx(reference.length / 3.0)
     both = shared(view, [read_moment(path), read_moment(path)])
@@ -176,7 +181,7 @@ def test_beds_have_a_legend_by_group(tmp_path: Path):
     moment = of_particles(frame)
     shown = scene(moment, default_view(moment))
     assert shown.layers[0].legend == [("odd", "#ff0000"), ("even", "#00ff00 #ffff00")]
-    texts = [text.get_text() for text in figure_of(shown).findobj(Text)]
+    texts = texts_of(shown)
     assert "odd" in texts and "even" in texts
     particles["color"][:], particles["group"][:] = 3, 1
     one = of_particles(frame)

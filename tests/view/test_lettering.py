@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib import font_manager
-from matplotlib.figure import Figure
 
 from hpcdem.post import lettering, saved
 from hpcdem.post.view.model import Layer, ModelView
@@ -49,6 +47,8 @@ def font(path: Path, letter: str) -> Path:
 @pytest.fixture
 def no_fonts(monkeypatch: pytest.MonkeyPatch):
     """A machine whose only fonts are those of matplotlib."""
+    from matplotlib import font_manager
+
     own = [one for one in font_manager.fontManager.ttflist if "mpl-data" in one.fname]
     monkeypatch.setattr(font_manager.fontManager, "ttflist", own)
     monkeypatch.setattr(font_manager, "findSystemFonts", lambda: [])
@@ -60,6 +60,9 @@ def no_fonts(monkeypatch: pytest.MonkeyPatch):
 
 def test_letters_of_a_font_of_curves_are_lines_in_a_pdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Noto's are such; PDF of matplotlib would hold them in a way in which they stay white."""
+    from matplotlib import font_manager
+    from matplotlib.figure import Figure
+
     path = font(tmp_path / "a.ttf", LETTER)
     monkeypatch.setattr(lettering, "font_of", lambda letters: (NAME, str(path)))
     font_manager.fontManager.addfont(path)
@@ -94,6 +97,9 @@ def red(path: Path) -> int:
 def test_a_font_that_has_the_letters_is_found(no_fonts: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                               capsys: pytest.CaptureFixture):  # fmt: skip
     """Also one that was installed after matplotlib made its list."""
+    from matplotlib import font_manager
+    from matplotlib.figure import Figure
+
     path = font(tmp_path / "a.ttf", LETTER)
     monkeypatch.setattr(font_manager, "findSystemFonts", lambda: [str(path)])
     figure = Figure()

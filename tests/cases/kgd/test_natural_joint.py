@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+import scipy
 
 from hpcdem.physics.fdem import diagnostics
 from tests.conftest import ROOT, absent
@@ -76,7 +76,7 @@ def of_tip(angle: float, friction: float) -> float:
         return float(np.linalg.eigvalsh(np.diag([-high, -LOW]) + size * tip)[1]) - STRENGTH
 
     for high in np.arange(LOW, 100e6, 0.1e6):
-        stress = np.diag([-high, -LOW]) + brentq(over, 0.0, 1e3 * STRENGTH, args=(high,)) * tip
+        stress = np.diag([-high, -LOW]) + scipy.optimize.brentq(over, 0.0, 1e3 * STRENGTH, args=(high,)) * tip
         if abs(along @ stress @ across) < 1e5 - friction * float(across @ stress @ across):
             return float(high)
     return math.inf

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+import scipy
 
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.flow.model import Flow
@@ -114,7 +114,7 @@ def stiffer(half: float) -> float:
         a = half_length(volume, float(opening[n - 1 : n + 1].mean()))
         return a * length, a * a / volume
 
-    length = brentq(lambda length: cracks(length)[0] - half, 0.5 * half, 1.5 * half, xtol=1e-3 * half)
+    length = scipy.optimize.brentq(lambda length: cracks(length)[0] - half, 0.5 * half, 1.5 * half, xtol=1e-3 * half)
     return cracks(length)[1] / cracks(0.0)[1]
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
+import scipy
 
 RADIUS, DENSITY, K, OVERLAP, MU, V0 = 50.0, 2500.0, 11e9, 0.220573, 0.1, 1.0
 MASS = DENSITY * 2.0 * math.sqrt(3.0) * RADIUS**2
@@ -32,7 +32,9 @@ class Exact:
     def __init__(self, eta: float) -> None:
         self.b = b = eta / (2.0 * MASS)
         self.wd = wd = math.sqrt(W**2 - b**2)
-        self.slips_at = t1 = brentq(lambda t: self._stick(t)[0] - STRETCH, 0.0, 0.5 * math.pi / wd, xtol=1e-15)
+        self.slips_at = t1 = scipy.optimize.brentq(
+            lambda t: self._stick(t)[0] - STRETCH, 0.0, 0.5 * math.pi / wd, xtol=1e-15
+        )
         v1 = self._stick(t1)[1]
         a = W**2 * STRETCH
         if b == 0.0:

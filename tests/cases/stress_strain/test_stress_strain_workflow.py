@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import ndimage
+import scipy
 
 from hpcdem.io.frames import list_frames
 from hpcdem.post.section import Section, read_section
@@ -61,7 +61,7 @@ def bands(section: Section, part: float, least: int) -> list[tuple[float, bool, 
     found = []
     for clockwise in (True, False):
         signed = strain if clockwise else -strain
-        names, count = ndimage.label(signed > part * np.abs(strain).max())
+        names, count = scipy.ndimage.label(signed > part * np.abs(strain).max())
         for k in range(1, count + 1):
             nodes = np.stack([x[names == k], y[names == k]], axis=1)
             if len(nodes) >= least:
