@@ -231,7 +231,7 @@ def hexes_that_obey(sim: Blocks) -> None:
 def obey_more(sim: Blocks) -> None:
     """What happens to it."""
     dig_hexes(sim)
-    if sim.clock.step == 150:
+    if sim.clock.step == 300:
         changes.reset_state(sim, np.arange(96, 144))
 
 
@@ -248,10 +248,10 @@ def they_obey(found: Found) -> None:
 def dig_hexes_that_flow(sim: Blocks) -> None:
     """The same; some forget that they have yielded or crept, or become elastic."""
     dig_hexes(sim)
-    if sim.clock.step == 150:
+    if sim.clock.step == 300:
         changes.reset_state(sim, np.arange(96, 144))
         changes.reset_kelvin_strain(sim, np.arange(48))
-    if sim.clock.step == 300:
+    if sim.clock.step == 600:
         changes.element_model(sim, np.flatnonzero(sim.yielding())[:24], "mech_iso_elastic", {**ROCK, "young": 1e8})
 
 
@@ -267,7 +267,7 @@ def they_flow_and_creep(found: Found) -> None:
 
 def dig_hexes(sim: Blocks) -> None:
     """Whole hexahedra are taken out in the middle of the run."""
-    if sim.clock.step == 250:
+    if sim.clock.step == 500:
         changes.null(sim, np.flatnonzero((sim.mesh.centroids()[:, 0] > 2.1) & (sim.mesh.macro_of() >= 0)))
 
 
@@ -632,16 +632,23 @@ MODELS = {
         warm_soil, warm_and_flowing, it_is_warm, dig_soil, steps=1000, middle=401, come=10, slow=True
     ),
     "hexahedra": Model(
-        damped_blocks_of_hexes, touching, it_hits, dig_hexes_and_fill, steps=900, middle=201, come=10, slow=True
+        damped_blocks_of_hexes, touching, it_hits, dig_hexes_and_fill, steps=900, middle=401, come=10, slow=True
     ),
     "hexahedra that flow": Model(
-        hexes_that_flow, flow_and_creep, they_flow_and_creep, dig_hexes_that_flow, steps=400, middle=201, come=10
+        hexes_that_flow,
+        flow_and_creep,
+        they_flow_and_creep,
+        dig_hexes_that_flow,
+        steps=900,
+        middle=401,
+        come=10,
+        slow=True,
     ),
     "hexahedra that glow": Model(
-        hexes_that_glow, hot_hexes, they_glow, glow_in_hexes, steps=900, middle=201, come=10, slow=True
+        hexes_that_glow, hot_hexes, they_glow, glow_in_hexes, steps=900, middle=401, come=10, slow=True
     ),
     "hexahedra that obey": Model(
-        hexes_that_obey, obeying, they_obey, obey_more, prepare=load_laws, steps=600, middle=201, come=10, slow=True
+        hexes_that_obey, obeying, they_obey, obey_more, prepare=load_laws, steps=600, middle=401, come=10, slow=True
     ),
     "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),
 }
