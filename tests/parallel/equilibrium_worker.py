@@ -51,7 +51,7 @@ SPACE = ("stress_xx", "stress_yz", "displacement_x", "displacement_z", "reaction
 
 
 def excavation(sim: Blocks, solver: str, out: str) -> None:
-    mesh = shaken(rectangle(24, 8, 2.4, 0.8, kind="mixed"), 0.2)
+    mesh = shaken(rectangle(15, 5, 2.4, 0.8, kind="mixed"), 0.2)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e9})
     joints = sim.numbers_of_joints(None)
@@ -164,7 +164,7 @@ def propped(sim: Blocks, solver: str, out: str) -> None:
 
 
 def cooled(sim: Blocks, solver: str, out: str) -> None:
-    sim.take_mesh(shaken(rectangle(24, 6, 2.4, 0.6, kind="mixed"), 0.2))
+    sim.take_mesh(shaken(rectangle(16, 4, 2.4, 0.6, kind="mixed"), 0.2))
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     mesh = sim.the_mesh()
     x, y = mesh.points.T
@@ -185,8 +185,8 @@ def cooled(sim: Blocks, solver: str, out: str) -> None:
     heat.prescribe(np.flatnonzero(x < 1e-9), "winter")
     heat.expose(None, environment="winter", transfer=30.0)
     run = Implicit(sim, solver)
-    for _ in range(10):
-        run.advance(1e4)
+    for _ in range(5):
+        run.advance(2e4)
     run.close()
     found = {name: diagnostics.values(sim, name) for name in (*NAMES, "temperature", "plastic_work")}
     assert found["plastic_work"].max() > 0.0
@@ -303,7 +303,7 @@ def seam(sim: Blocks, solver: str, out: str) -> None:
 
 def crushed(sim: Blocks, solver: str, out: str) -> None:
     """A bar of rock that yields under a stamp; a part is dug out."""
-    mesh = box((12, 3, 3), (2.4, 0.6, 0.6), 5, shaken=0.2)
+    mesh = box((9, 2, 2), (2.4, 0.6, 0.6), 5, shaken=0.2)
     sim.take_mesh(mesh)
     soil = {
         "density": 2000.0, "bulk": 3.9e9, "shear": 2.8e9, "friction": 30.0, "dilation": 10.0, "cohesion": 3.45e6,

@@ -62,7 +62,7 @@ def yielding(runs) -> Found:
 
 def test_both_stages_are_in_balance(alone):
     assert alone["ratios"].max() < 1e-8
-    assert alone["counts"][2] > 1000 and np.isnan(alone["stress_xx"]).sum() > 5
+    assert alone["counts"][2] > 400 and np.isnan(alone["stress_xx"]).sum() > 5
     assert np.nanmax(np.abs(alone["later_velocity_x"])) < 1e-12
 
 
@@ -100,7 +100,7 @@ def test_slurry_opens_it_too(runs):
 
 def test_cold_strains_the_joints(runs):
     found = runs(1, "direct-cooled")
-    assert found["joints"][0] > 20 and np.ptp(found["temperature"]) > 5.0
+    assert found["joints"][0] > 10 and np.ptp(found["temperature"]) > 5.0
     assert np.nanmax(found["stress_xx"]) > 1e6 and np.nanmax(found["opening"]) > 1e-7
 
 
