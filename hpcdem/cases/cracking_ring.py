@@ -28,7 +28,7 @@ class CrackingRing(Ring):
     """The hole of a jointed ring is heated slowly; tension at the outer rim grows until it cracks."""
 
     name: ClassVar[str] = "cracking-ring"
-    title: ClassVar[str] = "A ring that cracks by heat"
+    title: ClassVar[str] = "Thermal cracking of a ring"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Cracked
 

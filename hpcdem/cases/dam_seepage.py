@@ -1,4 +1,4 @@
-"""Water that seeps through a dam with upright sides and finds its level."""
+"""Seepage through a dam with vertical faces: the water level inside."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class DamSeepage(Water):
     """A rectangular dam between two levels of water: free surface, seepage face and discharge."""
 
     name: ClassVar[str] = "dam-seepage"
-    title: ClassVar[str] = "Water that seeps through a dam with upright sides"
+    title: ClassVar[str] = "Seepage through a dam with vertical faces"
     result: ClassVar[type] = Seepage
 
     length: float = quantity(16.0, "m", "from side to side of the dam", gt=0)

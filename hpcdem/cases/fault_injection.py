@@ -40,7 +40,7 @@ class FaultInjection(Case):
     lets it slip."""
 
     name: ClassVar[str] = "fault-injection"
-    title: ClassVar[str] = "A fault that slips when fluid is pumped into it"
+    title: ClassVar[str] = "Slip of a fault by fluid injection"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Slipping
 

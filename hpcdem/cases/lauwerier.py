@@ -29,7 +29,7 @@ class Lauwerier(Warm):
     """A straight fracture in a slab of rock: temperatures of water and rock over time."""
 
     name: ClassVar[str] = "lauwerier"
-    title: ClassVar[str] = "Heat of water in a fracture"
+    title: ClassVar[str] = "Heat transport by water in a fracture"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Front
 

@@ -34,7 +34,7 @@ class ProppantBed(Case):
     is left of it goes out on the right, and sand of 0.45 mm settles to a bed in between."""
 
     name: ClassVar[str] = "proppant-bed"
-    title: ClassVar[str] = "The bed of proppant in a slot"
+    title: ClassVar[str] = "Proppant bed in a slot"
     result: ClassVar[type] = Bed
 
     length: float = quantity(1.2192, "m", "of the slot, 4 ft", gt=0)

@@ -1,4 +1,4 @@
-"""The factor of safety of a slope, by reduction of its strength."""
+"""Factor of safety of a slope by strength reduction."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class SlopeStability(Case):
     """A slope of one soil under gravity, whose strength is divided by a factor until it comes down."""
 
     name: ClassVar[str] = "stability"
-    title: ClassVar[str] = "The factor of safety of a slope, by reduction of its strength"
+    title: ClassVar[str] = "Factor of safety of a slope by strength reduction"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Stability
 

@@ -1,4 +1,4 @@
-"""A tunnel in rock that yields, supported by bolts and a shell of shotcrete."""
+"""A tunnel in yielding rock, supported by bolts and a shell of shotcrete."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Support(Case):
     released."""
 
     name: ClassVar[str] = "support"
-    title: ClassVar[str] = "A tunnel in rock that yields, supported by bolts and shotcrete"
+    title: ClassVar[str] = "A tunnel in yielding rock, supported by bolts and shotcrete"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Supported
 

@@ -1,4 +1,4 @@
-"""A tunnel that is excavated in rock under stress."""
+"""Excavation of a tunnel in stressed rock."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Tunnel(Rock):
     """A tunnel: rock under stress, from which a circle or a horseshoe is excavated gradually."""
 
     name: ClassVar[str] = "tunnel"
-    title: ClassVar[str] = "A tunnel that is excavated in rock under stress"
+    title: ClassVar[str] = "Excavation of a tunnel in stressed rock"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Excavation
 

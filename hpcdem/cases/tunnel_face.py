@@ -26,7 +26,7 @@ class TunnelFace(Case):
     """A quarter of a round tunnel, driven along y into rock under the same pressure from all sides."""
 
     name: ClassVar[str] = "tunnel-face"
-    title: ClassVar[str] = "A tunnel in three dimensions closes before and behind its face"
+    title: ClassVar[str] = "Convergence of a tunnel ahead of and behind its face, in three dimensions"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Closure
 

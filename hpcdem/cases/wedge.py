@@ -34,7 +34,7 @@ class Wedge(Case):
     """A slope of sound rock with two joints, which cut a wedge out of its face and its top."""
 
     name: ClassVar[str] = "wedge"
-    title: ClassVar[str] = "A wedge between two joints slides out of a slope"
+    title: ClassVar[str] = "Sliding of a wedge between two joints of a slope"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Release
 

@@ -29,11 +29,11 @@ class Talk(Protocol):
 
 @click.command(context_settings=HELP)
 @click.option("--zdem", is_flag=True, help="ZDEM commands instead of PCDC commands and Python.")
-@click.option("-j", "threads", type=click.IntRange(1), metavar="N", help="Threads [what srun -c gives, else 1].")
-@click.option("--outdir", type=PATH, metavar="DIR", help="Results [data in this folder].")
+@click.option("-j", "threads", type=click.IntRange(1), metavar="N", help="Threads [value of srun -c, else 1].")
+@click.option("--outdir", type=PATH, metavar="DIR", help="Folder of the results [data in the current folder].")
 @click.option("--pipe", is_flag=True, hidden=True)
 def console(**options: Any) -> None:
-    """Take PCDC commands and Python line by line, on one rank. Tab completes; exit() or Ctrl-D ends."""
+    """Enter PCDC commands and Python line by line, on one rank. Tab completes; exit() or Ctrl-D ends."""
 
 
 def start(words: list[str]) -> NoReturn:

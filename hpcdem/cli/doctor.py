@@ -24,15 +24,13 @@ STYLES = {"OK": "green", "WARNING": "yellow", "PROBLEM": "bold red"}
 
 @click.command(context_settings=HELP)
 @click.option("--dir", "directory", type=PATH, default=Path(), metavar="DIR", help="Folder of the results [.].")
-@click.option(
-    "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
-)
+@click.option("-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [value of srun -c, else 1].")
 def doctor(**options: Any) -> None:
     """Report what would make a run fail, slow it down or put it at risk, and the commands that fix it: packages, MPI
     and its launcher, cores and memory, file systems, the kernel cache, Slurm, limits of the shell.
 
     Also under mpiexec or srun, as the run would be started: then all ranks and hosts are checked. Exit codes: 0 no
-    problem, 1 a problem (warnings are none).
+    problems, 1 problems found (warnings do not count).
     """
 
 

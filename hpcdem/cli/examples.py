@@ -23,7 +23,7 @@ PLACES = (Path(__file__).resolve().parents[2] / "examples", Path(sys.prefix) / "
 
 @click.command(context_settings=HELP, epilog="Then: hpcdem NAME.py. The first lines of each example describe it.")
 @click.argument("name", required=False)
-@click.option("--into", type=PATH, default=Path(), metavar="DIR", help="Folder to copy the example to [this one].")
+@click.option("--into", type=PATH, default=Path(), metavar="DIR", help="Destination folder [the current one].")
 def examples(**options: Any) -> None:
     """List the examples; with NAME, copy one of them, with the files it reads."""
 

@@ -27,7 +27,7 @@ grade = click.Command(
             ["--serve"],
             is_flag=True,
             help="Open a page in the browser with sliders for the options, which also saves the files; FILE is the "
-            "initial table. For this machine only.",
+            "initial table. Only this machine can open it.",
         ),
         click.Option(["--port"], type=click.IntRange(0, 65535), metavar="N", help="--serve: port [a free one]."),
         click.Option(["--no-browser"], is_flag=True, help="--serve: only print the address."),

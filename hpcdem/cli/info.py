@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="One JSON object per line and path.")
 @click.option("--all", "every", is_flag=True, help="For a folder: inspect all files, not only the newest ones.")
 def info(**options: Any) -> None:
-    """What is in a checkpoint (.sav), a frame (.vtkhdf, .dat) or the output folder of a run."""
+    """Show the contents of a checkpoint (.sav), a frame (.vtkhdf, .dat) or the output folder of a run."""
 
 
 def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:

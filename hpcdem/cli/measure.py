@@ -88,16 +88,16 @@ def measure(**options: Any) -> None:
     \b
     surface    profiles of the surface
     wedge      crest, toe, height, width, slopes and taper
-    faults     bands of strain: place, length, dip, vergence
-    wallforce  forces on walls over their way, and work
-    tracks     paths of particles: --ids, --near, all of --groups or --colors, or some spread over the bed
+    faults     bands of strain: position, length, dip, vergence
+    wallforce  forces on walls against their displacement, and work
+    tracks     paths of particles: --ids, --near, all of --groups or --colors, or a sample across the bed
     layers     areas of colours and groups
     cracks     broken bonds or joints, by mode and time, and damage
-    fragments  of blocks: number, areas, distribution of sizes
-    emission   of blocks: joints that broke as acoustic events: rate, magnitudes, b-value
-    fluid      of blocks: wet length or area, volume, largest pressure, aperture and velocity; each channel of the last
-    regions    of blocks in space: volume, extent, mean stress and strain of groups and of a --box
-    displacement  of blocks in space: how far their surface has moved
+    fragments  blocks: number, areas, distribution of sizes
+    emission   blocks: broken joints as acoustic events: rate, magnitudes, b-value
+    fluid      blocks: wet length or area, volume, largest pressure, aperture and velocity; each channel of the last
+    regions    blocks in three dimensions: volume, extent, mean stress and strain of groups and of a --box
+    displacement  blocks in three dimensions: displacement of their surface
     """
 
 

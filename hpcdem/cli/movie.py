@@ -38,7 +38,7 @@ PAGE = 17.0
     "--format", "kind", type=click.Choice(["gif", "mp4", "both"]), help="[gif, and mp4 if ffmpeg is installed]."
 )
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="The film [DIR/movie.gif, .mp4].")
-@click.option("--name", metavar="NAME", help="Frames of blocks NAME_<step>.vtkhdf [the name most of them have].")
+@click.option("--name", metavar="NAME", help="Frames of blocks NAME_<step>.vtkhdf [the most frequent name].")
 @click.option("--show", type=click.Choice(list(PANELS_SHOWN)), help="For blocks: cracks (by mode), stress "
               "(compressive), plastic strain, temperature; for fluid in joints pressure, saturation, aperture, "
               "velocity, proppant concentration; both: cracks and stress [all available].")  # fmt: skip
@@ -47,7 +47,7 @@ PAGE = 17.0
 def movie(**options: Any) -> None:
     """Make a film of all frames in DIR, of particles or of blocks, drawn with the same limits.
 
-    An animated GIF, and MP4 where ffmpeg is found (in the PATH, or of the package imageio-ffmpeg). --showlable=true
+    An animated GIF, and MP4 where ffmpeg is found (in the PATH or in the package imageio-ffmpeg). --showlable=true
     writes the step into each frame; in your own text, {step} and {time} (s) are replaced.
     """
 

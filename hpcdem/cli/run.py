@@ -474,8 +474,7 @@ class RunCommand(click.Command):
     "threads",
     type=click.IntRange(1),
     metavar="N",
-    help="Threads per rank [what srun -c gives, else 1; of a ZDEM "
-    "script that one process runs alone OMP_NUM_THREADS, else all cores].",
+    help="Threads per rank [value of srun -c, else 1; for a ZDEM script on one rank OMP_NUM_THREADS, else all cores].",
 )
 @click.option(
     "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."
@@ -487,7 +486,7 @@ class RunCommand(click.Command):
 )  # fmt: skip
 @keeping
 @click.option("--check", is_flag=True, help="Check the script and print what it would do; run nothing.")
-@click.option("--outdir", type=PATH, metavar="DIR", help="Results [data beside the script].")
+@click.option("--outdir", type=PATH, metavar="DIR", help="Folder of the results [data, next to the script].")
 @running
 @click.option(
     "--check-reproducible", type=click.IntRange(1), metavar="N", help="Log a fingerprint of the state every N steps."

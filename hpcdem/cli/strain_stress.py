@@ -40,9 +40,7 @@ if TYPE_CHECKING:
     "volume around each, over SIZE; that of the nearest particle; or the quantity on the pages of the manual, which is "
     "no change of volume [mean].",
 )  # fmt: skip
-@click.option(
-    "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
-)
+@click.option("-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [value of srun -c, else 1].")
 def strain_stress(**options: Any) -> None:
     """Stress and strain of the frames of a finished run, on a grid and on the particles.
 

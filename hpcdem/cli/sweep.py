@@ -80,8 +80,8 @@ class Setting(click.ParamType):
               "repeatable.")  # fmt: skip
 @click.option("--member", type=click.IntRange(0), hidden=True)
 def sweep(**options: Any) -> None:
-    """Run SCRIPT once for each combination of values of its parameters, each member in a folder of its own, many at
-    once; or continue the sweep in DIR."""
+    """Run SCRIPT once for each combination of parameter values, each in its own folder and several at a time; or
+    continue the sweep in DIR."""
 
 
 def _report_command() -> click.Command:
@@ -92,7 +92,7 @@ def _report_command() -> click.Command:
         click.Argument(["what"], type=click.Choice(WHAT_OF_SWEEPS), nargs=-1, metavar="[WHAT]..."),
         click.Option(["-o", "--output"], type=PATH, metavar="DIR", help="Folder for the report [DIR/report]."),
         click.Option(["--tables"], type=Words(), default="csv", metavar="LIST", help="csv, parquet (needs pyarrow), "
-                     "with commas between them [csv]."),
+                     "separated by commas [csv]."),
     ]  # fmt: skip
     return click.Command(
         "report", context_settings=HELP, no_args_is_help=True,

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 @click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="[a free one].")
 @click.option("--no-browser", is_flag=True, help="Only print the address.")
 def view(**options: Any) -> None:
-    """Show frames of particles or of blocks on a page in the browser: move, choose, colour, ask, play, save.
+    """Open frames of particles or blocks in the browser: pan and zoom, select and colour objects, query values, play,
+    export.
 
-    The page follows a folder into which a run writes. It is open to this machine only; on a cluster use ssh: `ssh -L
+    The page follows a running simulation. Only this machine can open it; on a cluster use ssh: `ssh -L
     PORT:127.0.0.1:PORT host`, with --port PORT here.
     """
 
