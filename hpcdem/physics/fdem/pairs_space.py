@@ -31,7 +31,7 @@ OF_CONTACTOR = [0, 1, 2, 3, 5, 6]
 
 class Surface(NamedTuple):
     """The surface of a whole model, one copy per node of the machine. mesh, closed, closed_faces: of which it is;
-    clusters (ne, 4): numbers of the corners, those that are connected have one; faces (k,): free faces, ascending;
+    clusters (ne, 4): numbers of the corners, those that are connected have one; free (4 ne,) bool: free faces;
     first (ne,): of each element with a corner on the surface its lowest free face, else the lowest of those that hang
     on its corners, -1: of others; begin, around: faces by cluster; length (ne,) [m]: median altitude of the elements of
     its body in the mesh.
@@ -41,7 +41,7 @@ class Surface(NamedTuple):
     closed: np.ndarray
     closed_faces: int
     clusters: np.ndarray
-    faces: np.ndarray
+    free: np.ndarray
     first: np.ndarray
     begin: np.ndarray
     around: np.ndarray
@@ -56,16 +56,17 @@ class Surface(NamedTuple):
             return known
         same = known is not None and known.mesh is mesh
         length = known.length if same else sim.per_node(lambda: lengths(sim))
-        clusters, faces, first, begin, around = sim.per_node(lambda: Surface._found(sim))
-        sim.surface = Surface(mesh, closed, count, clusters, faces, first, begin, around, length)
+        clusters, free, first, begin, around = sim.per_node(lambda: Surface._found(sim))
+        sim.surface = Surface(mesh, closed, count, clusters, free, first, begin, around, length)
         return sim.surface
 
     @staticmethod
     def _found(sim: State) -> tuple[np.ndarray, ...]:
-        """clusters, faces, first, begin, around."""
+        """clusters, free, first, begin, around."""
         mesh, closed = sim.the_mesh(), sim.closed_faces()
         clusters, lead = mesh.corner_clusters(sim.partner, ~closed)
-        faces = np.flatnonzero(sim.face_exists() & ~closed)
+        free = sim.face_exists() & ~closed
+        faces = np.flatnonzero(free)
         element = faces // 4
         of_faces = clusters[element[:, None], FACES[faces % 4]]
         at, face = of_faces.reshape(-1), np.repeat(faces, 3)
@@ -80,7 +81,12 @@ class Surface(NamedTuple):
         np.minimum.at(own, element, faces)
         first = np.where(own < nobody, own, first)
         first[(first == nobody) | ~sim.alive] = -1
-        return clusters, faces, first, begin, around
+        return clusters, free, first, begin, around
+
+    def faces_of(self, elements: np.ndarray) -> np.ndarray:
+        """Return the free faces (k,) of elements (n,), ascending."""
+        faces = (4 * np.sort(elements)[:, None] + np.arange(4)).reshape(-1)
+        return faces[self.free[faces]]
 
     def near(self, elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Faces that hang on the corners of elements (n,), each once: which element (k,), ascending, and face (k,)."""
@@ -155,7 +161,7 @@ class ContactSpace:
         self.face, rows = np.empty(0, np.int64), np.empty(0, np.int64)
         if sim.options.collision:
             surface = Surface.of(sim)
-            self.face = surface.faces[sim.where[surface.faces // 4] >= 0]
+            self.face = surface.faces_of(sim.number)
             rows = np.flatnonzero(surface.first[sim.number] >= 0)
         self._place(sim, rows)
         self._make_list(sim)
@@ -337,8 +343,7 @@ class AllPairs(ContactSpace):
     is not requested."""
 
     def __init__(self, sim: State) -> None:
-        faces = Surface.of(sim).faces
-        self.face = faces[sim.where[faces // 4] >= 0]
+        self.face = Surface.of(sim).faces_of(sim.number)
         self._place(sim, np.arange(len(sim.number)))
         self.first, self.second = self._near(sim, 0.0)
 

@@ -191,13 +191,11 @@ class Heat(Diffusing):
         blocks, pairs = self.blocks, self.blocks.local.pairs
         if self._pairs_of is not pairs:
             self._pairs_of = pairs
-            faces = Surface.of(blocks).faces
-            free = np.zeros(self.exposed.row.size, bool)
-            free[faces] = True
+            free = Surface.of(blocks).free
             face = np.repeat(pairs.face[pairs.first], 4)
             other = (4 * pairs.element[pairs.second][:, None] + np.arange(4)).reshape(-1)
             both = np.column_stack([face, other])[free[other]]
-            corners, share = facing(blocks.the_mesh(), faces, both)
+            corners, share = facing(blocks.the_mesh(), np.flatnonzero(free), both)
             self._facing = 4 * blocks.where[corners // 4] + corners % 4, share
         edge, h = float(blocks.mean_edge), self._transfers[blocks.number]
         (first, second), share = self._facing
