@@ -13,6 +13,7 @@ import pytest
 import scipy
 
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics
+from hpcdem.physics.fdem.kernels import elements, energy, energy_space
 from hpcdem.physics.fdem.kernels.joint_law import SOFTENING_AREA, softening
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks import models
@@ -204,3 +205,66 @@ def test_what_is_taken_out_while_storage_waits_to_be_sorted():
     waiting, v = run(True)
     assert waiting == pytest.approx(run(False)[0], rel=1e-3) and waiting < -3000.0
     np.testing.assert_array_equal(v, run(True, account=False)[1])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_work_and_kinetic_energy_are_sums_over_corners(dim: int):
+    """Two owned elements between ghosts, a triangle and a quad or two tetrahedra; forces by the mean velocity."""
+    rng = np.random.default_rng(dim)
+    first, n_own, a, b, dt = 1, 2, 0.25, 0.75, 0.1
+    before, after, of_joints, pushed = rng.normal(size=(4, 4, 4, dim if dim == 2 else 4))
+    mass, felt, outside = rng.uniform(1.0, 2.0, (4, 4)), rng.normal(size=(3, 2 * dim)), rng.normal(size=(3, dim))
+    v = (a * before + b * after)[..., :dim]
+    flat = [values.reshape(4, -1) for values in (before, after, of_joints, pushed)]
+    work, moving = np.zeros((n_own, 8)), np.zeros(n_own)
+    rows = np.array([2, 1])  # whom somebody pushes
+    begin = np.array([0, 2, 3, 4])
+    lowest = np.array([[1, 2], [0, 0], [2, 0], [2, 3]])  # (row, corner) of nodes; the first of each counts
+    place = lowest @ np.array([4, 1]) * (before.shape[2])
+    if dim == 2:
+        count = np.array([3, 4])
+        cells = np.array([[0, 1, 2, 3], [0, 1, 2, -1], [3, 4, 5, 6], [0, 1, 2, 3]])
+        energy.book_contact(rows, first, count[::-1], flat[3][:2], *flat[:2], a, b, dt, work)
+        energy.book_nodes(begin, place, felt, outside, *flat[:2], a, b, dt, first, n_own, 8, work)
+        energy.kinetic(first, n_own, cells, np.arange(4), *flat[:2], mass, moving)
+    else:
+        count = np.array([4, 4])
+        gravity = np.array([1.0, -2.0, 3.0])
+        energy_space.book(first, n_own, *flat[:2], a, b, flat[2], flat[3], mass, *gravity, dt, work)
+        for column, forces in ((energy.BY_JOINTS, of_joints), (energy.VISCOUS, pushed)):
+            assert work[:, column] == pytest.approx((forces[..., :3] * v)[1:3].sum(axis=(1, 2)) * dt, rel=1e-12)
+        weight = np.einsum("ek,m,ekm->e", mass, gravity, v)[1:3] * dt
+        assert work[:, energy.GRAVITY] == pytest.approx(weight, rel=1e-12)
+        energy_space.book_contact(rows, first, flat[3][:2], *flat[:2], a, b, dt, work)
+        energy_space.book_nodes(begin, place, felt, outside, *flat[:2], a, b, dt, first, n_own, work)
+        energy_space.kinetic(first, n_own, *flat[:2], mass, moving)
+    for row, force in zip(rows, pushed):
+        done = (force[..., :dim] * v[row])[: count[row - first]].sum() * dt
+        assert work[row - first, energy.BY_CONTACT] == pytest.approx(done, rel=1e-12)
+        both = (mass[row, :, None] * (before * after)[row, :, :dim])[: count[row - first]].sum()
+        assert moving[row - first] == pytest.approx(0.5 * both, rel=1e-12)
+    done = [((felt[i, dim:] + outside[i]) @ v[tuple(lowest[begin[i]])]) * dt for i in range(3)]
+    assert work[:, energy.OUTSIDE] == pytest.approx([done[0], done[1] + done[2]], rel=1e-12)
+
+
+def test_the_viscous_stress_of_a_triangle_works_as_its_power_says():
+    """Forces . velocities = - area times stress : rate, whatever the triangle and its rotation; none while it turns."""
+    xy = np.array([0.1, 0.2, 1.3, 0.4, 0.5, 1.1])
+    m = np.array([xy[2:4] - xy[:2], xy[4:] - xy[:2]]).T
+    area = 0.5 * np.linalg.det(m)
+    c = np.zeros(16)
+    c[:4] = np.linalg.inv(m).reshape(-1)
+    out, beta = np.zeros(6), 0.5
+    c[[elements.LAMBDA, elements.TWO_MU, elements.ETA]] = 3.0, 5.0, 7.0
+    for gradient in (
+        [[1.0, 0.0], [0.0, 0.0]],
+        [[0.0, 0.0], [0.0, 1.0]],
+        [[0.3, 1.0], [0.5, -0.7]],
+        [[0.0, 1.0], [-1.0, 0.0]],
+    ):
+        rate = 0.5 * (np.array(gradient) + np.array(gradient).T)
+        velocity = (np.array(gradient) @ xy.reshape(3, 2).T).T.reshape(-1)
+        energy._viscous_triangle(xy, velocity, c, False, beta, out)
+        stress = (7.0 + beta * 5.0) * rate + beta * 3.0 * np.trace(rate) * np.eye(2)
+        assert out @ velocity == pytest.approx(-area * (stress * rate).sum(), rel=1e-12, abs=1e-14)
+        assert out.reshape(3, 2).sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-14)

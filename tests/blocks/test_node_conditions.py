@@ -209,3 +209,35 @@ def test_a_file_with_conditions_by_points_goes_on():
     for name in ("position_y", "velocity_x", "reaction_x"):
         assert np.array_equal(diagnostics.values(sim, name), diagnostics.values(other, name))
     assert not other.sided and np.array_equal(sim.corner_row[cells >= 0], other.corner_row[cells >= 0])
+
+
+def test_what_each_condition_makes_of_a_velocity():
+    """Closed forms of nodes of one corner, and of one with two corners that are both stored twice, once at 0."""
+    begin, corner = np.array([0, 2, 3, 4, 5, 6]), 2 * np.arange(6)
+    place, again = np.array([2, 4, 6, 8, 10, 12]), np.array([14, 0, -1, -1, -1, -1])
+    v = np.full(16, np.nan)
+    v[place], v[place + 1] = 3.0, -2.0
+    force, applied = np.arange(1.0, 13.0), np.zeros(12)
+    applied[:2] = 0.5, 0.25
+    kick, share, alpha = np.array([0.1, 0.2, 0.2, 0.2, 0.2]), np.array([1.0, 1.0, 1.0, 1.0, 0.5]), 0.5
+    table = np.zeros((5, nodes.CONDITION))
+    table[:, nodes.DAMP] = -1.0
+    table[1, [nodes.DOES_X, nodes.AT_X]] = V, 7.0
+    table[2, [nodes.DOES_Y, nodes.AT_Y, nodes.DAMP]] = A, 4.0, 0.0
+    table[3, nodes.CONSTRAINT] = FIXED
+    table[4, [nodes.CONSTRAINT, nodes.WAY_X, nodes.WAY_Y, nodes.FORCE_X]] = ALONG, 0.6, 0.8, 10.0
+    outside, felt = np.zeros((5, 2)), np.zeros((5, 4))
+    nodes.move(
+        1, begin, corner, place, again, kick, np.arange(5), share, table, True, force, applied, v, alpha, outside, felt
+    )
+    x, y = v[place[begin[:-1]]], v[place[begin[:-1]] + 1]
+    f = np.array([[4.5, 6.25], [5.0, 6.0], [7.0, 8.0], [9.0, 10.0], [16.0, 12.0]])
+    assert (felt[:, :2] == f).all() and felt[:, 2:].tolist() == [[0.5, 0.25], *[[0.0, 0.0]] * 3, [5.0, 0.0]]
+    along = (3.0 * 0.6 - 2.0 * 0.8) + 0.2 * (16.0 * 0.6 + 12.0 * 0.8) * (1.0 - alpha)
+    assert x == pytest.approx([3.0 + 0.1 * 0.5 * 4.5, 7.0, 3.0 + 0.2 * 7.0, 0.0, 0.6 * along], rel=1e-14)
+    assert y == pytest.approx([-2.0 + 0.1 * 1.5 * 6.25, -2.0 + 0.2 * 9.0, 2.0, 0.0, 0.8 * along], rel=1e-14)
+    for second in (4, 14, 0):
+        assert v[second : second + 2].tolist() == v[2:4].tolist()
+    across = 12.0 * 0.6 - 16.0 * 0.8
+    expected = [[0.0, 0.0], [4.0 / 0.2 - 5.0, 0.0], [0.0, 4.0 / 0.2 - 8.0], [-3.0 / 0.2 - 9.0, 2.0 / 0.2 - 10.0]]
+    assert outside == pytest.approx(np.array([*expected, [across * 0.8, -across * 0.6]]), rel=1e-13)

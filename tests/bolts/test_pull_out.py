@@ -118,3 +118,38 @@ def test_pressure_across_the_bar_adds_friction() -> None:
         found[sigma] = np.abs(bolts.values("bolt-node", "bond_force"))
     assert found[-2e6] == pytest.approx(math.pi * 0.025 * (2e6 + 2e6 * math.tan(math.pi / 6.0)), rel=1e-6)
     assert found[2e6] == pytest.approx(STRENGTH, rel=1e-9)
+
+
+def test_grout_holds_and_slips_at_the_weaker_face() -> None:
+    """One node that holds, one that slips at the rock, pressed, one that slips at the bolt, pulled apart, and two that
+    have no grout or no host: forces, slip, states and lost work by hand."""
+    n, k = 5, 100.0
+    tangent, nodes = np.tile([0.6, 0.8], (n, 1)), np.zeros((n, 7))
+    nodes[:, kernels.GROUT] = k, k, k, 0.0, k
+    nodes[:, kernels.ROCK_COHESION :] = 10.0, 0.5, 12.0, 0.25
+    nodes[2, kernels.ROCK_COHESION] = 20.0
+    rock, step = np.zeros((n, 2)), np.zeros((n, 2))
+    rock[:] = 0.06, 0.08  # 0.1 along the bar
+    step[:] = [0.03, 0.04], [-0.3, -0.4], [0.3, 0.4], [0.3, 0.4], [0.3, 0.4]
+    normal, grout, slip = np.array([5.0, -4.0, 3.0, 0.0, 0.0]), np.array([1.0, 2.0, -3.0, 4.0, 5.0]), np.zeros(n)
+    state, work = np.array([kernels.SLIPS, 0, kernels.SLIPPED, kernels.SLIPS, 0]), np.zeros(kernels.WORK)
+    kernels.hold(tangent, step, rock, np.array([True] * 4 + [False]), nodes, normal, grout, slip, state, work)
+    assert grout == pytest.approx([6.0, 12.0, -12.0, 4.0, 5.0], rel=1e-14)
+    assert slip == pytest.approx([0.0, -(62.0 - 12.0) / k, (-12.0 + 43.0) / k, 0.0, 0.0], rel=1e-13)
+    both = kernels.SLIPS | kernels.SLIPPED
+    assert state.tolist() == [0, both, both, 0, 0]
+    lost = [0.5 * (f + new) * du - 0.5 * (new**2 - f**2) / k for f, new, du in ((2.0, 12.0, 0.6), (-3.0, -12.0, -0.4))]
+    assert work == pytest.approx([0.0, 0.0, sum(lost), 0.0, 0.0], rel=1e-12) and min(lost) > 0.0
+
+
+def test_stress_across_a_bar() -> None:
+    """In the plane n . s n; in space the mean of two directions across."""
+    rng = np.random.default_rng(6)
+    for dim in (2, 3):
+        t, stress, out = rng.normal(size=(4, dim)), rng.normal(size=(4, 6)), np.zeros(4)
+        t /= np.linalg.norm(t, axis=1)[:, None]
+        kernels.across(stress, t, out)
+        for way, (xx, yy, xy, zz, xz, yz), found in zip(t, stress, out, strict=True):
+            s = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[:dim, :dim]
+            _, _, across = np.linalg.svd(way[None, :])
+            assert found == pytest.approx(np.mean([n @ s @ n for n in across[1:]]), rel=1e-12)

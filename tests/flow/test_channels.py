@@ -413,3 +413,23 @@ def test_what_cannot_act_is_refused() -> None:
     creep.switch(sim, True)
     with pytest.raises(CommandError, match="elements creep while blocks move"):
         sim.step()
+
+
+def test_pressure_on_faces_pushes_with_its_resultant_and_its_moment() -> None:
+    """An edge and a triangle with a linear pressure: force and moment of what their corners get are its integrals."""
+    state = np.zeros((3, kernels.STATE))
+    state[:, kernels.P] = 2.0, 5.0, 11.0
+    x, applied = np.array([1.0, 2.0, 4.0, 6.0]), np.zeros(4)
+    at, none = np.array([[0, 2]]), np.empty((0, 4))
+    kernels.loads(at, at, np.array([[0, 1]]), none, none, x, state, kernels.P, applied)
+    normal = np.array([-4.0, 3.0])  # to the left of the edge, as long as it
+    assert applied[:2] == pytest.approx((2.0 * 2.0 + 5.0) / 6.0 * normal)
+    assert applied[2:] == pytest.approx((2.0 + 2.0 * 5.0) / 6.0 * normal)
+    points = np.array([[0.1, 0.2, 0.3], [1.5, 0.1, 0.4], [0.3, 1.2, 0.9]])
+    twice = np.cross(points[1] - points[0], points[2] - points[0])
+    x, applied, at = points.reshape(-1).copy(), np.zeros(9), np.array([[0, 3, 6]])
+    kernels.loads(at, at, np.array([[0, 1, 2]]), none, none, x, state, kernels.P, applied)
+    p, forces = state[:, kernels.P], applied.reshape(3, 3)
+    for k in range(3):
+        assert forces[k] == pytest.approx(-(p.sum() + p[k]) / 24.0 * twice)
+    assert forces.sum(axis=0) == pytest.approx(-0.5 * p.mean() * twice)

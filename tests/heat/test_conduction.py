@@ -10,6 +10,7 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, diagnostics, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.field import kernels
 from hpcdem.physics.field.diffusing import SAFETY
 from hpcdem.physics.heat import reference
 from hpcdem.physics.heat.model import Heat
@@ -342,3 +343,37 @@ def test_what_makes_no_sense_is_refused() -> None:
     bare.heat_clock(dt=1.0)
     with pytest.raises(CommandError, match="time-step of heat is set, but no element has a thermal model"):
         bare.step()
+
+
+def test_what_faces_bring_and_what_nodes_become() -> None:
+    """Flux and transfer at the corners of two faces; a free node, a held one, and accounts of this rank's corners."""
+    t, q, given = np.array([10.0, 20.0, 30.0, 40.0, 10.0]), np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.zeros(3)
+    table = np.array([[5.0, 0.0, 0.0], [0.0, 2.0, 100.0]])
+    corner, half = np.array([[0, 1], [2, 3]]), np.array([0.5, 0.25])
+    kernels.through_faces(corner, half, np.array([0, 1]), table, 1, 4, t, q, 0.1, given)
+    heat = np.array([2.5, 2.5, 0.25 * 2.0 * 70.0, 0.25 * 2.0 * 60.0, 0.0])
+    assert q == pytest.approx(np.array([1.0, 2.0, 3.0, 4.0, 5.0]) + heat, rel=1e-15)
+    assert given == pytest.approx(0.1 * heat[1:4], rel=1e-15)
+
+    q, given = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.zeros(3)
+    begin, around = np.array([0, 2, 4, 5]), np.array([0, 4, 2, 1, 3])
+    kernels.warm(2, begin, around, np.array([2.0, 4.0, 8.0]), np.array([-1, 1, 0]), table[:, 2], 1, 4, 0.5, q, t, given)
+    assert t == pytest.approx([10.0 + 0.5 * 6.0 / 2.0, 100.0, 100.0, 0.0, 11.5], rel=1e-15)
+    assert given == pytest.approx([0.0, 4.0 * 70.0 - 0.5 * 5.0, 8.0 * -40.0 - 0.5 * 4.0], rel=1e-15)
+
+
+def test_corners_of_a_node_become_one() -> None:
+    """By their capacities, or equally where there are none; what is equal keeps its bits."""
+    t, weight = np.array([10.0, 20.0, 0.1, 0.1, 0.1, 3.0, 5.0]), np.array([1.0, 3.0, 0.3, 0.7, 0.9, 0.0, 0.0])
+    begin, corner = np.array([0, 2, 5, 7]), np.arange(7)
+    kernels.unite(begin, corner, weight, t)
+    assert t.tolist() == [17.5, 17.5, 0.1, 0.1, 0.1, 4.0, 4.0]
+    out = np.zeros(3)
+    kernels.sums(begin, corner[::-1].copy(), t, out)
+    assert out == pytest.approx([8.0, 0.3, 35.0])
+
+
+def test_the_stress_of_what_is_warm_and_cannot_grow() -> None:
+    t, out = np.array([[10.0, 20.0, 30.0, 99.0], [10.0, 20.0, 30.0, 100.0]]), np.zeros(2)
+    kernels.eigenstress(np.array([False, True]), t, np.array([2.0, 3.0]), np.array([5.0, 4.0]), out)
+    assert out.tolist() == [2.0 * (5.0 - 20.0), 3.0 * (4.0 - 40.0)]

@@ -88,6 +88,11 @@ def test_a_crowd_in_one_cell_is_sorted_by_id(crowd):
     assert [rows[k] for k in order_of(rows)] == sorted(rows)
 
 
+def test_a_cell_is_sorted_without_those_before_it():
+    rows = [(0, 0, 5), (0, 0, 6), (1, 0, 4), (1, 0, 1), (1, 0, 2), (2, 0, 0)]
+    assert [rows[k] for k in order_of(rows)] == sorted(rows)
+
+
 @quick
 @given(cells_and_ids(5, 1000), st.randoms(use_true_random=False))
 def test_order_does_not_depend_on_where_particles_come_from(rows, random):

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.dem import bonds, cycles, particles, properties, settings, walls
-from hpcdem.core.fields import VX, VY, X, Y
+from hpcdem.core.cells import COLUMN
+from hpcdem.core.fields import RADIUS, VX, VY, WIDTH, X, Y
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.kernels import fast, laws, slips
 from hpcdem.physics.dem.kernels.histories import Histories
@@ -178,3 +179,28 @@ def test_a_point_that_crosses_a_segment() -> None:
     still, turned = (0.0, 0.0), (1.0, -1.0)  # the far end has come from (0, 1) to (1, 0), the near one stays at (0, 0)
     for x, y, expected in ((0.5, 0.2, True), (1.2, 0.2, False), (0.5, -0.2, False)):
         assert crosses(0.0, 0.0, 1.0, 0.0, x, y, still, turned, still) == expected, (x, y)
+
+
+def test_pairs_of_fast_discs_are_those_that_trying_all_finds() -> None:
+    """Each once, also of two fast ones; members of one clump are no pair."""
+    rng = np.random.default_rng(3)
+    n = 60
+    x, y = rng.uniform(0.0, 8.0, (2, n))
+    cell = x.astype(np.int64) * COLUMN + y.astype(np.int64)
+    order = np.argsort(cell, kind="stable")
+    hot, cell = np.zeros((n, WIDTH)), cell[order]
+    hot[:, X], hot[:, Y], hot[:, RADIUS] = x[order], y[order], rng.uniform(0.05, 0.2, n)
+    rows, clump = np.arange(2, n, 5), rng.integers(-1, 4, n)
+    reach = np.full(n, 0.1)
+    reach[rows] = rng.uniform(0.2, 0.7, len(rows))
+    expected = []
+    for i in range(n):
+        for j in range(i + 1, n):
+            near = math.dist(hot[i, :2], hot[j, :2]) <= hot[i, RADIUS] + hot[j, RADIUS] + reach[i] + reach[j]
+            if near and (i in rows or j in rows) and not 0 <= clump[i] == clump[j]:
+                expected.append((i << 32) + j)
+    found = fast.pairs(hot, cell, rows, reach[rows], 0.1, 2, clump)
+    assert found.tolist() == expected
+    both = [pair for pair in expected if pair >> 32 in rows and pair % (1 << 32) in rows]
+    assert both and len(expected) > 2 * len(both)
+    assert len(fast.pairs(hot, cell, rows, reach[rows], 0.1, 2, np.empty(0, np.int64))) > len(expected)

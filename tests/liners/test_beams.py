@@ -183,3 +183,46 @@ def test_hinges_are_where_plain_loops_find_them() -> None:
         assert b == pytest.approx(second - k * (2.0 * pa + 4.0 * pb), abs=1e-9)
         assert (pa == 0.0) or abs(a) == pytest.approx(1.0)
         assert (pb == 0.0) or abs(b) == pytest.approx(1.0)
+
+
+def test_a_step_of_the_nodes() -> None:
+    """Free, damped and led ones in the plane, and one without mass: velocities, reactions, ways and works by hand."""
+    parts, dt, alpha = np.array([0, 1, 5]), 0.1, 0.25
+    x, v, spin = np.zeros((3, 2)), np.array([[1.0, -2.0], [3.0, 0.5], [9.0, 9.0]]), np.array([[4.0], [-1.0], [9.0]])
+    total = np.array([[8.0, 4.0, -6.0], [2.0, -3.0, 5.0], [1.0, 1.0, 1.0]])
+    nodes = np.zeros((3, 5))
+    nodes[:2] = [2.0, 4.0, 0.0, -20.0, 0.0], [5.0, 8.0, 0.0, -50.0, 0.0]
+    conditions = np.zeros((3, 18))
+    conditions[1, [kernels.DOES, kernels.AT]] = 1.0, 7.0
+    conditions[1, [kernels.DOES + 10, kernels.AT + 10]] = 1.0, 2.0
+    conditions[0, kernels.FORCE + 1] = 3.0
+    reaction, step, work = np.full((3, 3), np.nan), np.full((3, 2), np.nan), np.zeros(kernels.WORK)
+    kernels.move(x, v, spin, parts, total, conditions, nodes, dt, alpha, reaction, step, work)
+    vx = [1.0 + 0.05 * 8.0 * 0.75, 7.0]
+    vy = [-2.0 + 0.05 * 4.0 * 1.25, 0.5 - 0.02 * 3.0 * 1.25]
+    assert v == pytest.approx(np.array([[vx[0], vy[0]], [vx[1], vy[1]], [9.0, 9.0]]), rel=1e-14)
+    assert spin[:, 0] == pytest.approx([4.0 - 0.025 * 6.0 * 1.25, 2.0, 9.0], rel=1e-14)
+    assert step == pytest.approx(np.array([*(dt * v[:2]), [0.0, 0.0]]), rel=1e-14) and (x == step).all()
+    forces = [5.0 * 4.0 / dt - 2.0, 8.0 * 3.0 / dt - 5.0]
+    assert reaction[:2] == pytest.approx(np.array([[0.0, 0.0, 0.0], [forces[0], 0.0, forces[1]]]), rel=1e-13)
+    driven = forces[0] * 0.5 * dt * 10.0 + forces[1] * 0.5 * dt * 1.0 + 3.0 * 0.5 * dt * (vy[0] - 2.0)
+    pulled = 0.5 * dt * (-20.0 * (vy[0] - 2.0) - 50.0 * (vy[1] + 0.5))
+    assert work == pytest.approx([0.0, 0.0, 0.0, driven, pulled], rel=1e-12)
+
+
+def test_what_the_bond_and_conditions_do_on_a_node() -> None:
+    conditions, nodes, total, on_rock = (
+        np.zeros((1, 18)),
+        np.zeros((1, 5)),
+        np.full((1, 3), np.nan),
+        np.full((2, 2), 9.0),
+    )
+    conditions[0, kernels.FORCE : kernels.FORCE + 6] = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
+    nodes[0, kernels.WEIGHT :] = 10.0, 20.0, 30.0
+    kernels.given(conditions, nodes, np.array([0, 1, 5]), 2, total, on_rock)
+    assert total.tolist() == [[11.0, 22.0, 6.0]] and (on_rock == 0.0).all()
+    frame = np.zeros((2, 2, 2))
+    frame[1] = [0.8, -0.6], [0.6, 0.8]
+    kernels.hold(1, 0, frame, np.array([9.0, 5.0]), np.array([[9.0], [10.0]]), total, on_rock)
+    assert total[0] == pytest.approx([11.0 + 4.0 + 6.0, 22.0 - 3.0 + 8.0, 6.0])
+    assert on_rock == pytest.approx(np.array([[0.0, 0.0], [-10.0, -5.0]]))

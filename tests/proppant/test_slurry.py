@@ -240,3 +240,70 @@ def test_what_makes_no_sense_is_refused() -> None:
     ):  # fmt: skip
         with pytest.raises(CommandError, match=message):
             act()
+
+
+def test_what_conditions_bring_finds_room_or_is_refused() -> None:
+    """Room, too little room, a pack; a part of what is there leaves, all of it at most, and none of a pack."""
+    nodes, state = np.zeros((7, own.NODE)), np.zeros((7, own.STATE))
+    nodes[:, own.ROOM] = 1.0
+    nodes[:, own.N] = 0.0, 0.3, 0.2, 0.4, 0.3, 0.2, 0.2
+    nodes[:, own.SOURCE] = 0.2, 0.5, 0.1, -0.25, -2.0, -0.5, 0.0
+    state[[2, 5], own.PACKED] = 1.0
+    assert own.pour(1.0, 0.6, nodes, state) == pytest.approx(0.2 + 0.1, rel=1e-14)
+    assert nodes[:, own.N] == pytest.approx([0.2, 0.6, 0.2, 0.3, 0.0, 0.2, 0.2], abs=1e-15)
+    assert nodes[:, own.CAME] == pytest.approx([0.2, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0], abs=1e-15)
+    assert nodes[:, own.LEFT] == pytest.approx([0.0, 0.0, 0.0, 0.1, 0.3, 0.0, 0.0], abs=1e-15)
+
+
+def test_what_a_node_is_by_its_sand_and_its_room() -> None:
+    """Room at a quarter of a step; a pack begins at its limit, ends a hundredth below, and is pressed beyond it."""
+    nodes, state = np.zeros((6, own.NODE)), np.zeros((6, own.STATE))
+    nodes[:, own.ROOM_BEFORE], nodes[:, own.ROOM], nodes[:, own.VOLUME] = 2.0, 1.0, 2.0
+    nodes[:, own.N] = 0.35, 0.0, 1.04475, 1.04475, 1.4, 1.1
+    state[3, own.PACKED] = 1.0
+    own.settle(0.25, 0.6, -2.5, 1e6, nodes, state)
+    c = [0.2, 0.0, 0.597, 0.597, 0.7, 0.6]
+    assert state[:, own.C] == pytest.approx(c, rel=1e-14)
+    assert state[:, own.PACKED].tolist() == [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
+    assert state[:, own.PUSHES] == pytest.approx([0.0, 0.0, 0.0, 0.0, 1e6 / 7.0, 0.0], rel=1e-12)
+    thick = [1.5**2.5, 1.0, 200.0**2.5, 200.0**2.5, 1e3**2.5, 1e3**2.5]
+    assert state[:, own.THICK] == pytest.approx(thick, rel=1e-9)
+
+
+def test_what_sand_does_to_a_channel() -> None:
+    """The parts of a channel one behind the other: slurry, at most as stiff as a pack, and a pack, by its permeability
+    or by its factor; the weight of what does not rest on walls."""
+    state = np.zeros((3, own.STATE))
+    state[:, own.C], state[:, own.THICK], state[:, own.PACKED] = (0.2, 0.6, 0.5), (3.0, 9.0, 1e4), (0.0, 1.0, 0.0)
+    edges, ends = np.zeros((2, kernels.CHANNEL)), np.array([[0, 1], [2, 0]])
+    edges[:, kernels.APERTURE], edges[:, kernels.CONDUCT] = 1e-3, 5.0
+    own.thicken(1, ends, state, 0.0, 1e-9, 1.5, edges)
+    pack = 1e-6 / 12e-9
+    assert edges[:, kernels.CONDUCT] == pytest.approx([10.0 / (3.0 + pack), 10.0 / (pack + 3.0)], rel=1e-14)
+    assert edges[:, kernels.WEIGHT] == pytest.approx([1.0 + 0.75 * 0.2, 1.0 + 0.75 * 0.7], rel=1e-14)
+    edges[:, kernels.CONDUCT] = 5.0
+    own.thicken(1, ends, state, 0.0, 1e-6, 1.5, edges)  # a pack that is no obstacle
+    assert edges[:, kernels.CONDUCT] == pytest.approx([5.0, 5.0])
+    triangle, around = np.zeros((3, kernels.CHANNEL)), np.array([[0, 1], [1, 2], [2, 0]])
+    triangle[:, kernels.APERTURE], triangle[:, kernels.CONDUCT] = 1e-3, (5.0, 7.0, -1.0)
+    own.thicken(3, around, state, 0.5, 1e-9, 0.0, triangle)
+    assert triangle[:, kernels.CONDUCT] == pytest.approx(np.array([5.0, 7.0, -1.0]) * 3.0 / (3.0 + 8.0 + 8.0))
+    assert (triangle[:, kernels.WEIGHT] == 1.0).all()
+
+
+def test_the_shortest_time_in_which_a_node_loses_its_slurry() -> None:
+    """What flows out of it and what settles; of a node that is nearly empty a tenth of its volume counts."""
+    begin, channel, side = np.array([0, 1, 3, 4]), np.array([0, 0, 1, 1]), np.array([-1.0, 1.0, -1.0, 1.0])
+    q, channels, fluid = np.array([2.0, 3.0]), np.zeros((2, kernels.CHANNEL)), np.zeros((3, kernels.NODE))
+    channels[:, kernels.APERTURE] = 0.5, 0.25
+    nodes = np.zeros((3, own.NODE))
+    nodes[:, own.ROOM] = 10.0, 0.1, 10.0
+    for fall, volume, shortest in (
+        ([0.0, 0.0], 0.0, 0.1 / 3.0),
+        ([0.0, 0.0], 2.0, 0.2 / 3.0),
+        ([-1.0, 1.0], 0.0, 0.1 / (3.0 + 4.0 * (0.5 + 0.25))),
+    ):
+        fluid[:, kernels.V] = volume
+        found = own.fastest(begin, channel, side, q, channels, np.array(fall), 4.0, fluid, nodes)
+        assert found == pytest.approx(shortest, rel=1e-14)
+    assert own.fastest(begin, channel, side, 0.0 * q, channels, np.zeros(2), 4.0, fluid, nodes) == np.inf

@@ -12,11 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcdem.core import fields
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.io.frames import read_frame
 from hpcdem.physics.dem import diagnostics, saved_state
 from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.diffusion import kernels
 from hpcdem.physics.diffusion.model import Diffusion
 from tests.property.workers import Resident
 from tests.short_push import assert_same_files, contents
@@ -225,3 +227,13 @@ def test_the_same_files_on_any_ranks_and_threads_and_after_a_restart(resident: R
         assert one.keys() == other.keys()
         differ = [key for key in one if not np.array_equal(one[key], other[key], equal_nan=one[key].dtype.kind == "f")]
         assert set(differ) <= {"@state", "@crc"}, differ  # how often lists were rebuilt, and its checksum
+
+
+def test_heat_between_discs_that_touch() -> None:
+    """Conductance times the difference, one way and the other; of a ghost and of what is apart nothing."""
+    hot = np.zeros((4, fields.WIDTH))
+    hot[:, fields.X], hot[:, fields.Y], hot[:, fields.RADIUS] = (0.0, 1.2, 2.4, 3.6), (0.0, 1.5, 3.0, 4.5), 1.0
+    temperature, flow, links = np.array([10.0, 30.0, 70.0, 20.0]), np.zeros(4), np.zeros(4)
+    row, partner = np.array([0, 1, 2, 0]), np.array([1, 2, 3, 3])
+    kernels.inflow(hot, row, partner, 1, 3, temperature, 0.5, flow, links)
+    assert flow.tolist() == [0.0, -10.0 + 20.0, -20.0 - 25.0, 0.0] and links.tolist() == [0.0, 2.0, 2.0, 0.0]

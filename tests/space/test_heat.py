@@ -16,6 +16,7 @@ from hpcdem.physics.fdem.hexahedra import OVERLAYS
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import TEMPERATURE, Over
+from hpcdem.physics.fdem.tetrahedra import FACES
 from hpcdem.physics.heat import kernels_space, reference
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
@@ -579,3 +580,25 @@ def test_obtuse_tetrahedra_are_told() -> None:
         sim.step()
         assert any("obtuse" in text for text in log.said) == some
         assert (temperatures(sim).min() < -1e-6) == some
+
+
+def test_friction_of_a_pair_heats_both_walls() -> None:
+    """Force of friction times speed of sliding, shared by effusivities and by the parts that corners take; no heat of
+    what does not touch or has no friction."""
+    rng = np.random.default_rng(3)
+    mine, theirs, push = np.array([0.5, 0.3, 0.2]), np.array([0.4, 0.3, 0.2, 0.1]), np.array([1.0, -2.0, 5.0])
+    force = np.zeros((3, 21))
+    force[:] = np.concatenate([np.outer(mine, push).reshape(-1), -np.outer(theirs, push).reshape(-1)])
+    history, touching = np.zeros((3, 5)), np.array([0, 1, 1])
+    history[[0, 2], :3] = 7.0, 3.0, -2.0
+    v, effusivity, part = rng.normal(size=(3, 16)), np.array([9.0, 2.0, 1.0]), np.array([9.0, 0.5, 0.25])
+    out, dt = np.zeros((3, 4)), 0.1
+    first, second, face, face_row, row = np.zeros(3, int), np.zeros(3, int), np.array([6]), np.array([2]), np.array([1])
+    kernels_space.rub(first, second, face, face_row, row, touching, v, force, history, effusivity, part, dt, out)
+    corners = list(FACES[2])
+    speed = mine @ v[2].reshape(4, 4)[corners, :3] - theirs @ v[1].reshape(4, 4)[:, :3]
+    heat = -dt * history[2, :3] @ speed
+    expected = np.zeros((3, 4))
+    expected[2, corners] = mine * (0.25 * heat / 3.0)
+    expected[1] = theirs * (0.5 * heat * 2.0 / 3.0)
+    assert out == pytest.approx(expected, rel=1e-12) and abs(heat) > 0.01
