@@ -119,6 +119,9 @@ def test_a_test_that_fails_anyhow_kills_nothing(tree: Path, tmp_path: Path) -> N
 
 
 SOURCES = """
+from numba import njit
+
+
 def f(a):
     return a + 1
 
@@ -136,6 +139,11 @@ def adder(b):
 
 def at_once():
     return 7
+
+
+@njit
+def kernel(a):
+    return 3 * a
 
 
 def nowhere(a):
@@ -171,20 +179,34 @@ def test_loop():
     assert part.forever(2) == 0
 
 
+def test_kernel():
+    assert part.kernel(2) == 6
+
+
 def test_fails_anyhow():
     assert part.f(1) == part.g(1.0) + 1
+"""
+CONFTEST = """
+import gc
+
+
+def pytest_collection_finish(session):
+    gc.freeze()
 """
 
 
 @pytest.mark.slow
 def test_the_table_and_going_on(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A function, one in a function that a factory has made before, one that an import has called, one that no test
-    calls, one that hangs."""
+    calls, one that hangs, a kernel, which is a plain function here; in tests that keep what there is from the garbage
+    collector."""
     (tree / "part.py").write_text(SOURCES)
+    (tree / "conftest.py").write_text(CONFTEST)
+    subprocess.run(["git", "add", "-A"], cwd=tree, check=True)
     (tree / "tests" / "test_part.py").write_text(TESTS)
     monkeypatch.setattr(cli, "ROOT", tree)
     monkeypatch.setattr(cli, "PLACES", ("part.py",))
-    monkeypatch.setattr(cli, "REACH", tmp_path / "reach.jsonl")
+    monkeypatch.setattr(cli, "REACH", tmp_path / "reach")
     record = tmp_path / "record.jsonl"
 
     def call(*words: str) -> list[dict]:
@@ -199,6 +221,7 @@ def test_the_table_and_going_on(tree: Path, tmp_path: Path, monkeypatch: pytest.
     assert found["adder.<locals>.add", "sign"] == ("killed", "tests/test_part.py::test_inner")
     assert found["at_once", "constant"] == ("killed", "tests/test_part.py::test_of_an_import")
     assert found["nowhere", "sign"] == ("untested", "")
+    assert found["kernel", "factor"] == ("killed", "tests/test_part.py::test_kernel")
     assert found["forever", "statement"] == ("killed", "tests/test_part.py::test_loop"), "it ends by its time"
     first = record.read_text()
     call()

@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[3]
 PLACES = ("hpcdem/physics", "hpcdem/lang", "hpcdem/halo", "hpcdem/io", "hpcdem/decomp", "hpcdem/numerics")
 
 
-REACH = ROOT / ".pytest_cache" / "mutants.jsonl"
-"""What tests call and how long they take, as measured on this machine."""
+REACH = ROOT / ".pytest_cache" / "mutants"
+"""Folder: what tests call and how long they take, with kernels of each sort, as measured on this machine."""
 RECORD = Path(__file__).with_name("results.jsonl")
 
 
@@ -35,7 +35,11 @@ RECORD = Path(__file__).with_name("results.jsonl")
 @click.option("--tests", multiple=True, help="Files or folders of tests; by default all.")
 @click.option("--record", default=str(RECORD), help="File of results; what is in it is skipped.")
 @click.option("--again", is_flag=True, help="Try once more what has survived without a reason on record.")
-@click.option("--compiled", is_flag=True, help="The same with compiled kernels: minutes for each mutant.")
+@click.option(
+    "--kernels",
+    type=click.Choice(["compiled", "plain", "anew"]),
+    help="Only what Python calls, or only the others; anew: as programs run, kernels compiled again, minutes each.",
+)
 @click.option("--measure", is_flag=True, help="Measure what the tests call, and try no mutant.")
 @click.option("--list", "only_list", is_flag=True, help="List the mutants and try none.")
 @click.option("--table", is_flag=True, help="Print the table of the recorded results and try none.")
@@ -48,7 +52,7 @@ def main(
     tests: tuple[str, ...],
     record: str,
     again: bool,
-    compiled: bool,
+    kernels: str | None,
     measure: bool,
     only_list: bool,
     table: bool,
@@ -56,9 +60,10 @@ def main(
     """Change the sources in small ways, one at a time, and see which tests notice.
 
     PLACES restrict what is tried to files or folders of the package; the mutants are chosen from physics, lang, halo,
-    io, decomp and numerics. Tests run in one process, with kernels as plain functions, in a copy of the tree: which
-    functions each of them calls is measured first, and a mutant meets those that call its function, the most specific
-    ones first. Results are appended to a file as they come: the same command resumes.
+    io, decomp and numerics. Tests run in one process in a copy of the tree, with compiled kernels for what Python calls
+    and then with kernels as plain functions: which functions each of them calls is measured first, and a mutant meets
+    those that call its function, the most specific ones first. Results are appended to a file as they come: the same
+    command resumes.
     """
     file = Path(record)
     done = read(file)
@@ -74,37 +79,40 @@ def main(
     entries = {entry["mutant"]: entry for entry in done}
     known = {"killed"} if again else {"killed", "survived"}
     settled = {name for name, entry in entries.items() if entry["outcome"] in known or entry.get("reason")}
-    mutants = [mutant for mutant in mutants if mutant.name not in settled]
+    mutants = [mutant for mutant in mutants if mutant.name not in settled][:limit]
+    known_lines = len(lines_of(file))
     with tempfile.TemporaryDirectory(prefix="mutants-", ignore_cleanup_errors=True) as folder:
         store, _ = kept.store_of({})
-        copy = Copy(ROOT, Path(folder), store if compiled and store.is_dir() else None).make()
-        if compiled:
-            for mutant in mutants[:limit]:
+        copy = Copy(ROOT, Path(folder), store if kernels == "anew" and store.is_dir() else None).make()
+        if kernels == "anew":
+            for mutant in mutants:
                 entry = judge(copy, mutant, 20.0 * seconds)
                 with file.open("a") as out:
                     out.write(json.dumps(entry) + "\n")
                 click.echo(f"{entry['outcome']:<9}{entry['seconds']:6.0f} s  {mutant.name}  {entry['by']}")
         else:
-            job = {
-                "root": str(copy.place / "tree"),
-                "reach": str(REACH),
-                "record": str(file.absolute()),
-                "tests": list(tests or ["tests"]),
-                "only_measure": measure,
-                "mutants": [asdict(mutant) for mutant in mutants[:limit]],
-                "seconds": seconds,
-            }
-            REACH.parent.mkdir(exist_ok=True)
-            (copy.place / "job.json").write_text(json.dumps(job))
-            words = [sys.executable, "-m", "mutants.inside", str(copy.place / "job.json")]
-            paths = [str(copy.place / "tree"), str(Path(__file__).parents[1])]
-            env = (
-                os.environ
-                | PLAIN
-                | {"PYTHONPATH": os.pathsep.join(paths), "NUMBA_CACHE_DIR": str(copy.place / "kernels")}
-            )
-            env.pop("HPCDEM_TEST_RESULTS", None)
-            subprocess.run(words, cwd=copy.place / "tree", env=env, check=False)
+            for sort in [kernels] if kernels else ["compiled", "plain"]:
+                job = {
+                    "root": str(copy.place / "tree"),
+                    "reach": str(REACH / f"{sort}.jsonl"),
+                    "record": str(file.absolute()),
+                    "tests": list(tests or ["tests"]),
+                    "only_measure": measure,
+                    "mutants": [asdict(mutant) for mutant in mutants],
+                    "seconds": seconds,
+                    "kernels": sort,
+                }
+                REACH.mkdir(parents=True, exist_ok=True)
+                (copy.place / "job.json").write_text(json.dumps(job))
+                words = [sys.executable, "-m", "mutants.inside", str(copy.place / "job.json")]
+                paths = [str(copy.place / "tree"), *(str(Path(__file__).parents[up]) for up in (1, 3))]
+                env = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+                if sort == "plain":
+                    env |= PLAIN | {"NUMBA_CACHE_DIR": str(copy.place / "kernels")}
+                env.pop("HPCDEM_TEST_RESULTS", None)
+                subprocess.run(words, cwd=copy.place / "tree", env=env, check=False)
+                tried = {entry["mutant"] for entry in lines_of(file)[known_lines:]}
+                mutants = [mutant for mutant in mutants if mutant.name not in tried]
     if not measure:
         tidy(file)
         click.echo(as_table(read(file)))
@@ -112,8 +120,12 @@ def main(
 
 def read(file: Path) -> list[dict]:
     """The results, of each mutant the last."""
-    lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
-    return list({entry["mutant"]: entry for entry in map(json.loads, lines)}.values())
+    return list({entry["mutant"]: entry for entry in lines_of(file)}.values())
+
+
+def lines_of(file: Path) -> list[dict]:
+    """What is in a file of results, as it came."""
+    return list(map(json.loads, file.read_text(encoding="utf-8").splitlines())) if file.is_file() else []
 
 
 def tidy(file: Path) -> None:

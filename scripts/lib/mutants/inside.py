@@ -19,7 +19,7 @@ import pytest
 from mutants import plain
 from mutants.seeds import Mutant
 from mutants.trial import Copy
-from mutants.within import Session
+from mutants.within import PACES, Session
 
 WALL = 90.0
 """Seconds by the clock after which a file of tests, or a mutant, is given up."""
@@ -27,12 +27,14 @@ WALL = 90.0
 
 def main() -> None:
     job = json.loads(Path(sys.argv[1]).read_text())
-    plain.install()
+    if job["kernels"] == "plain":
+        plain.install()
     few = {"max_examples": 10, "deadline": None, "derandomize": True, "database": None}
     hypothesis.settings.register_profile("mutants", **few)
     hypothesis.settings.load_profile("mutants")
     reach = Path(job["reach"])
-    known = [json.loads(line) for line in reach.read_text().splitlines()] if reach.is_file() else []
+    known = read(reach)
+    elsewhere = {said["test"]: said["seconds"] for said in read(reach.with_name("compiled.jsonl")) if "test" in said}
 
     def work(session: Session) -> None:
         imported = session.functions()
@@ -43,18 +45,27 @@ def main() -> None:
                 out.write(json.dumps(said) + "\n")
                 out.flush()
 
-            measure(session, known, keep)
+            measure(session, known, elsewhere, keep)
         if not job["only_measure"]:
             try_all(session, known, imported, job)
 
     names = ["-q", "-p", "no:cacheprovider", "--no-header", "-m", "not slow", *job["tests"]]
-    sys.exit(pytest.main(names, plugins=[Session(Path(job["root"]), work)]))
+    sys.exit(pytest.main(names, plugins=[Session(Path(job["root"]), work, PACES[job["kernels"]])]))
 
 
-def measure(session: Session, known: list[dict[str, Any]], keep: Callable[[dict[str, Any]], None]) -> None:
-    """What each test calls, of files that are not known yet."""
+def read(reach: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in reach.read_text().splitlines()] if reach.is_file() else []
+
+
+def measure(
+    session: Session,
+    known: list[dict[str, Any]],
+    seconds: dict[str, float],
+    keep: Callable[[dict[str, Any]], None],
+) -> None:
+    """What each test calls, of files that are not known yet. seconds: of tests with compiled kernels."""
     done = {said["file"] for said in known if "file" in said}
-    for file, items in session.measurable().items():
+    for file, items in session.measurable(seconds).items():
         if file not in done:
             began = time.monotonic()
             outcomes: dict[str, int] = defaultdict(int)
@@ -86,7 +97,8 @@ def choice(reaching: list[Reaching], seconds: float) -> list[tuple[str, float]]:
 
 
 def try_all(session: Session, known: list[dict[str, Any]], imported: set[str], job: dict[str, Any]) -> None:
-    """Each mutant of the job. imported: functions that were called while tests were collected."""
+    """Each mutant of the job. imported: functions that were called while tests were collected. With compiled kernels
+    those that Python calls are tried; the others, kernels and what nobody calls, are left to the plain ones."""
     root, record = Path(job["root"]), Path(job["record"])
     calls: dict[str, list[Reaching]] = defaultdict(list)
     passed_tests: list[Reaching] = []
@@ -95,28 +107,34 @@ def try_all(session: Session, known: list[dict[str, Any]], imported: set[str], j
             passed_tests.append((len(said["reach"]), said["seconds"], said["test"]))
             for function in said["reach"]:
                 calls[function].append(passed_tests[-1])
+    plainly = job["kernels"] == "plain"
     copy = Copy(root, root.parent)
     for mutant in (Mutant(**given) for given in job["mutants"]):
         began = time.monotonic()
         name = f"{mutant.file}::{mutant.function}"
         text = (root / mutant.file).read_text(encoding="utf-8")
         reaching = calls[name]
+        if not plainly and not reaching:
+            continue
         if name in imported and not reaching:  # a table at the top of the module, say: tests that may look into it
             callers = {
-                test.partition("::")[0] for f in calls if f.startswith(f"{mutant.file}::") for _, test in calls[f]
+                test.partition("::")[0] for f in calls if f.startswith(f"{mutant.file}::") for _, _, test in calls[f]
             }
             reaching = [one for one in passed_tests if one[2].partition("::")[0] in callers]
         tests = choice(reaching, job["seconds"])
         entry: dict[str, Any] = {"mutant": mutant.name, "file": mutant.file, "kind": mutant.kind}
         by, passed = "", 0
-        if tests and name in imported:
+        if tests and calls[name]:
+            wall = 40.0 + 12.0 * sum(spent for _, spent in tests)
+            try:
+                by, passed = session.judge(mutant, text, tests, wall)
+            except LookupError:
+                tests = [] if plainly or name not in imported else tests
+        if tests and not by and name in imported:
+            if not plainly:
+                continue
             by = copy.fresh(mutant, [test for test, _ in tests[:20]], WALL)
             passed = 0 if by else len(tests[:20])
-        elif tests:
-            try:
-                by, passed = session.judge(mutant, text, tests, 20.0 + 8.0 * sum(spent for _, spent in tests))
-            except LookupError:
-                tests = []
         outcome = "killed" if by else "survived" if tests else "untested"
         entry |= {"outcome": outcome, "by": by, "passed": passed, "seconds": round(time.monotonic() - began, 1)}
         with record.open("a") as out:

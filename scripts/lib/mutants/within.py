@@ -1,15 +1,18 @@
 """Many mutants in one process: as a plugin of pytest, which collects tests once and never runs them itself.
 
-Kernels are plain functions here (plain.py), so a mutant is the byte code of one function: a fork puts it into the
-function and runs the tests that call it, the most specific of each file first, up to the first that fails.
+A mutant is the byte code of one function: a fork puts it into the function and runs the tests that call it, the most
+specific of each file first, up to the first that fails. A function that Python calls while kernels are compiled is
+changed in such a process, in which tests take their usual time; a kernel in a process of plain functions (plain.py).
 """
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import gc
 import json
 import os
+import pickle
 import select
 import shutil
 import signal
@@ -19,20 +22,31 @@ import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType
-from typing import Any
+from typing import Any, cast
 
 import pytest
+from numba.core.dispatcher import Dispatcher
 
+from hpcdem.runtime import kept
 from mutants.seeds import Mutant
 
-LONGEST = 1.0
-"""Processor seconds after which a test is too slow for mutants."""
-CASES = 2
-"""Cases of one parametrized test that are measured."""
-MOST, OF_FILE = 24, 6.0
-"""Tests of one file that are measured, and processor seconds after which no more of them are."""
+
+@dataclass(frozen=True)
+class Pace:
+    """longest: processor seconds after which a test is too slow for mutants; of_file: after which no more tests of a
+    file are measured; loading: what a test may take longer than measured, as it is the first to load kernels."""
+
+    longest: float
+    of_file: float
+    loading: float
+
+
+PACES = {"plain": Pace(0.6, 8.0, 1.0), "compiled": Pace(2.5, 4.0, 6.0)}
+CASES, MOST = 2, 20
+"""Cases of one parametrized test, and tests of one file, that are measured."""
 ELSEWHERE = {"launch", "launch_once", "resident", "needs_mpi", "needs_petsc", "needs_parallel_hdf5", "slurm"}
 """Fixtures of tests that start other processes, in which nothing is changed."""
 MARKS = ("slow", "alone", "ranks", "mpi", "petsc", "slurm", "figures")
@@ -53,13 +67,40 @@ def function_of(code: CodeType, root: str) -> str | None:
 class Session:
     """The plugin. `work` is handed the collected tests, and decides what is run."""
 
-    def __init__(self, root: Path, work: Callable[[Session], None]) -> None:
-        self.root, self.work = f"{root}{os.sep}", work
+    def __init__(self, root: Path, work: Callable[[Session], None], pace: Pace) -> None:
+        self.root, self.work, self.pace = f"{root}{os.sep}", work, pace
+        self.made: dict[str, set[str]] = {}
         self.codes: set[CodeType] = set()
         self.items: dict[str, pytest.Item] = {}
         self.broken = self.why = ""
         self.known: dict[str, bool] = {}
+        self.living: dict[str, list[FunctionType]] = {}
+        self.kernels: dict[int, Any] = {}
+        self.loaded: list[tuple[int, Any]] = []
+        self._note_loads()
         self._trace()
+
+    def _note_loads(self) -> None:
+        """Write down which kernels this process takes from the store, and for which types of arguments."""
+        usual, files = kept.Files.load_overload, cast(Any, kept.Files)
+
+        def load_overload(of: Any, signature: Any, target: Any) -> Any:
+            found = usual(of, signature, target)
+            if found is not None:
+                self.loaded.append((id(of), signature))
+            return found
+
+        files.load_overload = load_overload
+
+    def _told_loads(self) -> dict[str, Any]:
+        return {"outcome": "loaded", "kernels": base64.b64encode(pickle.dumps(self.loaded)).decode()}
+
+    def _load(self, text: str) -> None:
+        """Load the kernels that a fork had to load, for those to come: reading them is most of the time of a test. They
+        are not run here, which would start threads."""
+        for of, signature in pickle.loads(base64.b64decode(text)):
+            if of in self.kernels:
+                self.kernels[of].compile(signature)
 
     def _trace(self) -> None:
         seen = self.codes.add
@@ -74,7 +115,20 @@ class Session:
         """Those of the package that were called since the last time."""
         codes, self.codes = self.codes, set()
         self._trace()
+        return self._named(codes)
+
+    def _named(self, codes: set[CodeType]) -> set[str]:
         return {name for name in (function_of(code, self.root) for code in codes) if name}
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_fixture_setup(self, fixturedef: Any) -> Iterator[None]:
+        """What several tests share is made in the first of them; each would make it if it ran alone."""
+        before = set(self.codes)
+        self.codes.clear()
+        yield
+        if fixturedef.scope != "function":
+            self.made[fixturedef.argname] = self._named(set(self.codes))
+        self.codes |= before
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         self.items = {item.nodeid: item for item in session.items}
@@ -106,8 +160,8 @@ class Session:
 
     # -- which functions each test calls
 
-    def measurable(self) -> dict[str, list[pytest.Item]]:
-        """Tests by file, of each only some of its cases."""
+    def measurable(self, seconds: dict[str, float]) -> dict[str, list[pytest.Item]]:
+        """Tests by file, of each only some of its cases, the quickest first. seconds: of those that are known."""
         cases: dict[str, list[pytest.Item]] = defaultdict(list)
         for item in self.items.values():
             if ELSEWHERE.isdisjoint(item.fixturenames) and not any(item.get_closest_marker(name) for name in MARKS):  # type: ignore[attr-defined]
@@ -116,7 +170,8 @@ class Session:
         for found in cases.values():
             step = max(1, len(found) // CASES)
             files[found[0].nodeid.partition("::")[0]] += found[::step][:CASES]
-        return {file: found[:: -(-len(found) // MOST)] for file, found in files.items()}
+        chosen = {file: found[:: -(-len(found) // MOST)] for file, found in files.items()}
+        return {file: sorted(found, key=lambda item: seconds.get(item.nodeid, 0.0)) for file, found in chosen.items()}
 
     def measure(self, file: str, items: list[pytest.Item], wall: float) -> Iterator[dict[str, Any]]:
         """Of each test of a file its outcome, seconds and functions."""
@@ -125,29 +180,36 @@ class Session:
 
         def tests(tell: Callable[[dict[str, Any]], None]) -> None:
             self.functions()
+            self.loaded.clear()
             whole = spent_before
             for item, following in zip(items, [*items[1:], None]):
-                if whole > OF_FILE:
+                if whole > self.pace.of_file:
                     break
                 began = time.process_time()
-                outcome = self.run(item, following, LONGEST)
+                outcome = self.run(item, following, self.pace.longest)
                 spent = round(time.process_time() - began, 3)
                 whole += spent
-                reach = sorted(self.functions())
+                reach = sorted(self.functions().union(*(self.made.get(name, ()) for name in item.fixturenames)))  # type: ignore[attr-defined]
                 tell({"test": item.nodeid, "outcome": outcome, "seconds": spent, "reach": reach})
                 if outcome == "torn":
                     break
+            tell(self._told_loads())
 
+        self._look()
         left = items
         while items := left:
             left, said = left[1:], None
-            for said in forked(tests, wall):
+            for heard in forked(tests, wall):
+                if heard["outcome"] == "loaded":
+                    self._load(heard["kernels"])
+                    continue
+                said = heard
                 if said["outcome"] == "time":
                     break
                 spent_before += said["seconds"]
                 yield said
                 left = items[[item.nodeid for item in items].index(said["test"]) + 1 :]
-            if spent_before > OF_FILE:
+            if spent_before > self.pace.of_file:
                 break
             if said and said["outcome"] not in ("torn", "time"):
                 left = left[1:]  # the next one has ended the process, if there is one
@@ -163,12 +225,13 @@ class Session:
     def judge(self, mutant: Mutant, text: str, tests: list[tuple[str, float]], wall: float) -> tuple[str, int]:
         """Run tests (name, expected seconds) with a mutant: which one kills it ("" if none, "time" if it hangs), and
         how many have passed. LookupError if the process does not know the function as it stands in the text."""
+        self._look()
         changed = compile(mutant.applied(text), f"{self.root}{mutant.file}", "exec")
         places = []
         inner = mutant.function
         while inner:  # those that there are, and what the functions around them will make from now on
             code = code_of(changed, inner)
-            living = self._living(f"{mutant.file}::{inner}")
+            living = self.living.get(f"{mutant.file}::{inner}", [])
             places += [
                 (place, code) for place in living if code and len(code.co_freevars) == len(place.__code__.co_freevars)
             ]
@@ -176,6 +239,8 @@ class Session:
         if not places:
             raise LookupError(mutant.function)
         by, passed = self._killer(places, tests, wall)
+        if by in ("time", "end of process") and self._killer([], tests, wall)[0]:
+            raise LookupError(by)  # without the mutant too
         if by and by in self.items and not self.sound(by, dict(tests)[by]):
             return self.judge(mutant, text, [(test, spent) for test, spent in tests if test != by], wall)
         return by, passed
@@ -185,30 +250,43 @@ class Session:
     ) -> tuple[str, int]:
         """Which test fails first with other code in some functions, and how many have passed before it."""
 
+        self._look()
+
         def trial(tell: Callable[[dict[str, Any]], None]) -> None:
+            self.loaded.clear()
             sys.settrace(None)
             threading.settrace(None)  # type: ignore[arg-type]
             for place, code in places:
                 place.__code__ = code
             items = [self.items[test] for test, _ in tests]
             for (test, seconds), item, following in zip(tests, items, [*items[1:], None]):
-                outcome = self.run(item, following, 4.0 * seconds + 1.0)
+                outcome = self.run(item, following, 4.0 * seconds + self.pace.loading)
+                if outcome != "passed" or test == tests[-1][0]:
+                    tell(self._told_loads())
                 tell({"test": test, "outcome": outcome, "why": self.broken[:200]})
                 if outcome != "passed":
                     break
 
         passed = 0
         for said in forked(trial, wall):
-            if said["outcome"] != "passed":
+            if said["outcome"] == "loaded":
+                self._load(said["kernels"])
+            elif said["outcome"] == "passed":
+                passed += 1
+            else:
                 self.why = said.get("why", "")
                 return said["test"] or "time", passed
-            passed += 1
         return ("" if passed == len(tests) else "end of process"), passed
 
-    def _living(self, name: str) -> list[FunctionType]:
-        """The functions of this name that there are: one, or as many as a factory has made."""
-        functions = (thing for thing in gc.get_objects() if isinstance(thing, FunctionType))
-        return [function for function in functions if function_of(function.__code__, self.root) == name]
+    def _look(self) -> None:
+        """Find the functions of the package that there are, one of each name or as many as a factory has made, and the
+        kernels; none comes later, as tests run in forks."""
+        gc.unfreeze()  # what tests/conftest.py spares the collector
+        for thing in [] if self.living else gc.get_objects():
+            if isinstance(thing, FunctionType):
+                self.living.setdefault(function_of(thing.__code__, self.root) or "", []).append(thing)
+            elif isinstance(thing, Dispatcher):
+                self.kernels[id(thing._cache)] = thing
 
 
 def code_of(module: CodeType, function: str) -> CodeType | None:
