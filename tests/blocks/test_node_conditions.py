@@ -241,3 +241,49 @@ def test_what_each_condition_makes_of_a_velocity():
     across = 12.0 * 0.6 - 16.0 * 0.8
     expected = [[0.0, 0.0], [4.0 / 0.2 - 5.0, 0.0], [0.0, 4.0 / 0.2 - 8.0], [-3.0 / 0.2 - 9.0, 2.0 / 0.2 - 10.0]]
     assert outside == pytest.approx(np.array([*expected, [across * 0.8, -across * 0.6]]), rel=1e-13)
+
+
+def test_what_each_condition_makes_of_a_velocity_in_space():
+    """Closed forms: free, with two corners; velocity, acceleration and nodal force; fixed; along and across a vector,
+    damped and not."""
+    begin, corner = np.array([0, 2, 3, 4, 5, 6, 7]), 4 * np.arange(7)
+    before, alpha, k = np.array([3.0, -2.0, 1.0]), 0.5, 0.2
+    v, force, applied = np.zeros(28), np.zeros(28), np.zeros(28)
+    for at in corner:
+        v[at : at + 3], force[at : at + 3] = before, (at + 1.0, -at - 2.0, 3.0)
+    applied[:3] = 0.5, 0.25, 0.125
+    table, condition = np.zeros((6, space.CONDITION)), np.arange(6)
+    table[:, space.NODE_DAMP] = -1.0
+    table[1, [space.DOES, space.AT, space.DOES + 2, space.AT + 2]] = V, 7.0, A, 4.0
+    table[1, [space.FORCE, space.FORCE + 1, space.FORCE + 2]] = 10.0, 20.0, 30.0
+    table[2, space.CONSTRAINT] = FIXED
+    way = np.array([0.6, 0.0, 0.8])
+    for row, kind in ((3, ALONG), (4, ACROSS), (5, ALONG)):
+        table[row, space.CONSTRAINT], table[row, space.WAY : space.WAY + 3] = kind, way
+    table[5, space.NODE_DAMP] = 0.0
+    outside, felt, share = np.full((6, 3), np.nan), np.zeros((6, 6)), np.full(6, 0.5)
+    args = begin, corner, begin, corner, np.full(6, k), condition, share, table, True, force, applied, v, alpha
+    space.move(2, *args, outside, felt)
+    f = np.array(
+        [[6.5, -7.75, 6.125], [14.0, 0.0, 18.0], *((4.0 * n + 1.0, -4.0 * n - 2.0, 3.0) for n in (3, 4, 5, 6))]
+    )
+    assert felt[:, :3] == pytest.approx(f, rel=1e-15)
+    assert felt[:2, 3:].tolist() == [[0.5, 0.25, 0.125], [5.0, 10.0, 15.0]] and (felt[2:, 3:] == 0.0).all()
+
+    def damped(force, velocity):
+        return force - alpha * abs(force) * math.copysign(1.0, velocity)
+
+    now = v.reshape(7, 4)[:, :3]
+    free = [b + k * damped(a, b) for a, b in zip(f[0], before)]
+    assert now[0] == pytest.approx(free, rel=1e-14) and (now[0] == now[1]).all()
+    assert now[2] == pytest.approx([7.0, -2.0, 5.0], rel=1e-14)
+    assert outside[1] == pytest.approx([4.0 / k - 14.0, 0.0, 4.0 / k - 18.0], rel=1e-13)
+    assert (now[3] == 0.0).all() and outside[2] == pytest.approx(-before / k - f[2], rel=1e-14)
+    speed, pull = before @ way, f[3] @ way
+    assert now[4] == pytest.approx((speed + k * damped(pull, speed)) * way, rel=1e-13)
+    assert outside[3] == pytest.approx(-(f[3] - pull * way), rel=1e-13)
+    pull = f[4] @ way
+    w = np.array([b + k * damped(a, b) for a, b in zip(f[4] - pull * way, before)])
+    assert now[5] == pytest.approx(w - (w @ way) * way, rel=1e-13, abs=1e-15)
+    assert outside[4] == pytest.approx(-pull * way, rel=1e-13)
+    assert now[6] == pytest.approx((before + k * f[5]) @ way * way, rel=1e-13)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from hpcdem.numerics.lanes import lane
 from hpcdem.physics.fdem import reference
 from hpcdem.physics.fdem.kernels import plasticity
 from hpcdem.physics.fdem.kernels.plasticity import SHEAR_NOW, TENSION_NOW
@@ -168,3 +169,51 @@ def test_every_number_of_the_law_counts():
     ends.append(flow(stress, ROCK)[0])
     for i, one in enumerate(ends):
         assert not any(np.array_equal(one, other) for other in ends[:i])
+
+
+def test_measures_of_what_flows_in_space():
+    """Of a tile of four stresses by their principal values and axes: strain, its shear, volume, work and shortening."""
+    rng, n = np.random.default_rng(8), 4
+    n_phi, n_psi, k, t, lame, two_mu = constants(FLOWS["usual"])
+    lanes = np.zeros(int(plasticity.LANES * lane(1)))
+    principal = rng.normal(size=(n, 3)) * 3.0 * k
+    principal[3] = 1e-3 * k  # inside
+    axes = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(n)]
+    constants_of = (
+        ("P_PHI", n_phi),
+        ("P_PSI", n_psi),
+        ("P_STRENGTH", k),
+        ("P_TENSILE", t),
+        ("P_LAM", lame),
+        ("P_MU2", two_mu),
+    )
+    for e in range(n):
+        for name, value in (*constants_of, ("P_SIZE", 2.0 + e)):
+            lanes[int(getattr(plasticity, name)) + e] = value
+        for q in range(3):
+            lanes[int((plasticity.T11, plasticity.T22, plasticity.T33)[q]) + e] = principal[e, q]
+            for r, axis in enumerate("XYZ"):
+                lanes[int(getattr(plasticity, f"{axis}{q + 1}")) + e] = axes[e][r, q]
+    plasticity.return_in_space(n, lanes)
+
+    def found(e: int, *names: str) -> list[float]:
+        return [float(lanes[int(getattr(plasticity, name)) + e]) for name in names]
+
+    for e in range(n):
+        order = np.argsort(principal[e])
+        s, way = principal[e][order], axes[e][:, order]
+        *r, how = plasticity.principal_return(*s, n_phi, n_psi, k, t, lame + two_mu, lame)
+        change = s - np.array(r)
+        strain = (change - lame / (3.0 * lame + two_mu) * change.sum()) / two_mu
+        whole = way @ np.diag(strain) @ way.T
+        expected = whole[[0, 1, 0, 2, 0, 1], [0, 1, 1, 2, 2, 2]]
+        assert found(e, "P11", "P22", "P12", "P33", "P13", "P23") == pytest.approx(expected, rel=1e-10, abs=1e-16)
+        aside = strain - strain.mean()
+        measures = (
+            math.sqrt(0.5 * (aside @ aside)),
+            strain.sum(),
+            r @ strain * (2.0 + e),
+            -np.minimum(strain, 0.0).sum(),
+        )
+        assert found(e, "P_SHEAR", "P_VOLUME", "P_WORK", "P_SHORT") == pytest.approx(measures, rel=1e-10, abs=1e-16)
+        assert found(e, "HOW") == [how] and (how > 0.0) == (e < 3)

@@ -11,7 +11,7 @@ import pytest
 from hpcdem.core.errors import CommandError, PhysicsError, ScriptError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.joints import tables as joint_tables
-from hpcdem.physics.fdem.kernels import joint_law
+from hpcdem.physics.fdem.kernels import joint_law, joint_points
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import BARTON_BANDIS, COULOMB_JOINT, Model, Rows
 from hpcdem.physics.fdem.simulation import Blocks
@@ -453,3 +453,23 @@ def test_implicit_steps_with_fluid_are_refused():
     Flow.of(sim).assign(np.flatnonzero(sim.slides()), {**WATER, "aperature_initial": 1e-4})
     with pytest.raises(CommandError, match=r"\(1 in all\) has the model joint-mohr-coulomb: implicit steps of blocks"):
         Coupled(sim, 1.0)
+
+
+@pytest.mark.parametrize(("o", "s"), [(-1e-6, 0.0), (-1e-6, 2e-6), (1e-6, 0.0), (1e-3, 1e-3)])
+def test_what_a_point_after_coulomb_gives_back(o: float, s: float):
+    """The energy of two springs as long as it sticks, none where it has torn off."""
+    law, beyond = law_of(COULOMB_JOINT, **COULOMB)
+    torn = o > 1e-4
+    expected = 0.0 if torn else 0.5 * 1e10 * o * o + 0.5 * 4e9 * s * s
+    assert joint_law.slide_stored(o, s, law, beyond, 0.0, 0.0) == pytest.approx(expected, rel=1e-12)
+
+
+def test_what_a_bent_joint_gives_back():
+    """Closed by e at its ends: L k (e_a^2 + e_a e_b + e_b^2) / 6 in the plane."""
+    law, beyond = law_of(COULOMB_JOINT, **COULOMB)
+    a, b = 1e-6, 3e-6
+    x = np.array([0.0, 0.0, 2.0, 0.0, 0.0, a, 2.0, b])
+    history, out, row = np.zeros((1, 14)), np.zeros(1), np.zeros(1, int)
+    args = row, np.array([[0, 2]]), np.array([[6, 4]]), np.array([0.5]), row, row, history
+    joint_points.stored(*args, x, law[None, :], beyond[None, :], out)
+    assert out[0] == pytest.approx(2.0 * 1e10 * (a * a + a * b + b * b) / 6.0, rel=1e-5)

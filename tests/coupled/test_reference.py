@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from hpcdem.commands.dem import properties
-from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, WIDTH, X, Y
 from hpcdem.core.selection import Interval
 from hpcdem.physics.coupling import reference
+from hpcdem.physics.coupling.kernels import disc_faces
+from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.fdem.mesh import Mesh
 from tests.blocks.support import joined, rectangle, shaken
 from tests.coupled.support import body, discs, together
@@ -62,3 +66,45 @@ def test_forces(tmp_path, kind: str, hertz: bool) -> None:
         assert np.array_equal(link.slot_on[at], touches) and link.slot_fs[at] == pytest.approx(friction, rel=1e-9)
         seen += touches.sum() == 1, touches.sum() > 1, (touches & ~on[at] & (friction != 0.0)).any()
     assert (seen > 3).all()
+
+
+def test_what_is_told_of_contacts() -> None:
+    """A linear disc on one face and one after Hertz on another, which is steeper; a third slot does not touch any more:
+    forces, places, overlaps and energies by hand."""
+    hot = np.zeros((3, WIDTH))
+    ihot = hot.view(np.int64)
+    hot[1:, RADIUS], ihot[1:, MATERIAL] = (1.0, 0.5), (0, 1)
+    hot[1, [X, Y]], hot[2, [X, Y]] = (0.5, 0.9), (10.0 - 0.8 * 0.4, 0.6 * 0.4)
+    ends = np.zeros((2, disc_faces.ENDS))
+    ends[0, :4] = 2.0, 0.0, 0.0, 0.0  # the element below
+    ends[1, :4] = 10.0 + 0.6, 0.8, 10.0 - 0.6, -0.8
+    table = np.zeros((4, 4))
+    table[0, [disc_faces.MODEL, disc_faces.A, disc_faces.B]] = laws.LINEAR, 1e6, 5e5
+    table[3, [disc_faces.MODEL, disc_faces.A, disc_faces.B]] = laws.HERTZ, 2e7, 1e7
+    row, begin, nobody = np.array([1, 2]), np.array([0, 2, 3]), np.full(3, -1)
+    on, fs = np.array([True, False, True]), np.array([300.0, 0.0, -40.0])
+    seen, out, at = np.full((2, disc_faces.SCRATCH), 9.0), np.zeros((3, 6)), np.zeros((3, 2), int)
+    n = disc_faces.contacts(
+        row,
+        begin,
+        hot,
+        ihot,
+        np.array([0, 0, 1]),
+        nobody,
+        nobody,
+        on,
+        fs,
+        ends,
+        np.array([0, 1]),
+        table,
+        2,
+        seen,
+        out,
+        at,
+    )
+    assert n == 2 and at[:2].tolist() == [[0, 0], [2, 1]]
+    assert out[0] == pytest.approx([1e5, 300.0, 0.5, 0.0, 0.1, 0.5 * 1e4 + 0.5 * 300.0**2 / 5e5], rel=1e-12)
+    root = math.sqrt(4.0 * 0.5 * 0.1)
+    fn = 2e7 * root * 0.1
+    energy = 0.4 * fn * 0.1 + 0.5 * 40.0**2 / (1e7 * root)
+    assert out[1] == pytest.approx([fn, -40.0, 10.0, 0.0, 0.1, energy], rel=1e-12, abs=1e-12)

@@ -331,3 +331,26 @@ def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(CommandError, match="all channels have the same fluid, but capacity is 4000 and 4200"):
         fluid.assign(flow.network.channels[2:], {**WATER, "capacity": 4000.0})
     fluid.assign(flow.network.channels[2:], {**WATER, "transfer_coeficient": 10.0})
+
+
+def test_temperature_of_what_flows_in_a_channel() -> None:
+    """Van Leer's limiter and the half step, by hand: as far as it goes between both nodes, behind a held node, against
+    the flow, and where the slopes have opposite signs."""
+    state = np.zeros((3, kernels.FLUID_STATE))
+    state[:, kernels.T], state[:, kernels.U], state[:, kernels.FROM] = (
+        (10.0, 14.0, 30.0),
+        (8.0, 10.0, 0.0),
+        (2.0, 4.0, 0.0),
+    )
+    state[:, kernels.FULL], state[:, kernels.RISE] = (5.0, 4.0, 8.0), (0.5, 2.0, -3.0)
+    ends, q, length, dt = np.array([[0, 1], [2, 1], [0, 1]]), np.array([2.0, 3.0, -1.5]), np.array([3.0, 5.0, 4.0]), 0.2
+    out = np.zeros(3)
+    kernels.faces(ends, q, length, False, dt, state, out)
+    assert out.tolist() == [10.0, 30.0, 14.0]
+    kernels.faces(ends, q, length, True, dt, state, out)
+    r = (10.0 - 8.0) / 2.0 * 3.0 / 4.0
+    first = r / (1.0 + r) * 4.0 * (1.0 - dt * 2.0 / 5.0) + 0.5 * dt * 0.5
+    second = 0.5 * -16.0 + 0.25 * dt * (2.0 - 3.0 / 4.0 * -16.0)
+    assert out == pytest.approx(
+        [10.0 + first, 30.0 + second, 14.0], rel=1e-14
+    )  # the last: -4 of the channel, +4 before

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hpcdem.physics.fdem import convergence, diagnostics, equilibrium
-from hpcdem.physics.fdem.kernels import joint_law, joints
+from hpcdem.physics.fdem.kernels import hexes as of_hexes
+from hpcdem.physics.fdem.kernels import joint_law, joints, joints_hexes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.space.support import ROCK, body, box, faces_on, hexes, nodes_on
@@ -281,3 +282,18 @@ def test_forces_are_those_of_the_plain_reference(size):
                 )[:2]
                 expected += area / 3.0 * np.outer(shape, sigma * normal + tau * slip / size_of_slip)
         assert np.allclose(mine, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
+
+
+def test_what_a_warped_side_moves_its_corners_by_and_kinetic_energy():
+    """Half the weighted sum of what opens at four corners; m v^2 / 2 of eight."""
+    near, far, weights = (1.0, 2.0, 3.0, 4.0), (2.0, 4.0, 7.0, 12.0), (0.1, 0.2, 0.3, 0.5)
+    a, b, c, d = near
+    p, r, q, s = far
+    half = 0.5 * sum(w * (y - x) for w, x, y in zip(weights, near, far))
+    assert joints_hexes._half_w(a, b, c, d, p, r, q, s, *weights) == pytest.approx(half, rel=1e-14)
+    rng = np.random.default_rng(2)
+    v, mass, h = rng.normal(size=(12, 4)), rng.uniform(1.0, 2.0, 8), np.zeros((2, of_hexes.H_MASS + 8))
+    place = rng.permutation(12)[:8]
+    h[1, of_hexes.H_MASS :] = mass
+    found = joints_hexes._kinetic(1, np.array([np.zeros(8, int), 4 * place]), h, v.reshape(-1))
+    assert found == pytest.approx(0.5 * (mass * (v[place, :3] ** 2).sum(axis=1)).sum(), rel=1e-13)
