@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equili
 from hpcdem.physics.fdem.elements.tangent import plane_slopes
 from hpcdem.physics.fdem.kernels import plasticity
 from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.moduli import moduli
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import EVERY_KIND, ROCK, model, near, rectangle, shaken
 from tests.blocks.test_creep import SALT, compliance, crept, width
@@ -326,3 +328,14 @@ def test_a_law_of_the_user_gives_no_stress_across_the_plane():
     sim.stress_condition(near(sim.mesh, 1, 1.0), yy=-1e6)
     convergence.solve(sim, ratio=1e-7, cycles=5000)
     assert width(sim) == pytest.approx([NU * 1e6 / E, -1e6 / E], rel=1e-4)
+
+
+def test_moduli_of_plane_stress() -> None:
+    """K_n = 9 K G / (3 K + 4 G), with which E and nu of the solid are those of the plate; zero where both are."""
+    rows = SimpleNamespace(column=lambda name: {"bulk": [0.0, 3e9], "shear": [0.0, 2e9]}[name])
+    for plate, lame in ((False, 3e9 - 4e9 / 3.0), (True, 54e18 / 17e9 - 2e9)):
+        found = moduli(rows, plate)
+        assert found.lame == pytest.approx([0.0, lame]) and found.wave == pytest.approx([0.0, lame + 4e9])
+        assert found.shear.tolist() == [0.0, 2e9] and found.normal == ([0, 1] if plate else [0, 1, 3])
+    young, nu = 54e18 / 11e9, (9e9 - 4e9) / 22e9
+    assert found.bulk[1] == pytest.approx(young / (2.0 * (1.0 - nu)))

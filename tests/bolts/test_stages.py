@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.bolts import kernels
+from hpcdem.physics.bolts import kernels, layout
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
@@ -298,3 +298,18 @@ def test_deleted_elements_carry_nothing_and_the_rest_goes_on() -> None:
     with pytest.raises(CommandError, match="bolt-element 16 has no model"):  # deleted ones need none, new ones do
         bolts.create([(0.2, 0.9), (0.2, 0.5)])
         sim.step()
+
+
+def test_edges_that_a_bar_crosses() -> None:
+    """Also at a common end of several edges; none beyond the ends of the bar, none of an edge along it."""
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    cells = np.array([[0, 1, 2, -1], [0, 2, 3, -1]])
+    corners = points[np.where(cells >= 0, cells, 0)]
+
+    def crossings(a: tuple[float, float], b: tuple[float, float]) -> list[float]:
+        return layout._crossings(np.array(a), np.array(b), corners, cells).tolist()
+
+    assert crossings((-1.0, 0.25), (3.0, 0.25)) == pytest.approx([0.25, 1.25 / 4.0, 1.25 / 4.0, 0.5])
+    assert crossings((0.5, -1.0), (0.5, 0.25)) == pytest.approx([0.8])
+    assert set(crossings((-1.0, 1.0), (1.0, -1.0))) == {0.5}, "through a corner of both elements"
+    assert set(crossings((2.0, 0.0), (0.0, 2.0))) == {0.5} and crossings((0.25, 0.125), (0.75, 0.25)) == []

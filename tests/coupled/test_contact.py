@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hpcdem.commands.dem import properties
+from hpcdem.core.fields import RADIUS, WIDTH, X, Y
+from hpcdem.numerics.exact_sum import as_integer
+from hpcdem.physics.coupling.links import Link
+from hpcdem.physics.coupling.model import law_table
+from hpcdem.physics.coupling.work import Work
+from hpcdem.physics.dem.budget import EMPTIED
+from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem.mesh import Mesh
 from tests.blocks.support import JOINT, joined, rectangle, shaken
@@ -242,3 +250,59 @@ def test_energy_across_the_contact(tmp_path):
     assert found["relative"] < 1e-6
     gone = 0.5 * MASS * (2.0**2 - of_disc(both, "vx") ** 2 - of_disc(both, "vy") ** 2)
     assert -found["work_on_particles"] == pytest.approx(gone, rel=1e-9)
+
+
+def test_hertz_law_of_a_disc_at_rock_of_another_material() -> None:
+    """1/E* and 1/G* written out; linear discs have their own springs; of two frictions the smaller one counts."""
+    disc = {"fric": 0.5, "hertz": True, "poiss": 0.2, "shear": 3e8, "kn": 1e7, "ks": 2e7}
+    table = law_table(
+        np.array([0.0, 5e9]), np.array([0.0, 0.3]), [disc, {**disc, "hertz": False}], np.array([0.4, 0.9])
+    )
+    plain, rough = table.reshape(2, 2, 2, 4)
+    star = 1.0 / (0.8 / 6e8 + 0.7 / 1e10)
+    shear = 1.0 / (1.8 / 3e8 + 1.7 / 5e9)
+    # F = 4/3 E* sqrt(R) U^1.5 and ks = 8 G* sqrt(R U) by sqrt(4 R U), twice the root of R U.
+    assert rough[1, 0] == pytest.approx([laws.HERTZ, 4.0 / 3.0 * star / 2.0, 8.0 * shear / 2.0, 0.5], rel=1e-14)
+    assert rough[1, 1].tolist() == [laws.LINEAR, 1e7, 2e7, 0.5] and (rough[0] == 0.0).all()
+    assert plain[1, :, 3].tolist() == [0.4, 0.4] and (plain[..., :3] == rough[..., :3]).all()
+
+
+def test_faces_are_sent_to_the_ranks_whose_discs_they_may_meet() -> None:
+    """Boxes of the discs of three ranks in a row; faces by their boxes, to each that they reach into."""
+    boxes = np.array([[0.0, 3.0, -1.0, 1.0], [2.0, 6.0, 0.0, 2.0], [8.0, 9.0, 0.0, 1.0]])
+
+    def most(box: np.ndarray) -> None:
+        box[[0, 2]] = boxes[[0, 2]] * [-1.0, 1.0, -1.0, 1.0]
+
+    hot = np.zeros((2, WIDTH))
+    hot[:, X], hot[:, Y], hot[:, RADIUS] = (2.6, 5.6), (0.6, 1.4), 0.5
+    link = SimpleNamespace(
+        comm=SimpleNamespace(size=3, rank=1, max_into=most), room=0.1, _rows=np.arange(2),
+        particles=SimpleNamespace(particles=SimpleNamespace(hot=hot)),
+    )  # fmt: skip
+    low = np.array([[0.5, 0.5], [2.5, 0.5], [2.5, 1.5], [6.5, 0.5], [8.5, -3.0], [5.0, 0.5]])
+    high = low + np.array([[0.1, 0.1]] * 5 + [[4.0, 0.1]])
+    row, rank = Link._reached(link, low, high)
+    assert list(zip(row.tolist(), rank.tolist())) == [(0, 0), (1, 0), (1, 1), (2, 1), (5, 1), (5, 2)]
+
+
+def test_bins_of_work_are_emptied_before_they_are_full() -> None:
+    """Into the sums of both sides, each once; sums are those of all ranks."""
+    told: list[tuple[str, int]] = []
+    both = SimpleNamespace(
+        particles=SimpleNamespace(energy=SimpleNamespace(add_from_blocks=lambda value: told.append(("discs", value)))),
+        blocks=SimpleNamespace(
+            budget=SimpleNamespace(start={}, add_from_discs=lambda value: told.append(("faces", value)))
+        ),
+        comm=SimpleNamespace(rank=0, allgather=lambda mine: [mine, (3, 50)]),
+    )
+    work = Work(both)
+    work._bins[0, 0, 1023], work._bins[1, 0, 1000] = 5, -7  # 5 and -7 units of some powers of two
+    one, other = as_integer(work._bins[0]), as_integer(work._bins[1])
+    for _ in range(EMPTIED - 1):
+        work.step_done()
+    assert not told
+    work.step_done()
+    assert told == [("discs", one), ("faces", other)] and not work._bins.any()
+    work.empty()
+    assert len(told) == 2 and work._sums() == [one + 3, other + 50]

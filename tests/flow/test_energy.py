@@ -9,7 +9,7 @@ from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow import account, kernels
 from hpcdem.physics.flow.account import ENTRIES
 from hpcdem.physics.flow.model import Flow
 from tests.blocks.support import JOINT
@@ -108,3 +108,11 @@ def test_where_grains_bear_it_is_refused() -> None:
     flow.energy = None
     with pytest.raises(CommandError, match="does not support packs of grains"):
         flow.energies()
+
+
+def test_what_does_not_add_up_is_told() -> None:
+    """Pumped and outside come, all others but what is pushed are taken; relative to the largest."""
+    entries = dict(zip(ENTRIES, (100.0, 1.0, 2.0, 4.0, 64.0, 8.0, 16.0, 32.0, -20.0)))
+    found = account.closed(entries)
+    assert found["closing"] == 100.0 - 20.0 - (1.0 + 2.0 + 4.0 + 8.0 + 16.0 + 32.0)
+    assert found["relative"] == pytest.approx(17.0 / 100.0)

@@ -5,6 +5,7 @@ python -m mutants.inside JOB     JOB: a file with what to do (cli.py)
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
 import time
@@ -109,7 +110,10 @@ def try_all(session: Session, known: list[dict[str, Any]], imported: set[str], j
                 calls[function].append(passed_tests[-1])
     plainly = job["kernels"] == "plain"
     copy = Copy(root, root.parent)
-    for mutant in (Mutant(**given) for given in job["mutants"]):
+    mutants = [Mutant(**given) for given in job["mutants"]]
+    for file in {mutant.file for mutant in mutants}:  # forks would load anew what only tests load
+        importlib.import_module(file.removesuffix(".py").removesuffix("/__init__").replace("/", "."))
+    for mutant in mutants:
         began = time.monotonic()
         name = f"{mutant.file}::{mutant.function}"
         text = (root / mutant.file).read_text(encoding="utf-8")
