@@ -168,3 +168,9 @@ def test_a_stop_in_mid_injection_changes_nothing(tmp_path, monkeypatch, reason) 
     assert again["pcdc"].history("p")[-1, 2] == Flow.of(again.blocks).values("flow-node", "pressure", at)[0] > 1e6
     one, other = (rock["pcdc"].history("p") for rock in (straight, again))
     assert one.shape == other.shape and other == pytest.approx(one, rel=1e-9)
+
+
+def test_durations_in_the_largest_unit_of_which_there_are_two() -> None:
+    assert [costs._length(t) for t in (1.5, 119.0, 120.0, 7199.0, 7200.0, 172800.0)] == [
+        "1.5 s", "1.2e+02 s", "2 min", "120 min", "2 h", "2 days",
+    ]  # fmt: skip
