@@ -23,6 +23,7 @@ PLACES = ("hpcdem/physics", "hpcdem/lang", "hpcdem/halo", "hpcdem/io", "hpcdem/d
 
 REACH = ROOT / ".pytest_cache" / "mutants"
 """Folder: what tests call and how long they take, with kernels of each sort, as measured on this machine."""
+RANKS = {"killed": 0, "survived": 1, "untested": 2}
 RECORD = Path(__file__).with_name("results.jsonl")
 
 
@@ -119,8 +120,15 @@ def main(
 
 
 def read(file: Path) -> list[dict]:
-    """The results, of each mutant the last."""
-    return list({entry["mutant"]: entry for entry in lines_of(file)}.values())
+    """The results, of each mutant the best that is known, of equal ones the last: a later trial may have had fewer
+    tests."""
+    found: dict[str, dict] = {}
+    for entry in lines_of(file):
+        known = found.get(entry["mutant"], entry)
+        if RANKS[entry["outcome"]] <= RANKS[known["outcome"]]:
+            reason = {"reason": known["reason"]} if "reason" in known and entry["outcome"] != "killed" else {}
+            found[entry["mutant"]] = reason | entry
+    return list(found.values())
 
 
 def lines_of(file: Path) -> list[dict]:
@@ -129,7 +137,7 @@ def lines_of(file: Path) -> list[dict]:
 
 
 def tidy(file: Path) -> None:
-    """Keep of each mutant the last result only, sorted by name: two people's results merge."""
+    """Keep of each mutant one result only, sorted by name: two people's results merge."""
     found = sorted(read(file), key=lambda entry: entry["mutant"])
     file.write_text("".join(json.dumps(entry, ensure_ascii=False) + "\n" for entry in found), encoding="utf-8")
 

@@ -45,7 +45,7 @@ class Pace:
 
 
 PACES = {"plain": Pace(0.6, 8.0, 1.0), "compiled": Pace(2.5, 4.0, 6.0)}
-CASES, MOST = 2, 20
+CASES, MOST = 2, 60
 """Cases of one parametrized test, and tests of one file, that are measured."""
 ELSEWHERE = {"launch", "launch_once", "resident", "needs_mpi", "needs_petsc", "needs_parallel_hdf5", "slurm"}
 """Fixtures of tests that start other processes, in which nothing is changed."""
