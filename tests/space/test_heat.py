@@ -594,7 +594,9 @@ def test_friction_of_a_pair_heats_both_walls() -> None:
     v, effusivity, part = rng.normal(size=(3, 16)), np.array([9.0, 2.0, 1.0]), np.array([9.0, 0.5, 0.25])
     out, dt = np.zeros((3, 4)), 0.1
     first, second, face, face_row, row = np.zeros(3, int), np.zeros(3, int), np.array([6]), np.array([2]), np.array([1])
-    kernels_space.rub(first, second, face, face_row, row, touching, v, force, history, effusivity, part, dt, out)
+    kernels_space.friction_heat(
+        first, second, face, face_row, row, touching, v, force, history, effusivity, part, dt, out
+    )
     corners = list(FACES[2])
     speed = mine @ v[2].reshape(4, 4)[corners, :3] - theirs @ v[1].reshape(4, 4)[:, :3]
     heat = -dt * history[2, :3] @ speed
