@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as hnp
 
 from hpcdem.core import cells
 from hpcdem.core.cells import COLUMN
-from hpcdem.decomp import strips
+from hpcdem.decomp import balance, strips
 
 quick = settings(max_examples=150, deadline=None, derandomize=True)
 weights = hnp.arrays(np.float64, st.integers(1, 80), elements=st.floats(0.0, 1e6))
@@ -177,3 +177,13 @@ def test_strays_are_those_that_belong_to_others(places, start, n):
     owner = strips.owner_of(cells.columns(key), borders)
     for rank in range(n):
         assert strips.strays(key, borders, rank).tolist() == np.flatnonzero(owner != rank).tolist()
+
+
+def test_how_uneven_ranks_are_and_what_a_particle_costs():
+    """Nothing to compare: as if all were equal; one measurement counts for a factor of two at most."""
+    assert balance.imbalance(1.5, 0.5) == 3.0 and balance.imbalance(0.0, 0.0) == 1.0
+    assert balance.cost_per_particle(3.0, 10.0, 8.0, 40.0) == pytest.approx(1.5)
+    assert (
+        balance.cost_per_particle(9.0, 10.0, 10.0, 40.0) == 2.0
+        and balance.cost_per_particle(0.0, 9.0, 1.0, 20.0) == 0.5
+    )

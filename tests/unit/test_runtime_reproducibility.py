@@ -108,3 +108,9 @@ def test_the_end(seen, said):
         check.see(check.models or check.new_model(), step, {"particles": A})
     check.close()
     assert said in out.getvalue()
+
+
+def test_rows_of_one_column_and_of_none() -> None:
+    one = np.array([1.0, 2.0, -3.0])
+    assert of_rows([one]).tolist() != of_rows([2.0 * one]).tolist()
+    assert of_rows([]).tolist() == [0, 0] == of_rows([one[:0], one[:0]]).tolist()

@@ -5,6 +5,7 @@ python -m mutants.inside JOB     JOB: a file with what to do (cli.py)
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import json
 import sys
@@ -64,16 +65,17 @@ def measure(
     seconds: dict[str, float],
     keep: Callable[[dict[str, Any]], None],
 ) -> None:
-    """What each test calls, of files that are not known yet. seconds: of tests with compiled kernels."""
-    done = {said["file"] for said in known if "file" in said}
+    """What each test calls, of files that are not known as they are now. seconds: of tests with compiled kernels."""
+    done = {(said["file"], said.get("text")) for said in known if "file" in said}
     for file, items in session.measurable(seconds).items():
-        if file not in done:
+        text = hashlib.sha256((Path(session.root) / file).read_bytes()).hexdigest()[:16]
+        if (file, text) not in done:
             began = time.monotonic()
             outcomes: dict[str, int] = defaultdict(int)
             for said in session.measure(file, items, WALL):
                 outcomes[said["outcome"]] += 1
                 keep(said)
-            keep({"file": file})
+            keep({"file": file, "text": text})
             counts = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
             print(f"measured {time.monotonic() - began:6.1f} s  {file}: {counts}", flush=True)
 
@@ -103,8 +105,8 @@ def try_all(session: Session, known: list[dict[str, Any]], imported: set[str], j
     root, record = Path(job["root"]), Path(job["record"])
     calls: dict[str, list[Reaching]] = defaultdict(list)
     passed_tests: list[Reaching] = []
-    for said in known:
-        if said.get("outcome") == "passed" and said["test"] in session.items:
+    for said in {said["test"]: said for said in known if "test" in said}.values():
+        if said["outcome"] == "passed" and said["test"] in session.items:
             passed_tests.append((len(said["reach"]), said["seconds"], said["test"]))
             for function in said["reach"]:
                 calls[function].append(passed_tests[-1])
