@@ -19,7 +19,7 @@ import numpy as np
 
 from hpcdem.core import units
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.core.looks import COLOURS, EYES, OBJECTS
+from hpcdem.core.picture_words import COLOURS, EYES, OBJECTS
 from hpcdem.io.axes import UNITS as AXES
 from hpcdem.lang import chinese
 from hpcdem.page import exports

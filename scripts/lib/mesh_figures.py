@@ -26,7 +26,7 @@ from hpcdem.pre.mesh.fractures import network, of_curves
 from hpcdem.pre.mesh.quality import quality
 from hpcdem.pre.mesh.regions import polygon_of
 from hpcdem.pre.mesh.sizes import Refinement, spaced
-from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate
+from hpcdem.pre.mesh.triangulate import MeshSettings, Region, triangulate
 
 GROUP_COLOURS = ("#dfe6e9", "#f6d7a7", "#c7ddb5", "#b8d4e8", "#e3c6dc", "#d9cfc1", "#f2e3a0", "#c9c9e3")
 EDGE_COLOUR = "#5f6b73"
@@ -114,7 +114,7 @@ def tunnel(kind: str) -> Mesh:
     layers.add("tunnel", arch)
     layers.add("bed", geometry.polygon([(-20.0, 5.0), (20.0, 7.5), (20.0, 10.5), (-20.0, 8.5)]))
     layers.add("fault", geometry.polyline([(-16.0, -15.0), (-2.0, 15.0)]))
-    wishes = Wishes(
+    settings = MeshSettings(
         regions=[Region("outline", "sandstone"), Region("bed", "clay", size=1.2)],
         size=2.4,
         kind=kind,
@@ -122,7 +122,7 @@ def tunnel(kind: str) -> Mesh:
         cracks=[("fault", 0)],
         refine=[Refinement("tunnel", 0.4, growth=0.15)],
     )
-    return triangulate(layers, wishes).mesh
+    return triangulate(layers, settings).mesh
 
 
 def kirsch() -> Mesh:
@@ -131,7 +131,7 @@ def kirsch() -> Mesh:
     layers.add("far", geometry.circle((0.0, 0.0), 8.0))
     layers.add("hole", geometry.circle((0.0, 0.0), 1.0))
     refine = [Refinement("hole", 2.0 * math.pi / 96, growth=0.12)]
-    return triangulate(layers, Wishes([Region("far", "rock")], 0.8, holes=["hole"], refine=refine)).mesh
+    return triangulate(layers, MeshSettings([Region("far", "rock")], 0.8, holes=["hole"], refine=refine)).mesh
 
 
 def specimen() -> Mesh:
@@ -145,7 +145,7 @@ def specimen() -> Mesh:
     layers.add(
         "ends", geometry.polyline([(-26.0, 0.0), (26.0, 0.0)]), geometry.polyline([(-26.0, 108.0), (26.0, 108.0)])
     )
-    return triangulate(layers, Wishes(regions, 4.0, cracks=[("ends", 0)])).mesh
+    return triangulate(layers, MeshSettings(regions, 4.0, cracks=[("ends", 0)])).mesh
 
 
 def slope() -> Mesh:
@@ -163,7 +163,7 @@ def slope() -> Mesh:
         Orientation("normal", 115.0, 8.0), Length("power", 2.2, least=2.5, greatest=20.0), "p21", 0.14, ends_at=0.7
     )
     traces = network([bedding, cross], region, seed=12, least=0.8)
-    return triangulate(layers, Wishes([Region("slope", "rock")], 0.8, fractures=traces)).mesh
+    return triangulate(layers, MeshSettings([Region("slope", "rock")], 0.8, fractures=traces)).mesh
 
 
 def _panels(

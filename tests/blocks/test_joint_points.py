@@ -16,7 +16,7 @@ from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.geometry import Layers
-from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate
+from hpcdem.pre.mesh.triangulate import MeshSettings, Region, triangulate
 from tests.blocks.support import JOINT, ROCK, jointed, model, rectangle
 from tests.conftest import absent
 
@@ -127,7 +127,7 @@ def bar(smooth: bool) -> Mesh:
             absent(name, f"no package {name} here: install the extra [mesh]")
     layers = Layers()
     layers.add("o", geometry.rectangle((0.0, 0.0), (0.01, 0.02)))
-    return triangulate(layers, Wishes([Region("o")], 0.0015, irregular=True, smooth=smooth)).mesh
+    return triangulate(layers, MeshSettings([Region("o")], 0.0015, irregular=True, smooth=smooth)).mesh
 
 
 @pytest.mark.parametrize("penalty", [10.0, 100.0])

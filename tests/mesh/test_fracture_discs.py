@@ -125,7 +125,7 @@ def test_discs_are_cut_in_exactly(gmsh: object) -> None:
     one, two = made("disc", (0.5, 0.5, 0.5), (1, 0.3, 0.5), 0.3), made("disc", (0.4, 0.5, 0.5), (0, 0.3, 0.5), 0.3)
     plane = made("plane", (0.5, 0.5, 0.15), (0.1, 0, 1))
     cube = made("box", (0, 0, 0), (1, 1, 1))
-    found = fill.filled(fill.Wishes([cube], 0.15, surfaces=[("discs", [one, two]), ("plane", [plane])]), "rock")
+    found = fill.filled(fill.MeshSettings([cube], 0.15, surfaces=[("discs", [one, two]), ("plane", [plane])]), "rock")
     mesh = Mesh.of(found.points, found.cells, layers=found.faces)
     check(mesh)
     assert mesh.areas().sum() == pytest.approx(1.0, rel=1e-9) and not found.notes
@@ -144,11 +144,11 @@ def test_discs_are_cut_in_exactly(gmsh: object) -> None:
 
 
 def test_a_plane_outside_is_refused(gmsh: object) -> None:
-    wishes = fill.Wishes([CUBE], 2.0, surfaces=[("plane", [made("plane", (0, 0, 9), (0, 0, 1))])])
+    wishes = fill.MeshSettings([CUBE], 2.0, surfaces=[("plane", [made("plane", (0, 0, 9), (0, 0, 1))])])
     with pytest.raises(CommandError, match="layer 'plane' does not cut the body"):
         fill.filled(wishes, "rock")
     with pytest.raises(CommandError, match="layer 'ball' has bodies"):
-        fill.filled(fill.Wishes([CUBE], 2.0, surfaces=[("ball", [made("sphere", (2, 2, 2), 1)])]), "rock")
+        fill.filled(fill.MeshSettings([CUBE], 2.0, surfaces=[("ball", [made("sphere", (2, 2, 2), 1)])]), "rock")
 
 
 def test_faces_between_elements_on_both_sides_follow_a_disc() -> None:

@@ -12,7 +12,7 @@ from hpcdem.lang.pcdc import check
 from hpcdem.pre.mesh import geometry, optional
 from hpcdem.pre.mesh.dxf import read_dxf
 from hpcdem.pre.mesh.imported import import_mesh
-from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate
+from hpcdem.pre.mesh.triangulate import MeshSettings, Region, triangulate
 
 
 @pytest.mark.parametrize("name", ["shapely", "gmsh", "meshio", "ezdxf"])
@@ -54,7 +54,7 @@ def test_those_who_need_one_say_so(monkeypatch, tmp_path):
     layers = geometry.Layers()
     layers.add("o", geometry.rectangle((0, 0), (1, 1)))
     with pytest.raises(HpcdemError, match="Meshing of arbitrary outlines needs the package gmsh"):
-        triangulate(layers, Wishes([Region("o")], 0.5))
+        triangulate(layers, MeshSettings([Region("o")], 0.5))
     with pytest.raises(HpcdemError, match="Import of mesh files needs the package meshio"):
         import_mesh(tmp_path / "m.vtk")
     with pytest.raises(HpcdemError, match="Import of DXF drawings needs the package ezdxf"):

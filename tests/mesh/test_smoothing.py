@@ -15,7 +15,7 @@ from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.pre.mesh.quality import quality
 from hpcdem.pre.mesh.sizes import Refinement
 from hpcdem.pre.mesh.smooth import smoothed
-from hpcdem.pre.mesh.triangulate import Meshed, Region, Wishes, triangulate
+from hpcdem.pre.mesh.triangulate import Meshed, MeshSettings, Region, triangulate
 
 STAR = [(r * math.cos(a), r * math.sin(a)) for a, r in ((0.2 * math.pi * k, (1.0, 0.3)[k % 2]) for k in range(10))]
 COMB = [(0, 0), (9, 0), (9, 5), (8, 5), (8, 1), (6, 1), (6, 5), (5, 5), (5, 1), (1, 1), (1, 5), (0, 5)]
@@ -26,7 +26,7 @@ def meshed(curves: dict, size: float, smooth: bool = True, **wishes) -> Meshed:
     for name, curve in curves.items():
         layers.add(name, curve)
     wishes = {"irregular": True} | wishes
-    made = triangulate(layers, Wishes([Region("o", "rock")], size, smooth=smooth, **wishes))
+    made = triangulate(layers, MeshSettings([Region("o", "rock")], size, smooth=smooth, **wishes))
     check(made.mesh)
     return made
 

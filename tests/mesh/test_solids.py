@@ -53,7 +53,7 @@ def test_the_inside_has_the_volume_of_the_closed_form(given: tuple, volume: floa
 @pytest.mark.parametrize(("given", "volume", "error"), BODIES, ids=NAMES)
 def test_a_mesh_fills_it_and_its_faces_lie_on_it(given: tuple, volume: float, error: float, gmsh: object) -> None:
     body = made(*given)
-    found = fill.filled(fill.Wishes([body], 0.25 if given[-1] == 0.0 else 0.5), "rock")
+    found = fill.filled(fill.MeshSettings([body], 0.25 if given[-1] == 0.0 else 0.5), "rock")
     mesh = Mesh.of(found.points, found.cells)
     check(mesh)
     assert mesh.areas().sum() == pytest.approx(volume, rel=max(error, 1e-9))
@@ -138,7 +138,7 @@ def test_a_shell_of_triangles_becomes_a_body(tmp_path: Path, gmsh: object) -> No
     (body,) = cad.read(stl(tmp_path / "cube.stl", [t[::-1] if k % 3 == 0 else t for k, t in enumerate(CUBE)]))
     at = np.array([[0.5, 0.5, 0.5], [0.5, 0.5, 1.25], [2.0, 2.0, 0.5], [0.5, 0.9, 0.5]])
     assert body.distance(at) == pytest.approx([-0.5, 0.25, math.sqrt(2), -0.1])
-    found = fill.filled(fill.Wishes([body], 0.4, holes=[made("sphere", (0.5, 0.5, 0.5), 0.3)]), "rock")
+    found = fill.filled(fill.MeshSettings([body], 0.4, holes=[made("sphere", (0.5, 0.5, 0.5), 0.3)]), "rock")
     mesh = Mesh.of(found.points, found.cells)
     check(mesh)
     assert mesh.areas().sum() == pytest.approx(1.0 - 0.036 * math.pi, rel=0.06)
@@ -215,7 +215,7 @@ def test_solids_of_a_cad_file_hang_together_and_are_groups(tmp_path: Path, gmsh:
     subprocess.run([sys.executable, "-c", PARTS, tmp_path / "parts.brep", tmp_path / "flat.brep"], check=True)
     (small, _), (one, other) = cad.read(tmp_path / "parts.brep", scale=1e-3), cad.read(tmp_path / "parts.brep")
     np.testing.assert_allclose(small.bounds(), 1e-3 * one.bounds(), atol=1e-9)
-    found = fill.filled(fill.Wishes([one, other], 0.3, regions=[("one", [one]), ("other", [other])]), "rest")
+    found = fill.filled(fill.MeshSettings([one, other], 0.3, regions=[("one", [one]), ("other", [other])]), "rest")
     mesh = Mesh.of(found.points, found.cells)
     check(mesh)
     volumes = [mesh.areas()[found.groups[name]].sum() for name in ("one", "other")]

@@ -16,7 +16,7 @@ from hpcdem.pre.mesh.fractures import Fractures
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.pre.mesh.quality import corner_angles, quality
 from hpcdem.pre.mesh.sizes import Refinement, SizeField
-from hpcdem.pre.mesh.triangulate import Meshed, Region, Wishes, triangulate
+from hpcdem.pre.mesh.triangulate import Meshed, MeshSettings, Region, triangulate
 from tests.mesh.areas import enclosed_area
 from tests.tables import each
 
@@ -34,7 +34,7 @@ def layers(**curves: geometry.Curve | list[geometry.Curve]) -> Layers:
 
 
 def meshed(curves: dict, regions: list[Region] | None = None, size: float = 0.5, **wishes) -> Meshed:
-    made = triangulate(layers(**curves), Wishes(regions or ROCK, size, **wishes))
+    made = triangulate(layers(**curves), MeshSettings(regions or ROCK, size, **wishes))
     check(made.mesh)
     return made
 
@@ -410,7 +410,7 @@ def test_slivers_of_the_outline_are_told():
 def test_nonsense_is_refused(curves, regions, wishes, message):
     wishes = {"size": 0.5} | wishes
     with pytest.raises(CommandError, match=message):
-        triangulate(layers(**curves), Wishes(regions, wishes.pop("size"), **wishes))
+        triangulate(layers(**curves), MeshSettings(regions, wishes.pop("size"), **wishes))
 
 
 def test_what_gmsh_says_is_passed_on(gmsh, monkeypatch):
@@ -419,7 +419,7 @@ def test_what_gmsh_says_is_passed_on(gmsh, monkeypatch):
 
     monkeypatch.setattr(gmsh.model.mesh, "generate", fails)
     with pytest.raises(HpcdemError, match=r"gmsh could not make the mesh: .*Unable to recover the edge 7"):
-        triangulate(layers(o=BOX), Wishes(ROCK, 0.5))
+        triangulate(layers(o=BOX), MeshSettings(ROCK, 0.5))
     assert not gmsh.isInitialized()
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.core.picture_words import COLOURS, OBJECTS
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.lang import chinese
 from hpcdem.page import exports

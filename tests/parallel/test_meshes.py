@@ -22,7 +22,7 @@ from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
 from hpcdem.pre.mesh.fractures import network
 from hpcdem.pre.mesh.regions import polygon_of
 from hpcdem.pre.mesh.sizes import Refinement
-from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate
+from hpcdem.pre.mesh.triangulate import Region, MeshSettings, triangulate
 
 comm = MpiComm(MPI.COMM_WORLD) if MPI.COMM_WORLD.size > 1 else SerialComm()
 layers = geometry.Layers()
@@ -34,8 +34,8 @@ def make(kind, size=0.3):
     assert comm.rank == 0, "made on the first rank only"
     one = FractureSet(Orientation("fisher", 40.0, 20.0), Length("exponential", 1.5), "p21", 0.7)
     traces = network([one], polygon_of(layers, ["o"], 0.3, ["h"]), seed=4)
-    wishes = Wishes([Region("o", "rock")], size, kind, holes=["h"], fractures=traces, refine=[Refinement("h", 0.1)])
-    return triangulate(layers, wishes)
+    settings = MeshSettings([Region("o", "rock")], size, kind, holes=["h"], fractures=traces, refine=[Refinement("h", 0.1)])
+    return triangulate(layers, settings)
 
 
 for kind in ("tri", "quad"):

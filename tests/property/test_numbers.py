@@ -70,7 +70,7 @@ def test_walls_csv_and_histories_hold_doubles(x: float, y: float, xv: float, dt:
         walls.wall(sim, 3, ((x, y), (x + 1.5, y - 0.7)), xv=xv)
         particles.ball(sim, 0, x, y + 5.0, 1e-3 + 1e-6 * abs(x) + 1e-6 * abs(y))
         sim.particles["fix"][:] = 7
-        sim.history_wishes[1] = (1, "time")
+        sim.history_requests[1] = (1, "time")
         cycles.cycle(sim, 2)
         head, *rows = (Path(name) / "walls.csv").read_text().splitlines()
         assert head == output.WALL_COLUMNS

@@ -156,7 +156,7 @@ def test_the_series_at_the_middle_of_a_side() -> None:
 
 def test_torsion_of_a_round_bar(gmsh: object) -> None:
     """Radius 0.05 m: 5.0930e-3 of a metre under 1 kN m; the stress grows with the radius, to 5.0930 MPa."""
-    found = fill.filled(fill.Wishes([solids.made("cylinder", (0, 0, 0), (0, 0, LENGTH), 0.05)], 0.008), "bar")
+    found = fill.filled(fill.MeshSettings([solids.made("cylinder", (0, 0, 0), (0, 0, LENGTH), 0.05)], 0.008), "bar")
     mesh = Mesh.of(found.points, found.cells)
     sim = twisted(mesh, 5.0930e-3)
     top = np.flatnonzero(np.abs(mesh.points[:, 2] - LENGTH) < 1e-9)
@@ -220,7 +220,7 @@ def test_a_disc_that_is_pressed_between_two_lines(gmsh: object) -> None:
     radius, thick = 0.025, 0.025
     disc = solids.made("cylinder", (0, 0, -0.5 * thick), (0, 0, 0.5 * thick), radius)
     cube = solids.made("box", (0, 0, 0), (1.0, 1.0, 1.0))
-    found = fill.filled(fill.Wishes([disc], 0.0014, regions=[("eighth", [cube])]), "rest")
+    found = fill.filled(fill.MeshSettings([disc], 0.0014, regions=[("eighth", [cube])]), "rest")
     used, numbers = np.unique(found.cells[found.groups["eighth"]], return_inverse=True)
     mesh = Mesh.of(found.points[used], numbers.reshape(-1, 4))
     sim = body(mesh, dynamic=False)

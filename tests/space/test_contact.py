@@ -380,7 +380,7 @@ def test_a_ball_bounces_off_a_plate() -> None:
     radius, fine = 0.05, 7e-4
     cube, ball = solids.made("box", (0, 0, 0), (0.1, 0.1, 0.1)), solids.made("sphere", (0, 0, radius), radius)
     near = solids.made("box", (-0.0043, -0.0041, -0.0011), (0.0043, 0.0042, 0.0013))
-    whole = fill.filled(fill.Wishes([ball], 0.012, [], [("quarter", [cube])], [([near], fine, 0.03)]), "rest")
+    whole = fill.filled(fill.MeshSettings([ball], 0.012, [], [("quarter", [cube])], [([near], fine, 0.03)]), "rest")
     used, cells = np.unique(whole.cells[whole.groups["quarter"]], return_inverse=True)
     points = whole.points[used] - [0.0, 0.0, whole.points[used][:, 2].min() - 1e-7]
     plate = box((3, 3, 1), (0.015, 0.015, 0.005))

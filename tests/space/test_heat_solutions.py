@@ -30,7 +30,7 @@ TABLE = {
 def eighth(size: float) -> Mesh:
     """Of a full sphere of radius 1."""
     cube, rim = solids.made("box", (0, 0, 0), (1.0, 1.0, 1.0)), solids.made("sphere", (0, 0, 0), 1.0)
-    found = fill.filled(fill.Wishes([rim], size, regions=[("eighth", [cube])]), "rest")
+    found = fill.filled(fill.MeshSettings([rim], size, regions=[("eighth", [cube])]), "rest")
     used, numbers = np.unique(found.cells[found.groups["eighth"]], return_inverse=True)
     return Mesh.of(found.points[used], numbers.reshape(-1, 4))
 

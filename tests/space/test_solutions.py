@@ -99,7 +99,7 @@ def octant(inner: float, outer: float, size: float, fine: float) -> Mesh:
     """An eighth of a hollow sphere."""
     cube, hole = solids.made("box", (0, 0, 0), (outer, outer, outer)), solids.made("sphere", (0, 0, 0), inner)
     rim = solids.made("sphere", (0, 0, 0), outer)
-    wishes = fill.Wishes([rim], size, [hole], [("eighth", [cube])], [([hole], fine, 2.0)])
+    wishes = fill.MeshSettings([rim], size, [hole], [("eighth", [cube])], [([hole], fine, 2.0)])
     found = fill.filled(wishes, "rest")
     points, keep = found.points, found.cells[found.groups["eighth"]]
     used, numbers = np.unique(keep, return_inverse=True)

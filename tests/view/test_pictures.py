@@ -15,7 +15,7 @@ from hpcdem.cli.draw import draw as command
 from hpcdem.cli.draw import work
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.core.looks import COLOURS
+from hpcdem.core.picture_words import COLOURS
 from hpcdem.io.axes import View
 from hpcdem.io.frame import Columns
 from hpcdem.io.vtkhdf import read_vtkhdf

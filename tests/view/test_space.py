@@ -14,7 +14,7 @@ from hpcdem.cli.movie import movie
 from hpcdem.cli.movie import work as film
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import HpcdemError
-from hpcdem.core.looks import EYES
+from hpcdem.core.picture_words import EYES
 from hpcdem.io.axes import View
 from hpcdem.physics.fdem import tetrahedra
 from hpcdem.post.view import space

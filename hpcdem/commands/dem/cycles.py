@@ -374,7 +374,7 @@ class Due:
         assert progress is not None
         origin, intervals = progress["origin"], progress["intervals"]
         tasks: list[Task] = []
-        for ident, (every, _) in sorted(sim.history_wishes.items()):
+        for ident, (every, _) in sorted(sim.history_requests.items()):
             tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
         last = -1 if progress["last"] is None else progress["last"]
         tasks.append(Task(self._bar, progress["first"], self._report, also=last))

@@ -31,7 +31,7 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
             sim.history_origins[id] = origin
     elif what not in followed(sim):
         raise CommandError(f"HIST cannot follow {what}; it supports {', '.join((*followed(sim), *OF_PARTS))}")
-    sim.history_wishes[id] = (interval, what)
+    sim.history_requests[id] = (interval, what)
 
 
 def plot_hist(sim: Simulation, y: int, x: int) -> None:

@@ -198,7 +198,7 @@ def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> Non
     The layout of the latter is that of which public readers of ZDEM's histories take the numbers: a line with the word
     hist, two lines of headings, rows, and a last line that is skipped (written by `finish`).
     """
-    what = sim.history_wishes[ident][1]
+    what = sim.history_requests[ident][1]
     step, time = sim.clock.step, sim.clock.time
     with sim.timers("output"):
         name, unit = what.split()[0], unit_of(sim, what)
@@ -353,7 +353,7 @@ def secure_series(sim: Simulation) -> None:
 
 def close_histories(sim: Simulation) -> None:
     """The last line of each `hist_id_<id>.dat`, which its readers pass over; once. Collective."""
-    for ident in sim.history_wishes:
+    for ident in sim.history_requests:
         name = f"hist_id_{ident}.dat"
         if name in sim.series_open and name not in sim.series_closed:
             append_rows(folder(sim) / name, "", ["end"], None, sim.comm)
@@ -364,7 +364,7 @@ def finish(sim: Simulation) -> None:
     """At STOP, write the last line of histories, and the curves requested by PLOT, `hist_<y>_vs_<x>.txt` and `.png`."""
     close_histories(sim)
     for y, x in sim.plots:
-        missing = [i for i in (y, x) if i not in sim.history_wishes]
+        missing = [i for i in (y, x) if i not in sim.history_requests]
         if missing:
             raise CommandError(f"PLOT {y} {x}: there is no HIST {missing[0]}")
         text, names = "", [""]
@@ -375,7 +375,7 @@ def finish(sim: Simulation) -> None:
                 path = Path(sim.outdir) / f"hist_{ident}.csv"
                 lines = path.read_text().splitlines()[1:] if path.exists() else []
                 columns.append({line.split(",")[0]: line.split(",")[2] for line in lines})
-            names = [sim.history_wishes[i][1] for i in (x, y)]
+            names = [sim.history_requests[i][1] for i in (x, y)]
             pairs = [(columns[0][s], columns[1][s]) for s in columns[0] if s in columns[1]]
             text = "\n".join([f"# {names[0]} {names[1]}", *(f"{a} {b}" for a, b in pairs)]) + "\n"
         path = folder(sim) / f"hist_{y}_vs_{x}.txt"

@@ -156,7 +156,7 @@ def _added(sim: Simulation, law: str, parameter: Mapping[str, float], folder: Pa
         unknown = f"the stored energy of the law {new.title} is not known: define it with pair_law(energy=)"
         if sim.energy is not None or sim.settings.energy:
             raise CommandError(f"SET energy: {unknown}; switch it off with SET energy 0")
-        if any(what == "energy" for _, what in sim.history_wishes.values()):
+        if any(what == "energy" for _, what in sim.history_requests.values()):
             raise CommandError(f"HIST energy: {unknown}")
     values = user_laws.given(new, parameter, whole=True)
     if not sim.own_laws.number(new.name):

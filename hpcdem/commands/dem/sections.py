@@ -13,8 +13,8 @@ from hpcdem.commands.dem import bonds
 from hpcdem.commands.dem.particles import add, check_circles
 from hpcdem.commands.dem.properties import chosen, prop
 from hpcdem.core.errors import CommandError
-from hpcdem.core.looks import NUMBERS
 from hpcdem.core.material import PROPERTIES
+from hpcdem.core.picture_words import NUMBERS
 from hpcdem.core.selection import Particles, Selection, even_odd
 from hpcdem.io.agreed import on_first
 from hpcdem.physics.dem.simulation import Simulation

@@ -99,7 +99,7 @@ def _delete(sim: Simulation, id: int) -> None:
     row = sim.walls.row(id)
     if sim.walls.side[row]:
         raise CommandError(f"wall {id} is a side of BOX, which cannot be deleted")
-    for number, (_, what) in sim.history_wishes.items():
+    for number, (_, what) in sim.history_requests.items():
         name, *of = what.split()
         if of[:1] == ["wall"] and str(id) in of[1].split("|"):
             raise CommandError(f"wall {id} cannot be deleted: HIST {number} records its {name}")

@@ -39,7 +39,7 @@ from hpcdem.pre.mesh import patch as patches
 from hpcdem.pre.mesh.pieces import Piece
 from hpcdem.pre.mesh.regions import polygon_of
 from hpcdem.pre.mesh.sizes import Refinement
-from hpcdem.pre.mesh.triangulate import Meshed, Region, Wishes, triangulate
+from hpcdem.pre.mesh.triangulate import Meshed, MeshSettings, Region, triangulate
 
 ARC_STEPS = 360
 """Arcs of the outline of a fracture network stand for so many sides per its size."""
@@ -84,7 +84,7 @@ def create(
     if bodies:
         raise CommandError("bodies of mesh create is for three dimensions")
     first = 0 if project.mesh is None else int(project.mesh.crack_sets.max(initial=-1)) + 1
-    wishes = Wishes(
+    settings = MeshSettings(
         [Region(layer, name, set_name) for layer, name in ((from_layer, group), *regions)],
         size,
         type,
@@ -95,7 +95,7 @@ def create(
         irregular=irregular,
         smooth=smooth,
     )
-    made: Meshed = project.comm.per_node(lambda: triangulate(project.layers, wishes), once=True)
+    made: Meshed = project.comm.per_node(lambda: triangulate(project.layers, settings), once=True)
     for note in made.notes:
         _say(project, note)
     _add(project, lambda: made.mesh)
@@ -116,7 +116,7 @@ def _fill(
 ) -> None:
     layers = project.layers
     own = [(getattr(one, "name", "") or f"{outline} {k + 1}", [one]) for k, one in enumerate(layers[outline])]
-    wishes = fill.Wishes(
+    settings = fill.MeshSettings(
         layers[outline],
         size,
         [one for layer in holes for one in layers[layer]],
@@ -124,7 +124,7 @@ def _fill(
         [(layers[layer], fine, distance) for layer, fine, distance in refine],
         [(layer, layers[layer]) for layer in (*embedded, *cracks)],
     )
-    made: fill.Filled = project.comm.per_node(lambda: fill.filled(wishes, group), once=True)
+    made: fill.Filled = project.comm.per_node(lambda: fill.filled(settings, group), once=True)
     for note in made.notes:
         _say(project, note)
     first = 0 if project.mesh is None else int(project.mesh.crack_sets.max(initial=-1)) + 1
@@ -179,8 +179,8 @@ def patch(
     if project.dim == 3:
         raise CommandError("lines bound a mesh in two dimensions only")
     shaped = [(piece, shape(*piece.shape) if piece.shape else []) for piece in pieces]
-    layers, wishes = patches.wishes(project.layers, shaped, size, tolerance, (set_name, group))
-    made: Meshed = project.comm.per_node(lambda: triangulate(layers, wishes), once=True)
+    layers, settings = patches.settings(project.layers, shaped, size, tolerance, (set_name, group))
+    made: Meshed = project.comm.per_node(lambda: triangulate(layers, settings), once=True)
     for note in made.notes:
         _say(project, note)
     mesh = made.mesh

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 from hpcdem.core.limits import LARGEST
-from hpcdem.core.looks import EYES, eye_of, section_of
 from hpcdem.core.nearest import hint
+from hpcdem.core.picture_words import EYES, eye_of, section_of
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
 from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN, TEMPERATURE
 

@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import Any
 
 from hpcdem.commands.fdem.recorded import UNITS as UNITS_OF
-from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.core.picture_words import COLOURS, OBJECTS
 from hpcdem.core.units import CHOICES as UNITS
 from hpcdem.lang.pcdc.keywords import Keyword
 from hpcdem.lang.pcdc.kinds import (

@@ -16,10 +16,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from hpcdem.core.looks import NUMBERS as COLORS
 from hpcdem.core.material import PROPERTIES
 from hpcdem.core.nearest import hint
 from hpcdem.core.outputs import OUTPUTS
+from hpcdem.core.picture_words import NUMBERS as COLORS
 from hpcdem.core.units import CHOICES as UNITS
 
 SOURCES = {

@@ -89,7 +89,7 @@ def state_of(sim: Simulation) -> dict[str, Any]:
         "stamp": sim.stamp,
         "physics": [[physics.name, physics.parameters()] for physics in sim.physics],
         "rebuilds": sim.rebuilds,
-        "history_wishes": {str(k): list(v) for k, v in sim.history_wishes.items()},
+        "history_wishes": {str(k): list(v) for k, v in sim.history_requests.items()},
         "history_origins": {str(k): list(v) for k, v in sim.history_origins.items()},
         "progress": sim.progress,
         "position": sim.position,
@@ -228,7 +228,7 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Table
         getattr(sim, name).take_floats(np.array(state[name], dtype=np.float64))
     for name in ("groups", "next_gid", "streams"):
         setattr(sim, name, state[name])
-    sim.history_wishes = {int(k): (int(v[0]), str(v[1])) for k, v in state["history_wishes"].items()}
+    sim.history_requests = {int(k): (int(v[0]), str(v[1])) for k, v in state["history_wishes"].items()}
     sim.makers = [(int(first), int(line)) for first, line in state.get("makers", [])]
     origins = state.get("history_origins", {})
     sim.history_origins = {int(k): (int(v[0]), float(v[1])) for k, v in origins.items()}

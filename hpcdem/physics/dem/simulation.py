@@ -157,7 +157,7 @@ class Simulation(Model):
         self.own_laws = ModelLaws()  # of the user; materials say which discs have them
         self.own_table: np.ndarray | None = None
         self.stamp = 1  # evaluations of forces, for the memory of these laws
-        self.history_wishes: dict[int, tuple[int, str]] = {}
+        self.history_requests: dict[int, tuple[int, str]] = {}
         self.history_origins: dict[int, tuple[int, float]] = {}  # axis and distance of strains
         self.plots: list[tuple[int, int]] = []
         self.drawing: tuple[int, tuple[str, ...]] | None = None

@@ -15,8 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 
 from hpcdem.core import validation
 from hpcdem.core.errors import HpcdemError
-from hpcdem.core.looks import COLOURS, OBJECTS, eye_of, section_of
 from hpcdem.core.nearest import hint
+from hpcdem.core.picture_words import COLOURS, OBJECTS, eye_of, section_of
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.disk import explain
 from hpcdem.post.view.filter import LONGEST
@@ -78,9 +78,9 @@ class Layer(_Table):
 
 class ModelView(_Table):
     """layers: what is shown, the later ones over the earlier; camera: left, right, bottom, top of the part of the plane
-    [m], in space of the plane of the picture, else the whole model; eye, section: in space from where it is seen, and
-    a plane that cuts it, as `hpcdem.core.looks` reads them; deformed: factor on displacements, 1 as it is, 0 as it was
-    in the mesh; title: over the picture, with {step} and {time}; step: of the frame, else the last one."""
+    [m], in space of the plane of the picture, else the whole model; eye, section: in space from where it is seen, and a
+    plane that cuts it, as `hpcdem.core.picture_words` reads them; deformed: factor on displacements, 1 as it is, 0 as
+    it was in the mesh; title: over the picture, with {step} and {time}; step: of the frame, else the last one."""
 
     layers: Annotated[tuple[Layer, ...], Field(max_length=MOST_LAYERS)] = ()
     camera: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None

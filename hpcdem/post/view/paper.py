@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import UsageError
-from hpcdem.core.looks import COLOURS
+from hpcdem.core.picture_words import COLOURS
 from hpcdem.io.axes import CM, View, number
 from hpcdem.post import blocks
 from hpcdem.post.saved import write

@@ -11,8 +11,8 @@ import numpy as np
 
 from hpcdem.core import units
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.core.looks import COLOURS, HIDDEN, OBJECTS, eye_of, section_of
 from hpcdem.core.nearest import hint
+from hpcdem.core.picture_words import COLOURS, HIDDEN, OBJECTS, eye_of, section_of
 from hpcdem.io import colours
 from hpcdem.io.axes import View, bar_ticks
 from hpcdem.post import blocks

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hpcdem.core.looks import Section
+from hpcdem.core.picture_words import Section
 
 SIDES = 6
 """Of a bar."""

@@ -28,7 +28,7 @@ HXT, DELAUNAY = 10, 1
 
 
 @dataclass(frozen=True)
-class Wishes:
+class MeshSettings:
     """outline, holes: bodies; size: of edges [m]; regions: (group, bodies) of parts with a group of their own; refine:
     (bodies and surfaces, size there [m], distance over which it grows to that of the rest [m] or None); surfaces:
     (layer, surfaces) that become faces of the mesh."""
@@ -53,33 +53,33 @@ class Filled:
     notes: list[str] = field(default_factory=list)
 
 
-def filled(wishes: Wishes, group: str) -> Filled:
+def filled(settings: MeshSettings, group: str) -> Filled:
     """The mesh; `group`: of what is in no region. HpcdemError where Gmsh fails, or the size makes too many elements."""
     optional.gmsh()
-    for what, of in (("the outline", wishes.outline), ("a hole", wishes.holes), *(
-        (f"region '{name}'", one) for name, one in wishes.regions
+    for what, of in (("the outline", settings.outline), ("a hole", settings.holes), *(
+        (f"region '{name}'", one) for name, one in settings.regions
     )):  # fmt: skip
         flat = [one for one in of if one.surface]
         if flat:
             raise CommandError(f"{what} is a body, but the layer has a {type(flat[0]).__name__.lower()}, a surface")
-    for name, of in wishes.surfaces:
+    for name, of in settings.surfaces:
         if not of or not all(one.surface for one in of):
             raise CommandError(f"layer '{name}' has bodies; meshes are cut along polygons, discs and planes")
-    cut, notes = snap.snapped(wishes.surfaces, wishes.outline, wishes.size)
-    bounds = np.array([one.bounds() for one in wishes.outline])
+    cut, notes = snap.snapped(settings.surfaces, settings.outline, settings.size)
+    bounds = np.array([one.bounds() for one in settings.outline])
     low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
-    not_too_many(float(np.prod((high - low) / wishes.size)) * 6.0 * np.sqrt(2.0), f"size {wishes.size:g}")
-    for _, size, _ in wishes.refine:
-        if size > wishes.size:
+    not_too_many(float(np.prod((high - low) / settings.size)) * 6.0 * np.sqrt(2.0), f"size {settings.size:g}")
+    for _, size, _ in settings.refine:
+        if size > settings.size:
             raise CommandError(
                 f"refine-layer must make elements smaller, but size {size:g} is larger than that of the mesh"
             )
     request = {
-        "outline": state(list(wishes.outline)), "holes": state(list(wishes.holes)), "size": wishes.size,
-        "regions": [state(list(of)) for _, of in wishes.regions], "middle": (0.5 * (low + high)).tolist(),
+        "outline": state(list(settings.outline)), "holes": state(list(settings.holes)), "size": settings.size,
+        "regions": [state(list(of)) for _, of in settings.regions], "middle": (0.5 * (low + high)).tolist(),
         "refine": [
-            [state(list(of)), size, distance or (wishes.size - size) / GROWTH or wishes.size]
-            for of, size, distance in wishes.refine
+            [state(list(of)), size, distance or (settings.size - size) / GROWTH or settings.size]
+            for of, size, distance in settings.refine
         ],
         "surfaces": [state(list(of)) for _, of in cut], "reach": float(np.linalg.norm(high - low)),
     }  # fmt: skip
@@ -89,7 +89,7 @@ def filled(wishes: Wishes, group: str) -> Filled:
         with np.load(into, allow_pickle=False) as found:
             points, cells, region, of_layer = (found[name] for name in ("points", "cells", "region", "of_layer"))
             faces = found["faces"]
-    names = [group, *(name for name, _ in wishes.regions)]
+    names = [group, *(name for name, _ in settings.regions)]
     groups: dict[str, list[np.ndarray]] = {}
     for k, name in enumerate(names):
         if (region == k).any():

@@ -11,17 +11,17 @@ from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh.geometry import Curve, Layers
 from hpcdem.pre.mesh.pieces import HOLE, LINE, OUTLINE, Piece
 from hpcdem.pre.mesh.sizes import Refinement, positive
-from hpcdem.pre.mesh.triangulate import Region, Wishes
+from hpcdem.pre.mesh.triangulate import MeshSettings, Region
 
 
-def wishes(
+def settings(
     layers: Layers,
     pieces: Sequence[tuple[Piece, list[Curve]]],
     size: float | None,
     tolerance: float,
     group: tuple[str, str],
-) -> tuple[Layers, Wishes]:
-    """What triangulate.py takes: the layers, those of pieces without a name among them, and wishes. pieces: with the
+) -> tuple[Layers, MeshSettings]:
+    """What triangulate.py takes: the layers, those of pieces without a name among them, and settings. pieces: with the
     curves of their shapes; group: (set, group)
     of the elements. CommandError for pieces that bound nothing or have no size."""
     if not any(piece.role == OUTLINE for piece, _ in pieces):
@@ -55,7 +55,7 @@ def wishes(
     of = {role: [name for name, has in roles.items() if has == role] for role in (OUTLINE, HOLE, LINE)}
     set_name, in_group = group
     regions = [Region(name, in_group, set_name) for name in of[OUTLINE]]
-    return found, Wishes(regions, base, holes=of[HOLE], inside=of[LINE], refine=refine)
+    return found, MeshSettings(regions, base, holes=of[HOLE], inside=of[LINE], refine=refine)
 
 
 def _free(what: str, *taken: Layers) -> str:

@@ -45,27 +45,29 @@ class SizeField:
         self.base = float(base)
         self.parts: list[tuple[np.ndarray, cKDTree, float, float]] = []
         """Points along each refined layer (n, 2), their tree, the size there [m], its growth with distance."""
-        self.named = [(wish.layer, float(wish.size)) for wish, _ in refined]
+        self.named = [(refinement.layer, float(refinement.size)) for refinement, _ in refined]
         self.areas: list[tuple[Any, float]] = []
         """Polygons of shapely with a size of their own [m]."""
-        for wish, curves in refined:
-            positive(wish.size, f"mesh size near layer '{wish.layer}'")
-            if wish.size >= base:
+        for refinement, curves in refined:
+            positive(refinement.size, f"mesh size near layer '{refinement.layer}'")
+            if refinement.size >= base:
                 raise CommandError(
-                    f"mesh size near layer '{wish.layer}' is {wish.size:g}, which does not refine the mesh size "
-                    f"{base:g}"
+                    f"mesh size near layer '{refinement.layer}' is {refinement.size:g}, which does not refine the mesh "
+                    f"size {base:g}"
                 )
-            growth = wish.growth
-            if wish.distance is not None:
-                positive(wish.distance, f"distance of the refinement near layer '{wish.layer}'")
-                growth = (base - wish.size) / wish.distance
-            positive(growth, f"growth of the mesh size near layer '{wish.layer}'")
+            growth = refinement.growth
+            if refinement.distance is not None:
+                positive(refinement.distance, f"distance of the refinement near layer '{refinement.layer}'")
+                growth = (base - refinement.size) / refinement.distance
+            positive(growth, f"growth of the mesh size near layer '{refinement.layer}'")
             # Half an edge between samples: distances are met within 3 % of the size where they matter.
-            spacing = 0.5 * wish.size
+            spacing = 0.5 * refinement.size
             if sum(c.length() for c in curves) / spacing > MOST_SAMPLES:
-                raise CommandError(f"mesh size {wish.size:g} near layer '{wish.layer}' is too small for its length")
+                raise CommandError(
+                    f"mesh size {refinement.size:g} near layer '{refinement.layer}' is too small for its length"
+                )
             points = np.concatenate([sampled(c, spacing) for c in curves])
-            self.parts.append((points, cKDTree(points), float(wish.size), float(growth)))
+            self.parts.append((points, cKDTree(points), float(refinement.size), float(growth)))
 
     @property
     def smallest(self) -> float:

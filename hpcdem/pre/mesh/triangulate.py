@@ -68,7 +68,7 @@ class Region:
 
 
 @dataclass(frozen=True)
-class Wishes:
+class MeshSettings:
     """What to mesh. Layers are named; sizes in metres."""
 
     regions: Sequence[Region]
@@ -97,31 +97,31 @@ class Meshed:
     notes: list[str]
 
 
-def triangulate(layers: Layers, wishes: Wishes) -> Meshed:
-    """Make the mesh. CommandError for wishes that make no sense, HpcdemError where gmsh fails."""
+def triangulate(layers: Layers, settings: MeshSettings) -> Meshed:
+    """Make the mesh. CommandError for invalid settings, HpcdemError where gmsh fails."""
     optional.gmsh(), optional.shapely()
-    if wishes.kind not in ("tri", "quad"):
-        raise CommandError(f"a mesh consists of 'tri' or 'quad', not '{wishes.kind}'")
-    if wishes.irregular and wishes.kind != "tri":
+    if settings.kind not in ("tri", "quad"):
+        raise CommandError(f"a mesh consists of 'tri' or 'quad', not '{settings.kind}'")
+    if settings.irregular and settings.kind != "tri":
         raise CommandError("irregular supports triangles only")
-    if wishes.smooth and wishes.kind != "tri":
+    if settings.smooth and settings.kind != "tri":
         raise CommandError("smooth supports triangles only")
-    if not wishes.regions:
+    if not settings.regions:
         raise CommandError("a mesh needs at least one layer as outline")
-    sizes = _size_field(layers, wishes)
-    _not_too_many(layers, wishes, sizes)
+    sizes = _size_field(layers, settings)
+    _not_too_many(layers, settings, sizes)
     plane = Plane(sizes)
-    areas = _outlines(plane, layers, wishes)
+    areas = _outlines(plane, layers, settings)
     for area in areas:
         if area.size is not None:
             optional.shapely().prepare(area.polygon)
             sizes.areas.append((area.polygon, area.size))
-    points, traces, notes = _lines_inside(plane, layers, wishes, areas)
+    points, traces, notes = _lines_inside(plane, layers, settings, areas)
     plane.divide()
     xy = np.column_stack([plane.x, plane.y])
     notes += _moved(plane, xy, traces)
     surfaces = _surfaces(plane, xy, areas)
-    mesh = _filled(plane, xy, surfaces, points, wishes, sizes, notes)
+    mesh = _filled(plane, xy, surfaces, points, settings, sizes, notes)
     check(mesh, "mesh made by gmsh")
     found = quality(mesh)
     if found.angle_least < SHARP:
@@ -142,24 +142,24 @@ class _Area:
     size: float | None
 
 
-def _size_field(layers: Layers, wishes: Wishes) -> SizeField:
-    own = [Refinement(r.layer, r.size) for r in wishes.regions if r.size is not None and r.size < wishes.size]
-    coarser = [r for r in wishes.regions if r.size is not None and r.size > wishes.size]
+def _size_field(layers: Layers, settings: MeshSettings) -> SizeField:
+    own = [Refinement(r.layer, r.size) for r in settings.regions if r.size is not None and r.size < settings.size]
+    coarser = [r for r in settings.regions if r.size is not None and r.size > settings.size]
     if coarser:
         raise CommandError(
-            f"region '{coarser[0].layer}' has the mesh size {coarser[0].size:g}, larger than {wishes.size:g}: use "
+            f"region '{coarser[0].layer}' has the mesh size {coarser[0].size:g}, larger than {settings.size:g}: use "
             "the largest size for the mesh"
         )
-    return SizeField(wishes.size, [(r, layers[r.layer]) for r in [*wishes.refine, *own]])
+    return SizeField(settings.size, [(r, layers[r.layer]) for r in [*settings.refine, *own]])
 
 
 # --- outlines ----------------------------------------------------------------------------------------------------
 
 
-def _outlines(plane: Plane, layers: Layers, wishes: Wishes) -> list[_Area]:
+def _outlines(plane: Plane, layers: Layers, settings: MeshSettings) -> list[_Area]:
     """Put the outlines of regions and holes into the plane; returns the areas between them that are to be filled."""
     shapely = optional.shapely()
-    names = list(dict.fromkeys([*(r.layer for r in wishes.regions), *wishes.holes]))
+    names = list(dict.fromkeys([*(r.layer for r in settings.regions), *settings.holes]))
     segments = {n: _segments(layers, n, plane.sizes) for n in names}
     polygons = {n: shapely.union_all(faces(segments[n], n, plane.sizes.smallest)) for n in names}
     pieces = noded(np.concatenate(list(segments.values())), GRID * plane.sizes.smallest)
@@ -172,9 +172,9 @@ def _outlines(plane: Plane, layers: Layers, wishes: Wishes) -> list[_Area]:
     areas = []
     for polygon in shapely.get_parts(shapely.polygonize(_lines_of(plane))):
         inside = polygon.representative_point()
-        if any(polygons[h].contains(inside) for h in wishes.holes):
+        if any(polygons[h].contains(inside) for h in settings.holes):
             continue
-        regions = [r for r in wishes.regions if polygons[r.layer].contains(inside)]
+        regions = [r for r in settings.regions if polygons[r.layer].contains(inside)]
         if regions:
             groups = {r.set_name: r.group for r in regions if r.group is not None}
             areas.append(_Area(polygon, groups, next((r.size for r in reversed(regions) if r.size is not None), None)))
@@ -192,12 +192,12 @@ def _segments(layers: Layers, name: str, sizes: SizeField) -> np.ndarray:
     return np.concatenate([np.empty((0, 2, 2)), *(edges_of_curve(c, sizes, sizes.on(name)) for c in layers[name])])
 
 
-def _not_too_many(layers: Layers, wishes: Wishes, sizes: SizeField) -> None:
+def _not_too_many(layers: Layers, settings: MeshSettings, sizes: SizeField) -> None:
     """Estimate, from a sample of places, before anything is cut: an equilateral triangle of edge h has 0.433 h2."""
     shapely = optional.shapely()
     edges = 0.0
-    every = dict.fromkeys([*(r.layer for r in wishes.regions), *wishes.holes, *wishes.inside])
-    for name in [*every, *(n for n, _ in wishes.cracks)]:
+    every = dict.fromkeys([*(r.layer for r in settings.regions), *settings.holes, *settings.inside])
+    for name in [*every, *(n for n, _ in settings.cracks)]:
         for curve in layers[name]:
             if curve.segments:
                 length = curve.length()
@@ -207,7 +207,7 @@ def _not_too_many(layers: Layers, wishes: Wishes, sizes: SizeField) -> None:
             f"mesh size {sizes.base:g} would cut lines into about {edges:.2g} edges, at most {MOST_EDGES:.0g} allowed"
         )
     elements = 0.0
-    for region in wishes.regions:
+    for region in settings.regions:
         rough = max(c.length() for c in layers[region.layer]) / 64.0 if layers[region.layer] else 1.0
         polygon = polygon_of(layers, [region.layer], rough or 1.0)
         x0, y0, x1, y1 = polygon.bounds
@@ -222,7 +222,7 @@ def _not_too_many(layers: Layers, wishes: Wishes, sizes: SizeField) -> None:
 
 
 def _lines_inside(
-    plane: Plane, layers: Layers, wishes: Wishes, areas: list[_Area]
+    plane: Plane, layers: Layers, settings: MeshSettings, areas: list[_Area]
 ) -> tuple[list[int], np.ndarray, list[str]]:
     """Put inner layers, cracks and fractures into the plane.
 
@@ -233,11 +233,11 @@ def _lines_inside(
     domain = shapely.union_all([a.polygon for a in areas])
     notes: list[str] = []
     points = []
-    for name in wishes.inside:
+    for name in settings.inside:
         single = [c.points[0] for c in layers[name] if not c.segments]
         points += [plane.add_point(float(x), float(y)) for x, y in single if domain.intersects(shapely.Point(x, y))]
-    outlines = {*(r.layer for r in wishes.regions), *wishes.holes}
-    layered = [(n, None) for n in wishes.inside] + [(n, int(k)) for n, k in wishes.cracks]
+    outlines = {*(r.layer for r in settings.regions), *settings.holes}
+    layered = [(n, None) for n in settings.inside] + [(n, int(k)) for n, k in settings.cracks]
     traces: list[Fractures] = []
     labels: list[frozenset] = []
     for name, number in layered:
@@ -251,8 +251,8 @@ def _lines_inside(
             raise CommandError(f"layer '{name}' is empty")
         traces.append(Fractures(rows, np.zeros(len(rows), np.int64)))
         labels += [frozenset({name} if number is None else {name, number})] * len(rows)
-    traces.append(wishes.fractures)
-    labels += [frozenset({int(k)}) for k in wishes.fractures.sets]
+    traces.append(settings.fractures)
+    labels += [frozenset({int(k)}) for k in settings.fractures.sets]
     every = joined(*traces)
     if not np.isfinite(every.ends).all():
         raise CommandError("fracture traces must be finite")
@@ -339,7 +339,7 @@ def _filled(
     xy: np.ndarray,
     surfaces: list[_Surface],
     points: list[int],
-    wishes: Wishes,
+    settings: MeshSettings,
     sizes: SizeField,
     notes: list[str],
 ) -> Mesh:
@@ -356,9 +356,9 @@ def _filled(
         gmsh.model.add("hpcdem")
         centre = 0.5 * (xy.min(axis=0) + xy.max(axis=0))
         try:
-            nodes, tags = _described(gmsh, plane, (xy - centre) / sizes.base, surfaces, points, wishes, sizes, centre)
+            nodes, tags = _described(gmsh, plane, (xy - centre) / sizes.base, surfaces, points, settings, sizes, centre)
             gmsh.model.mesh.generate(2)
-            return _taken_out(gmsh, plane, xy, surfaces, nodes, tags, wishes, sizes.base, centre, notes)
+            return _taken_out(gmsh, plane, xy, surfaces, nodes, tags, settings, sizes.base, centre, notes)
         except HpcdemError:
             raise
         except Exception as error:  # gmsh raises nothing more special
@@ -382,14 +382,14 @@ def _described(
     scaled: np.ndarray,
     surfaces: list[_Surface],
     points: list[int],
-    wishes: Wishes,
+    settings: MeshSettings,
     sizes: SizeField,
     centre: np.ndarray,
 ) -> tuple[dict[int, int], list[int]]:
     """Tell gmsh the geometry; returns its tag of each point used, and of each surface."""
-    of_triangles = DELAUNAY if wishes.irregular else FRONTAL_DELAUNAY
-    gmsh.option.setNumber("Mesh.Algorithm", of_triangles if wishes.kind == "tri" else FRONTAL_QUADS)
-    gmsh.option.setNumber("Mesh.RecombineAll", 0 if wishes.kind == "tri" else 1)
+    of_triangles = DELAUNAY if settings.irregular else FRONTAL_DELAUNAY
+    gmsh.option.setNumber("Mesh.Algorithm", of_triangles if settings.kind == "tri" else FRONTAL_QUADS)
+    gmsh.option.setNumber("Mesh.RecombineAll", 0 if settings.kind == "tri" else 1)
     geo = gmsh.model.geo
     nodes: dict[int, int] = {}
     lines: dict[tuple[int, int], int] = {}
@@ -477,7 +477,7 @@ def _taken_out(
     surfaces: list[_Surface],
     nodes: dict[int, int],
     tags: list[int],
-    wishes: Wishes,
+    settings: MeshSettings,
     scale: float,
     centre: np.ndarray,
     notes: list[str],
@@ -495,7 +495,7 @@ def _taken_out(
     cells, start = [], 0
     # Groups come in the order of the regions, not of the areas.
     groups: dict[str, dict[str, list[np.ndarray]]] = {}
-    for region in wishes.regions:
+    for region in settings.regions:
         if region.group is not None:
             groups.setdefault(region.set_name, {})[region.group] = []
     for surface, tag in zip(surfaces, tags):
@@ -512,7 +512,7 @@ def _taken_out(
         cells.append(here)
         start += len(here)
     triangles = np.concatenate(cells)
-    if wishes.smooth:
+    if settings.smooth:
         held = np.zeros(len(points), bool)
         held[list(mine.values())] = True
         points, stayed = smoothed(points, triangles, held)
@@ -524,7 +524,7 @@ def _taken_out(
         {s: {g: np.concatenate(rows) for g, rows in of.items() if rows} for s, of in groups.items()},
         mine,
         plane,
-        wishes,
+        settings,
     )
 
 
@@ -550,15 +550,15 @@ def _compact(
     groups: dict[str, dict[str, np.ndarray]],
     mine: dict[int, int],
     plane: Plane,
-    wishes: Wishes,
+    settings: MeshSettings,
 ) -> Mesh:
     """Leave points out that no element uses, and name the edges on layers and cracks."""
     used = np.zeros(len(points), bool)
     used[cells[cells >= 0]] = True
     number = np.cumsum(used) - 1
     cells = np.where(cells >= 0, number[cells], -1)
-    layers: dict[str, list] = {n: [] for n in [*(r.layer for r in wishes.regions), *wishes.holes, *wishes.inside]}
-    layers |= {n: [] for n, _ in wishes.cracks}
+    layers: dict[str, list] = {n: [] for n in [*(r.layer for r in settings.regions), *settings.holes, *settings.inside]}
+    layers |= {n: [] for n, _ in settings.cracks}
     cracks, crack_sets = [], []
     for key, labels in plane.edges.items():
         a, b = (mine.get(i, -1) for i in key)
@@ -591,4 +591,4 @@ def _only_existing(mesh: Mesh, edges: Any) -> Mesh:
     return Mesh.of(mesh.points, mesh.cells, mesh.groups, mesh.layers, mesh.cracks[inner], mesh.crack_sets[inner])
 
 
-__all__ = ["GROWTH", "Meshed", "Refinement", "Region", "Wishes", "triangulate"]
+__all__ = ["GROWTH", "MeshSettings", "Meshed", "Refinement", "Region", "triangulate"]
