@@ -9,12 +9,14 @@ import os
 import shutil
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import hpcdem
+from hpcdem.cli import sweep as program
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.lock import holder_of
 from hpcdem.sweep import driver
@@ -54,6 +56,21 @@ def call(*words: object, cwd: Path, code: int = 0) -> str:
     done = run([sys.executable, "-m", "hpcdem", "sweep", *map(str, words)], cwd=cwd)
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout + done.stderr
+
+
+@pytest.fixture
+def refused(tmp_path, monkeypatch, capsys) -> Callable[..., str]:
+    """`hpcdem sweep WORDS` in this process, for what is refused before anything runs; what it prints."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(program.launch, "prepare_environment", lambda threads: (threads, []))
+
+    def refuse(*words: str) -> str:
+        with pytest.raises(SystemExit) as left:
+            program.start(list(words))
+        assert left.value.code == 2
+        return "".join(capsys.readouterr())
+
+    return refuse
 
 
 def table(path: Path) -> list[dict[str, str]]:
@@ -272,9 +289,9 @@ def test_jobs_limit_how_many_run(tmp_path):
         (["--seed", "-1"], "SET"),
     ],
 )
-def test_what_makes_no_sense_is_refused_by_name(tmp_path, words, why):
+def test_what_makes_no_sense_is_refused_by_name(tmp_path, refused, words, why):
     (tmp_path / "fall.py").write_text(FALL)
-    assert why in call("fall.py", *words, cwd=tmp_path, code=2)
+    assert why in refused("fall.py", *words)
     assert not list(tmp_path.glob("fall_sweep/*/data"))
 
 
@@ -289,10 +306,10 @@ def test_what_makes_no_sense_is_refused_by_name(tmp_path, words, why):
         ("script = 'fall.py'\n[set]\ngravity = {a = 1}", "a number, a word or a list"),
     ],
 )
-def test_wrong_settings_are_refused(tmp_path, text, why):
+def test_wrong_settings_are_refused(tmp_path, refused, text, why):
     (tmp_path / "fall.py").write_text(FALL)
     (tmp_path / "settings.toml").write_text(text)
-    assert why in call("settings.toml", cwd=tmp_path, code=2)
+    assert why in refused("settings.toml")
 
 
 def test_a_folder_that_holds_another_sweep_is_refused(tmp_path):
