@@ -69,7 +69,8 @@ def test_a_mistake_is_named_with_its_line(resident: Resident, tmp_path: Path, ca
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("how", ["hpcdem", pytest.param("python", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["hpcdem", "python"])
 def test_a_mistake_stops_all_ranks_with_one_message(launch: Launcher, tmp_path: Path, how: str) -> None:
     program(tmp_path, "sim.prop(density=-1.0)\n")
     start = launch if how == "hpcdem" else launch.python
