@@ -34,7 +34,9 @@ def make(kind, size=0.3):
     assert comm.rank == 0, "made on the first rank only"
     one = FractureSet(Orientation("fisher", 40.0, 20.0), Length("exponential", 1.5), "p21", 0.7)
     traces = network([one], polygon_of(layers, ["o"], 0.3, ["h"]), seed=4)
-    settings = MeshSettings([Region("o", "rock")], size, kind, holes=["h"], fractures=traces, refine=[Refinement("h", 0.1)])
+    settings = MeshSettings(
+        [Region("o", "rock")], size, kind, holes=["h"], fractures=traces, refine=[Refinement("h", 0.1)]
+    )
     return triangulate(layers, settings)
 
 
