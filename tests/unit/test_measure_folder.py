@@ -395,7 +395,7 @@ def test_figures_of_all_measures_in_all_formats(folder: Path, tmp_path: Path) ->
     for word in ("shortening", "height (km)", "slope (°)", "surface slope α"):
         assert word in text, word
     assert "x (km)" in (tmp_path / "a" / "faults.svg").read_text()
-    assert "way of wall 1 (m)" in (tmp_path / "a" / "wallforce.svg").read_text()
+    assert "displacement of wall 1 (m)" in (tmp_path / "a" / "wallforce.svg").read_text()
     assert "on the wall (MN)" in (tmp_path / "a" / "wallforce.svg").read_text()
 
 
