@@ -61,7 +61,7 @@ def members(
         raise UsageError("no parameter is varied: give --seed or --set NAME=VALUES")
     choices: dict[str, list[Value] | Range] = {}
     for name, words in wanted.items():
-        choices[name] = _choice(script, name, words, sampling is not None and name != "seed")
+        choices[name] = choice(script, name, words, sampling is not None and name != "seed")
     lists = {name: values for name, values in choices.items() if isinstance(values, list)}
     ranges = {name: values for name, values in choices.items() if isinstance(values, Range)}
     number = math.prod(map(len, lists.values())) * (1 if sampling is None else sampling.number)
@@ -85,7 +85,7 @@ def members(
     return found
 
 
-def _choice(script: Adjustable, name: str, words: str | Sequence[object], sampled: bool) -> list[Value] | Range:
+def choice(script: Adjustable, name: str, words: str | Sequence[object], sampled: bool) -> list[Value] | Range:
     """The specification of one parameter."""
     script.parameter(name)
     if not isinstance(words, str):

@@ -7,6 +7,7 @@ import inspect
 import click
 
 from hpcdem.cli import warmup
+from hpcdem.cli.calibrate import calibrate
 from hpcdem.cli.case import listing
 from hpcdem.cli.console import console
 from hpcdem.cli.doctor import doctor
@@ -30,6 +31,7 @@ PROGRAMS: dict[str, click.Command] = {
     "hpcdem": hpcdem, "hpcdem resume": resume, "hpcdem info": info, "hpcdem -s": strain_stress,
     "hpcdem measure": measure, "hpcdem draw": draw, "hpcdem movie": movie, "hpcdem view": view, "hpcdem sweep": sweep,
     "hpcdem sweep report": report,
+    "hpcdem calibrate": calibrate,
     "hpcdem section": section, "hpcdem grade": grade, "hpcdem case": listing([]), "hpcdem examples": examples,
     "hpcdem console": console,
     "hpcdem warmup": warmup, "hpcdem doctor": doctor, "zdem2jpg": zdem2jpg, "zdemss": zdemss,
