@@ -316,6 +316,7 @@ class ParticleCommands:
         fric: float | None = None,
         rubber: bool = False,
         conserving: bool = False,
+        moment: bool = False,
     ) -> int:
         """PROP with bond keys: bond the pairs that touch, renew the bonds that are there.
 
@@ -336,6 +337,7 @@ class ParticleCommands:
         conserving : one shear stiffness, touching or open, so that opening and closing make no energy (of a contact
             bond of
             Hertz particles that at the moment of bonding).
+        moment : elastic bonds resist relative rotation, and break in tension by the stress at their outer fibre.
 
         Returns
         -------

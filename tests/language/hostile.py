@@ -38,6 +38,8 @@ LINES = [
     ("DRAW -interval 5", "expected a keyword: interval"),
     ("DRAW -bluff", "expected a keyword: interval"),
     ("PROP rubber", "rubber marks the bonds of the same line"),
+    ("PROP moment", "moment applies to the bonds of the same line"),
+    ("PROP n_bond 1e4 moment", "moment: the bending stiffness follows from ebmod"),
     ("PROP conserving", "conserving applies to the bonds of the same line"),
     ("PROP xp 10e6 RANGE y {top} - 1000.0 {top}", "blanks are not allowed in an expression: write {top}-1000.0"),
     ("DEL RANGE y {top} - 1000.0", "blanks are not allowed in an expression: write {top}-1000.0"),

@@ -32,6 +32,7 @@ STOP
 
 
 ROLLING = SHOWER.replace("restitution 0.45", "energy 200").replace("fric 0.4 yv", "fric 0.4 rfric 0.3 rdamp 0.2 yv")
+ROLLING = ROLLING.replace("sstrength 1e4", "sstrength 1e4 moment")
 SCRIPTS = {"dashpots": SHOWER, "rolling": ROLLING.replace("SET restitution 0.8", "PROP rfric 0.1 RANGE x (0 20)")}
 
 

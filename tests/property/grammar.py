@@ -224,7 +224,7 @@ class Maker:
         for ident, what in ((1, "kinetic"), (2, "step"), (3, "energy")):
             if self.chance(40 if ident < 3 else 15):
                 self.add(f"HIST id {ident} interval {self.whole(5, 40)}, {what}")
-        if self.chance(25):
+        if self.chance(50):
             what = self.pick("time", "unbalanced", "contacts", "bonds")
             self.add(f"HIST id 9 interval {self.whole(5, 40)}, {what}")
         if all(any(line.startswith(f"HIST id {n}") for line in self.lines) for n in (1, 2)):
@@ -395,6 +395,8 @@ class Maker:
         else:
             keys = f"n_bond {number(force)} s_bond {number(force * self.pick(1, 3))}"
         keys += self.perhaps(15, " rubber") + self.perhaps(25, " conserving")
+        if "ebmod" in keys and self.disk != "on":  # there are no clumps then
+            keys += self.perhaps(30, " moment")
         self.add("PROP", keys, reach, self.perhaps(30, "fric 0.5"), self.perhaps(70, self.range()))
 
     def do_break(self) -> None:

@@ -19,7 +19,7 @@ from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.pre.section.crossing import crossing
 
 ELASTIC = ("ebmod", "gbmod", "tstrength", "sstrength")
-KEPT = (*ELASTIC, "rubber", "conserving")
+KEPT = (*ELASTIC, "rubber", "conserving", "moment")
 TOLERATE = 1e-6
 FARTHEST = 10.0
 """Widest gap that can be bonded, in radii of the largest particle. More is a slip of units, and would bond all with
@@ -41,6 +41,7 @@ def bond(
     fric: float | None = None,
     rubber: bool = False,
     conserving: bool = False,
+    moment: bool = False,
 ) -> int:
     """PROP with bond keys: bond the pairs that touch, renew the bonds that are there.
 
@@ -59,18 +60,14 @@ def bond(
     rubber : mark the bonds as those of a membrane, without any effect on the motion.
     conserving : one shear stiffness, touching or open, so that opening and closing make no energy (of a contact bond of
         Hertz particles that at the moment of bonding).
+    moment : elastic bonds resist relative rotation, and break in tension by the stress at their outer fibre.
 
     Returns
     -------
     int : how many are new.
     """
     kind, given = _law_of((ebmod, gbmod, tstrength, sstrength), (n_bond, s_bond))
-    if rubber:
-        given["rubber"] = 1.0
-        if sim.log is not None:
-            sim.log.warn_once("rubber", "rubber: the mark is stored and written but has no effect on the motion")
-    if conserving:
-        given["conserving"] = 1.0
+    given |= _marks(sim, given, rubber, conserving, moment)
     if sim.own_laws:
         raise CommandError(f"bonds are not supported with the user law {sim.own_laws.titles}")
     gap = TOLERATE if tolerate is None else tolerate
@@ -81,6 +78,8 @@ def bond(
     if largest == 0.0:
         return 0
 
+    if moment:
+        sim.bond_types.row(kind=kind, **given)  # contacts begin to remember with the next lists
     # Lists that are sure to hold every pair within the search distance, made at the present positions.
     sim.open_model()
     sim.close_model(least_skin=reach)
@@ -89,9 +88,7 @@ def bond(
     renewed = _renewed(sim, kind, given).astype(np.int32)
     fresh = sim.bond_types.row(kind=kind, **given)
     made_of = sim.bond_types.rows[[fresh, *renewed]]
-    soft = (made_of["conserving"] != 0.0) & (made_of["gbmod"] == 0.0) & (made_of["kind"] == laws.ELASTIC_BOND)
-    if soft.any():
-        raise CommandError("conserving bonds have their own shear stiffness, touching or open: gbmod above 0 is needed")
+    _refuse_soft(made_of)
     made, longest2 = 0, 0.0
     for t in range(lists.n_blocks):
         n, d2 = contacts.make_bonds(
@@ -122,6 +119,23 @@ def _law_of(elastic: Sequence[float | None], contact: Sequence[float | None]) ->
         if value < 0.0:
             raise CommandError(f"{name} must not be negative, got {value:g}")
     return laws.ELASTIC_BOND if of_elastic else laws.CONTACT_BOND, given
+
+
+def _marks(sim: Simulation, given: dict[str, float], rubber: bool, conserving: bool, moment: bool) -> dict[str, float]:
+    """Columns of the table of types that these words set beside the properties given."""
+    if moment and not given.get("ebmod"):
+        raise CommandError("moment: the bending stiffness follows from ebmod; assign ebmod above 0 with it")
+    if rubber and sim.log is not None:
+        sim.log.warn_once("rubber", "rubber: the mark is stored and written but has no effect on the motion")
+    words = {"rubber": rubber, "conserving": conserving, "moment": moment}
+    return {name: 1.0 for name, said in words.items() if said}
+
+
+def _refuse_soft(types: np.ndarray) -> None:
+    """CommandError for types of bonds that lack the modulus which their words need."""
+    elastic = types["kind"] == laws.ELASTIC_BOND
+    if ((types["conserving"] != 0.0) & (types["gbmod"] == 0.0) & elastic).any():
+        raise CommandError("conserving bonds have their own shear stiffness, touching or open: gbmod above 0 is needed")
 
 
 def _reach(sim: Simulation, gap: float, scale: float) -> tuple[float, float]:

@@ -79,7 +79,7 @@ def with_rolling(threads: int = 1) -> None:
     diagnostics.highest_frequency(sim)
     assert sim.rolling is not None
     for book in (sim.rolling.book_lost, sim.rolling.book_stored):
-        book(sim, np.zeros(BINS_SHAPE, np.int64))
+        book(sim, np.zeros(BINS_SHAPE, np.int64), np.zeros(BINS_SHAPE, np.int64))
 
 
 def _model(threads: int) -> Simulation:

@@ -16,7 +16,7 @@ from hpcdem.lang.zdem.statement import Statement
 BEGINNINGS = "START, RESTORE or LOAD"
 BOND_MODEL_1 = ("ebmod", "gbmod", "tstrength", "sstrength")
 BOND_MODEL_2 = ("n_bond", "s_bond")
-BOND_KEYS = (*BOND_MODEL_1, *BOND_MODEL_2, "tolerate", "rext", "rubber", "conserving")
+BOND_KEYS = (*BOND_MODEL_1, *BOND_MODEL_2, "tolerate", "rext", "rubber", "conserving", "moment")
 
 _HIST = next(command for command in t.COMMANDS if command.name == "HIST")
 RECORDED = tuple(option.name for option in _HIST.options if option.name not in ("id", "interval", "wall"))
@@ -122,9 +122,11 @@ def _prop(s: Statement) -> None:
             )
     first = [key for key in BOND_MODEL_1 if key in s.arguments]
     second = [key for key in BOND_MODEL_2 if key in s.arguments]
-    for word, does in (("rubber", "marks"), ("conserving", "applies to")):
+    for word, does in (("rubber", "marks"), ("conserving", "applies to"), ("moment", "applies to")):
         if word in s.arguments and not first and not second:
             raise s.error(f"{word} {does} the bonds of the same line; give their strengths with it")
+    if "moment" in s.arguments and not s.get("ebmod"):
+        raise s.error("moment: the bending stiffness follows from ebmod; assign ebmod above 0 with it")
     if first and second:
         raise s.error(f"{first[0]} and {second[0]} belong to different bond models; a bond is of one model")
 

@@ -357,6 +357,8 @@ _PROPERTIES = (
            source="P"),
     Option("conserving", "the bonds keep one shear stiffness, closed or open, so that opening and closing create no "
            "energy (docs/physics.md, Bonds)", source="X"),
+    Option("moment", "model 1 bond: resists relative rotation, and breaks in tension by the stress at its outer fibre",
+           source="X"),
     Option("n_bond", "model 2 bond: tensile strength", kind=NOT_NEGATIVE, unit="N"),
     Option("s_bond", "model 2 bond: shear strength", kind=NOT_NEGATIVE, unit="N"),
     Option("tolerate", "largest bonded gap, up to 10 times the largest radius; the word alone keeps the default",

@@ -127,7 +127,7 @@ class Budget(engine.Budget[Simulation, int]):
                     *_own_pairs(sim), self._bins, lists.u_made, self._shear, self._normal, self._memory, dt
                 )
             if sim.rolling is not None:
-                sim.rolling.book_lost(sim, self._bins[energy.TURNED])
+                sim.rolling.book_lost(sim, self._bins[energy.TURNED], self._bins[energy.BONDS])
             _wall_losses(*_wall_slots(sim), self._wall_shear, self._wall_side, sim.wall_laws, n_mat, dt, self._bins)
 
     # ---- readings --------------------------------------------------------------------------------------------------
@@ -244,7 +244,7 @@ def _stored_bins(sim: Simulation, whole_step: bool = True) -> np.ndarray:
     if sim.own_laws.loops is not None:
         sim.own_laws.loops.stored(*_own_pairs(sim), bins)
     if sim.rolling is not None:
-        sim.rolling.book_stored(sim, bins[energy.ROLLING])
+        sim.rolling.book_stored(sim, bins[energy.ROLLING], bins[energy.BONDED])
     _wall_energy(*_wall_slots(sim), sim.wall_laws, n_mat, bins)
     return bins
 

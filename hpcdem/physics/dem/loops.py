@@ -57,7 +57,7 @@ def refresh(sim: Any) -> None:
 
         sim.dashpots = Dashpots(sim)
     sim.rolling = None
-    if rolling.columns(rows):
+    if rolling.columns(sim):
         sim.prepare_kernels("rolling")
         sim.rolling = rolling.Rolling(sim)
     for physics in sim.physics:

@@ -23,11 +23,12 @@ properties. New columns are at the end: older checkpoints have the first ones, i
 BOND_TYPE = np.dtype(
     [
         ("kind", "f8"), ("ebmod", "f8"), ("gbmod", "f8"), ("tstrength", "f8"), ("sstrength", "f8"), ("rubber", "f8"),
-        ("conserving", "f8"),
+        ("conserving", "f8"), ("moment", "f8"),
     ]
 )  # fmt: skip
 """Kind (laws.ELASTIC_BOND, laws.CONTACT_BOND), moduli [Pa], strengths [Pa; N for contact bonds], 1 for bonds of a
-membrane (a mark, without mechanics), 1 for those with one shear stiffness, touching or open. Row 0: no bond."""
+membrane (a mark, without mechanics), 1 for those with one shear stiffness, touching or open,
+1 for those that carry a moment. New columns are at the end. Row 0: no bond."""
 
 MOST_ROWS = 4096
 

@@ -1,4 +1,4 @@
-"""PROP rfric: rolling resistance in the contacts of discs with each other and with walls (kernels/rolling.py)."""
+"""Moments between discs: PROP rfric, rolling resistance, and PROP moment, that of bonds (kernels/rolling.py)."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ CONSTANT, SPRING = "a", "c"
 """Types of Ai et al. 2011, as SET rolling names them."""
 
 
-def columns(materials: np.ndarray) -> int:
-    """Columns that contacts of discs of these materials remember; 0 without rolling resistance."""
-    return rolling.WIDTH if (materials["rfric"] > 0.0).any() else 0
+def columns(sim: Any) -> int:
+    """Columns that contacts remember; 0 without moments."""
+    there = (sim.materials.rows["rfric"] > 0.0).any() or sim.bond_types.rows["moment"].any()
+    return rolling.WIDTH if there else 0
 
 
 def begin(sim: Any, given: Mapping[str, float]) -> None:
-    """Open the model if it gets rolling resistance with these properties: contacts begin to remember. Collective."""
-    if given.get("rfric") and not columns(sim.materials.rows):
+    """Open the model if it gets moments with these properties: contacts begin to remember. Collective."""
+    if given.get("rfric") and not columns(sim):
         sim.open_model()
 
 
@@ -44,12 +45,15 @@ class Rolling:
         inverse[p.owned] = np.divide(1.0, at_touch, out=np.zeros(len(body)), where=turns)
         sim.halo.fill(inverse)
         self.lost, self.lost_at_walls = np.zeros(len(lists.row)), np.zeros(len(lists.slot_row))
+        self.lost_of_bonds = np.zeros(len(lists.row))
+        self._bends = sim.bond_types.rows["moment"] != 0.0
         self._torques: Any = rolling.torques if lists.n_blocks == 1 else rolling.torques_threaded
         self._args = (
             lists.n_blocks, p.hot, p.ihot, b.cut, b.lo, b.poff, b.foff, lists.ptr, lists.partner, lists.bond,
-            lists.memory, sim.pair_laws, of_pairs, lists.wptr, sim._wall_table, lists.slot_row, lists.slot_wall,
-            lists.slot_side, lists.slot_memory, sim.wall_laws, of, n_mat, inverse, sim.clock.dt,
-            s.rolling == CONSTANT, spheres, float(sim.stamp), lists.force, self.lost, self.lost_at_walls,
+            lists.u_made, lists.fs, lists.memory, sim.pair_laws, sim.bond_laws, self._bends, of_pairs,
+            lists.wptr, sim._wall_table, lists.slot_row, lists.slot_wall, lists.slot_side, lists.slot_memory,
+            sim.wall_laws, of, n_mat, inverse, sim.clock.dt, s.rolling == CONSTANT, spheres, float(sim.stamp),
+            lists.force, self.lost, self.lost_at_walls, self.lost_of_bonds, lists.tally,
         )  # fmt: skip
         self._of, self._of_pairs = of, of_pairs
 
@@ -57,31 +61,34 @@ class Rolling:
         """Add the torques at the present places and spins."""
         self._torques(*self._args)
 
-    def book_lost(self, sim: Any, bins: np.ndarray) -> None:
-        """Add what was lost in the last step to exact bins."""
+    def book_lost(self, sim: Any, bins: np.ndarray, of_bonds: np.ndarray) -> None:
+        """Add what was lost in the last step to exact bins: by rolling, and by bonds that broke."""
         self._book(sim, self.lost, self.lost_at_walls, bins)
+        self._book(sim, self.lost_of_bonds, np.empty(0), of_bonds)
 
-    def book_stored(self, sim: Any, bins: np.ndarray) -> None:
-        """Add what the springs store to exact bins."""
-        pairs, walls = (memory[:, rolling.STORED].copy() for memory in (sim.lists.memory, sim.lists.slot_memory))
-        self._book(sim, pairs, walls, bins)
+    def book_stored(self, sim: Any, bins: np.ndarray, of_bonds: np.ndarray) -> None:
+        """Add what the springs store to exact bins: those of rolling, and those of bonds."""
+        memory, stored = sim.lists.memory, sim.lists.memory[:, rolling.STORED]
+        bent = memory[:, rolling.STAMP] > float(sim.stamp)
+        self._book(sim, np.where(bent, 0.0, stored), sim.lists.slot_memory[:, rolling.STORED].copy(), bins)
+        self._book(sim, np.where(bent, stored, 0.0), np.empty(0), of_bonds)
 
     def _book(self, sim: Any, of_slots: np.ndarray, of_walls: np.ndarray, bins: np.ndarray) -> None:
         lists, b = sim.lists, sim.lists.blocks
         rolling.book(lists.n_blocks, b.cut, b.lo, b.poff, lists.ptr, of_slots, of_walls, bins)
 
     def stiffnesses(self, sim: Any) -> tuple[np.ndarray, np.ndarray]:
-        """kr of the pair slots and of the wall slots [N m/rad]; 0 where discs do not touch, and of type A."""
+        """kr, or that of bonds, of the pair slots and of the wall slots [N m/rad]; 0 without, and of type A."""
         lists, p, b = sim.lists, sim.particles, sim.lists.blocks
         pairs, walls = np.zeros(len(lists.row)), np.zeros(len(lists.slot_row))
-        if sim.settings.rolling == CONSTANT:
-            return pairs, walls
         n_mat, spheres = len(sim.materials), mass.SPHERES[sim.settings.disk]
         for t in range(lists.n_blocks):
             rolling.stiffnesses(
                 t, p.hot, p.ihot, b.cut, b.lo, b.poff, lists.ptr, lists.partner, lists.bond, sim.pair_laws,
-                self._of_pairs, n_mat, spheres, pairs,
+                sim.bond_laws, self._bends, self._of_pairs, n_mat, spheres, sim.settings.rolling == CONSTANT, pairs,
             )  # fmt: skip
+        if sim.settings.rolling == CONSTANT:
+            return pairs, walls
         rolling.stiffnesses_at_walls(
             p.hot, p.ihot, sim._wall_table, lists.slot_row, lists.slot_wall, lists.slot_side, sim.wall_laws, self._of,
             n_mat, spheres, walls,
@@ -108,6 +115,7 @@ def _refuse(sim: Any) -> None:
         "a user law, whose normal stiffness is not known": bool(sim.own_laws),
         "contacts with blocks, which have their own law": sim.coupled,
     }
+    name = "PROP moment (bonds)" if sim.bond_types.rows["moment"].any() else "PROP rfric (rolling resistance)"
     for what, there in others.items():
         if there:
-            raise CommandError(f"PROP rfric (rolling resistance) does not support {what}; PROP rfric 0 removes it")
+            raise CommandError(f"{name} does not support {what}; use a model without it, or without moments")

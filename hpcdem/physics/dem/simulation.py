@@ -360,7 +360,7 @@ class Simulation(Model):
     def _share_out(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         p, box = self.particles, self.walls.box()
         cell, self.hist, (hot, cold, more, *rigid) = self._send_home(
-            cell, self.hist.resized(self.own_laws.memory or rolling.columns(self.materials.rows)),
+            cell, self.hist.resized(self.own_laws.memory or rolling.columns(self)),
             [p.hot, p.cold, p.more, *([] if p.rigid is None else [p.rigid])], None if box is None else box[:2],
             least=self.rebuild_state.columns, left=lambda leave, to: self.trail.note(p["gid"][leave], to),
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Rolling resistance of discs that touch, with each other and with walls: the torques, and what they store and lose.
+"""Moments between discs: rolling resistance where they touch each other and walls, and the moments of bonds.
 
 After Ai, Chen, Rotter & Ooi 2011 (Powder Technology 206: 269), with the rate of relative rotation w = w_i - w_j, the
 rolling radius Rr = Ri Rj / (Ri + Rj) (R at a wall) and the limit M_max = mu_r Rr Fn:
@@ -8,7 +8,10 @@ rolling radius Rr = Ri Rj / (Ri + Rj) (R at a wall) and the limit M_max = mu_r R
   below the limit the dashpot C w is added, C = 2 eta_r sqrt(Ir kr) with 1/Ir = sum of 1/(I + m R^2); none at the limit.
 
 kr = 3 kn mu_r^2 Rr^2 for discs: a uniform bed of springs of width B has kn B^2/12 and carries at most Fn B/6 without
-tension, which is M_max for B = 6 mu_r Rr (Jiang et al. 2005). Spheres: 2.25 in the place of 3. kn is dFn/dU.
+tension, which is M_max for B = 6 mu_r Rr (Jiang et al. 2005). Spheres: 2.25 instead of 3. kn is dFn/dU.
+
+Bonds with a moment (Potyondy & Cundall 2004) have a spring E I/L against w, and break in tension where the stress at
+the outer fibre, -Fn/A + |M| Rt/I, exceeds T. I = pi Rt^4/4 between spheres, 2/3 Rt^3 x 1 m between discs.
 
 The torque on i is -M, that on j is +M. A pass of its own, after the forces: models without it do not pay for it. Pairs
 are worked through by the owners of both partners, with the same arithmetic.
@@ -24,13 +27,15 @@ from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, X, Y
 from hpcdem.numerics.exact_sum import add_to_bins
 from hpcdem.numerics.lanes import as_bits
 from hpcdem.physics.dem.kernels import laws
-from hpcdem.physics.dem.kernels.contacts import MODEL, A, B
+from hpcdem.physics.dem.kernels.contacts import E_MOD, MODEL, TENSILE, TENSION_BREAKS, A, B, pair_law
 from hpcdem.physics.dem.kernels.walls import NONE, end_of_slots, heir, meeting
 
 # What a contact remembers: the stamp of live memory (histories.py), Mk [N m], torque with the dashpot [N m], and what
 # its spring stores [J].
 STAMP, SPRING, TORQUE, STORED = range(4)
 WIDTH = 4
+OF_BOND = 0.5
+"""Added to the stamp of the moment of a bond."""
 # Columns of the properties of a pair of materials, or of a material at a wall.
 FRICTION, DAMPING = range(2)
 
@@ -77,10 +82,45 @@ def _open(memory, k, rate, dt):
     return lost
 
 
+@njit(cache=True, error_model="numpy")
+def second_moment(two_rt, spheres):
+    """Of the cross-section of a bond about its middle [m^4]."""
+    rt = 0.5 * two_rt
+    return 0.25 * math.pi * rt**4 if spheres else 2.0 / 3.0 * rt**3
+
+
+@njit(cache=True, error_model="numpy")
+def _bend(
+    t, k, i, j, hot, ihot, u, two_rt, bond, u_made, fs, memory, pairs, bonds, n_mat, spheres, rate, dt, stamp, tally,
+    own,
+):  # fmt: skip
+    """Advance the moment of the bond of slot k, which may break; returns its torque [N m] and what was lost [J]. own:
+    the block owns the earlier partner."""
+    row = bond[k]
+    area, inertia = laws.bond_area(two_rt, spheres), second_moment(two_rt, spheres)
+    stiff = bonds[row, E_MOD] * inertia / (hot[i, RADIUS] + hot[j, RADIUS])
+    held = memory[k, SPRING] + stiff * rate * dt
+    stored = 0.5 * held * held / stiff
+    fn, ks, _, _ = pair_law(i, j, row, u_made[k], hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u)
+    lost = memory[k, STORED] - stored + 0.5 * (memory[k, TORQUE] + held) * rate * dt
+    if 0.5 * two_rt * abs(held) / inertia - fn / area > bonds[row, TENSILE]:
+        # of the rest that the bond stores, energy.pair_losses books what it finds: all but the shear of an open one
+        lost += stored + (laws.shear_energy(fs[k], ks) if u < 0.0 else 0.0)
+        bond[k] = 0
+        if own:
+            tally[t, TENSION_BREAKS] += 1
+        for column in range(WIDTH):
+            memory[k, column] = 0.0
+        return 0.0, lost
+    memory[k, SPRING], memory[k, TORQUE], memory[k, STORED] = held, held, stored
+    memory[k, STAMP] = stamp + OF_BOND
+    return held, lost
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _of_pairs(
-    t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, memory, pairs, properties, n_mat, inverse_inertia, dt,
-    constant, spheres, stamp, force, lost,
+    t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, u_made, fs, memory, pairs, bonds, bends, properties, n_mat,
+    inverse_inertia, dt, constant, spheres, stamp, force, lost, lost_of_bonds, tally,
 ):  # fmt: skip
     """The part of `torques` between the discs of block t."""
     shift, p = foff[t] - lo[t], poff[t] - lo[t]
@@ -90,16 +130,27 @@ def _of_pairs(
             dx, dy, ri, rj = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y], hot[i, RADIUS], hot[j, RADIUS]
             rate = hot[i, SPIN] - hot[j, SPIN]
             q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
-            lost[k] = 0.0
-            if bond[k] != 0 or properties[q, FRICTION] == 0.0 or dx * dx + dy * dy >= (ri + rj) * (ri + rj):
+            lost[k] = lost_of_bonds[k] = 0.0
+            if memory[k, STAMP] == stamp + OF_BOND and bond[k] == 0:  # broken by its forces, or by a command
+                lost_of_bonds[k] = _open(memory, k, rate, dt)
+            if bends[bond[k]] and memory[k, STAMP] == stamp:
+                lost[k] = _open(memory, k, rate, dt)
+            resists = bond[k] == 0 and properties[q, FRICTION] > 0.0 and dx * dx + dy * dy < (ri + rj) * (ri + rj)
+            if not (resists or bends[bond[k]]):
                 if memory[k, STAMP] != 0.0:
                     lost[k] = _open(memory, k, rate, dt)
                 continue
             _, _, _, u, two_rt = laws.pair_geometry(dx, dy, ri, rj)
-            total, lost[k] = _step(
-                memory, k, pairs[q], two_rt, 0.25 * two_rt, u, properties[q], inverse_inertia[i] + inverse_inertia[j],
-                rate, dt, constant, spheres, stamp,
-            )  # fmt: skip
+            if resists:
+                total, lost[k] = _step(
+                    memory, k, pairs[q], two_rt, 0.25 * two_rt, u, properties[q],
+                    inverse_inertia[i] + inverse_inertia[j], rate, dt, constant, spheres, stamp,
+                )  # fmt: skip
+            else:
+                total, lost_of_bonds[k] = _bend(
+                    t, k, i, j, hot, ihot, u, two_rt, bond, u_made, fs, memory, pairs, bonds, n_mat, spheres, rate, dt,
+                    stamp, tally, i >= cut[t],
+                )  # fmt: skip
             if i >= cut[t]:
                 force[shift + i, 2] -= total
             if cut[t] <= j < cut[t + 1]:
@@ -144,20 +195,20 @@ def _of_walls(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def torques(
-    n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, memory, pairs, of_pairs, wptr, walls, slot_row,
-    slot_wall, slot_side, slot_memory, table, of_walls, n_mat, inverse_inertia, dt, constant, spheres, stamp, force,
-    lost, lost_at_walls,
+    n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, u_made, fs, memory, pairs, bonds, bends, of_pairs,
+    wptr, walls, slot_row, slot_wall, slot_side, slot_memory, table, of_walls, n_mat, inverse_inertia, dt, constant,
+    spheres, stamp, force, lost, lost_at_walls, lost_of_bonds, tally,
 ):  # fmt: skip
     """Add the torques of all contacts to force, and move their memories on by dt.
 
     of_pairs (n_mat^2, 2), of_walls (n_mat, 2): mu_r and eta_r; inverse_inertia (n,): 1/(I + m R^2) per storage row, 0
-    where a disc keeps its spin; memory (slots, 4), slot_memory (wall slots, 4): see above; lost, lost_at_walls: what
-    each lost in the step [J].
+    where a disc keeps its spin; memory (slots, 4), slot_memory (wall slots, 4): see above; bonds: contacts.bond_laws;
+    bends (types,) bool: those with a moment; lost, lost_at_walls, lost_of_bonds: what each lost in the step [J].
     """
     for t in range(n_blocks):
         _of_pairs(
-            t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, memory, pairs, of_pairs, n_mat, inverse_inertia, dt,
-            constant, spheres, stamp, force, lost,
+            t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, u_made, fs, memory, pairs, bonds, bends, of_pairs,
+            n_mat, inverse_inertia, dt, constant, spheres, stamp, force, lost, lost_of_bonds, tally,
         )  # fmt: skip
         _of_walls(
             t, hot, ihot, lo, foff, wptr, walls, slot_row, slot_wall, slot_side, slot_memory, table, of_walls, n_mat,
@@ -167,15 +218,15 @@ def torques(
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def torques_threaded(
-    n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, memory, pairs, of_pairs, wptr, walls, slot_row,
-    slot_wall, slot_side, slot_memory, table, of_walls, n_mat, inverse_inertia, dt, constant, spheres, stamp, force,
-    lost, lost_at_walls,
+    n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, u_made, fs, memory, pairs, bonds, bends, of_pairs,
+    wptr, walls, slot_row, slot_wall, slot_side, slot_memory, table, of_walls, n_mat, inverse_inertia, dt, constant,
+    spheres, stamp, force, lost, lost_at_walls, lost_of_bonds, tally,
 ):  # fmt: skip
     """The same, a thread for each block."""
     for t in prange(n_blocks):
         _of_pairs(
-            t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, memory, pairs, of_pairs, n_mat, inverse_inertia, dt,
-            constant, spheres, stamp, force, lost,
+            t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, u_made, fs, memory, pairs, bonds, bends, of_pairs,
+            n_mat, inverse_inertia, dt, constant, spheres, stamp, force, lost, lost_of_bonds, tally,
         )  # fmt: skip
         _of_walls(
             t, hot, ihot, lo, foff, wptr, walls, slot_row, slot_wall, slot_side, slot_memory, table, of_walls, n_mat,
@@ -198,9 +249,9 @@ def book(n_blocks, cut, lo, poff, ptr, of_slots, of_wall_slots, bins):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def stiffnesses(
-    t, hot, ihot, cut, lo, poff, ptr, partner, bond, pairs, of_pairs, n_mat, spheres, out
+    t, hot, ihot, cut, lo, poff, ptr, partner, bond, pairs, bonds, bends, of_pairs, n_mat, spheres, constant, out
 ):  # fmt: skip
-    """kr of the slots of block t that touch, into out (slots,) [N m/rad]; 0 for others."""
+    """kr of the slots of block t that touch, E I/L of bonds with a moment, into out (slots,) [N m/rad], else 0."""
     p = poff[t] - lo[t]
     for i in range(lo[t], cut[t + 1]):
         for k in range(ptr[p + i], ptr[p + i + 1]):
@@ -209,8 +260,11 @@ def stiffnesses(
                 hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y], hot[i, RADIUS], hot[j, RADIUS]
             )
             q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
-            touches = bond[k] == 0 and u > 0.0
+            touches = bond[k] == 0 and u > 0.0 and not constant
             mu = of_pairs[q, FRICTION]
+            if bends[bond[k]]:
+                out[k] = bonds[bond[k], E_MOD] * second_moment(two_rt, spheres) / (hot[i, RADIUS] + hot[j, RADIUS])
+                continue
             out[k] = stiffness(pairs[q], two_rt, 0.25 * two_rt, u, mu, spheres) if touches and mu > 0.0 else 0.0
 
 
