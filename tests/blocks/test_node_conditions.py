@@ -246,12 +246,11 @@ def test_what_each_condition_makes_of_a_velocity():
 def test_what_each_condition_makes_of_a_velocity_in_space():
     """Closed forms: free, with two corners; velocity, acceleration and nodal force; fixed; along and across a vector,
     damped and not."""
-    begin, corner = np.array([0, 2, 3, 4, 5, 6, 7]), 4 * np.arange(7)
+    begin, corner = np.array([0, 2, 3, 4, 5, 6, 7]), 4 * np.arange(7, dtype=np.int32)
     before, alpha, k = np.array([3.0, -2.0, 1.0]), 0.5, 0.2
-    v, force, applied = np.zeros(28), np.zeros(28), np.zeros(28)
-    for at in corner:
-        v[at : at + 3], force[at : at + 3] = before, (at + 1.0, -at - 2.0, 3.0)
-    applied[:3] = 0.5, 0.25, 0.125
+    v, force, applied = np.zeros((3, 7, 4))
+    v[:, :3], force[:, :3] = before, [(at + 1.0, -at - 2.0, 3.0) for at in corner]
+    applied[0, :3] = 0.5, 0.25, 0.125
     table, condition = np.zeros((6, space.CONDITION)), np.arange(6)
     table[:, space.NODE_DAMP] = -1.0
     table[1, [space.DOES, space.AT, space.DOES + 2, space.AT + 2]] = V, 7.0, A, 4.0
@@ -273,7 +272,7 @@ def test_what_each_condition_makes_of_a_velocity_in_space():
     def damped(force, velocity):
         return force - alpha * abs(force) * math.copysign(1.0, velocity)
 
-    now = v.reshape(7, 4)[:, :3]
+    now = v[:, :3]
     free = [b + k * damped(a, b) for a, b in zip(f[0], before)]
     assert now[0] == pytest.approx(free, rel=1e-14) and (now[0] == now[1]).all()
     assert now[2] == pytest.approx([7.0, -2.0, 5.0], rel=1e-14)

@@ -358,23 +358,18 @@ def test_the_time_step_is_the_least_of_all_hexahedra():
     """Each with its own frequency, viscosity and modulus: of two that of the one that allows less; mass is added until
     the step that is asked for is stable."""
     omega2, eta, modulus = np.array([4.0, 9.0]), np.array([3.0, 0.1]), np.array([2.0, 5.0])
-    place = np.stack(
-        [
-            16 * np.repeat([0, 1], 4) + 4 * np.tile(np.arange(4), 2),
-            16 * np.repeat([2, 3], 4) + 4 * np.tile(np.arange(4), 2),
-        ]
-    )
+    place = 4 * np.arange(16, dtype=np.int32).reshape(2, 8)
     springs, dashpots = np.zeros((2, 8)), np.zeros((2, 8))
     springs[1, 3], dashpots[0, 5] = 7.0, 2.0
 
     def step(which, target: float = 0.0, mass=None) -> float:
         mass = np.full((4, 4), 2.0) if mass is None else mass
         return kernels.time_step(
-            omega2[which], eta[which], modulus[which], place[which], springs[which], dashpots[which], 0.3, 0.2, 0.8,
-            target, mass,
+            omega2[which], np.column_stack([eta[which]] * 2)[:, 0], modulus[which], place[which], springs[which],
+            dashpots[which], 0.3, 0.2, 0.8, target, mass,
         )  # fmt: skip
 
-    alone = [step([0]), step([1])]
+    alone = [step([0, 0]), step([1, 1])]
     assert alone[0] != alone[1] and step([0, 1]) == min(alone) == step([1, 0])
     mass = np.full((4, 4), 2.0)
     longer = step([0, 1], 1.5 * 0.8 * min(alone), mass)
