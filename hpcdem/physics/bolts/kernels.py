@@ -260,14 +260,6 @@ def add(node, row, weight, on_rock, stride, applied):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def work_on_rock(before, after, rock, work):
-    """Add what the mean of the forces (n, d) at both ends of a step did on the rock."""
-    for i in range(len(rock)):
-        for c in range(rock.shape[1]):
-            work[ON_ROCK] += 0.5 * (before[i, c] + after[i, c]) * rock[i, c]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def across(stress, tangent, out):
     """Normal stress across unit vectors t (n, d), of stresses (n, 4 or 6): xx, yy, xy, zz, in space xz, yz.
 

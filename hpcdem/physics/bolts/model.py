@@ -14,8 +14,7 @@ from hpcdem.physics.bolts import kernels, layout
 from hpcdem.physics.bolts.properties import BOLT
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE
-from hpcdem.physics.fdem.node_set import ALPHA
-from hpcdem.physics.fdem.structures import MARGIN, REMOVED, Columns, Number, Structure, empty
+from hpcdem.physics.fdem.structures import REMOVED, Columns, Number, Structure, empty
 
 if TYPE_CHECKING:
     pass
@@ -88,6 +87,8 @@ class Bolts(Structure):
     of_nodes: ClassVar[Columns] = _NODES
     of_elements: ClassVar[Columns] = _ELEMENTS
     model = BOLT
+    held = "nodes"
+    at_rest: ClassVar[Mapping[str, int]] = {"host": -1, "plate": 0, "weight": 0, "condition": 0, "v": 0, "reaction": 0}
     condition_type: ClassVar[type] = Condition
     flows = ("work_on_rock", "lost_in_bars", "lost_in_grout", "lost_by_dashpots", "work_of_conditions")
 
@@ -154,12 +155,7 @@ class Bolts(Structure):
         new["v"][held] = _at(weight[held], cells[host[held]], speed[host[held]])
         bars = empty(_ELEMENTS, n - 1)
         bars["length"][:] = span
-        numbers = np.arange(len(self), len(self) + n), len(self.elements["row"]) + np.arange(n - 1)
-        blocks.before_change()
-        self.nodes = {name: np.concatenate([old, new[name]]) for name, old in self.nodes.items()}
-        self.elements = {name: np.concatenate([old, bars[name]]) for name, old in self.elements.items()}
-        self._arrange()
-        blocks.changed()
+        numbers = self._add(new, bars)
         free = int((host < 0).sum())
         if blocks.log is not None and free:
             blocks.log.info(f"{free} of the {n} nodes of the bolt lie outside the mesh and are not grouted")
@@ -199,22 +195,10 @@ class Bolts(Structure):
 
     # ---- what is queried -------------------------------------------------------------------------------------------
 
-    def _value(self, kind: str, name: str) -> np.ndarray:
-        return self._node_value(name) if kind == BOLT_NODE else self._element_value(name)
-
     def _node_value(self, name: str) -> np.ndarray:
         nodes = self.nodes
-        stem, _, axis = name.rpartition("_")
-        c = max("xyz".find(axis), 0)
-        match stem:
-            case "position":
-                return nodes["x"][:, c].copy()
-            case "displacement":
-                return nodes["x"][:, c] - nodes["origin"][:, c]
-            case "velocity":
-                return nodes["v"][:, c].copy()
-            case "reaction":
-                return nodes["reaction"][:, c] * self._node_spacing
+        if (found := self._vector(name)) is not None:
+            return found * self._node_spacing if name.startswith("reaction") else found
         if name == "bond_force":
             length = nodes["grout"].sum(axis=1)
             force = nodes["bond"] * self._node_spacing
@@ -285,8 +269,7 @@ class Bolts(Structure):
 
     def _led(self) -> np.ndarray:
         """(n,) bool: nodes with a prescribed velocity or acceleration."""
-        rows = [(one.does_x, one.does_y, one.does_z) for one in self.conditions]
-        return (np.array(rows) != kernels.FREE).any(axis=1)[self.nodes["condition"]]
+        return self._does().any(axis=1)
 
     # ---- tables of the kernels -------------------------------------------------------------------------------------
 
@@ -346,23 +329,11 @@ class Bolts(Structure):
             kernels.directions(first, nodes["x"], bars["state"], self._along, self._tangent)
             self._find_forces()
 
-    def _set_masses(self) -> None:
-        """Masses along the bar for this time step: 2 k / m bounds omega^2, k: of the elements on both sides and of the
-        grout. In dynamic runs they are raised where the step would not be stable, in static ones fictitious."""
-        o, dt = self.blocks.options, self.blocks.clock.dt
-        if self._prepared_for == (dt, o.dynamic, o.safety):
-            return
-        was, self._prepared_for = self._prepared_for, (dt, o.dynamic, o.safety)
-        before = self._moving(was[0]) if was is not None else 0.0
+    def _weigh(self, factor: float, true: float) -> tuple[np.ndarray, str]:
+        """Along the bar, with the stiffness of the elements on both sides and of the grout."""
         k = self._stiffness + self._node_table[:, kernels.GROUT]
-        if not o.dynamic:
-            self._node_table[:, kernels.MASS] = 0.5 * MARGIN * (1.0 + ALPHA) * k
-            return
-        mass = np.maximum(self._true_mass, 0.5 * k * (dt / o.safety) ** 2)
-        self._node_table[:, kernels.MASS] = mass
-        if was is not None and self._account is not None:
-            self.commands += self._moving(dt) - before
-        self._tell_of_mass(mass, self._true_mass, ", along them")
+        self._node_table[:, kernels.MASS] = np.maximum(true * self._true_mass, factor * k)
+        return self._node_table[:, kernels.MASS], ", along them"
 
     def _conditions_at(self, time: float, middle: float) -> np.ndarray:
         table = super()._conditions_at(time, middle)
@@ -394,51 +365,31 @@ class Bolts(Structure):
         np.add.at(out, rows - blocks.n_left, k[at, None] * np.abs(self.nodes["weight"][at]))
         return out
 
-    def _held_here(self) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes whose host is owned by this rank, and its storage rows."""
-        blocks = self.blocks
-        row = np.where(self.hosted, blocks.where[self.nodes["host"]], -1)
-        at = np.flatnonzero((row >= blocks.owned.start) & (row < blocks.owned.stop))
-        return at, row[at]
+    def _hosts(self) -> np.ndarray:
+        return self.nodes["host"]
 
     def add_to(self, applied: np.ndarray) -> None:
         """Forces on the rock at the present positions, in the order of nodes [N/m]."""
         kernels.add(self._mine, self._rows, self.nodes["weight"], self._on_rock, self.blocks.stride, applied)
 
-    def follow(self) -> None:
-        """The rock has moved: move the nodes over the same step, and find the new forces."""
-        blocks, nodes, bars = self.blocks, self.nodes, self.elements
-        clock = blocks.clock
-        with blocks.timers("force"):
-            self._set_masses()
-            seen = self._seen()
-        if blocks.comm.size > 1:
-            with blocks.timers("reduce"):
-                blocks.comm.sum_into(seen.view(np.int64))  # one rank has each row, the others zero: exact
-        with blocks.timers("force"):
-            static = not blocks.options.dynamic
-            point, normal = np.ascontiguousarray(seen[:, :-1]), np.ascontiguousarray(seen[:, -1])
-            time = self._time_before()
-            conditions = self._conditions_at(time, time if static else clock.time - 0.5 * clock.dt)
-            work = self.work if self._account is not None and not static else np.zeros(kernels.WORK)
-            before = self._on_rock.copy()
-            kernels.move(
-                self.first, nodes["x"], nodes["v"], point, nodes["point"], self._tangent, self._total, nodes["bond"],
-                nodes["plate"], self.hosted, self._carrier, self._share, conditions, self._node_table, clock.dt,
-                ALPHA if static else 0.0, nodes["reaction"], self._step, self._rock, work,
-            )  # fmt: skip
-            nodes["point"][self.hosted] = point[self.hosted]
-            kernels.stretch(
-                self.first, nodes["x"], self._element_table, self._length, bars["force"], bars["state"],
-                bars["plastic"], work,
-            )  # fmt: skip
-            kernels.hold(
-                self._tangent, self._step, self._rock, self.hosted, self._node_table, normal, nodes["bond"],
-                nodes["slip"], nodes["bond_state"], work,
-            )  # fmt: skip
-            kernels.directions(self.first, nodes["x"], bars["state"], self._along, self._tangent)
-            self._find_forces()
-            kernels.work_on_rock(before, self._on_rock, self._rock, work)
+    def _move(self, seen: np.ndarray, conditions: np.ndarray, alpha: float, work: np.ndarray) -> None:
+        nodes, bars = self.nodes, self.elements
+        point, normal = np.ascontiguousarray(seen[:, :-1]), np.ascontiguousarray(seen[:, -1])
+        kernels.move(
+            self.first, nodes["x"], nodes["v"], point, nodes["point"], self._tangent, self._total, nodes["bond"],
+            nodes["plate"], self.hosted, self._carrier, self._share, conditions, self._node_table,
+            self.blocks.clock.dt, alpha, nodes["reaction"], self._step, self._rock, work,
+        )  # fmt: skip
+        nodes["point"][self.hosted] = point[self.hosted]
+        kernels.stretch(
+            self.first, nodes["x"], self._element_table, self._length, bars["force"], bars["state"], bars["plastic"],
+            work,
+        )  # fmt: skip
+        kernels.hold(
+            self._tangent, self._step, self._rock, self.hosted, self._node_table, normal, nodes["bond"],
+            nodes["slip"], nodes["bond_state"], work,
+        )  # fmt: skip
+        kernels.directions(self.first, nodes["x"], bars["state"], self._along, self._tangent)
 
     def _seen(self) -> np.ndarray:
         """(n, d + 1) of the nodes whose host is owned here: where the rock is [m], and its stress across the bar
@@ -463,17 +414,11 @@ class Bolts(Structure):
         f = (self._total * self._tangent).sum(axis=1) + nodes["bond"]
         return np.abs(f[free]), np.concatenate([2.0 * np.abs(self.elements["force"]), np.abs(nodes["bond"])])
 
-    def elements_removed(self, elements: np.ndarray) -> None:
-        """Nodes in these elements of the rock are free of it from now on, plates fall off."""
-        lost = np.isin(self.nodes["host"], elements)
-        if not lost.any():
-            return
+    def _unbind(self, lost: np.ndarray) -> None:
+        """Plates fall off."""
         nodes = self.nodes
-        with self._booked():
-            nodes["host"][lost], nodes["plate"][lost], nodes["weight"][lost] = -1, 0, 0.0
-            nodes["bond"][lost], nodes["bond_state"][lost] = 0.0, nodes["bond_state"][lost] & ~kernels.SLIPS
-        if self.blocks.log is not None:
-            self.blocks.log.info(f"{int(lost.sum())} bolt nodes lost their rock, which was removed")
+        nodes["host"][lost], nodes["plate"][lost], nodes["weight"][lost] = -1, 0, 0.0
+        nodes["bond"][lost], nodes["bond_state"][lost] = 0.0, nodes["bond_state"][lost] & ~kernels.SLIPS
 
     def _let_go(self, elements: np.ndarray) -> None:
         """Half of the grout of a node goes with each of its elements, and with it its part of the force."""
@@ -484,12 +429,6 @@ class Bolts(Structure):
         nodes["bond"] *= np.divide(left, before, out=np.ones(len(left)), where=before > 0.0)
         bars["state"][elements] |= kernels.RUPTURED
         bars["force"][elements] = 0.0
-        gone = bars["state"] & REMOVED > 0
-        gone[elements] = True
-        lost = np.ones(len(self), bool)
-        lost[self.ends()[~gone].reshape(-1)] = False
-        for name, nothing in (("host", -1), ("plate", 0), ("weight", 0), ("condition", 0), ("v", 0), ("reaction", 0)):
-            nodes[name][lost] = nothing
 
 
 def _at(weight: np.ndarray, cells: np.ndarray, values: np.ndarray) -> np.ndarray:

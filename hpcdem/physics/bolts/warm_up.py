@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from hpcdem.core.comm import SerialComm
 from hpcdem.physics.bolts.model import Bolts
-from hpcdem.physics.fdem import changes
-from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.warm_up import ROCK
+from hpcdem.physics.fdem.warm_up import rock, two
 
 STEEL = {
     "density": 7850.0, "young": 200e9, "diameter": 0.025, "shear_stiffness_rock_bolt": 1e8, "grout_thickness": 0.01,
@@ -17,9 +13,7 @@ STEEL = {
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]))
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim = rock(two(2), threads)
     bolts = Bolts.of(sim)
     _, elements = bolts.create([(0.1, 0.2), (0.9, 0.8)], segments=3)
     bolts.assign(elements, STEEL)

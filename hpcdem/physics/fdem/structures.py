@@ -14,9 +14,11 @@ from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numba import njit
 
 from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.node_set import ALPHA
 from hpcdem.physics.fdem.properties import Model
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 
@@ -35,30 +37,110 @@ Columns = Mapping[str, tuple[type, int]]
 """Type and width of columns by name, width 0: (n,)."""
 
 
-class Structure(SurfaceLoad):
+class Prescribed(SurfaceLoad):
+    """What is prescribed at the nodes of a structure. nodes: columns by name, among them the row of `conditions`."""
+
+    blocks: Blocks
+    nodes: dict[str, np.ndarray]
+    conditions: list[Any]
+    word: ClassVar[str]
+    """What one of them is called."""
+    condition_type: ClassVar[type]
+    """Dataclass of what is prescribed at a node: does_*, at_* in the middle of a step; the rest at its time."""
+
+    parts: ClassVar[tuple[str, str]]
+    """The kinds of object (groups.py) that its elements and its nodes are."""
+
+    @abstractmethod
+    def alive(self, kind: str) -> np.ndarray:
+        """(n,) bool: elements that were not deleted, or nodes of such. Not collective."""
+
+    def condition(self, nodes: np.ndarray, **changes: Any) -> None:
+        """Prescribe components of nodes (k,), see the class of conditions; the others stay as they are."""
+        for value in changes.values():
+            if isinstance(value, str) and value not in self.blocks.tables:
+                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
+                raise CommandError(f"there is no table '{value}'; there is {known}")
+            if not isinstance(value, str) and not math.isfinite(value):
+                raise CommandError(f"a condition of a {self.word} must be finite, got {value:g}")
+        self.blocks.before_change()
+        column = self.nodes["condition"]
+        for row in np.unique(column[nodes]).tolist():
+            wanted = replace(self.conditions[row], **changes)
+            if wanted not in self.conditions:
+                self.conditions.append(wanted)
+            column[nodes[column[nodes] == row]] = -1 - self.conditions.index(wanted)
+        column[column < 0] = -1 - column[column < 0]
+        self.blocks.changed(stiffness=False)
+
+    def remove_conditions(self, nodes: np.ndarray) -> None:
+        """Take back what was prescribed at nodes (k,)."""
+        self.blocks.before_change()
+        self.nodes["condition"][nodes] = 0
+        self.blocks.changed(stiffness=False)
+
+    def uses_table(self, name: str) -> bool:
+        """Whether a node follows this table. Not collective."""
+        used = {self.conditions[row] for row in np.unique(self.nodes["condition"]).tolist()}
+        return any(name in asdict(one).values() for one in used)
+
+    def driven(self) -> int | None:
+        """The first node that is made to move. Not collective."""
+        for node in np.flatnonzero(self.alive(self.parts[1])).tolist():
+            condition = asdict(self.conditions[self.nodes["condition"][node]])
+            if any(name.startswith("does_") and does != FREE and condition[f"at_{name[5:]}"] != 0.0
+                   for name, does in condition.items()):  # fmt: skip
+                return node
+        return None
+
+    def _conditions_at(self, time: float, middle: float) -> np.ndarray:
+        """Prescribed conditions (n, entries of a condition): forces at `time`, motion in the middle of a step."""
+        tables = self.blocks.tables
+        names = [one.name for one in fields(self.condition_type)]
+
+        def now(condition: Any, name: str) -> float:
+            value = getattr(condition, name)
+            when = middle if name.startswith("at_") else time
+            return tables[value](when) if isinstance(value, str) else value
+
+        used, row = np.unique(self.nodes["condition"], return_inverse=True)
+        rows = np.array([[now(self.conditions[k], name) for name in names] for k in used.tolist()], np.float64)
+        return rows.reshape(-1, len(names))[row.reshape(-1)]
+
+    def _does(self) -> np.ndarray:
+        """(n, components of a condition) bool: motion that is prescribed."""
+        names = [one.name for one in fields(self.condition_type) if one.name.startswith("does_")]
+        rows = [[getattr(one, name) for name in names] for one in self.conditions]
+        return (np.array(rows) != FREE)[self.nodes["condition"]]
+
+
+class Structure(Prescribed):
     """All of a kind in a model of blocks. nodes, elements: columns by name, equal on all ranks. Methods are collective
     unless they say otherwise; CommandError, alike on all ranks, for what makes no sense."""
 
     of_mesh: ClassVar[bool] = True
-    word: ClassVar[str]
-    """What one of them is called."""
-    parts: ClassVar[tuple[str, str]]
-    """The kinds of object (groups.py) that its elements and its nodes are."""
     quantities: ClassVar[Mapping[str, Mapping[str, tuple[str, str]]]]
     """What can be asked of them, by kind of object: unit and meaning."""
     of_nodes: ClassVar[Columns]
     of_elements: ClassVar[Columns]
     model: ClassVar[Model]
-    condition_type: ClassVar[type]
-    """Dataclass of what is prescribed at a node: does_*, at_* in the middle of a step; the rest at its time."""
+    held: ClassVar[str]
+    """Columns with the `host` in the rock: "nodes" or "elements"."""
+    at_rest: ClassVar[Mapping[str, int]]
+    """Columns of nodes whose elements were all deleted."""
     flows: ClassVar[tuple[str, ...]]
     """Entries of its work: on the rock first; those that begin with work_of bring energy in, the others take it."""
+    _on_rock: np.ndarray
+    """Forces (points, d) on the rock."""
+    _rock: np.ndarray
+    """Displacements (points, d) of the rock in a step [m]."""
+    _true_mass: np.ndarray
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
         self.nodes, self.elements = (empty(of(blocks.dim), 0) for of in (self.node_columns, self.element_columns))
         self.rows: list[tuple[float, ...]] = []
-        self.conditions: list[Any] = [self.condition_type()]
+        self.conditions = [self.condition_type()]
         self.work = np.zeros(len(self.flows))
         self.commands = 0.0
         self._stored_at_start = 0.0
@@ -106,12 +188,33 @@ class Structure(SurfaceLoad):
         around it, and this moment has no step yet (energy.py). Zero in static runs."""
 
     @abstractmethod
-    def _value(self, kind: str, name: str) -> np.ndarray:
-        """A quantity of all nodes or elements."""
+    def _node_value(self, name: str) -> np.ndarray:
+        """A quantity of all nodes, see also `_vector`."""
 
     @abstractmethod
-    def _held_here(self) -> tuple[np.ndarray, np.ndarray]:
-        """Which of its points are held by an element that this rank owns, and the storage rows of these."""
+    def _element_value(self, name: str) -> np.ndarray:
+        """A quantity of all elements."""
+
+    @abstractmethod
+    def _hosts(self) -> np.ndarray:
+        """Elements of the rock that hold its points, -1: none."""
+
+    @abstractmethod
+    def _unbind(self, lost: np.ndarray) -> None:
+        """No rock holds these of `held` (n,) any more."""
+
+    @abstractmethod
+    def _weigh(self, factor: float, true: float) -> tuple[np.ndarray, str]:
+        """Set the masses of nodes: `factor` times their stiffness, at least `true` times their own. Returns them, and
+        more to tell of them."""
+
+    @abstractmethod
+    def _seen(self) -> np.ndarray:
+        """What points see of the rock that holds them, where this rank owns it; zeros elsewhere."""
+
+    @abstractmethod
+    def _move(self, seen: np.ndarray, conditions: np.ndarray, alpha: float, work: np.ndarray) -> None:
+        """Move nodes and stretch elements over a step, after rock of which points see `seen`."""
 
     @abstractmethod
     def ends(self) -> np.ndarray:
@@ -161,13 +264,22 @@ class Structure(SurfaceLoad):
     # ---- what is given ----------------------------------------------------------------------------------------------
 
     def alive(self, kind: str) -> np.ndarray:
-        """(n,) bool: elements that were not deleted, or nodes of such. Not collective."""
         there = self.elements["state"] & REMOVED == 0
         if kind == self.parts[0]:
             return there
         out = np.zeros(len(self), bool)
         out[self.ends()[there].reshape(-1)] = True
         return out
+
+    def _add(self, nodes: Mapping[str, np.ndarray], elements: Mapping[str, np.ndarray]) -> tuple[Any, Any]:
+        """More of them; the numbers of these nodes and elements."""
+        n, m = len(self), len(self.elements["row"])
+        self.blocks.before_change()
+        self.nodes = {name: np.concatenate([old, nodes[name]]) for name, old in self.nodes.items()}
+        self.elements = {name: np.concatenate([old, elements[name]]) for name, old in self.elements.items()}
+        self._arrange()
+        self.blocks.changed()
+        return np.arange(n, len(self)), np.arange(m, len(self.elements["row"]))
 
     def delete(self, elements: np.ndarray) -> None:
         """Take elements (k,) out, at once. The numbers of the others stay."""
@@ -176,45 +288,10 @@ class Structure(SurfaceLoad):
         with self._booked():
             self._let_go(elements)
             self.elements["state"][elements] |= REMOVED
+            lost = ~self.alive(self.parts[1])
+            for name, nothing in self.at_rest.items():
+                self.nodes[name][lost] = nothing
         blocks.changed()
-
-    def condition(self, nodes: np.ndarray, **changes: Any) -> None:
-        """Prescribe components of nodes (k,), see the class of conditions; the others stay as they are."""
-        for value in changes.values():
-            if isinstance(value, str) and value not in self.blocks.tables:
-                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
-                raise CommandError(f"there is no table '{value}'; there is {known}")
-            if not isinstance(value, str) and not math.isfinite(value):
-                raise CommandError(f"a condition of a {self.word} must be finite, got {value:g}")
-        self.blocks.before_change()
-        column = self.nodes["condition"]
-        for row in np.unique(column[nodes]).tolist():
-            wanted = replace(self.conditions[row], **changes)
-            if wanted not in self.conditions:
-                self.conditions.append(wanted)
-            column[nodes[column[nodes] == row]] = -1 - self.conditions.index(wanted)
-        column[column < 0] = -1 - column[column < 0]
-        self.blocks.changed(stiffness=False)
-
-    def remove_conditions(self, nodes: np.ndarray) -> None:
-        """Take back what was prescribed at nodes (k,)."""
-        self.blocks.before_change()
-        self.nodes["condition"][nodes] = 0
-        self.blocks.changed(stiffness=False)
-
-    def uses_table(self, name: str) -> bool:
-        """Whether a node follows this table. Not collective."""
-        used = {self.conditions[row] for row in np.unique(self.nodes["condition"]).tolist()}
-        return any(name in asdict(one).values() for one in used)
-
-    def driven(self) -> int | None:
-        """The first node that is made to move. Not collective."""
-        for node in np.flatnonzero(self.alive(self.parts[1])).tolist():
-            condition = asdict(self.conditions[self.nodes["condition"][node]])
-            if any(name.startswith("does_") and does != FREE and condition[f"at_{name[5:]}"] != 0.0
-                   for name, does in condition.items()):  # fmt: skip
-                return node
-        return None
 
     def stop(self) -> None:
         """Velocities become zero. Not collective."""
@@ -240,20 +317,6 @@ class Structure(SurfaceLoad):
         k = [one.name for one in self.model.properties].index(name)
         return np.array([otherwise, *(row[k] for row in self.rows)])[self.elements["row"]]
 
-    def _conditions_at(self, time: float, middle: float) -> np.ndarray:
-        """Prescribed conditions (n, entries of a condition): forces at `time`, motion in the middle of a step."""
-        tables = self.blocks.tables
-        names = [one.name for one in fields(self.condition_type)]
-
-        def now(condition: Any, name: str) -> float:
-            value = getattr(condition, name)
-            when = middle if name.startswith("at_") else time
-            return tables[value](when) if isinstance(value, str) else value
-
-        used, row = np.unique(self.nodes["condition"], return_inverse=True)
-        rows = np.array([[now(self.conditions[k], name) for name in names] for k in used.tolist()], np.float64)
-        return rows.reshape(-1, len(names))[row.reshape(-1)]
-
     def _time_before(self) -> float:
         """Time at which tables were read before the last step of the blocks."""
         blocks = self.blocks
@@ -266,8 +329,17 @@ class Structure(SurfaceLoad):
     def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
         """A quantity of nodes or elements (None: all), on all ranks. Not collective."""
         self.check(kind, name)
-        found = self._value(kind, name)
+        found = self._node_value(name) if kind == self.parts[1] else self._element_value(name)
         return np.asarray(found if numbers is None else found[numbers], np.float64)
+
+    def _vector(self, name: str) -> np.ndarray | None:
+        """A component of a vector of nodes; None for other quantities."""
+        nodes, (stem, _, axis) = self.nodes, name.rpartition("_")
+        c = "xyz".find(axis)
+        if stem == "displacement":
+            return nodes["x"][:, c] - nodes["origin"][:, c]
+        column = {"position": "x", "velocity": "v", "reaction": "reaction"}.get(stem)
+        return None if column is None else nodes[column][:, c].copy()
 
     def columns(self) -> dict[str, dict[str, np.ndarray]]:
         """Columns of frames: all quantities of "elements" and "nodes". Not collective."""
@@ -305,12 +377,65 @@ class Structure(SurfaceLoad):
             self.work[:] = -self._half_step(blocks.clock.dt) if self._account is not None else 0.0
             self.commands, self._stored_at_start = 0.0, self._stored()
 
+    def _held_here(self) -> tuple[np.ndarray, np.ndarray]:
+        """Which of its points are held by an element that this rank owns, and the storage rows of these."""
+        blocks, host = self.blocks, self._hosts()
+        row = np.where(host >= 0, blocks.where[host], -1)
+        at = np.flatnonzero((row >= blocks.owned.start) & (row < blocks.owned.stop))
+        return at, row[at]
+
+    def _set_masses(self) -> None:
+        """Masses of nodes for this time step: 2 k / m bounds omega^2. In dynamic runs they are raised where the step
+        would not be stable, in static ones fictitious."""
+        o, dt = self.blocks.options, self.blocks.clock.dt
+        if self._prepared_for == (dt, o.dynamic, o.safety):
+            return
+        was, self._prepared_for = self._prepared_for, (dt, o.dynamic, o.safety)
+        before = self._moving(was[0]) if was is not None else 0.0
+        if not o.dynamic:
+            self._weigh(0.5 * MARGIN * (1.0 + ALPHA), 0.0)
+            return
+        mass, more = self._weigh(0.5 * (dt / o.safety) ** 2, 1.0)
+        if was is not None and self._account is not None:
+            self.commands += self._moving(dt) - before
+        self._tell_of_mass(mass, more)
+
+    def follow(self) -> None:
+        """The rock has moved: move the nodes over the same step, and find the new forces."""
+        blocks, clock = self.blocks, self.blocks.clock
+        if not len(self):
+            return
+        with blocks.timers("force"):
+            self._set_masses()
+            seen = self._seen()
+        if blocks.comm.size > 1:
+            with blocks.timers("reduce"):
+                blocks.comm.sum_into(seen.view(np.int64))  # one rank has each row, the others zero: exact
+        with blocks.timers("force"):
+            static, time = not blocks.options.dynamic, self._time_before()
+            conditions = self._conditions_at(time, time if static else clock.time - 0.5 * clock.dt)
+            work = self.work if self._account is not None and not static else np.zeros(len(self.flows))
+            before = self._on_rock.copy()
+            self._move(seen, conditions, ALPHA if static else 0.0, work)
+            self._find_forces()
+            work_on_rock(before, self._on_rock, self._rock, work)
+
+    def elements_removed(self, elements: np.ndarray) -> None:
+        """What these elements of the rock held is free of them from now on."""
+        lost = np.isin(getattr(self, self.held)["host"], elements)
+        if not lost.any():
+            return
+        with self._booked():
+            self._unbind(lost)
+        if self.blocks.log is not None:
+            self.blocks.log.info(f"{int(lost.sum())} {self.word} {self.held} lost their rock, which was removed")
+
     def mesh_replaced(self) -> None:
         """There is another mesh: `of_mesh` says that these are gone with the one before."""
 
-    def _tell_of_mass(self, mass: np.ndarray, true: np.ndarray, more: str) -> None:
+    def _tell_of_mass(self, mass: np.ndarray, more: str) -> None:
         """Say once in a while how much mass the time step adds to the nodes."""
-        log, dt = self.blocks.log, self.blocks.clock.dt
+        log, dt, true = self.blocks.log, self.blocks.clock.dt, self._true_mass
         if log is None or not true.any():
             return
         added = float((mass - true).sum() / true.sum())
@@ -347,6 +472,14 @@ class Structure(SurfaceLoad):
         made.commands, made._stored_at_start = state["commands"], state["start"]
         made._dynamic, made._account = state["dynamic"], blocks.budget
         made._arrange()
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def work_on_rock(before: np.ndarray, after: np.ndarray, rock: np.ndarray, work: np.ndarray) -> None:
+    """Add what the mean of the forces (points, d) at both ends of a step did on the rock to the first flow."""
+    for q in range(len(rock)):
+        for c in range(rock.shape[1]):
+            work[0] += 0.5 * (before[q, c] + after[q, c]) * rock[q, c]
 
 
 def wide(k: int) -> tuple[int, ...]:

@@ -3,6 +3,8 @@ each model needs, one for each kind that only some do."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hpcdem.core.comm import SerialComm
@@ -93,6 +95,24 @@ def _meshes() -> list[Mesh]:
     return found
 
 
+_CORNERS = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
+
+
+def two(dim: int) -> Mesh:
+    """Two triangles, or two tetrahedra, with a joint between them."""
+    if dim == 2:
+        return Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)])
+    return Mesh.of(_CORNERS, [(0, 1, 2, 3), (1, 4, 2, 3)])
+
+
+def rock(mesh: Mesh, threads: int, law: str = "mech_iso_elastic", **properties: Value) -> Blocks:
+    """A model whose elements have a law."""
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, law, {**ROCK, **properties})
+    return sim
+
+
 def _jointed(mesh: Mesh, threads: int) -> Blocks:
     """A model with joints, contact, conditions and budgets; open."""
     sim = Blocks(SerialComm(), threads)
@@ -131,9 +151,7 @@ def creeping(threads: int = 1) -> None:
 
 def _creep(mesh: Mesh, threads: int) -> None:
     """Step in motion, then in a static creep step."""
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_burgers", {**ROCK, "kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
+    sim = rock(mesh, threads, "mech_burgers", kelvin_shear=1e9, kelvin_viscosity=1.0)
     sim.initial_stress(None, yy=1e3)
     sim.option(collision=False)
     creep.switch(sim, True)
@@ -142,6 +160,10 @@ def _creep(mesh: Mesh, threads: int) -> None:
     diagnostics.energies(sim)
     diagnostics.values(sim, "creep_strain_xx")
     diagnostics.account_energy(sim, False)
+    _creep_at_rest(sim)
+
+
+def _creep_at_rest(sim: Blocks) -> None:
     sim.option(dynamic=False)
     creep.switch(sim, True, dt=1.0)
     creep.begin(sim, 1.0)
@@ -150,18 +172,16 @@ def _creep(mesh: Mesh, threads: int) -> None:
     creep.finish(sim, 1.0)
 
 
-def _in_space(threads: int, law: str, properties: dict[str, Value]) -> Blocks:
-    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
-    below = [(x, y, z - 1.001) for x, y, z in points[:4]]
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of(points + below, [(0, 1, 2, 3), (1, 4, 2, 3), (5, 6, 7, 8)]))
-    changes.element_model(sim, None, law, {**ROCK, **properties})
-    return sim
+def _in_space(threads: int, law: str = "mech_iso_elastic", **properties: Value) -> Blocks:
+    """Two tetrahedra, and one that touches them."""
+    below = [(x, y, z - 1.001) for x, y, z in _CORNERS[:4]]
+    mesh = Mesh.of(_CORNERS + below, [(0, 1, 2, 3), (1, 4, 2, 3), (5, 6, 7, 8)])
+    return rock(mesh, threads, law, **properties)
 
 
 def yielding_in_space(threads: int = 1) -> None:
     """Compile the kernels of tetrahedra that yield."""
-    sim = _in_space(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
+    sim = _in_space(threads, "mech_mohr_coulomb", dilation=10.0, cohesion=1.0, tensile=1.0)
     sim.table("c", [(0.0, 1.0), (1.0, 0.0)])
     sim.element_property([0], {"cohesion": Over("c", PLASTIC_STRAIN)})
     sim.initial_stress(None, yy=1e3)
@@ -172,7 +192,7 @@ def yielding_in_space(threads: int = 1) -> None:
 
 def creeping_in_space(threads: int = 1) -> None:
     """Compile the kernels of tetrahedra that creep."""
-    sim = _in_space(threads, "mech_burgers", {"kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
+    sim = _in_space(threads, "mech_burgers", kelvin_shear=1e9, kelvin_viscosity=1.0)
     sim.initial_stress(None, yy=1e3)
     creep.switch(sim, True)
     convergence.advance(sim, 2)
@@ -182,7 +202,7 @@ def creeping_in_space(threads: int = 1) -> None:
 
 def tangent_in_space(threads: int = 1) -> None:
     """Compile the kernels of the static solver for tetrahedra, with joints, one of them past its peak, and yielding."""
-    sim = _in_space(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
+    sim = _in_space(threads, "mech_mohr_coulomb", dilation=10.0, cohesion=1.0, tensile=1.0)
     sim.initial_stress(None, yy=1e3)
     sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
     sim.close_model()
@@ -191,10 +211,7 @@ def tangent_in_space(threads: int = 1) -> None:
 
 def hexahedra(threads: int = 1) -> None:
     """Compile the kernels of hexahedra: two in contact in motion, at rest, and their tangent."""
-    points = [(x, y, z) for z in (0.0, 1.0, 1.001, 2.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of_hexes(points, [range(8), range(8, 16)]))
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim = rock(_hexes((0.0, 1.0, 1.001, 2.0), range(8), range(8, 16)), threads)
     sim.initial_stress(None, yy=1e3)
     sim.stress_condition([0], normal=-1.0)
     convergence.advance(sim, 2)
@@ -204,18 +221,21 @@ def hexahedra(threads: int = 1) -> None:
     equilibrium.tangent(sim)
 
 
-def _hexahedron(threads: int, law: str, properties: dict[str, Value]) -> Blocks:
-    points = [(x, y, z) for z in (0.0, 1.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of_hexes(points, [range(8)]))
-    changes.element_model(sim, None, law, {**ROCK, **properties})
+def _hexes(levels: Sequence[float], *cells: range) -> Mesh:
+    """Hexahedra of the corners of a square on some levels."""
+    square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+    return Mesh.of_hexes([(x, y, z) for z in levels for x, y in square], cells)
+
+
+def _hexahedron(threads: int, law: str, **properties: Value) -> Blocks:
+    sim = rock(_hexes((0.0, 1.0), range(8)), threads, law, **properties)
     sim.initial_stress(None, yy=1e3)
     return sim
 
 
 def yielding_hexahedra(threads: int = 1) -> None:
     """Compile the kernels of hexahedra that yield, and their tangent."""
-    sim = _hexahedron(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
+    sim = _hexahedron(threads, "mech_mohr_coulomb", dilation=10.0, cohesion=1.0, tensile=1.0)
     sim.table("c", [(0.0, 1.0), (1.0, 0.0)])
     sim.element_property(None, {"cohesion": Over("c", PLASTIC_STRAIN)})
     convergence.advance(sim, 2)
@@ -227,25 +247,17 @@ def yielding_hexahedra(threads: int = 1) -> None:
 
 def creeping_hexahedra(threads: int = 1) -> None:
     """Compile the kernels of hexahedra that creep, in motion and in a static creep step."""
-    sim = _hexahedron(threads, "mech_burgers", {"kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
+    sim = _hexahedron(threads, "mech_burgers", kelvin_shear=1e9, kelvin_viscosity=1.0)
     creep.switch(sim, True)
     convergence.advance(sim, 2)
     for name in ("strain_energy", "creep_strain_xx"):
         diagnostics.values(sim, name)
-    sim.option(dynamic=False)
-    creep.switch(sim, True, dt=1.0)
-    creep.begin(sim, 1.0)
-    sim.local.solids.linear()
-    sim.step()
-    creep.finish(sim, 1.0)
+    _creep_at_rest(sim)
 
 
 def jointed_hexahedra(threads: int = 1) -> None:
     """Compile the kernels of joints between hexahedra, which are torn apart, and their tangent."""
-    points = [(x, y, z) for z in (0.0, 1.0, 2.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of_hexes(points, [range(8), range(4, 12)]))
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim = rock(_hexes((0.0, 1.0, 2.0), range(8), range(4, 12)), threads)
     sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
     changes.set_velocity(sim, [8, 9], 1.0, 1.0, 1.0)
     diagnostics.account_energy(sim)
@@ -257,7 +269,7 @@ def jointed_hexahedra(threads: int = 1) -> None:
 
 def in_space(threads: int = 1) -> None:
     """Compile the kernels of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
-    sim = _in_space(threads, "mech_iso_elastic", {})
+    sim = _in_space(threads)
     sim.face_model([0], "contact_mohr_coulomb", {"penalty_normal": 1e10})
     sim.initial_stress(None, yy=1e3)
     sim.velocity_condition([0], vx=0.0, vz=0.0)
@@ -285,9 +297,7 @@ def in_space(threads: int = 1) -> None:
 
 def _rest(mesh: Mesh, threads: int) -> None:
     """One body at rest, of which an element is removed gradually."""
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim = rock(mesh, threads)
     sim.initial_stress(None, yy=-1.0)
     sim.option(dynamic=False, overlap="keep")
     sim.step()

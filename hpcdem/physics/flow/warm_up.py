@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from hpcdem.core.comm import SerialComm
-from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.groups import CHANNEL
-from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.warm_up import ROCK
+from hpcdem.physics.fdem.warm_up import rock, two
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 
@@ -19,19 +15,16 @@ WATER = {
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
-    _flow(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]), threads)
+    _flow(2, threads)
 
 
 def in_space(threads: int = 1) -> None:
     """The same between two tetrahedra."""
-    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
-    _flow(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
+    _flow(3, threads)
 
 
-def _flow(mesh: Mesh, threads: int) -> None:
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+def _flow(dim: int, threads: int) -> None:
+    sim = rock(two(dim), threads)
     flow = Flow.of(sim)
     flow.assign(None, WATER)
     flow.prescribe(None, kernels.PRESSURE, 1.0)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import changes
-from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.warm_up import ROCK
+from hpcdem.physics.fdem.warm_up import rock, two
 from hpcdem.physics.heat import friction, kernels, kernels_space
 from hpcdem.physics.heat.model import Heat
 
@@ -17,7 +15,7 @@ GRANITE = {"conductivity": 2.7, "capacity": 1000.0, "expansion_coeficient": 1e-5
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
-    sim = _heated(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]), threads)
+    sim = _heated(2, threads)
     pairs, one = np.array([0]), np.ones(2)
     friction.friction_heat(
         pairs, pairs + 1, np.zeros(2, np.int64), np.arange(2), np.zeros(2, bool), sim.x, sim.v,
@@ -28,8 +26,7 @@ def warm_up(threads: int = 1) -> None:
 
 def in_space(threads: int = 1) -> None:
     """The same between two tetrahedra."""
-    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
-    _heated(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
+    _heated(3, threads)
     pairs, one = np.zeros(1, np.int64), np.ones(1)
     kernels_space.friction_heat(
         pairs, pairs, pairs, pairs, pairs, np.zeros(1, np.uint8), np.zeros((1, 16)), np.zeros((1, 21)),
@@ -37,10 +34,8 @@ def in_space(threads: int = 1) -> None:
     )  # fmt: skip
 
 
-def _heated(mesh: Mesh, threads: int) -> Blocks:
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+def _heated(dim: int, threads: int) -> Blocks:
+    sim = rock(two(dim), threads)
     heat = Heat.of(sim)
     heat.assign(None, GRANITE)
     heat.initial(np.array([0]), 20.0)

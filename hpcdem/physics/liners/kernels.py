@@ -170,14 +170,6 @@ def add(point, row, corner, on_rock, stride, applied):
             applied[row[m], stride * corner[q] + c] += on_rock[q, c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def work_on_rock(before, after, rock, work):
-    """Add what the mean of the forces (points, d) at both ends of a step did on the rock."""
-    for q in range(len(rock)):
-        for c in range(rock.shape[1]):
-            work[ON_ROCK] += 0.5 * (before[q, c] + after[q, c]) * rock[q, c]
-
-
 # ---- beams, the elements in the plane: the rock is to the left on the way from the first node to the last ------------
 
 

@@ -12,8 +12,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import LINER_ELEMENT, LINER_NODE
-from hpcdem.physics.fdem.node_set import ALPHA
-from hpcdem.physics.fdem.structures import FREE, MARGIN, REMOVED, Columns, Number, Structure, empty
+from hpcdem.physics.fdem.structures import FREE, Columns, Number, Structure, empty
 from hpcdem.physics.liners import kernels
 from hpcdem.physics.liners.beams import Beams
 from hpcdem.physics.liners.elements import Elements
@@ -74,6 +73,8 @@ class Liners(Structure):
     parts: ClassVar[tuple[str, str]] = (LINER_ELEMENT, LINER_NODE)
     quantities = QUANTITIES
     model = LINER
+    held = "elements"
+    at_rest: ClassVar[Mapping[str, int]] = {"condition": 0, "v": 0, "spin": 0, "reaction": 0}
     condition_type: ClassVar[type] = Condition
     flows = ("work_on_rock", "lost_in_beams", "lost_in_bond", "work_of_conditions", "work_of_gravity")
 
@@ -117,12 +118,7 @@ class Liners(Structure):
         elements["ends"][:], elements["face"][:], elements["host"][:] = ends, faces, faces // 4
         elements["point"][:] = at[corner].reshape(m, -1)
         self.kind.begin(laid, new, elements)
-        numbers = np.arange(len(self), len(self) + n), len(self.elements["row"]) + np.arange(m)
-        blocks.before_change()
-        self.nodes = {name: np.concatenate([before, new[name]]) for name, before in self.nodes.items()}
-        self.elements = {name: np.concatenate([before, elements[name]]) for name, before in self.elements.items()}
-        self._arrange()
-        blocks.changed()
+        numbers = self._add(new, elements)
         if blocks.log is not None and laid.parted:
             blocks.log.info(
                 f"{laid.parted} {self.kind.parted_at} of the mesh divide the liner: the rock is open there, or more "
@@ -167,25 +163,12 @@ class Liners(Structure):
 
     # ---- queries -----------------------------------------------------------------------------------------------------
 
-    def _value(self, kind: str, name: str) -> np.ndarray:
-        return self._node_value(name) if kind == LINER_NODE else self._element_value(name)
-
     def _node_value(self, name: str) -> np.ndarray:
-        nodes, dim = self.nodes, self.blocks.dim
         stem, _, axis = name.rpartition("_")
-        c = "xyz".find(axis)
-        match stem:
-            case "position":
-                return nodes["x"][:, c].copy()
-            case "displacement":
-                return nodes["x"][:, c] - nodes["origin"][:, c]
-            case "velocity":
-                return nodes["v"][:, c].copy()
-            case "reaction":
-                return nodes["reaction"][:, c].copy()  # also reaction_moment of the plane: the last one
-            case "reaction_moment":
-                return nodes["reaction"][:, dim + c].copy()
-        return self.kind.node_value(name)
+        if stem == "reaction_moment":
+            return self.nodes["reaction"][:, self.blocks.dim + "xyz".find(axis)].copy()
+        found = self._vector(name)  # also reaction_moment of the plane: the last one
+        return self.kind.node_value(name) if found is None else found
 
     def _element_value(self, name: str) -> np.ndarray:
         beams = self.elements
@@ -249,11 +232,7 @@ class Liners(Structure):
 
     def _led(self) -> np.ndarray:
         """(n, components of nodes) bool: prescribed velocities."""
-        rows = [
-            (one.does_x, one.does_y, one.does_z, one.does_turn_x, one.does_turn_y, one.does_turn)
-            for one in self.conditions
-        ]
-        return (np.array(rows) != FREE)[:, self.kind.parts][self.nodes["condition"]]
+        return self._does()[:, self.kind.parts]
 
     # ---- tables of the kernels -------------------------------------------------------------------------------------
 
@@ -295,28 +274,15 @@ class Liners(Structure):
             self.kind.frames(self._frame)
             self._find_forces()
 
-    def _set_masses(self) -> None:
-        """Masses and rotational inertias for this time step: 2 k / m bounds omega^2, 2 k: the rows of the stiffness of
-        elements by Gershgorin (`Elements.arrange`) and twice that of the bond. In dynamic runs both are raised where
-        the step would not be stable, in static ones fictitious."""
-        o, dt = self.blocks.options, self.blocks.clock.dt
-        if self._prepared_for == (dt, o.dynamic, o.safety):
-            return
-        was, self._prepared_for = self._prepared_for, (dt, o.dynamic, o.safety)
-        before, table = self._moving(was[0]) if was is not None else 0.0, self._node_table
-        if not o.dynamic:
-            table[:, kernels.MASS] = 0.5 * MARGIN * (1.0 + ALPHA) * self._stiffness
-            table[:, kernels.INERTIA] = 0.5 * MARGIN * (1.0 + ALPHA) * self._turning
-            return
-        least = 0.5 * (dt / o.safety) ** 2
-        mass = np.maximum(self._true_mass, least * self._stiffness)
-        table[:, kernels.MASS], table[:, kernels.INERTIA] = mass, np.maximum(self._true_inertia, least * self._turning)
-        if was is not None and self._account is not None:
-            self.commands += self._moving(dt) - before
+    def _weigh(self, factor: float, true: float) -> tuple[np.ndarray, str]:
+        """Rotational inertias too, with the rows of the stiffness of elements by Gershgorin (`Elements.arrange`) and
+        twice that of the bond."""
+        table = self._node_table
+        table[:, kernels.MASS] = np.maximum(true * self._true_mass, factor * self._stiffness)
+        table[:, kernels.INERTIA] = np.maximum(true * self._true_inertia, factor * self._turning)
         raised = table[:, kernels.INERTIA] > self._true_inertia
-        self._tell_of_mass(
-            mass, self._true_mass, f", and raises the rotational inertia of {int(raised.sum())}" if raised.any() else ""
-        )
+        more = f", and raises the rotational inertia of {int(raised.sum())}" if raised.any() else ""
+        return table[:, kernels.MASS], more
 
     def _find_forces(self) -> None:
         time, o = self.blocks.time_now(), self.blocks.options
@@ -345,53 +311,37 @@ class Liners(Structure):
         np.add.at(out, (rows - blocks.n_left, self._corner[at]), stiff)
         return out
 
-    def _held_here(self) -> tuple[np.ndarray, np.ndarray]:
-        blocks = self.blocks
-        host = np.repeat(self.elements["host"], self.kind.corners)
-        row = np.where(self._bound, blocks.where[host], -1)
-        at = np.flatnonzero((row >= blocks.owned.start) & (row < blocks.owned.stop))
-        return at, row[at]
+    def _hosts(self) -> np.ndarray:
+        return np.where(self._bound, np.repeat(self.elements["host"], self.kind.corners), -1)
 
     def add_to(self, applied: np.ndarray) -> None:
         """Forces on the rock at the present positions, in the order of elements [N/m]."""
         kernels.add(self._mine, self._rows, self._corner, self._on_rock, self.blocks.stride, applied)
 
-    def follow(self) -> None:
-        """The rock has moved: move the nodes over the same step, and find the new forces."""
-        blocks, nodes, beams = self.blocks, self.nodes, self.elements
-        if not len(self):
-            return
-        clock = blocks.clock
-        with blocks.timers("force"):
-            self._set_masses()
-            seen = np.zeros_like(self._on_rock)
-            kernels.host_points(self._mine, self._rows, self._corner, blocks.x, blocks.stride, seen)
-        if blocks.comm.size > 1:
-            with blocks.timers("reduce"):
-                blocks.comm.sum_into(seen.view(np.int64))  # one rank has each row, the others zero: exact
-        with blocks.timers("force"):
-            static = not blocks.options.dynamic
-            time = self._time_before()
-            conditions = self._conditions_at(time, time if static else clock.time - 0.5 * clock.dt)
-            work = self.work if self._account is not None and not static else np.zeros(kernels.WORK)
-            before, point = self._on_rock.copy(), beams["point"].reshape(seen.shape)
-            self._rock[:] = np.where(self._bound[:, None], seen - point, 0.0)
-            point[self._bound] = seen[self._bound]
-            kernels.move(
-                nodes["x"], nodes["v"], nodes["spin"].reshape(len(self), -1), self.kind.parts, self._total, conditions,
-                self._node_table, clock.dt, ALPHA if static else 0.0, nodes["reaction"], self._step, work,
-            )  # fmt: skip
-            self.kind.turn(clock.dt)
-            gap, pressure, bond_state = (beams[name].reshape(-1) for name in ("gap", "pressure", "bond_state"))
-            slip, shear = (beams[name].reshape(len(gap), -1) for name in ("slip", "shear"))
-            kernels.bond(
-                beams["ends"], self._frame, beams["state"], self._bound, self._point_table, self._step, self._rock,
-                gap, slip, pressure, shear, bond_state, work,
-            )  # fmt: skip
-            self.kind.bend(work)
-            self.kind.frames(self._frame)
-            self._find_forces()
-            kernels.work_on_rock(before, self._on_rock, self._rock, work)
+    def _seen(self) -> np.ndarray:
+        """Where the rock is [m] at each point."""
+        seen = np.zeros_like(self._on_rock)
+        kernels.host_points(self._mine, self._rows, self._corner, self.blocks.x, self.blocks.stride, seen)
+        return seen
+
+    def _move(self, seen: np.ndarray, conditions: np.ndarray, alpha: float, work: np.ndarray) -> None:
+        nodes, beams, dt = self.nodes, self.elements, self.blocks.clock.dt
+        point = beams["point"].reshape(seen.shape)
+        self._rock[:] = np.where(self._bound[:, None], seen - point, 0.0)
+        point[self._bound] = seen[self._bound]
+        kernels.move(
+            nodes["x"], nodes["v"], nodes["spin"].reshape(len(self), -1), self.kind.parts, self._total, conditions,
+            self._node_table, dt, alpha, nodes["reaction"], self._step, work,
+        )  # fmt: skip
+        self.kind.turn(dt)
+        gap, pressure, bond_state = (beams[name].reshape(-1) for name in ("gap", "pressure", "bond_state"))
+        slip, shear = (beams[name].reshape(len(gap), -1) for name in ("slip", "shear"))
+        kernels.bond(
+            beams["ends"], self._frame, beams["state"], self._bound, self._point_table, self._step, self._rock, gap,
+            slip, pressure, shear, bond_state, work,
+        )  # fmt: skip
+        self.kind.bend(work)
+        self.kind.frames(self._frame)
 
     def balance(self) -> tuple[np.ndarray, np.ndarray]:
         """Unbalanced and contributing forces [N/m] at all nodes that move by themselves, moments over the length of the
@@ -405,35 +355,16 @@ class Liners(Structure):
         parts.append(np.abs(self._node_table[:, kernels.WEIGHT : kernels.WEIGHT + self.blocks.dim]))
         return unbalanced[~self._led()], np.concatenate([part.reshape(-1) for part in parts])
 
-    def elements_removed(self, elements: np.ndarray) -> None:
-        """Liners on faces of these elements of the rock are free of them from now on."""
+    def _unbind(self, lost: np.ndarray) -> None:
         beams = self.elements
-        lost = np.isin(beams["host"], elements)
-        if not lost.any():
-            return
-        with self._booked():
-            self._unbind(lost)
-        if self.blocks.log is not None:
-            self.blocks.log.info(f"{int(lost.sum())} liner elements lost their rock, which was removed")
-
-    def _unbind(self, elements: np.ndarray) -> None:
-        """No rock holds these elements any more."""
-        beams = self.elements
-        beams["host"][elements] = -1
+        beams["host"][lost] = -1
         for name in ("pressure", "shear"):
-            beams[name][elements] = 0.0
-        beams["bond_state"][elements] &= ~(kernels.SLIPS | kernels.OPEN)
+            beams[name][lost] = 0.0
+        beams["bond_state"][lost] &= ~(kernels.SLIPS | kernels.OPEN)
 
     def _let_go(self, elements: np.ndarray) -> None:
         self._unbind(elements)
-        beams = self.elements
-        beams["force"][elements] = 0.0
-        gone = beams["state"] & REMOVED > 0
-        gone[elements] = True
-        lost = np.ones(len(self), bool)
-        lost[beams["ends"][~gone].reshape(-1)] = False
-        for name in ("condition", "v", "spin", "reaction"):
-            self.nodes[name][lost] = 0
+        self.elements["force"][elements] = 0.0
 
 
 def _sizes(vectors: np.ndarray, dim: int, over: np.ndarray | float = 1.0) -> np.ndarray:

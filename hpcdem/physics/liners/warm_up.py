@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hpcdem.core.comm import SerialComm
-from hpcdem.physics.fdem import changes
-from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.warm_up import ROCK
+from hpcdem.physics.fdem.warm_up import rock, two
 from hpcdem.physics.liners.model import Liners
 
 SHOTCRETE = {
@@ -20,19 +16,16 @@ SHOTCRETE = {
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
-    _step(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]), threads)
+    _step(2, threads)
 
 
 def in_space(threads: int = 1) -> None:
     """The same of those of a model in space. Writes nothing."""
-    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
-    _step(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
+    _step(3, threads)
 
 
-def _step(mesh: Mesh, threads: int) -> None:
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+def _step(dim: int, threads: int) -> None:
+    sim = rock(two(dim), threads)
     liners = Liners.of(sim)
     _, elements = liners.create(np.array([0, 1]))
     liners.assign(elements, SHOTCRETE)

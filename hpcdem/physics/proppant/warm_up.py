@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from hpcdem.core.comm import SerialComm
-from hpcdem.physics.fdem import changes
-from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.warm_up import ROCK
+from hpcdem.physics.fdem.warm_up import rock, two
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.warm_up import WATER
@@ -20,19 +16,16 @@ SAND = {
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
-    _settles(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]), threads)
+    _settles(2, threads)
 
 
 def in_space(threads: int = 1) -> None:
     """The same between two tetrahedra."""
-    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
-    _settles(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
+    _settles(3, threads)
 
 
-def _settles(mesh: Mesh, threads: int) -> None:
-    sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+def _settles(dim: int, threads: int) -> None:
+    sim = rock(two(dim), threads)
     flow = Flow.of(sim)
     flow.assign(None, WATER)
     flow.fill(None, saturation=1.0)
