@@ -298,13 +298,7 @@ class Clocks(Words, Accounts):
     def _now(self, ask: Callable[[Any], Any]) -> Any:
         return ask(self._do.project())
 
-    def cycle_option(
-        self,
-        part: str,
-        *,
-        time_step: float | None = None,
-        cycle_number: int | None = None,
-    ) -> None:
+    def cycle_option(self, part: str, *, time_step: float | None = None, cycle_number: int | None = None) -> None:
         """Time step [s] and number of steps of a part ("mechanical", "thermal", "hydraulic", "proppant-transport") in a
         cycle of a coupled calculation."""
         self._of_part("model cycle-option", part, time_step=time_step, cycle_number=cycle_number)

@@ -7,14 +7,7 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from hpcdem import session
-from hpcdem.core.errors import (
-    CommandError,
-    EquilibriumError,
-    HpcdemError,
-    ScriptError,
-    WrongTypeError,
-    WrongValueError,
-)
+from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, ScriptError, WrongTypeError, WrongValueError
 from hpcdem.core.nearest import hint
 from hpcdem.core.place import PACKAGE
 

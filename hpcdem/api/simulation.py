@@ -18,14 +18,7 @@ from hpcdem.api.functions import look as _look
 from hpcdem.api.particles import ParticleCommands
 from hpcdem.api.program import carried_out
 from hpcdem.commands import dem, fdem
-from hpcdem.core.errors import (
-    CommandError,
-    HpcdemError,
-    ScriptError,
-    UnknownNameError,
-    UsageError,
-    WrongValueError,
-)
+from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UnknownNameError, UsageError, WrongValueError
 from hpcdem.core.fields import FIELDS
 from hpcdem.core.nearest import hint
 from hpcdem.core.place import place as _place

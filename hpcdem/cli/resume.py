@@ -25,10 +25,7 @@ from hpcdem.runtime import run_folder
     "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."
 )
 @click.option(
-    "--before",
-    type=Finite(0.0),
-    metavar="T",
-    help="From the last checkpoint at or before T seconds of the model.",
+    "--before", type=Finite(0.0), metavar="T", help="From the last checkpoint at or before T seconds of the model."
 )
 @keeping
 @running

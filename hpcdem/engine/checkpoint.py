@@ -43,11 +43,7 @@ def read(
 
 
 def take_newest(
-    folders: list[Path],
-    model: Model,
-    before: float,
-    take: Callable[[Path], dict[str, Any]],
-    fatal: type[CommandError],
+    folders: list[Path], model: Model, before: float, take: Callable[[Path], dict[str, Any]], fatal: type[CommandError]
 ) -> tuple[Path, dict[str, Any]] | None:
     """Restore the newest complete checkpoint among the .sav files of some folders.
 

@@ -16,10 +16,7 @@ from hpcdem.io.transport import Places, Section, size_of, text_in_blocks, to_roo
 
 
 def write_sections(
-    path: str | os.PathLike,
-    comm: Comm,
-    build: Callable[[], Sequence[Section]],
-    later: Deliveries | None = None,
+    path: str | os.PathLike, comm: Comm, build: Callable[[], Sequence[Section]], later: Deliveries | None = None
 ) -> None:
     """Collective: write a file of sections, each either bytes (rank 0's are taken) or a table in slabs by rank.
 

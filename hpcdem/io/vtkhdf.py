@@ -59,11 +59,7 @@ def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Comm, later: Deliv
         vertices = np.arange(particles.offset, particles.offset + len(particles), dtype=np.int64)
         _topology(out, "Vertices", [(vertices[:, None], particles.offset)], 1, n)
         _topology(
-            out,
-            "Lines",
-            [(links[0], contacts.offset), (links[1], n_contacts + bonds.offset)],
-            2,
-            n_contacts + n_bonds,
+            out, "Lines", [(links[0], contacts.offset), (links[1], n_contacts + bonds.offset)], 2, n_contacts + n_bonds
         )
         for name in ("Polygons", "Strips"):
             _topology(out, name, [], 0, 0)

@@ -72,10 +72,7 @@ class Curves:
 
     def state(self) -> dict[str, Any]:
         """What there is to draw."""
-        return {
-            "records": [[one.name, one.title, one.label] for one in self.records()],
-            "charts": self.charts(),
-        }
+        return {"records": [[one.name, one.title, one.label] for one in self.records()], "charts": self.charts()}
 
     def presets(self) -> list[dict[str, Any]]:
         """Charts of the script, and what a laboratory draws: stress over strain first, load over shortening last.

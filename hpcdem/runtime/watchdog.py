@@ -35,11 +35,7 @@ class Watchdog:
     """The thread that listens. rank: named in its messages; leave: ends the process (replaced in tests)."""
 
     def __init__(
-        self,
-        rank: int = 0,
-        timeout: float = TIMEOUT,
-        grace: float = GRACE,
-        leave: Callable[[int], object] = os._exit,
+        self, rank: int = 0, timeout: float = TIMEOUT, grace: float = GRACE, leave: Callable[[int], object] = os._exit
     ) -> None:
         self._rank, self._timeout, self._grace, self._leave = rank, timeout, grace, leave
         self._main = threading.main_thread().ident or 0

@@ -13,8 +13,7 @@ TOUCHING = ("BALL id 0 rad 1.0 x 0.0 y 0.0", "BALL id 1 rad 1.0 x 1.9 y 0.0", "B
 
 
 @pytest.mark.parametrize(
-    ("word", "unit", "value"),
-    [("time", "s", 2e-3), ("contacts", "1", 2.0), ("bonds", "1", 1.0), ("step", "1", 2.0)],
+    ("word", "unit", "value"), [("time", "s", 2e-3), ("contacts", "1", 2.0), ("bonds", "1", 1.0), ("step", "1", 2.0)]
 )
 def test_a_word_of_hist(play, word, unit, value):
     sim, _ = play(*TOUCHING, f"HIST id 4 interval 1 {word}", "CYC 2")

@@ -134,10 +134,7 @@ def test_a_mask_of_an_unresolved_expression_is_refused():
 
 @pytest.mark.parametrize(
     ("program", "message"),
-    [
-        (("top", 0.0, "/"), "divides by zero"),
-        (("top", 1e308, "*", 1e308, "*"), "not a finite number"),
-    ],
+    [(("top", 0.0, "/"), "divides by zero"), (("top", 1e308, "*", 1e308, "*"), "not a finite number")],
 )
 def test_expressions_without_a_value(program, message):
     with pytest.raises(CommandError, match=message):

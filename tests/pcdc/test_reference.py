@@ -88,11 +88,7 @@ def test_tables_have_five_columns():
 def test_everything_has_a_meaning():
     for command in t.COMMANDS:
         assert command.doc and command.example, command.name
-        for option in (
-            *command.leading,
-            *command.options,
-            *(o for m in command.models for o in m.options),
-        ):
+        for option in (*command.leading, *command.options, *(o for m in command.models for o in m.options)):
             assert option.doc, (command.name, option.name)
 
 

@@ -114,10 +114,7 @@ sim.frame("walls")
 
 @pytest.mark.parametrize(
     ("ranks", "line", "told"),
-    [
-        (1, 17, "of: expected 'particles' or 'blocks', got 'walls'"),
-        (2, 10, "on one rank; on several .*hpcdem.frames"),
-    ],
+    [(1, 17, "of: expected 'particles' or 'blocks', got 'walls'"), (2, 10, "on one rank; on several .*hpcdem.frames")],
 )
 def test_frame_of_a_simulation(resident: Resident, tmp_path: Path, ranks: int, line: int, told: str) -> None:
     """As it is now: particles, blocks, and what it shows; on several ranks it is refused, with the way out."""

@@ -308,8 +308,7 @@ def test_clocks(make_machine):
 
 
 @pytest.mark.parametrize(
-    ("output", "names", "wrong"),
-    [("utf-8", "UTF8", False), ("ascii", "utf-8", True), ("utf-8", "latin1", True)],
+    ("output", "names", "wrong"), [("utf-8", "UTF8", False), ("ascii", "utf-8", True), ("utf-8", "latin1", True)]
 )
 def test_text(make_machine, monkeypatch, output, names, wrong):
     said = SimpleNamespace(stdout=SimpleNamespace(encoding=output), getfilesystemencoding=lambda: names)

@@ -69,14 +69,7 @@ def test_durations(seconds, text):
 
 @pytest.mark.parametrize(
     ("number", "text"),
-    [
-        (0.25, "0.25"),
-        (812, "812"),
-        (999.9, "1000"),
-        (20431, "20400"),
-        (48.2e6, "48.2 million"),
-        (2.5e9, "2.5 billion"),
-    ],
+    [(0.25, "0.25"), (812, "812"), (999.9, "1000"), (20431, "20400"), (48.2e6, "48.2 million"), (2.5e9, "2.5 billion")],
 )
 def test_rates(number, text):
     assert rate(number) == text

@@ -13,27 +13,10 @@ from typing import TYPE_CHECKING, Any
 from hpcdem.commands import fdem, units
 from hpcdem.commands.fdem.values import DEFAULT_LAYER
 from hpcdem.core.errors import CommandError
+from hpcdem.lang.pcdc import table as t
 from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import FunctionName, TableName
-from hpcdem.lang.pcdc.table import (
-    BOLT_FORCE,
-    BOLT_VELOCITY,
-    CONST_HEAT,
-    FIELDS_AT_FACES,
-    FIELDS_AT_NODES,
-    FLOW_CONDITION,
-    FLUID_TEMPERATURE,
-    FORCE,
-    MOVE,
-    PROPPANT_CONDITION,
-    SHORT,
-    STRESS,
-    TEMPERATURE,
-    VELOCITY,
-    Command,
-    Model,
-    Option,
-)
+from hpcdem.lang.pcdc.table import Command, Model, Option
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
 
@@ -105,7 +88,7 @@ class Call:
 
 def argument(name: str) -> str:
     """Name of the argument of functions for a word of the language."""
-    return "set_name" if name == "set" else SHORT.get(name) or python(name)
+    return "set_name" if name == "set" else t.SHORT.get(name) or python(name)
 
 
 def _in_order(option: Option, given: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -275,14 +258,14 @@ def _removed(call: Call, *conditions: Model) -> list[bool]:
 @converter
 def free_nodes(call: Call) -> None:
     """Release conditions of nodes of the physics to which they belong."""
-    of_blocks = zip(("motion", "force", "constraint"), _removed(call, VELOCITY, FORCE, MOVE))
+    of_blocks = zip(("motion", "force", "constraint"), _removed(call, t.VELOCITY, t.FORCE, t.MOVE))
     if kinds := [kind for kind, removed in of_blocks if removed]:
         fdem.assignments.remove_node_conditions(call.project, call.where, kinds)
-    if any(of_flow := _removed(call, FLOW_CONDITION, PROPPANT_CONDITION)):
+    if any(of_flow := _removed(call, t.FLOW_CONDITION, t.PROPPANT_CONDITION)):
         fdem.flow.remove_conditions(call.project, call.where, *of_flow)
-    if any(of_heat := _removed(call, TEMPERATURE, FLUID_TEMPERATURE)):
+    if any(of_heat := _removed(call, t.TEMPERATURE, t.FLUID_TEMPERATURE)):
         fdem.heat.remove_conditions(call.project, call.where, *of_heat)
-    _free_of_fields(call, FIELDS_AT_NODES)
+    _free_of_fields(call, t.FIELDS_AT_NODES)
 
 
 def _free_of_fields(call: Call, conditions: Mapping[str, Model]) -> None:
@@ -294,18 +277,18 @@ def _free_of_fields(call: Call, conditions: Mapping[str, Model]) -> None:
 @converter
 def free_faces(call: Call) -> None:
     """Release conditions of faces of the physics to which they belong."""
-    stress, heat = _removed(call, STRESS, CONST_HEAT)
+    stress, heat = _removed(call, t.STRESS, t.CONST_HEAT)
     if stress:
         fdem.assignments.remove_face_conditions(call.project, call.where)
     if heat:
         fdem.heat.remove_face_conditions(call.project, call.where)
-    _free_of_fields(call, FIELDS_AT_FACES)
+    _free_of_fields(call, t.FIELDS_AT_FACES)
 
 
 @converter
 def free_bolt_nodes(call: Call) -> None:
     """Release the components that the conditions prescribe."""
-    motion, force = _removed(call, BOLT_VELOCITY, BOLT_FORCE)
+    motion, force = _removed(call, t.BOLT_VELOCITY, t.BOLT_FORCE)
     stems = () if motion and force else ("does", "at") if motion else ("force",)
     fdem.supports.remove_conditions(call.project, g.BOLT_NODE, call.where, stems)
 
@@ -324,7 +307,7 @@ def initial_nodes(call: Call) -> None:
         fdem.assignments.force(call.project, **forces, where=call.where)
     if "temperature" in call.arguments:
         fdem.heat.initial(call.project, call["temperature"], call.where)
-    for field in FIELDS_AT_NODES:
+    for field in t.FIELDS_AT_NODES:
         if field in call.arguments:
             fdem.fields.initial(call.project, field, call[field], call.where)
 

@@ -11,30 +11,8 @@ from typing import Any
 from hpcdem.commands.fdem import geometry, values
 from hpcdem.commands.fdem.values import HOLE, LINE, OUTLINE, Piece
 from hpcdem.core.errors import CommandError
+from hpcdem.lang.pcdc import table as t
 from hpcdem.lang.pcdc.kinds import FunctionName, Pending, TableName
-from hpcdem.lang.pcdc.table import (
-    BARTON_BANDIS,
-    BOLT,
-    BOLT_VELOCITY,
-    BURGERS,
-    COHESIVE,
-    COMMANDS,
-    CONTACT,
-    COULOMB_JOINT,
-    FIELD_MODELS,
-    FLOW_CONDITION,
-    FLUID_HEAT,
-    ISO_ELASTIC,
-    ISO_HEAT,
-    LINER,
-    MOHR_COULOMB,
-    POROUS,
-    PROPPANT,
-    PROPPANT_CONDITION,
-    RECORDED,
-    USER,
-    Command,
-)
 from hpcdem.physics.bolts import layout
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
@@ -44,30 +22,13 @@ from hpcdem.physics.heat.properties import FLUID_HEAT as HEAT_OF_FLUID
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT
 from hpcdem.physics.proppant.properties import PROPPANT as GRAINS
 
-MODELS = {
-    model.keyword.name: model.of
-    for model in (
-        ISO_ELASTIC,
-        MOHR_COULOMB,
-        BURGERS,
-        USER,
-        CONTACT,
-        COHESIVE,
-        COULOMB_JOINT,
-        BARTON_BANDIS,
-        BOLT,
-        LINER,
-        POROUS,
-        PROPPANT,
-        ISO_HEAT,
-        FLUID_HEAT,
-        *FIELD_MODELS.values(),
-    )
-    if model.of is not None
-}
+MODELS = {one.keyword.name: one.of for command in t.COMMANDS for one in command.models if one.of is not None}
 """Models of the language by their names in full."""
 OF_FIELDS = tuple(one.model for one in kinds().values())
-_OF_SLIDING = (COULOMB_JOINT.of, BARTON_BANDIS.of)
+_COMPLETED = (
+    t.BOLT.of, t.LINER.of, FLUID, GRAINS, HEAT, HEAT_OF_FLUID, *OF_FIELDS, t.COULOMB_JOINT.of, t.BARTON_BANDIS.of,
+)  # fmt: skip
+"""Models whose properties are checked together as soon as all that are required are known."""
 _OF_COMMAND = {
     "element property": properties.SOLID,
     "element-face property": properties.CONTACT_MOHR_COULOMB,
@@ -75,7 +36,7 @@ _OF_COMMAND = {
 }
 
 
-def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+def check(command: t.Command, arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     """ValueError if values of a line make no sense in any model; expressions are left to the commands, which refuse the
     same."""
     try:
@@ -119,11 +80,11 @@ def python(name: str) -> str:
 @functools.cache
 def _hyphens() -> dict[str, str]:
     """Words with hyphens by their names in Python."""
-    models = [model for command in COMMANDS for model in command.models]
-    rows: list[Any] = [*COMMANDS, *models]
+    models = [model for command in t.COMMANDS for model in command.models]
+    rows: list[Any] = [*t.COMMANDS, *models]
     options = [option for row in rows for option in row.options]
     names = {row.name for row in options} | {model.keyword.name for model in models}
-    return {python(name): name for name in names.union(*RECORDED.values()) if "-" in name}
+    return {python(name): name for name in names.union(*t.RECORDED.values()) if "-" in name}
 
 
 def hyphened(text: str) -> str:
@@ -153,11 +114,11 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
         kind, *way = given["type"]
         if kind in (2, 3) and not (way and any(way[0])):
             raise CommandError("type 2 needs the vector along which the nodes may move, for example type 2 (1,0)")
-    elif name in ("mechanical-velocity-boundary-condition", BOLT_VELOCITY.keyword.name):
+    elif name in ("mechanical-velocity-boundary-condition", t.BOLT_VELOCITY.keyword.name):
         for axis in "xyz":
             if f"velocity-{axis}" in arguments and f"acceleration-{axis}" in arguments:
                 raise CommandError(f"velocity-{axis} and acceleration-{axis} cannot be combined")
-    elif name in (FLOW_CONDITION.keyword.name, PROPPANT_CONDITION.keyword.name) and len(arguments) > 1:
+    elif name in (t.FLOW_CONDITION.keyword.name, t.PROPPANT_CONDITION.keyword.name) and len(arguments) > 1:
         raise CommandError(f"{' and '.join(arguments)} cannot be combined at a flow node")
 
 
@@ -174,10 +135,8 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
     if model is properties.MECH_MOHR_COULOMB and {"friction", "dilation"} <= given.keys():
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
-    if (
-        model in (BOLT.of, LINER.of, POROUS.of, PROPPANT.of, ISO_HEAT.of, FLUID_HEAT.of, *OF_FIELDS, *_OF_SLIDING)
-        and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys()
-    ):
+    required = {p.name for p in model.properties if p.default is None and not p.optional}
+    if model in _COMPLETED and required <= given.keys():
         model.complete(given)
     if model in (properties.COHESIVE, properties.OF_JOINTS):
         for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):

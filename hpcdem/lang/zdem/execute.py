@@ -25,9 +25,7 @@ def refuse_unexecuted(statements: Sequence[Statement]) -> None:
     for statement in statements:
         if statement.unexecuted:
             raise ScriptError(
-                statement.file,
-                statement.line,
-                f"hpcdem does not support {', '.join(statement.unexecuted)} yet",
+                statement.file, statement.line, f"hpcdem does not support {', '.join(statement.unexecuted)} yet"
             )
 
 

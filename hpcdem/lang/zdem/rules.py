@@ -35,9 +35,7 @@ def check_place(statement: Statement, before: Sequence[Statement]) -> None:
     begins = statement.command in ("START", "RESTORE", "LOAD")
     if not before and not begins:
         raise ScriptError(
-            statement.file,
-            statement.line,
-            f"the first command is {statement.command}; it must be {BEGINNINGS}",
+            statement.file, statement.line, f"the first command is {statement.command}; it must be {BEGINNINGS}"
         )
     # START followed at once by LOAD or RESTORE loses nothing; anything else would throw a model away unnoticed.
     after_start = len(before) == 1 and before[0].command == "START" and statement.command != "START"

@@ -373,11 +373,7 @@ _PROP_DOC = (
     "immediately; existing bonds get the new values. Without a bond key tolerate and rext have no effect."
 )
 
-_DEGREES = (
-    Option("x", "motion in x"),
-    Option("y", "motion in y"),
-    Option("spin", "rotation"),
-)
+_DEGREES = (Option("x", "motion in x"), Option("y", "motion in y"), Option("spin", "rotation"))
 
 
 def _interval(name: str, doc: str, source: str = "R") -> Option:

@@ -180,10 +180,7 @@ def fit(mesh: Mesh, since: int = 0) -> Fit:
     turned = np.isin(pairs, quads).all(axis=1)
     middle = free.at.mean(axis=1)
     return Fit(
-        free.bodies,
-        middle[pairs[same, 0]],
-        middle[quads].mean(axis=1),
-        middle[pairs[~same & ~turned]].mean(axis=1),
+        free.bodies, middle[pairs[same, 0]], middle[quads].mean(axis=1), middle[pairs[~same & ~turned]].mean(axis=1)
     )
 
 

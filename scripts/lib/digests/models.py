@@ -81,16 +81,8 @@ def _shortened(text: str) -> str:
 
 
 CHAINS: dict[str, dict[str, str]] = {
-    "push": {
-        "push": "",
-        "syn_erosion": "push/data/0000006000.sav",
-        "syn_sedimentaion": "push/data/0000006000.sav",
-    },
-    "pre_struct": {
-        "pre_struct": "",
-        "detachment": "pre_struct/init_xyr.dat",
-        "palaeohigh": "pre_struct/init_xyr.dat",
-    },
+    "push": {"push": "", "syn_erosion": "push/data/0000006000.sav", "syn_sedimentaion": "push/data/0000006000.sav"},
+    "pre_struct": {"pre_struct": "", "detachment": "pre_struct/init_xyr.dat", "palaeohigh": "pre_struct/init_xyr.dat"},
     "ex8": {"ex8_dem_am_gen": "", "ex8_dem_am_push": "ex8_dem_am_gen/ini_xyr.dat"},
     "extens_rigid": {"extens_rigid": ""},
     "extens_ductile_patent": {"extens_ductile_patent": ""},

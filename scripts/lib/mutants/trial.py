@@ -151,8 +151,4 @@ def judge(copy: Copy, mutant: Mutant, seconds: float) -> dict[str, object]:
         by = ""  # it fails without the change too
         record["unsound"] = True
     copy.forget()
-    return record | {
-        "outcome": "killed" if by else "survived",
-        "by": by,
-        "seconds": round(time.monotonic() - began, 1),
-    }
+    return record | {"outcome": "killed" if by else "survived", "by": by, "seconds": round(time.monotonic() - began, 1)}

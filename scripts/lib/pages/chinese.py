@@ -81,12 +81,7 @@ def zdem_page() -> str:
             lines += ["例:", "", "```", *command.example, "```", ""]
         parts.append("\n".join(lines))
     parts += ["## RANGE\n\n写在行末,只对部分颗粒起作用;不写时对全部。各项用 `and`、`or` 连接,从左到右。\n"]
-    parts += [
-        _chinese(zdem._options(_meant(ZDEM.range_terms))),
-        "\n## 颜色\n",
-        "| 编号 | 名称 |",
-        "|---|---|",
-    ]
+    parts += [_chinese(zdem._options(_meant(ZDEM.range_terms))), "\n## 颜色\n", "| 编号 | 名称 |", "|---|---|"]
     parts += [f"| {number} | {name} |" for name, number in COLORS.items()]
     return "\n".join(parts).rstrip("\n") + "\n"
 

@@ -171,10 +171,7 @@ def _recorded() -> str:
     return "\n".join([*rows, ""])
 
 
-IN_THE_PLANE = {
-    "free-field": "自由场边界",
-    "discs that touch blocks": "与块体接触的圆盘",
-}
+IN_THE_PLANE = {"free-field": "自由场边界", "discs that touch blocks": "与块体接触的圆盘"}
 """What no word of the table tells, in English and Chinese: refused as it is met, before the run."""
 
 

@@ -161,10 +161,7 @@ pcdc model step 60
 
 
 HOSTILE = [
-    (
-        "element-face c-model c-m-c property friction 30 cohesion 1e5",
-        "contacts have friction but no cohesion",
-    ),
+    ("element-face c-model c-m-c property friction 30 cohesion 1e5", "contacts have friction but no cohesion"),
     ("node mechanical-damp local 1.5", "from 0 to 1"),
     ("node mechanical-damp", "lacks l{ocal}"),
     ("element-face boundary m-s-b-c dip table 'no'", "there is no table 'no'"),
