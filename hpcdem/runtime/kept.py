@@ -169,6 +169,8 @@ def install() -> None:
     from numba.core.caching import FunctionCache
     from numba.core.dispatcher import Dispatcher
 
+    from hpcdem.numerics.on_threads import OnThreads
+
     if _usual is None:
         name_kernels_apart()
         spare_c_entries()
@@ -185,7 +187,9 @@ def install() -> None:
     store.cache_clear()
     for name, module in list(sys.modules.items()):
         if name.startswith("hpcdem"):
-            kernels: list[Any] = [thing for thing in vars(module).values() if isinstance(thing, Dispatcher)]
+            things = vars(module).values()
+            both = [kernel for thing in things if isinstance(thing, OnThreads) for kernel in (thing.one, thing.several)]
+            kernels: list[Any] = [*both, *(thing for thing in things if isinstance(thing, Dispatcher))]
             for kernel in kernels:
                 there = isinstance(kernel._cache, _OfPackage) and store()[0] in Path(kernel._cache.cache_path).parents
                 if isinstance(kernel._cache, FunctionCache | _OfPackage) and not there:

@@ -60,9 +60,8 @@ def test_a_law_is_compiled_once(tmp_path, monkeypatch):
             del MODELS[name]
         sim = Blocks()
         law = user_laws.load(sim, path, "law.py:stiff")
-        told.append(
-            (sum(law.loops.triangle.stats.cache_hits.values()), sum(law.loops.triangle.stats.cache_misses.values()))
-        )
+        stats = law.loops.triangle.one.stats
+        told.append((sum(stats.cache_hits.values()), sum(stats.cache_misses.values())))
         return law
 
     first = stresses(load())
@@ -73,24 +72,24 @@ def test_a_law_is_compiled_once(tmp_path, monkeypatch):
     files = sorted(file.name.partition("-")[0] for file in folder.iterdir())
     assert files == ["evaluate", "find", "triangle"]
     law = load()
-    (signature,) = law.loops.triangle.overloads
+    (signature,) = law.loops.triangle.one.overloads
     loop = next(folder.glob("triangle-*"))
     whole = loop.read_bytes()
-    files_ = law.loops.triangle._cache
-    assert files_.load_overload(signature, law.loops.triangle.targetctx) is not None
+    files_ = law.loops.triangle.one._cache
+    assert files_.load_overload(signature, law.loops.triangle.one.targetctx) is not None
     if loop.stat().st_uid:  # what is root's is as safe as the system
         with monkeypatch.context() as somebody:
             somebody.setattr(kept.os, "getuid", lambda: 987654)
-            assert files_.load_overload(signature, law.loops.triangle.targetctx) is None
+            assert files_.load_overload(signature, law.loops.triangle.one.targetctx) is None
     else:
         os.chown(loop, 54321, -1)
-        assert files_.load_overload(signature, law.loops.triangle.targetctx) is None
+        assert files_.load_overload(signature, law.loops.triangle.one.targetctx) is None
         os.chown(loop, 0, -1)
     for damage in (whole[:-100], whole[:50] + b"?" + whole[51:], b""):
         loop.write_bytes(damage)
-        assert files_.load_overload(signature, law.loops.triangle.targetctx) is None
+        assert files_.load_overload(signature, law.loops.triangle.one.targetctx) is None
     loop.write_bytes(whole)
-    assert files_.load_overload(signature, law.loops.triangle.targetctx) is not None
+    assert files_.load_overload(signature, law.loops.triangle.one.targetctx) is not None
 
 
 def parts(tmp_path: Path, text: str) -> str | None:

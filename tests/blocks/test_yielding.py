@@ -171,7 +171,7 @@ def test_the_loop_over_quads_that_yield_is_flow_and_then_forces(large):
             args += [*out, True, 1.0, -9.81, 0.5, 1e-6, 3, np.zeros((7, elements.TALLY), np.int64)]
             own = sim.n_left, of.flat(of.initial), of.law
             if parts:
-                plastic_quads.yielding(*args, *own, soft, memory, table)
+                plastic_quads.yielding.one(args[0], soft, *args[1:], *own, memory, table)
             else:
                 flow.flows(
                     1, of.tables, of.count, of.flowing, of.initial, of.law, soft, not large, 3, memory, s0, table

@@ -98,7 +98,7 @@ def test_one_pass_over_channels_has_the_bits_of_two() -> None:
                 kernels.sub_step(ends, *along, channels, q, lost, *np.full((2, n + copies), 7.0), *told)
             else:
                 kernels.flows(1, ends, *along, channels, state, q, lost)
-                kernels.fill_threaded(2, begin, channel, side, q, leaks, lost, *told)
+                kernels.fill(2, begin, channel, side, q, leaks, lost, *told)
             found.append(np.concatenate([nodes.reshape(-1), state.reshape(-1), q, lost]))
     assert np.array_equal(found[0], found[1]) and np.array_equal(found[2], found[3])
     assert not np.array_equal(found[0], found[2])

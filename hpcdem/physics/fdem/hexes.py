@@ -107,8 +107,7 @@ class Hexes:
     def forces(self, force: np.ndarray, v: np.ndarray, gravity: tuple[float, float, float], s0: np.ndarray) -> None:
         """Into the rows (n, 16) [N] of these tetrahedra, with the velocities v (n, 16); s0: see `hexes.forces`."""
         sim, o = self.sim, self.sim.options
-        kernel: Any = hexes.forces if sim.threads == 1 else hexes.forces_threaded
-        kernel(
+        hexes.forces(
             sim.threads, self.count, self.place, sim.x, v, self.parts, self.h, self.remember, s0,
             not o.large_strain, force, *gravity, o.mass_damping, o.stiffness_damping,
         )  # fmt: skip

@@ -59,8 +59,7 @@ class HexJoints:
         """Add those on the corners (n, 16) [N], with keep to of_joints (n, 16) too; histories move on."""
         local, sim, hexes = self.local, self.local.sim, self.local.hexes
         assert hexes is not None
-        kernel: Any = joints_hexes.forces if sim.threads == 1 else joints_hexes.forces_threaded
-        kernel(
+        joints_hexes.forces(
             sim.threads, self.begin, self.slot, self.hexahedron, self.at, self.weights, hexes.place, hexes.h, sim.x, v,
             local.slot_kind, local.slot_state, local.slot_history, local.joint_table, local.joint_beyond, keep,
             of_joints, force, sim.clock.step, local.tally,

@@ -217,10 +217,6 @@ class Local(JointTables):
     def _bind(self) -> None:
         """Kernels for this number of threads, and their argument lists."""
         sim, pairs, o = self.sim, self.pairs, self.sim.options
-        one = sim.threads == 1
-        self._triangles: Any = elements.triangles if one else elements.triangles_threaded
-        self._quads: Any = elements.quads if one else elements.quads_threaded
-        self._yielding_quads: Any = plastic_quads.yielding if one else plastic_quads.yielding_threaded
         self.of_joints = np.zeros((len(sim.number) if sim.budget is not None else 1, elements.FORCE))
         small = not o.large_strain
         (s0, quad_s0), laws, stressed = (of.flat() for of in self.solids.blocks), self.laws, self.solids.stressed
@@ -264,7 +260,7 @@ class Local(JointTables):
         self.solids.move_on(every=False)
         what = (keep, o.gx, o.gy, o.mass_damping, o.stiffness_damping)
         args: tuple[Any, ...] = *self._triangle_args, special, block_special, force, of_joints, *what, alpha, step
-        self.laws.forces(0, self._triangles, *args, self.tally)
+        self.laws.forces(0, elements.triangles, *args, self.tally)
         if self.whole is not None:
             self.whole.add_forces(sim.v, 1.0, force)
         if not len(self.quad_rows):
@@ -272,11 +268,12 @@ class Local(JointTables):
         args = *self._quad_args, force, of_joints, *what, step, self.tally
         if self.yielding.on:
             of, yielding = self.solids.blocks[1], self.yielding
-            self._yielding_quads(
-                *args, sim.n_left, of.flat(of.initial), of.law, yielding.strength, sim.cold["plastic"], yielding.table
-            )
+            plastic_quads.yielding(
+                args[0], yielding.strength, *args[1:], sim.n_left, of.flat(of.initial), of.law, sim.cold["plastic"],
+                yielding.table,
+            )  # fmt: skip
         else:
-            self.laws.forces(1, self._quads, *args)
+            self.laws.forces(1, elements.quads, *args)
 
     def open_joints(self) -> None:
         """Joints remember the present positions: those beyond their peak pass it, or break. Elements do not flow."""

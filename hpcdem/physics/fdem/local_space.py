@@ -142,9 +142,6 @@ class LocalSpace(Local):
         self.some_alone = bool(alone.any())
 
     def _bind(self) -> None:
-        one = self.sim.threads == 1
-        self._forces: Any = tets.forces if one else tets.forces_threaded
-        self._kick: Any = space.kick if one else space.kick_threaded
         self.of_joints = np.zeros((len(self.sim.number) if self.sim.budget is not None else 1, tets.ROW))
 
     def _in_step(self, keep: bool) -> None:
@@ -168,7 +165,7 @@ class LocalSpace(Local):
         (tetrahedra, hexahedra), hexes = self.solids.blocks, self.hexes
         stressed = self.solids.stressed or self.laws.some
         some = 0 if hexes is not None and 6 * hexes.count == self.count else self.count
-        self._forces(
+        tets.forces(
             sim.threads, some, self.rows, sim.x, v, self.c, tetrahedra.flat(), stressed, not o.large_strain, force,
             *gravity, o.mass_damping, o.stiffness_damping, joints and self.jointed, self.slot_size, self.slot_link,
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
@@ -187,7 +184,7 @@ class LocalSpace(Local):
         """New velocities from the forces on corners. Collective."""
         sim = self.sim
         if self.some_alone:
-            self._kick(sim.threads, sim.n_left, self.kick, self.force, sim.v, 0.0 if sim.options.dynamic else ALPHA)
+            space.kick(sim.threads, sim.n_left, self.kick, self.force, sim.v, 0.0 if sim.options.dynamic else ALPHA)
         self.nodes.move(self.force, self.loads)
 
     def stresses(

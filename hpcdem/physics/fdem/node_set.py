@@ -4,10 +4,11 @@ elements whose forces are stored (kernels/nodes.py, in space kernels/space.py)."
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hpcdem.numerics.on_threads import OnThreads
 from hpcdem.physics.fdem import build
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
@@ -52,8 +53,7 @@ class NodeSet:
 
     kick: np.ndarray
     _table: np.ndarray | None
-    _kernel: Any = staticmethod(moving.move)
-    _kernel_threaded: Any = staticmethod(moving.move_threaded)
+    _kernel: OnThreads = moving.move
 
     def __init__(self, sim: State, special: np.ndarray, width: int, stride: int) -> None:
         self.sim, self.special, self.width, self.stride = sim, special, width, stride
@@ -131,8 +131,7 @@ class NodeSet:
         if table is None:
             now, half = sim.time_now(), 0.5 * clock.dt if sim.options.dynamic else 0.0
             table = conditions_now(sim, self.functions, now, now + half, clock.dt)
-        kernel = self._kernel if sim.threads == 1 else self._kernel_threaded
-        kernel(
+        self._kernel(
             sim.threads, self.begin, self.corner, *self._where(), self.kick, self.condition, self.share, table,
             loads.some, force, loads.applied, sim.v, 0.0 if sim.options.dynamic else ALPHA, self.outside, self.felt,
         )  # fmt: skip
@@ -162,8 +161,7 @@ class NodeSet:
 class NodeSetSpace(NodeSet):
     """Only the corners of nodes are kept. Of hexahedra only one corner at each of their points has forces."""
 
-    _kernel = staticmethod(space.move)
-    _kernel_threaded = staticmethod(space.move_threaded)
+    _kernel = space.move
     _pulled: tuple[np.ndarray, np.ndarray] | None = None
 
     def pull(self, true_mass: np.ndarray) -> None:

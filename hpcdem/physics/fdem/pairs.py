@@ -486,24 +486,18 @@ class ContactPairs(Bodies):
 
     def forces(self, x: np.ndarray, v: np.ndarray, dt: float) -> None:
         """Contact forces at the present positions; histories move on by dt."""
-        act, collect = (
-            (contact.forces, contact.collect)
-            if self.threads == 1
-            else (contact.forces_threaded, contact.collect_threaded)
-        )
-        act(
+        contact.forces(
             self.threads, self.first, self.second, self.x_place, self.v_place, x, v, self.table, self.history,
             self.dampers, self.largest, self.chosen, self.choice_begin, self.choices, self.touching, self.out, dt,
         )  # fmt: skip
-        collect(
+        contact.collect(
             self.threads, self.begin, self.entry, self.entry_start, self.corners, self.touching, self.out, self.pushed
         )
 
     def parts(self, x: np.ndarray) -> np.ndarray:
         """Present depth of overlap of pairs over an altitude (m,)."""
         part = np.zeros(len(self))
-        find = contact.parts if self.threads == 1 else contact.parts_threaded
-        find(self.threads, self.first, self.second, self.x_place, x, self.table, self.touching, part)
+        contact.parts(self.threads, self.first, self.second, self.x_place, x, self.table, self.touching, part)
         return part
 
     def depths_of(self, at: np.ndarray, x: np.ndarray, depth: np.ndarray) -> None:

@@ -277,8 +277,7 @@ class ContactSpace:
 
     def forces(self, x: np.ndarray, v: np.ndarray, dt: float) -> None:
         """Contact forces at the present positions; histories move on by dt."""
-        act = contact.forces if self.threads == 1 else contact.forces_threaded
-        act(
+        contact.forces(
             self.threads, self.place, self.box, self.first, self.second, self.corner, self.length, x, v, self.law,
             self.chosen, self.choice_begin, self.choices, self.history, self.touching, self.out, dt, self.begin,
             self.entry, self.pushed,
@@ -287,8 +286,7 @@ class ContactSpace:
     def parts(self, x: np.ndarray) -> np.ndarray:
         """Present depth of overlap of pairs over an altitude (m,)."""
         part = np.zeros(len(self))
-        find = contact.parts if self.threads == 1 else contact.parts_threaded
-        find(self.threads, self.first, self.second, self.corner, self.place, x, self.touching, part)
+        contact.parts(self.threads, self.first, self.second, self.corner, self.place, x, self.touching, part)
         return part
 
     def depths_of(self, at: np.ndarray, x: np.ndarray, depth: np.ndarray) -> None:

@@ -149,8 +149,7 @@ class Blocks(Edited):
 
     def _move_rows(self, first: int, last: int) -> None:
         of = tets if self.dim == 3 else elements
-        kernel = of.drift if self.threads == 1 else of.drift_threaded
-        kernel(self.threads, self.n_left + first, self.n_left + last, self.x, self.v, self.clock.dt)
+        of.drift(self.threads, self.n_left + first, self.n_left + last, self.x, self.v, self.clock.dt)
 
     def _moved(self) -> None:
         clock = self.clock

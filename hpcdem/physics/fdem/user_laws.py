@@ -180,9 +180,11 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     values, place = made_of(kernel, path), None
     if values is not None:
         place = kept.folder(name, values, repr((names, states, columns, declared.dim)))
-        for what, made in {"evaluate": evaluate, **loops._asdict()}.items():
+        kept.keep(evaluate, place, "evaluate")
+        for what, made in loops._asdict().items():
             if made is not None:
-                kept.keep(made, place, what)
+                kept.keep(made.one, place, what)
+                kept.keep(made.several, place, f"{what}_threaded")
     if place is None or not kept.knows(place, "evaluate"):  # what is kept has passed this
         check_what_returns(kernel, len(names), wanted, path, line)
     try:

@@ -384,14 +384,14 @@ class Diffusing(Conditions):
         return False
 
     def _sub_step(self) -> None:
-        blocks, threads = self.blocks, self.blocks.threads
+        blocks = self.blocks
         q = self.inflow(self.time, self.dt).reshape(-1)
         self.time += self.dt
         first, last = self._own_corners()
         t, given, at = self.t.reshape(-1), blocks.cold[self.given].reshape(-1), self.at
-        (kernels.warm if threads == 1 else kernels.warm_threaded)(
-            threads, at.begin, at.corner, at.capacity, at.held, self.held_at(self.time), first, last, self.dt, q, t,
-            given,
+        kernels.warm(
+            blocks.threads, at.begin, at.corner, at.capacity, at.held, self.held_at(self.time), first, last, self.dt, q,
+            t, given,
         )  # fmt: skip
         blocks.halo.fill(self.t)
 

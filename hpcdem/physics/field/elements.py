@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.core.units import counted
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.elements.kind import HEXAHEDRON, QUAD, TETRAHEDRON, TRIANGLE, Kind
 
@@ -125,19 +126,10 @@ def _at_places(part, threads, at, g, t, q):
             q[at[i, k]] = total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def conduct(threads, g, at, g_there, t, q):
     """What flows to the corners of elements by conduction in them, stored in q (flat), with values t (flat): g (n, 3 or
     6) between those of rows of storage, then g_there (m, 24) between those at places at (m, 8)."""
-    for part in range(threads):
-        _in_rows(part, threads, g, t, q)
-    for part in range(threads):
-        _at_places(part, threads, at, g_there, t, q)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def conduct_threaded(threads, g, at, g_there, t, q):
-    """The same on several threads."""
     for part in prange(threads):
         _in_rows(part, threads, g, t, q)
     for part in prange(threads):
@@ -172,7 +164,7 @@ class Conduction:
     def __init__(self, blocks: Blocks, width: int, conductivities: Callable[[np.ndarray], np.ndarray]) -> None:
         """conductivities: (n, 6) of elements (n,)."""
         mesh, self.number, self.width = blocks.reference, blocks.number, width
-        self.blocks, self.kernel = blocks, conduct if blocks.threads == 1 else conduct_threaded
+        self.blocks = blocks
         self.g = np.zeros((len(self.number), len(PAIRS[width])))
         self.hexes, self.g_hexes = np.empty((0, 8), np.int64), np.empty((0, len(PAIRS[8])))
         self.sizes = np.zeros((len(self.number), width))
@@ -194,7 +186,7 @@ class Conduction:
 
     def conduct(self, t: np.ndarray, q: np.ndarray) -> None:
         """What flows to corners into q (flat), with values t (flat)."""
-        self.kernel(self.blocks.threads, self.g, self.hexes, self.g_hexes, t, q)
+        conduct(self.blocks.threads, self.g, self.hexes, self.g_hexes, t, q)
 
     def by_kind(self) -> Iterator[tuple[Kind, np.ndarray, np.ndarray, np.ndarray]]:
         """Kind, numbers of elements (m,), corners (m, c), element * 4 + k, and what flows between these (m, pairs)."""

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from numba import njit, prange
 
+from hpcdem.numerics.on_threads import on_threads
+
 FLUX, TRANSFER, ENVIRONMENT = range(3)
 """Columns of the table of conditions of faces [W/m2, W/(m2 K), K]."""
 
@@ -50,7 +52,7 @@ def _warm(part, threads, begin, corner, capacity, held, table, first, last, dt, 
             t[corner[m]] = new
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def warm(threads, *args):
     """Temperatures after dt [s] of heat q that flows to them, (99).
 
@@ -58,15 +60,8 @@ def warm(threads, *args):
     held (n,): row of the table of prescribed temperatures, -1: free; t, q, given: flat; corners first : last are this
     rank's, what conditions bring is booked in given [J/m].
     """
-    for part in range(threads):
-        _warm(part, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def warm_threaded(threads, begin, corner, capacity, held, table, first, last, dt, q, t, given):
-    """The same on several threads."""
     for part in prange(threads):
-        _warm(part, threads, begin, corner, capacity, held, table, first, last, dt, q, t, given)
+        _warm(part, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -231,8 +231,8 @@ class Channels(Travelling, FlowAssignments):
 
     def find_geometry(self) -> None:
         """Apertures and conductances where the blocks are now. Not collective."""
-        blocks, kernel = self.blocks, kernels.geometry if self.blocks.threads == 1 else kernels.geometry_threaded
-        kernel(blocks.threads, *self.sides, self._law, self._law_table, blocks.x, self.viscosity, self.channel_table)
+        blocks, to = self.blocks, self.channel_table
+        kernels.geometry(blocks.threads, *self.sides, self._law, self._law_table, blocks.x, self.viscosity, to)
         if self.slurry is not None:
             self.slurry.thicken(self._ends, self.channel_table)
 
@@ -281,11 +281,9 @@ class Channels(Travelling, FlowAssignments):
         return self._flowing
 
     def _find_flows(self, dt: float) -> None:
-        threads, table = self.blocks.threads, self._flowing_table()
-        kernel = kernels.flows if threads == 1 else kernels.flows_threaded
-        kernel(
-            threads, self._ends, self._law, self._law_table, self._since, self._leaks, self.time, self.time + dt,
-            table, self.state, self._q, self._lost_fluid,
+        kernels.flows(
+            self.blocks.threads, self._ends, self._law, self._law_table, self._since, self._leaks, self.time,
+            self.time + dt, self._flowing_table(), self.state, self._q, self._lost_fluid,
         )  # fmt: skip
 
     def mean_flows(self) -> np.ndarray:

@@ -249,8 +249,9 @@ class Fluid:
         wet = state.copy()
         wet[:, kernels.S] = np.maximum(wet[:, kernels.S], 0.0)  # trial states may lack it
         threads = self.flow.blocks.threads
-        flows = kernels.flows if threads == 1 else kernels.flows_threaded
-        flows(threads, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, wet, q, lost)
+        kernels.flows(
+            threads, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, wet, q, lost
+        )
         volume = self.rooms(table)
         fluid = volume * (state[:, kernels.S] + state[:, kernels.P] / self.bulk)
         dt, stored = step.dt, fluid - step.fluid
@@ -316,8 +317,7 @@ class Fluid:
         corners = np.ascontiguousarray(x[self.at].reshape(self.m, width))
         near = width * np.arange(self.m)[:, None] + dim * np.arange(dim)
         threads = self.flow.blocks.threads
-        geometry = kernels.geometry if threads == 1 else kernels.geometry_threaded
-        geometry(threads, near, near + dim * dim, self.law, self.laws, corners, self.flow.viscosity, table)
+        kernels.geometry(threads, near, near + dim * dim, self.law, self.laws, corners, self.flow.viscosity, table)
         return table
 
     # ---- the end of a step ---------------------------------------------------------------------------------------

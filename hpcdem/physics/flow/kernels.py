@@ -14,6 +14,7 @@ import math
 
 from numba import njit, prange
 
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.kernels import joints, joints_space
 
 P, S, E = range(3)
@@ -101,7 +102,7 @@ def _geometry(t, threads, one, other, law, laws, x, viscosity, out):
         out[c, CONDUCT], out[c + 1, CONDUCT], out[c + 2, CONDUCT] = over * cot_a, over * cot_b, over * cot_c
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def geometry(threads, *args):
     """Aperture [m] (79) with what slip adds, conductance [m2 / (Pa s)] and half of the volume [m2] of the links of
     channels, out (l, 4), in space [m3 / (Pa s)] and [m3]. one, other (m, dim): where the corners of both faces begin in
@@ -110,15 +111,8 @@ def geometry(threads, *args):
     An edge is one link, delta^3 / (12 mu L). Pressure is linear over a triangle, so what flows to its corners, -q . n s
     / 2 each (the manual's 7.5.1), is the sum of what goes along its sides, three links of a third of its area each:
     delta^3 cot(angle opposite) / (24 mu)."""
-    for t in range(threads):
-        _geometry(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def geometry_threaded(threads, one, other, law, laws, x, viscosity, out):
-    """The same on several threads."""
     for t in prange(threads):
-        _geometry(t, threads, one, other, law, laws, x, viscosity, out)
+        _geometry(t, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -211,7 +205,7 @@ def _flows(t, threads, ends, law, laws, since, leaks, before, after, channels, s
             lost[c] = _leaking(c, ends, laws[law[c]], since[c], before, after, channels, state)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def flows(threads, *args):
     """Flow q (m,) [m2/s] from the first to the last end of channels, and what each end loses to the rock in a sub-step
     lost (m,) [m2], by the state of their ends (m, 2).
@@ -219,15 +213,8 @@ def flows(threads, *args):
     The saturation in `part` is the mean of both ends, at most that of the end that it flows from: dry nodes give
     nothing away. since (m,) [s]: when leak-off began (inf: it has not); before, after: times of the sub-step.
     """
-    for t in range(threads):
-        _flows(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def flows_threaded(threads, ends, law, laws, since, leaks, before, after, channels, state, q, lost):
-    """The same on several threads."""
     for t in prange(threads):
-        _flows(t, threads, ends, law, laws, since, leaks, before, after, channels, state, q, lost)
+        _flows(t, threads, *args)
 
 
 @njit(cache=True, error_model="numpy")
@@ -270,7 +257,7 @@ def sub_step(
 
     condition (nodes,): row of the table (rows, 2) of what is prescribed and its value: pressure [Pa]; energy of the
     surface [Pa]: hydrostatic below it, above it fluid can leave (a seepage face); rate [m2/s], as far as there is fluid
-    to take. One pass over the channels: a node's sum is in the order of channels, as in `fill_threaded`.
+    to take. One pass over the channels: a node's sum is in the order of channels, as in `fill`.
     """
     into[:] = 0.0
     if leaks:
@@ -302,12 +289,12 @@ def _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table
         _take(i, into, leaks, gone, dt, condition, table, bulk, nodes, state)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def fill_threaded(threads, begin, channel, side, q, leaks, lost, dt, condition, table, bulk, nodes, state):
+@on_threads
+def fill(threads, *args):
     """What `sub_step` does with the nodes after `flows`, on several threads. begin (n + 1,), channel, side (k,): see
     network.at_nodes."""
     for t in prange(threads):
-        _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table, bulk, nodes, state)
+        _fill(t, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

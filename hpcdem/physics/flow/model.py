@@ -250,7 +250,7 @@ class Flow(Values):
         else:
             self._find_flows(self.dt)
             links = self._begin, self._channel, self._side, self._q, self._leaks, self._lost_fluid
-            kernels.fill_threaded(blocks.threads, *links, *told)
+            kernels.fill(blocks.threads, *links, *told)
         self.time = after
         if self.carried is not None:
             self.carried += self.dt * self._q

@@ -46,11 +46,10 @@ class Creeping:
         """Elements creep for the time that has passed, see `creep.creep`: memory, if they keep it, and stress without
         strain of the blocks [Pa] become those after it."""
         sim = self.sim
-        kernel = creep.creep if sim.threads == 1 else creep.creep_threaded
         how = self.table, not sim.options.large_strain, sim.creep.passed, keep, memory
         for of, stress in zip(self.blocks, s0):
             if len(of.creeping):
-                kernel(sim.threads, of.creeping, of.tables, of.uncrept, of.model, *how, stress)
+                creep.creep(sim.threads, of.creeping, of.tables, of.uncrept, of.model, *how, stress)
 
     def keep(self) -> None:
         """Elements have crept for the time that has passed, and remember it."""

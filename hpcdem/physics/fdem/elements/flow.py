@@ -29,6 +29,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.elements import parts
 from hpcdem.physics.fdem.elements.kind import HEXAHEDRON, QUAD, TETRAHEDRON, TRIANGLE, Kind
 from hpcdem.physics.fdem.elements.parts import _by_kind as by_kind
@@ -513,8 +514,8 @@ def _flow(kind: Kind) -> Any:
 _flow_of = by_kind(_flow)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def flows(threads, *args):
+@on_threads
+def flows(threads, g, count, who, base, law, soft, *args):
     """Let elements that are outside their yield surface at the present positions flow.
 
     g: tables of elements (kind.py); count: of them; who (count + 3,): which can yield, of all kinds but tetrahedra all,
@@ -522,12 +523,5 @@ def flows(threads, *args):
     small: small strains; step: number of this step. They become those after the flow: memory, see plasticity.py; s0
     (.., parts, 4 or 8) [Pa]: stress without strain; table (rows, 4) of yield surfaces, see `plasticity.YIELD`.
     """
-    for t in range(threads):
-        _flow_of(args[0], t, threads, *args[1:])
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def flows_threaded(threads, g, count, who, base, law, soft, small, step, memory, s0, table):
-    """The same on several threads."""
     for t in prange(threads):
-        _flow_of(g, t, threads, count, who, base, law, soft, small, step, memory, s0, table)
+        _flow_of(g, t, threads, count, who, base, law, soft, *args)

@@ -98,7 +98,7 @@ class UserLaws:
 
         (one, some), of, memory = runs, self.blocks[k], sim.cold[user_laws.COLUMN]
         given = LawTables(some, of.model, one.table, self._dt(), sim.n_left, memory, self._width(memory))
-        one.law.loops.with_forces(of.kind, sim.threads)(args[0], given, *args[1:])
+        one.law.loops.with_forces(of.kind)(args[0], given, *args[1:])
 
     def _dt(self) -> float:
         return float(self.sim.clock.dt) if self.sim.options.dynamic else 0.0
@@ -118,8 +118,7 @@ class UserLaws:
 
     def _find(self, one: LawHere, k: int, memory: np.ndarray, s0: np.ndarray) -> None:
         sim, of = self.sim, self.blocks[k]
-        loop = one.law.loops.find if sim.threads == 1 else one.law.loops.find_threaded
-        loop(
+        one.law.loops.find(
             sim.threads, one.who[k], of.tables, self.initial, self.thermal, of.model, one.table, self._dt(),
             not sim.options.large_strain, memory, self._width(memory), s0,
         )  # fmt: skip

@@ -136,10 +136,9 @@ class Yielding:
         forces."""
         memory, after, table, history = self.state() if state is None else state
         sim, soft = self.sim, self.strength._replace(history=history)
-        kernel = plastic_flow.flows if sim.threads == 1 else plastic_flow.flows_threaded
         for of, s0 in zip(self.blocks, after):
             if len(of.flowing) and (every or of.kind is not QUAD):
-                kernel(
+                plastic_flow.flows(
                     sim.threads, of.tables, len(of.flowing) - 3, of.flowing, of.initial, of.law, soft,
                     not sim.options.large_strain, step, memory, s0, table,
                 )  # fmt: skip

@@ -36,6 +36,7 @@ from hpcdem.numerics.lanes import (
     put_two_columns,
     two_columns,
 )
+from hpcdem.numerics.on_threads import on_threads
 
 BATCH = 32
 """Pairs looked at between two questions whether there is enough to work on."""
@@ -557,7 +558,7 @@ def _forces(
         n = 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def forces(threads, *args):
     """Forces of all pairs; histories move on by dt.
 
@@ -567,21 +568,8 @@ def forces(threads, *args):
     (n + 1,) i8: rows of choices (q, 11); without rows if there are none; touching (m,) u1: pairs that overlap; out
     (m, 12) [N/m]: forces on the corners of the first and of the second body, valid where they touch.
     """
-    for t in range(threads):
-        _forces(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(
-    threads, first, second, x_place, v_place, x, v, pairs, history, dampers, largest, chosen, choice_begin, choices,
-    touching, out, dt,
-):  # fmt: skip
-    """The same on several threads."""
     for t in prange(threads):
-        _forces(
-            t, threads, first, second, x_place, v_place, x, v, pairs, history, dampers, largest, chosen, choice_begin,
-            choices, touching, out, dt,
-        )  # fmt: skip
+        _forces(t, threads, *args)
 
 
 @njit(cache=True, error_model="numpy")
@@ -614,19 +602,12 @@ def _parts(t, threads, first, second, x_place, x, pairs, touching, part):
                 part[k] = max(part[k], edge_integral(a1, a2, a3, b1, b2, b3, aside)[3])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def parts(threads, *args):
     """How deep the contactors of each row are in the other body, over its altitude there: part (m,), at most 1/3, 0
     where they do not touch. Arguments as those of `forces`."""
-    for t in range(threads):
-        _parts(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def parts_threaded(threads, first, second, x_place, x, pairs, touching, part):
-    """The same on several threads."""
     for t in prange(threads):
-        _parts(t, threads, first, second, x_place, x, pairs, touching, part)
+        _parts(t, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -680,19 +661,12 @@ def _collect(t, threads, begin, entry, start, corners, touching, out, pushed):
                 pushed[i, at + 1] += out[k, from_ + 2 * c + 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def collect(threads, *args):
     """Sum of the contact forces on the corners of each element of the contact set, in the order of partners.
 
     begin (n + 1,), entry (k,): pair * 2 + side, start (k,): the element's corner that is the body's first; corners
     (n,): 3 or 4; pushed (n, 8) [N/m].
     """
-    for t in range(threads):
-        _collect(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def collect_threaded(threads, begin, entry, start, corners, touching, out, pushed):
-    """The same on several threads."""
     for t in prange(threads):
-        _collect(t, threads, begin, entry, start, corners, touching, out, pushed)
+        _collect(t, threads, *args)

@@ -25,6 +25,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import U
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.kernels.tets import ROW, STRIDE
 from hpcdem.physics.fdem.tetrahedra import FACES
 
@@ -399,7 +400,7 @@ def _collect(t, threads, begin, entry, touching, out, pushed):
                         pushed[i, STRIDE * FACES[face, c] + k] += out[p, 3 * c + k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def forces(threads, place, box, first, second, corner, length, x, v, law, chosen, choice_begin, choices, history,
            touching, out, dt, begin, entry, pushed):  # fmt: skip
     """Forces of all pairs, and their sums by elements; histories move on by dt.
@@ -411,19 +412,6 @@ def forces(threads, place, box, first, second, corner, length, x, v, law, chosen
     that overlap; out (m, 21) [N]: forces on the corners of the face and of the target, valid where they touch; begin
     (k + 1,), entry: pair * 8 + face of each element with pairs, + 4: it is the target; pushed (k, 16) [N].
     """
-    for t in range(threads):
-        _boxes(t, threads, place, x, box)
-    for t in range(threads):
-        _forces(t, threads, first, second, corner, place, length, box, x, v, law, chosen, choice_begin, choices,
-                history, touching, out, dt)  # fmt: skip
-    for t in range(threads):
-        _collect(t, threads, begin, entry, touching, out, pushed)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(threads, place, box, first, second, corner, length, x, v, law, chosen, choice_begin, choices,
-                    history, touching, out, dt, begin, entry, pushed):  # fmt: skip
-    """The same on several threads."""
     for t in prange(threads):
         _boxes(t, threads, place, x, box)
     for t in prange(threads):
@@ -453,19 +441,12 @@ def _parts(t, threads, first, second, corner, place, x, touching, part):
             part[p] = 0.25 * _integrals(w)[4]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def parts(threads, *args):
     """How deep the face of each pair is in its target, over its altitude there: part (m,), at most 1/4, 0 where they do
     not touch. Arguments as those of `forces`."""
-    for t in range(threads):
-        _parts(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def parts_threaded(threads, first, second, corner, place, x, touching, part):
-    """The same on several threads."""
     for t in prange(threads):
-        _parts(t, threads, first, second, corner, place, x, touching, part)
+        _parts(t, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

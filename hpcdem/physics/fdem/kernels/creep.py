@@ -33,6 +33,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.elements import parts
 from hpcdem.physics.fdem.kernels import laws
 
@@ -181,8 +182,8 @@ def _creep(t, threads, who, g, base, law, table, small, dt, keep, memory, s0):
         parts.share(g, i, s0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def creep(threads, *args):
+@on_threads
+def creep(threads, who, g, *args):
     """Let elements creep for dt [s], at the end of which they are at the present positions. keep: they remember it,
     and their stress now is what the next creep step begins with; else only s0 is what it would be.
 
@@ -190,15 +191,8 @@ def creep(threads, *args):
     their parts; law (n,): row of the table (rows, 3) of models, see `LAW`; small: small strains; memory: of owned
     elements, see `MEMORY`; s0, as base: stress without strain now.
     """
-    for t in range(threads):
-        _creep(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def creep_threaded(threads, who, g, base, law, table, small, dt, keep, memory, s0):
-    """The same on several threads."""
     for t in prange(threads):
-        _creep(t, threads, who, g, base, law, table, small, dt, keep, memory, s0)
+        _creep(t, threads, who, g, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, put_four_columns, put_two_columns, two_columns
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.kernels import joint_law, joints, laws, softening
 from hpcdem.physics.fdem.kernels.joint_law import HISTORY, KINETIC, PEAK_KINETIC, PEAK_STEP, STEP
 from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, NONE, YIELDED
@@ -392,7 +393,7 @@ def triangle_blocks(stress, more=0):
 _triangles = triangle_blocks(_elastic_block)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def triangles(threads, *args):
     """Forces on the corners of all owned triangles at the present positions; corners that move by themselves are
     kicked, forces on the others are stored. Joint histories move on.
@@ -405,23 +406,8 @@ def triangles(threads, *args):
     `pushed` (k, 8) fall on which lane of which block; special (count,), some_special (blocks,) bool; force, of_joints
     (n, 8) [N/m]; drag [1/s], beta [s]: Rayleigh damping; alpha: local damping; tally (threads, 8) i8.
     """
-    for t in range(threads):
-        _triangles(None, t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def triangles_threaded(
-    threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head, follow,
-    table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
-    of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
-):  # fmt: skip
-    """The same on several threads."""
     for t in prange(threads):
-        _triangles(
-            None, t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
-            follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
-            of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
-        )  # fmt: skip
+        _triangles(None, t, threads, *args)
 
 
 # ---- quads ---------------------------------------------------------------------------------------------------------
@@ -860,26 +846,13 @@ def quad_blocks(stress, more=0):
 _quads = quad_blocks(_elastic_quads)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def quads(threads, *args):
     """Forces on the corners of all owned quads, stored. Arguments as for `triangles`; c (count, 32), see `QUAD`; s0
     (count, 16) [Pa]: stress without strain 11, 22, 12, 33 of each of their triangles; the slots of the quads' edges
     follow those of the triangles from `base` on, four each; slot_of (count,) i4: row of `pushed`, or -1."""
-    for t in range(threads):
-        _quads(None, t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def quads_threaded(
-    threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
-    slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
-):  # fmt: skip
-    """The same on several threads."""
     for t in prange(threads):
-        _quads(
-            None, t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history,
-            table, beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
-        )  # fmt: skip
+        _quads(None, t, threads, *args)
 
 
 # ---- motion --------------------------------------------------------------------------------------------------------
@@ -901,18 +874,11 @@ def _drift(t, threads, first, last, x, v, dt):
             x[r, 6], x[r, 7] = x1, y1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def drift(threads, *args):
     """x += v dt for the storage rows first : last."""
-    for t in range(threads):
-        _drift(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def drift_threaded(threads, first, last, x, v, dt):
-    """The same on several threads."""
     for t in prange(threads):
-        _drift(t, threads, first, last, x, v, dt)
+        _drift(t, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import U, four_columns, lane, put_four_columns
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.hexahedra import OVERLAYS
 from hpcdem.physics.fdem.kernels import tets
 from hpcdem.physics.fdem.kernels.limits import corner_step
@@ -361,7 +362,7 @@ def _forces(t, threads, count, place, x, v, parts, h, own, s0, small, force, gx,
         _put(n, first, place, force, lanes)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def forces(threads, *args):
     """Forces on the corners of hexahedra, stored; of their rows nothing else is touched.
 
@@ -369,15 +370,8 @@ def forces(threads, *args):
     (blocks, 10, 10, 32): constants of the tetrahedra, `WORDS`; h (count + 3, 20): `HEX`; own: each tetrahedron
     has a stress without strain of its own, s0 (count + 3, 10, 8) [Pa]; others: see `tets.forces`.
     """
-    for t in range(threads):
-        _forces(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(threads, count, place, x, v, parts, h, own, s0, small, force, gx, gy, gz, drag, beta):
-    """The same on several threads."""
     for t in prange(threads):
-        _forces(t, threads, count, place, x, v, parts, h, own, s0, small, force, gx, gy, gz, drag, beta)
+        _forces(t, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -23,6 +23,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import U, four_columns, lane
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.kernels import joint_law, joints_space
 from hpcdem.physics.fdem.kernels.elements import NEW_BROKEN, NEW_YIELDED
 from hpcdem.physics.fdem.kernels.hexes import H_MASS
@@ -205,7 +206,7 @@ def _forces(
         first += n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def forces(threads, *args):
     """Add the forces of joints on sides of hexahedra to those of their corners; histories move on.
 
@@ -213,18 +214,5 @@ def forces(threads, *args):
     (m + 3, 8) i4 and weights (m + 3, 8), see `CORNERS`; place, h: see `hexes.forces`; kind, state, history, table,
     beyond, step, tally: see `tets.forces`; x, v, force (n, 16); keep: to of_joints (n, 16) [N] too.
     """
-    for t in range(threads):
-        _forces(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(
-    threads, begin, slot, hexahedron, at, weights, place, h, x, v, kind, state, history, table, beyond, keep, of_joints,
-    force, step, tally,
-):  # fmt: skip
-    """The same on several threads."""
     for t in prange(threads):
-        _forces(
-            t, threads, begin, slot, hexahedron, at, weights, place, h, x, v, kind, state, history, table, beyond, keep,
-            of_joints, force, step, tally,
-        )  # fmt: skip
+        _forces(t, threads, *args)

@@ -11,6 +11,7 @@ import math
 
 from numba import njit, prange
 
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.kernels import laws
 
 FREE, VELOCITY, ACCELERATION = 0, 1, 2
@@ -136,7 +137,7 @@ def _move(
                 v[p], v[p + 1] = wx, wy
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def move(threads, *args):
     """New velocities of the nodes from the forces of their corners.
 
@@ -146,18 +147,5 @@ def move(threads, *args):
     on the node; alpha: local damping of nodes that have none of their own. Fills outside (n, 2): what the conditions
     had to add [N/m], and felt (n, 4): all forces without that, and those of them that are applied from outside.
     """
-    for t in range(threads):
-        _move(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def move_threaded(
-    threads, begin, corner, place, again, kick, condition, share, table, some_applied, force, applied, v, alpha,
-    outside, felt,
-):  # fmt: skip
-    """The same on several threads."""
     for t in prange(threads):
-        _move(
-            t, threads, begin, corner, place, again, kick, condition, share, table, some_applied, force, applied, v,
-            alpha, outside, felt,
-        )  # fmt: skip
+        _move(t, threads, *args)

@@ -23,6 +23,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, put_four_columns
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.kernels import elements, laws, plasticity, softening, strength
 from hpcdem.physics.fdem.kernels.elements import (
     PARTS,
@@ -381,8 +382,8 @@ def _outside_of(n, item, row, lanes, who, whose):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _yielding(
-    t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
-    slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally, first_row, initial, yields, soft,
+    t, threads, soft, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
+    beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally, first_row, initial, yields,
     memory, surfaces,
 ):  # fmt: skip
     lanes, some, tile = (
@@ -433,24 +434,9 @@ def _yielding(
         )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def yielding(threads, *args):
+@on_threads
+def yielding(threads, soft, *args):
     """`elements.quads` for quads some of which can yield, after their `flow`. Arguments of both, in this order; of the
-    second: first_row, base (as initial), law (as yields), soft, memory, table (as surfaces)."""
-    for t in range(threads):
-        _yielding(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def yielding_threaded(
-    threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
-    slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally, first_row, initial, yields, soft,
-    memory, surfaces,
-):  # fmt: skip
-    """The same on several threads."""
+    second: soft, which comes first, and first_row, base (as initial), law (as yields), memory, table (as surfaces)."""
     for t in prange(threads):
-        _yielding(
-            t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
-            beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally, first_row, initial,
-            yields, soft, memory, surfaces,
-        )  # fmt: skip
+        _yielding(t, threads, soft, *args)

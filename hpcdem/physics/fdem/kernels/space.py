@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import U
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.kernels import laws
 from hpcdem.physics.fdem.kernels.limits import corner_step
 from hpcdem.physics.fdem.kernels.nodes import ACCELERATION, FREE, VELOCITY
@@ -286,41 +287,21 @@ def _kick(t, threads, first, kick, force, v, alpha):
                 v[r, c] += q * laws.damped(force[r, c], v[r, c], alpha)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def kick(threads, *args):
     """New velocities of corners that are nodes by themselves: v (n, 16) += kick force, of the storage rows from `first`
     on; kick (n_own, 4): dt / mass, 0 for corners that `move` moves."""
-    for t in range(threads):
+    for t in prange(threads):
         _kick(t, threads, *args)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def kick_threaded(threads, first, kick, force, v, alpha):
-    """The same on several threads."""
-    for t in prange(threads):
-        _kick(t, threads, first, kick, force, v, alpha)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def move(threads, *args):
     """New velocities of the nodes from the forces of their corners, see `nodes.move`; corner (m,): where they begin in
     `force`, `applied` and v (flat); pull_begin, pull_corner: the same of those that can have a force; table (rows, 14);
     outside (n, 3) [N], felt (n, 6)."""
-    for t in range(threads):
-        _move(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def move_threaded(
-    threads, begin, corner, pull_begin, pull_corner, kick, condition, share, table, some_applied, force, applied, v,
-    alpha, outside, felt,
-):  # fmt: skip
-    """The same on several threads."""
     for t in prange(threads):
-        _move(
-            t, threads, begin, corner, pull_begin, pull_corner, kick, condition, share, table, some_applied, force,
-            applied, v, alpha, outside, felt,
-        )  # fmt: skip
+        _move(t, threads, *args)
 
 
 # ---- limits --------------------------------------------------------------------------------------------------------

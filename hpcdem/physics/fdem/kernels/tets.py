@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import U, four_columns, lane, put_four_columns
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.kernels import joints_space
 from hpcdem.physics.fdem.tetrahedra import ROW as ROW
 from hpcdem.physics.fdem.tetrahedra import STRIDE as STRIDE
@@ -347,7 +348,7 @@ def _forces(
         _put(n, first, rows, force, lanes)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def forces(threads, *args):
     """Forces on the corners of tetrahedra, stored. Joint histories move on.
 
@@ -357,21 +358,8 @@ def forces(threads, *args):
     `joints_space.links`; law, kind, state, history, follow, table, beyond, tally: see `elements.triangles`; head (4
     blocks,): lists of joints behind their peak by block and face; keep: forces of joints into of_joints (n, 16) [N].
     """
-    for t in range(threads):
-        _forces(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(
-    threads, count, rows, x, v, c, s0, stressed, small, force, gx, gy, gz, drag, beta, jointed, sizes, link, law, kind,
-    state, history, head, follow, table, beyond, keep, of_joints, step, tally,
-):  # fmt: skip
-    """The same on several threads."""
     for t in prange(threads):
-        _forces(
-            t, threads, count, rows, x, v, c, s0, stressed, small, force, gx, gy, gz, drag, beta, jointed, sizes, link,
-            law, kind, state, history, head, follow, table, beyond, keep, of_joints, step, tally,
-        )  # fmt: skip
+        _forces(t, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -407,15 +395,8 @@ def _drift(t, threads, first, last, x, v, dt):
             x[r, c] += v[r, c] * dt
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def drift(threads, *args):
     """x += v dt for the storage rows first : last."""
-    for t in range(threads):
-        _drift(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def drift_threaded(threads, first, last, x, v, dt):
-    """The same on several threads."""
     for t in prange(threads):
-        _drift(t, threads, first, last, x, v, dt)
+        _drift(t, threads, *args)

@@ -22,6 +22,7 @@ from numba import njit, prange
 
 from hpcdem.numerics.lane_arguments import arguments, storing
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane
+from hpcdem.numerics.on_threads import OnThreads
 from hpcdem.physics.fdem.elements import parts
 from hpcdem.physics.fdem.elements.kind import QUAD, TRIANGLE, Kind
 from hpcdem.physics.fdem.kernels import elements, tets
@@ -64,19 +65,16 @@ class LawTables(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """Kernels of a law, on one thread and on several: they update stress and states (find), or in the plane replace
-    `elements.triangles` and `elements.quads`."""
+    """Kernels of a law: they update stress and states (find), or in the plane replace `elements.triangles` and
+    `elements.quads`."""
 
-    find: Any
-    find_threaded: Any
-    triangle: Any = None
-    triangle_threaded: Any = None
-    quad: Any = None
-    quad_threaded: Any = None
+    find: OnThreads
+    triangle: OnThreads | None = None
+    quad: OnThreads | None = None
 
-    def with_forces(self, kind: Kind, threads: int) -> Any:
+    def with_forces(self, kind: Kind) -> Any:
         """In the place of the loop over the forces of elements of a kind of the plane."""
-        return getattr(self, kind.name if threads == 1 else f"{kind.name}_threaded")
+        return getattr(self, kind.name)
 
 
 class _Law:
@@ -111,7 +109,7 @@ def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequen
     """The loops over elements of a law, a kernel of the arguments `names`; columns: of the table of properties, a
     multiple of four, one of them `OWN`."""
     one = _Law(law, names, states, columns, dim)
-    return Loops(*_finding(one)) if dim == 3 else Loops(*_finding(one), *_triangles(one), *_quads(one))
+    return Loops(_finding(one)) if dim == 3 else Loops(_finding(one), _triangles(one), _quads(one))
 
 
 # ---- before the forces ---------------------------------------------------------------------------------------------
@@ -192,7 +190,7 @@ def _evaluation(one: _Law) -> Any:
     return plane if one.dim == 2 else space
 
 
-def _finding(one: _Law) -> tuple[Any, Any]:
+def _finding(one: _Law) -> OnThreads:
     """`Loops.find`."""
     n_states, n_columns, width = len(one.states), len(one.columns), len(INITIAL[one.dim])
     first_state = _REST + n_columns
@@ -254,21 +252,15 @@ def _finding(one: _Law) -> tuple[Any, Any]:
                 i = who[first + k]
                 put(g, i, k * n, base, g.rows[i] - g.first, memory, per_part, s0, lanes)
 
-    @njit(nogil=True, error_model="numpy")
-    def find(threads, *args):
+    def find(threads, who, g, *args):
         """who (m,): which elements of g, see `kind.Tables`; base (n_own, 4 or 6) [Pa]: initial stress of owned
         elements; thermal (n_own,): strain of heat, or (0,); row (n,): of the flat table of properties `table`; small:
         small strains; memory (n_own, 1 + parts states): what owned elements remember, `per_part` columns each part from
         column 1 on, becomes that after this moment; s0 (n, parts, 4 or 8) [Pa]: becomes the stress."""
-        for t in range(threads):
-            some(t, threads, *args)
-
-    @njit(parallel=True, error_model="numpy")
-    def find_threaded(threads, who, g, base, thermal, row, table, dt, small, memory, per_part, s0):
         for t in prange(threads):
-            some(t, threads, who, g, base, thermal, row, table, dt, small, memory, per_part, s0)
+            some(t, threads, who, g, *args)
 
-    return find, find_threaded
+    return OnThreads(find, cache=False)
 
 
 def at_strain(
@@ -353,7 +345,7 @@ def _moving(one: _Law, first: int, kind: Kind) -> tuple[Any, Any]:
     return take, put
 
 
-def _triangles(one: _Law) -> tuple[Any, Any]:
+def _triangles(one: _Law) -> OnThreads:
     """Make the loops that replace `elements.triangles`."""
     first_state, own = LANES + len(one.columns) + 1, lane(LANES + list(one.columns).index(OWN))
     evaluate, (take, put) = one.at(LANES, first_state, (S11, S22, S12, S33)), _moving(one, LANES, TRIANGLE)
@@ -382,28 +374,14 @@ def _triangles(one: _Law) -> tuple[Any, Any]:
 
     blocks = elements.triangle_blocks(stress, len(one.columns) + 1 + len(one.states))
 
-    @njit(nogil=True, error_model="numpy")
     def triangles(threads, tables, *args):
-        for t in range(threads):
+        for t in prange(threads):
             blocks(tables, t, threads, *args)
 
-    @njit(parallel=True, error_model="numpy")
-    def triangles_threaded(
-        threads, tables, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
-        follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
-        of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
-    ):  # fmt: skip
-        for t in prange(threads):
-            blocks(
-                tables, t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state,
-                history, head, follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special,
-                some_special, force, of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
-            )  # fmt: skip
-
-    return triangles, triangles_threaded
+    return OnThreads(triangles, cache=False)
 
 
-def _quads(one: _Law) -> tuple[Any, Any]:
+def _quads(one: _Law) -> OnThreads:
     """Make the loops that replace `elements.quads`."""
     n_columns, n_states = len(one.columns), len(one.states)
     own, (take, put) = lane(QUAD_LANES + list(one.columns).index(OWN)), _moving(one, QUAD_LANES, QUAD)
@@ -447,20 +425,8 @@ def _quads(one: _Law) -> tuple[Any, Any]:
 
     blocks = elements.quad_blocks(stress, n_columns + 1 + 4 * n_states)
 
-    @njit(nogil=True, error_model="numpy")
     def quads(threads, tables, *args):
-        for t in range(threads):
+        for t in prange(threads):
             blocks(tables, t, threads, *args)
 
-    @njit(parallel=True, error_model="numpy")
-    def quads_threaded(
-        threads, tables, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
-        beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
-    ):  # fmt: skip
-        for t in prange(threads):
-            blocks(
-                tables, t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state,
-                history, table, beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
-            )  # fmt: skip
-
-    return quads, quads_threaded
+    return OnThreads(quads, cache=False)

@@ -129,8 +129,7 @@ class SixNodes:
     def add_forces(self, v: np.ndarray, elastic: float, force: np.ndarray) -> None:
         """Add to the rows of the parts (n, 8) [N/m], with these velocities; elastic: see `kernels.forces`."""
         sim, o = self.sim, self.sim.options
-        kernel: Any = kernels.forces if sim.threads == 1 else kernels.forces_threaded
-        kernel(
+        kernels.forces(
             sim.threads, self.block.tables, self.from_v, self.to, v, self.s0, elastic, not o.large_strain,
             o.stiffness_damping, force,
         )  # fmt: skip

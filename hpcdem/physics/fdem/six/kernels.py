@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.kernels import laws
 from hpcdem.physics.fdem.kernels.elements import _energy
 
@@ -90,19 +91,12 @@ def _forces(t, threads, g, from_v, to, v, s0, elastic, small, beta, force):
                 force[at + 1] -= t21 * SLOPES[p, a, 0] + t22 * SLOPES[p, a, 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def forces(threads, *args):
+@on_threads
+def forces(threads, g, *args):
     """Add forces [N/m] to rows (n, 8). from_v, to (m, 6): where velocities of each node begin, and its forces; s0
     (m, 3, 4) [Pa]: stress without strain at the Gauss points; elastic: 1, or 0 for viscous forces alone."""
-    for t in range(threads):
-        _forces(t, threads, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(threads, g, from_v, to, v, s0, elastic, small, beta, force):
-    """The same on several threads."""
     for t in prange(threads):
-        _forces(t, threads, g, from_v, to, v, s0, elastic, small, beta, force)
+        _forces(t, threads, g, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
