@@ -24,7 +24,7 @@ GROUPS: dict[str, tuple[Program, ...]] = {
         Program("resume", "[DIR]", "resume an interrupted run from its newest checkpoint"),
         Program("console", "", "interactive PCDC commands and Python", "console"),
         Program("sweep", "SCRIPT", "run a script for many parameter values and report statistics", "sweep"),
-        Program("calibrate", "FILE", "find parameters that reproduce measured properties", "calibrate"),
+        Program("calibrate", "SETTINGS.toml", "find parameters that reproduce measured properties", "calibrate"),
     ),
     "Look": (
         Program("view", "DIR", "open a run or a script in the browser", "view"),
