@@ -30,7 +30,7 @@ def uniform(seed, stream, counter):
 
 
 def uniforms(seed: int, stream: int, counters: np.ndarray) -> np.ndarray:
-    """The same as an array, for an array of counters."""
+    """Return the uniform numbers of an array of counters, see `uniform`."""
 
     def mix(z: np.ndarray) -> np.ndarray:
         z = (z ^ (z >> _S30)) * _M1

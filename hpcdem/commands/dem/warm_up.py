@@ -71,7 +71,7 @@ def with_restitution(threads: int = 1) -> None:
 
 
 def with_rolling(threads: int = 1) -> None:
-    """The same for rolling resistance."""
+    """Compile the kernels of rolling resistance."""
     sim = _model(threads)
     properties.prop(sim, rfric=0.1)
     cycles.prepare(sim)

@@ -1,5 +1,5 @@
-"""What joints behind their peak and contacts remember, taken out of the kernels' tables: rows that belong to elements,
-travel with them, and are put back at the next rebuild.
+"""Histories of contacts and of joints past their peak, copied from the tables of kernels: rows that belong to elements,
+move with them, and are written back at the next rebuild.
 
 A row is 20 words: key, state, and up to eighteen numbers. Keys of joints are -1 - edge (0..3); keys of contacts are the
 other body's number * 2 + half of this element, bodies being element * 2 + half (quads have two, see `pairs.py`); in

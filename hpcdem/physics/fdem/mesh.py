@@ -139,7 +139,7 @@ class Mesh:
         return middle
 
     def with_own_points(self, elements: np.ndarray, places: np.ndarray) -> Mesh:
-        """The same with these elements (n,) at places (n, 4, dim) [m], by points of their own that parts of a
+        """Return the mesh with these elements (n,) at positions (n, 4, dim) [m] on new points, which the parts of a
         macro-element share."""
         cells, macros = self.cells.copy(), self.macros.copy()
         own = cells[elements]
@@ -247,7 +247,7 @@ class Mesh:
         return found
 
     def face_corners(self, faces: np.ndarray) -> np.ndarray:
-        """The same by corners, element * 4 + k."""
+        """Return the corners of these faces, element * 4 + k."""
         found: np.ndarray = self._of.face_corners(self.cells, faces)
         return found
 

@@ -442,7 +442,7 @@ class ContactPairs(Bodies):
 
     @staticmethod
     def named(element: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same from rows of histories.py of the elements `element` (k,)."""
+        """Name pairs from rows of histories.py of the elements `element` (k,)."""
         key = rows.view(np.int64)[:, KEY]
         own, other = 2 * element + key % 2, key // 2
         return np.minimum(own, other), np.maximum(own, other), rows[:, FIRST:]

@@ -15,8 +15,8 @@ MOST = 10
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def friction_heat(first, second, face, face_row, row, touching, v, force, history, effusivity, part, dt, out):
-    """Heat of friction, see `friction.rub`: add that (rows, 4) [J] of a step dt [s] to the corners of the elements held
-    here.
+    """Heat of friction, see `friction.friction_heat`: add that (rows, 4) [J] of a step dt [s] to the corners of the
+    elements held here.
 
     first, second (m,): pairs of contactors and targets; face (contactors,): theirs; face_row, row: storage rows of
     both; touching (m,), force (m, 21) [N], history (m, 5) [N]: see `ContactSpace`, of this step. By the parts of the

@@ -124,8 +124,8 @@ def hold(q, i, frame, pressure, shear, total, on_rock):
 @njit(cache=True, nogil=True, error_model="numpy")
 def move(x, v, spin, parts, total, conditions, nodes, dt, alpha, reaction, step, work):
     """Move the nodes over a step dt with the forces and moments on them, and give them new rates of rotation; parts:
-    components of the conditions that there are; alpha: local damping. Fills step (n, d), the way of each, and reaction
-    (n, len(parts)), what conditions had to add."""
+    components of the conditions present; alpha: local damping. Fills step (n, d), the displacement of each, and
+    reaction (n, len(parts)), what conditions had to add."""
     dim = x.shape[1]
     for i in range(len(x)):
         if nodes[i, MASS] == 0.0:

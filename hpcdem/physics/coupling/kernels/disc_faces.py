@@ -330,7 +330,7 @@ def near(hot, rows, sorted_keys, side, places, room, pairs):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def centres_inside(hot, ihot, rows, sorted_keys, side, corners, number):
-    """The lowest gid whose centre is inside an element, and that element; (-1, -1) if there is none. corners (ne, 8):
+    """The lowest gid whose centre is inside an element, and that element; (-1, -1) if no centre is. corners (ne, 8):
     of triangles the first corner twice."""
     gid, element = np.int64(-1), np.int64(-1)
     for e in range(len(corners)):

@@ -18,7 +18,7 @@ from hpcdem.physics.dem.kernels import laws
 # Columns of the pair law table (row = material_i * n_materials + material_j).
 MODEL, A, B, MU = range(4)
 USER = 32.0
-"""MODEL of pairs with the first law of the user, the second has one more; built-in laws are below. A and B are what its
+"""MODEL of pairs with the first user law; the second has one more; built-in laws are below. A and B are what its
 stiffnesses are never above, MU is not used."""
 # Columns of the bond type table; row 0 is "no bond".
 KIND, E_MOD, G_MOD, TENSILE, SHEAR = range(5)
@@ -29,7 +29,7 @@ LONGEST2, TENSION_BREAKS, SHEAR_BREAKS = range(3)
 @njit(cache=True, error_model="numpy", forceinline=True)
 def pair_law(i, j, row, u_made, hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u):
     """laws.pair_state of the particles in storage rows i and j with a bond of table row `row` (0: none), at overlap
-    u [m]: (Fn, ks, kn, energy of Fn). u_made: of a law of the user its normal force; of its energy knows user_pairs.py.
+    u [m]: (Fn, ks, kn, energy of Fn). u_made: the normal force of a user law, whose energy is in user_pairs.py.
     """
     q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
     if pairs[q, MODEL] >= USER:
@@ -101,7 +101,7 @@ def report(t, hot, ihot, blocks, ptr, partner, fs, bond, u_made, pairs, bonds, n
     """Touching or bonded pairs of block t as rows, each pair once in the whole model; returns the number of rows.
 
     out (m, 8) f8: Fn, Fs, Fx, Fy (on the first), x, y, overlap, tangent stiffness; iout (m, 3) i8: gid, gid, bond type;
-    pairs are turned so that the lower gid comes first. Nothing of the state changes.
+    pairs are turned so that the lower gid leads. Nothing of the state changes.
     """
     cut, lo, _, poff, _ = blocks
     n = 0
@@ -224,7 +224,7 @@ def pair_table(materials: np.ndarray, which: np.ndarray, bounds: np.ndarray | No
     """Pair laws of all material pairs: (n*n, 4) f8 [MODEL, A, B, MU].
 
     materials: structured columns as a dict-like record array with kn, ks, shear, poiss, fric; which (n, n): see
-    user_laws.ModelLaws; bounds (n, n, 2): stiffnesses [N/m] of pairs with a law of the user.
+    user_laws.ModelLaws; bounds (n, n, 2): stiffnesses [N/m] of pairs with a user law.
     Hertz pairs use mean moduli, linear pairs springs in series, friction is the smaller of the two (PFC).
     A mixed pair gets NaN: the caller refuses it when it can occur.
     """

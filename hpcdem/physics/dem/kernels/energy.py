@@ -37,8 +37,8 @@ from hpcdem.physics.dem.kernels.walls import (
     wall_state,
 )  # fmt: skip
 
-# Flows [J], the rows of bins (11, 2, 2112): work done on the model, then what it loses; LAWS: in pairs with a law of
-# the user (user_pairs.py); TURNED: by rolling resistance (rolling.py).
+# Flows [J], the rows of bins (11, 2, 2112): work done on the model, then what it loses; LAWS: in pairs with a user law
+# (user_pairs.py); TURNED: by rolling resistance (rolling.py).
 GRAVITY, WALLS, DRIVEN, FRICTION, LOCAL, LATTICE, BONDS, OPENED, STIFFNESS, LAWS, TURNED = range(11)
 FLOWS = 11
 # What is stored [J], rows of bins (6, 2, 2112).
@@ -60,7 +60,7 @@ def kicks(t, hot, n_left, cut, lo, foff, force, body, gx, gy, eta, dt, whole, si
     """Work of gravity, of what drives fixed particles, and losses by damping in the coming kick of block t.
 
     whole: the whole kick, otherwise the half up to the whole step; sign: 1 to book, -1 to take back. Arguments else as
-    motion.move. Members of clumps are passed over; the clumps themselves come in the same way as particles (rigid.py).
+    motion.move. Members of clumps are skipped; the clumps themselves come in the same way as particles (rigid.py).
     """
     shift = foff[t] - lo[t]
     span, to_mean = (sign * dt, 0.5) if whole else (sign * 0.5 * dt, 0.0)

@@ -42,7 +42,7 @@ GAIN = 4.0
 CLASSES = 32
 """Classes of speed, each twice as fast as the one before."""
 ASKED = 32
-"""At most so many, the fastest, are asked whether they are alone."""
+"""Largest number of particles, the fastest, that are tested for being alone."""
 NEARLY = 0.999
 """Of the free way of a particle that is alone, for rounding."""
 

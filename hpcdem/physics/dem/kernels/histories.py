@@ -14,7 +14,7 @@ U = np.uint64
 # Columns of an entry: partner gid (-1 - w for wall w) and bond type, as int64 bits, and two numbers.
 PARTNER, SHEAR, EXTRA, BOND = range(4)
 WIDTH = 4
-"""Of an entry; behind it stands the memory of a law of the user (user_pairs.py), or of rolling (rolling.py)."""
+"""Columns of an entry; the memory of a user law (user_pairs.py) or of rolling (rolling.py) follows it."""
 
 
 @dataclass
@@ -22,7 +22,7 @@ class Histories:
     """What contacts remember, per owned particle (CSR): the entries of particle c are rows[ptr[c] : ptr[c+1]].
 
     ptr (n + 1,) i8; rows (m, 4 + memory) f8: partner, shear force [N], a second number (overlap at bonding of a pair
-    [m], normal force of a law of the user [N]; side of a wall contact), bond type, memory of a user law or of
+    [m], normal force of a user law [N]; side of a wall contact), bond type, memory of a user law or of
     rolling. Both partners of a pair carry it. The walls of a particle follow its pairs.
     """
 
@@ -43,7 +43,7 @@ class Histories:
         bond: np.ndarray,
         memory: np.ndarray | None = None,
     ) -> Histories:
-        """From one array (m,) per column, and (m, columns) of a law of the user."""
+        """From one array (m,) per column, and (m, columns) of a user law."""
         out = Histories(ptr, np.empty((len(partner), WIDTH + (0 if memory is None else memory.shape[1]))))
         out.rows[:, SHEAR], out.rows[:, EXTRA] = fs, extra
         if memory is not None:
@@ -73,7 +73,7 @@ class Histories:
 
     @property
     def memory(self) -> np.ndarray:
-        """View (m, columns) f8: what a law of the user remembers."""
+        """View (m, columns) f8: the memory of a user law."""
         return self.rows[:, WIDTH:]
 
     def resized(self, columns: int) -> Histories:

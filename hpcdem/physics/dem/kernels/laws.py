@@ -127,7 +127,7 @@ def elastic_bond(e, g, area, length, u):
 
 @njit(cache=True, error_model="numpy")
 def contact_bond(model, a, b, two_rt, u_made, u):
-    """Open contact bond (u < 0): the contact's own springs go on in tension.
+    """Open contact bond (u < 0): the contact's own springs also act in tension.
 
     For Hertz contacts the tangent stiffnesses at the overlap `u_made` [m] of the moment of bonding are used.
     """

@@ -100,8 +100,8 @@ def survey(hot, n_left, n_own, origin, dt, without, out):
     """Largest path since the list was built squared, speed squared, |v| dt / R, and 1 if a number is not finite; of all
     but the owned particles `without` (m,) i8, ascending.
 
-    origin (n_own, 2) f8: positions when the list was built. out (4,) f8. All four are maxima, so their global
-    value does not depend on how particles are shared out. A running maximum would drop NaN; it is asked for on its own.
+    origin (n_own, 2) f8: positions when the list was built. out (4,) f8. All four are maxima, so their global value
+    does not depend on how particles are shared out. A running maximum would drop NaN, so NaN is tested separately.
     """
     out[PATH2], out[SPEED2], out[STRIDE], out[BROKEN] = 0.0, 0.0, 0.0, 0.0
     first = 0

@@ -179,7 +179,7 @@ def _fill(
 ):  # fmt: skip
     """List of block t into slots begin : begin + room; nothing past the room is written.
 
-    bond2 [m^2]: bonded pairs are listed up to this distance, negative if there are none; more (k,) i8: pairs of fast
+    bond2 [m^2]: bonded pairs are listed up to this distance, negative without bonds; more (k,) i8: pairs of fast
     particles (fast.py). Returns slots needed, bonds placed, longest bonded distance squared.
     """
     n, placed, longest2 = _fill_near(
@@ -243,7 +243,7 @@ class ContactLists:
 
     Built by `build`; `histories` hands back what the slots remember. All arrays are plain numpy for the kernels.
 
-    Pair slots: row and partner (storage rows, row < partner), fs [N], bond (type), u_made [m] (of a law of the user its
+    Pair slots: row and partner (storage rows, row < partner), fs [N], bond (type), u_made [m] (of a user law its
     normal force [N]) and memory of that law or of rolling (slots, columns); row i of block t has the slots ptr[poff[t]
     + i - lo[t]] up to the next; slots of a block follow each other. Wall slots: slot_row, slot_wall, slot_fs [N],
     slot_side, slot_memory, sorted by row, then wall; block t has wptr[t] : wptr[t+1].
@@ -366,8 +366,8 @@ def build(
 
     hot (n, 8) f8 rows [left ghosts | owned | right ghosts]; cell (n,) i8: keys of their cells of this side [m]; hist:
     of the owned particles, that of the c-th stands at where[c]; walls (w, 8) f8; largest radius [m]; skin [m];
-    bond_reach [m]: bonded pairs are listed up to this distance, 0 if there are none; clump (n,) i8: number of the rigid
-    clump of each row, -1 for none: members of one clump are no pairs (None: there are no clumps); fast_ones: particles
+    bond_reach [m]: bonded pairs are listed up to this distance, 0 without bonds; clump (n,) i8: number of the rigid
+    clump of each row, -1 for none: members of one clump are no pairs (None: no clumps); fast_ones: particles
     with a reach of their own, whose partners lie up to so many columns away.
     """
     ihot = hot.view(np.int64)

@@ -38,7 +38,7 @@ from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.dem.kernels.contacts import LONGEST2, SHEAR_BREAKS, TENSION_BREAKS
 
 SLOTS = 64
-"""Slots looked at between two questions whether there is enough to work on."""
+"""Number of slots examined between two tests whether a batch is full."""
 WHOLE = 8
 """Pairs are worked on in multiples of this, the widest vectors, except the last of a block."""
 ENOUGH = CAPACITY - SLOTS - 16

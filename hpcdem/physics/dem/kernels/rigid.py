@@ -10,7 +10,7 @@ body never changes its shape, however often it turns:
 (velocities stand half a step behind positions, as those of particles do). Ranks that share a clump compute it from
 equal numbers in equal order, hence to equal bits; only the forces on members at the borders are exchanged.
 
-Like all of physics, this knows no ranks: rows are those of the storage [left ghosts | owned | right ghosts].
+Like all of physics, this does not depend on ranks: rows are those of the storage [left ghosts | owned | right ghosts].
 """
 
 from __future__ import annotations

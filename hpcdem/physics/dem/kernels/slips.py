@@ -2,7 +2,7 @@
 
 A row is a chain of particles with successive ids. A particle has passed it when its centre has crossed the line between
 two neighbours of the chain. To do so it must have touched one of them, so the pairs of the lists are all that is
-looked at; likewise for the slots of walls.
+examined; likewise for the slots of walls.
 """
 
 from __future__ import annotations

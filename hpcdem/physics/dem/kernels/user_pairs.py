@@ -1,4 +1,4 @@
-"""The force loop with laws of the user: that of pair_forces.py, with other functions in the place of the contact law.
+"""The force loop with user laws: that of pair_forces.py, with other functions instead of the contact law.
 
 There are no bonds in a model with such laws. Pairs that have a built-in one are computed beside, in the same order.
 What a contact remembers lies in the memory of its slot, behind a stamp: the number of the last evaluation of forces in
@@ -44,7 +44,7 @@ GIVEN = ("u", "fs", "two_rt", "sliding", "approach", "dt")
 """Arguments of a law: overlap [m] of discs that touch, shear force after the step before [N], 2 Rt [m], sliding speed
 and speed at which the overlap grows [m/s], time step [s]."""
 NORMAL = E
-"""Lane of the normal force: that of the modulus of bonds, of which there are none."""
+"""Lane of the normal force: that of the modulus of bonds, which these pairs do not have."""
 
 
 class Kernel(NamedTuple):

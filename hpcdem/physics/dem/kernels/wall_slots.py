@@ -1,7 +1,7 @@
 """Which particles may touch which walls: the wall slots of the lists.
 
 Particles are sorted by column, then row. What is near a wall in a column lies between two rows, and these are found by
-bisection, so that nothing is asked of the many particles that are far from all walls.
+bisection, so that the many particles far from all walls cost nothing.
 """
 
 from __future__ import annotations

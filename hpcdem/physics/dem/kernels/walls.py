@@ -74,7 +74,7 @@ def geometry(wall, x, y, r, side):
 @njit(cache=True, error_model="numpy")
 def _cover(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py):
     """The slot by which the particle meets the end point (px, py) of slot k as well: by the face of a wall that passes
-    through this point, else by an end there that comes earlier; -1 if there is none."""
+    through this point, else by an end there with a lower number; -1 if none does."""
     found = -1
     for q in range(first, last):
         if q == k:
@@ -93,7 +93,7 @@ def _cover(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py):
 
 @njit(cache=True, error_model="numpy")
 def heir(k, first, last, x, y, r, walls, slot_wall, slot_side):
-    """The slot that goes on with the shear force of slot k, of a particle with the slots first : last: where the
+    """The slot that continues with the shear force of slot k, of a particle with the slots first : last: where the
     particle has come to an end of its wall, that of the wall by which it meets this end as well; else k itself.
 
     The number means the same at the new wall: the tangent belongs to the normal from the particle to the wall.

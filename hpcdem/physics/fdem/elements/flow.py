@@ -114,7 +114,7 @@ base less D e_p."""
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def relieve_all(g, count, base, memory, s0):
-    """The same of the first elements of g."""
+    """Apply `relieve` to the first elements of g."""
     for i in range(count):
         relieve(g, i, base, memory, s0)
 

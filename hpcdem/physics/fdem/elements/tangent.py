@@ -64,7 +64,7 @@ def _plane_inverse(m, out):
 
 @njit(error_model="numpy")
 def _space_inverse(m, out):
-    """The same of m (3, 3)."""
+    """Invert m (3, 3)."""
     for i in range(3):
         for j in range(3):
             p, q, r, s = (j + 1) % 3, (j + 2) % 3, (i + 1) % 3, (i + 2) % 3

@@ -39,7 +39,7 @@ from hpcdem.numerics.lanes import (
 from hpcdem.numerics.on_threads import on_threads
 
 BATCH = 32
-"""Pairs looked at between two questions whether there is enough to work on."""
+"""Number of pairs examined between two tests whether a batch is full."""
 ENOUGH = 32
 """Pairs that are worked on together, at least."""
 
@@ -192,7 +192,7 @@ def edge_integral(a1, a2, a3, b1, b2, b3, aside):
     """Integrals of phi and t phi along an edge, and the length inside, for an edge of length 1; and largest phi / 3.
 
     a_k, b_k: lambda_k of the target at both ends; aside: added to lambda_2 in phi (large where the third edge of the
-    target lies inside a quad: phi is then 3 min(lambda_1, lambda_3), and goes on in the other half).
+    target lies inside a quad: phi is then 3 min(lambda_1, lambda_3), and continues in the other half).
     """
     d1, d2, d3 = b1 - a1, b2 - a2, b3 - a3
     t0, t1 = _clip(a1, d1, 0.0, 1.0)
@@ -565,7 +565,7 @@ def forces(threads, *args):
     first, second (m,) i8: bodies of each pair; x_place, v_place (bodies,) i8: where their corners begin in x and v
     (flat); pairs (m, 4), history (m, 6), dampers (m, 4), largest (m, 12): see above, the last two without rows if
     nothing is damped; chosen (m,) i8: rows whose properties are chosen, number in choice_begin, else -1; choice_begin
-    (n + 1,) i8: rows of choices (q, 11); without rows if there are none; touching (m,) u1: pairs that overlap; out
+    (n + 1,) i8: rows of choices (q, 11); without rows if no pair has one; touching (m,) u1: pairs that overlap; out
     (m, 12) [N/m]: forces on the corners of the first and of the second body, valid where they touch.
     """
     for t in prange(threads):

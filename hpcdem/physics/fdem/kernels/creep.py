@@ -20,7 +20,7 @@ Strains are those of the frame that turns with the element, sigma = sigma_0 + D 
 step S+ depends on the strain as in an elastic element with 2 G = 1 / X.
 
 In plane stress the strain across the plane is such that the stress there is 0 at the end of the step: with K the bulk
-modulus, p_0 the mean of the initial stress and h33 the deviator S+ that there is without strain, z = e33 follows from
+modulus, p_0 the mean of the initial stress and h33 the deviator S+ without strain, z = e33 follows from
 p_0 + K (e11 + e22 + z) + h33 + (2 z - e11 - e22) / (3 X) = 0, as S+ is linear in the strain. Creep strains are
 deviators there too; sigma = sigma_0 + D' (U - 1 - e_c) in the plane, D' with lambda' (moduli.py).
 
@@ -37,7 +37,7 @@ from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.fdem.elements import parts
 from hpcdem.physics.fdem.kernels import laws
 
-# Columns of the table of element models (rows, 3): G_K [Pa], 1 / eta_K, 1 / eta_M [1/(Pa s)]; zero: there is none.
+# Columns of the table of element models (rows, 3): G_K [Pa], 1 / eta_K, 1 / eta_M [1/(Pa s)]; zero: not present.
 KELVIN, PER_KELVIN, PER_MAXWELL = range(3)
 LAW = 3
 PLACES = (0, 1, 2, 4, 5)

@@ -1,12 +1,12 @@
 """Who may touch whom until something has moved half the buffer: pairs of triangles whose boxes come near each other.
 
-Only triangles (or halves of quads, along the shorter diagonal) with a corner on a free face are looked at. The pairs
+Only triangles (or halves of quads, along the shorter diagonal) with a corner on a free face are examined. The pairs
 found are all in which the box around the free faces of one and that around the other, half the buffer wider on every
 side, overlap: that does not depend on how they are found.
 
-Left out are two elements whose common face holds, and two that share no face but a point around which they still hang
-together. Across an open face they touch, also where it ends (at the tip of a crack): otherwise they would sink into
-each other there, and be thrown apart when the crack goes on.
+Left out are two elements whose common face holds, and two that share no face but a point around which they are still
+connected. Across an open face they touch, also where it ends (at the tip of a crack): otherwise they would sink into
+each other there, and be repelled violently when the crack extends.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def _spread(box, side, key, body):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _connected(e, f, cells, partner, closed):
-    """Whether elements e and f hang together: across the face between them if there is one, else around a point of the
-    mesh that they share, through closed faces."""
+    """Whether elements e and f are connected: across the face between them if they share one, else around a point of
+    the mesh that they share, through closed faces."""
     ne = 4 if cells[e, 3] >= 0 else 3
     nf = 4 if cells[f, 3] >= 0 else 3
     for k in range(ne):

@@ -1,6 +1,6 @@
 """Which faces may touch which tetrahedra until something has moved half the buffer: pairs whose boxes overlap, each
 half the buffer wider on every side, unless along the normal of a side of the tetrahedron, or of the face, they are
-farther apart than the buffer. What detect.py is in the plane; which pairs are left out is said there."""
+farther apart than the buffer. The counterpart of detect.py in space, which states which pairs are omitted."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def _spread(box, side, key, body):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _apart(face, target, clusters, partner, closed):
-    """Whether element `target` may touch `face`: it is another element that does not hang together with the one of the
-    face, across the face between them if there is one, else around a point."""
+    """Whether element `target` may touch `face`: it is another element that is not connected to the one of the
+    face, across the face between them if they share one, else around a point."""
     e = face >> 2
     if e == target:
         return False
@@ -164,7 +164,7 @@ def find(
 
     corner (c, 3): where the corners of each contactor are in x, face (c,): its number; target (n, 4), element (n,): the
     same of targets; face_owned, owned (bool): pairs of which neither is owned are left out; buffer [m]; clusters
-    (ne, 4): of the corners of all elements, those that hang together have one number; partner, closed (4 ne,): the
+    (ne, 4): of the corners of all elements, connected corners have one number; partner, closed (4 ne,): the
     mesh, and which faces hold together.
     """
     nothing = np.empty(0, np.int64)

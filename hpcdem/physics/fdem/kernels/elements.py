@@ -6,8 +6,8 @@ sent to a neighbour, so neither threads nor ranks meet. Triangles go through in 
 
 1. rows of triangle and partners' edges are turned into lanes (numerics/lanes.py);
 2. stress and joints before their peak are plain loops over lanes, which become vector instructions; the loop over
-   stresses is made for a law, so that a law of the user (user_laws.py) runs in the place of the elastic one;
-3. joints behind their peak, of which each block has a list, go through lanes of their own (softening.py) and overwrite
+   stresses is made for a law, so that a user law (user_laws.py) runs instead of the elastic one;
+3. joints past their peak, of which each block has a list, go through lanes of their own (softening.py) and overwrite
    what step 2 found for them;
 4. contact forces are added, and corners that move by themselves are kicked: v += f dt / m. For the others the forces
    are stored; nodes.py adds them up.
@@ -275,7 +275,7 @@ def _slow_joints(
     b, n, first, rows, wide, x, partner, law, kind, state, history, head, follow, table, beyond, step, lanes, room,
     tally,
 ):  # fmt: skip
-    """Joints behind their peak: those on the list of block b, and those that get there now."""
+    """Joints past their peak: those on the list of block b, and those that get there now."""
     if _any_past_peak(n, lanes) < 0:
         for e in range(n):
             for k in range(3):
@@ -353,7 +353,7 @@ def triangle_blocks(stress, more=0):
 
     @njit(nogil=True, error_model="numpy")
     def work(
-        obeys, t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
+        own_law, t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
         follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
         of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
     ):  # fmt: skip
@@ -366,7 +366,7 @@ def triangle_blocks(stress, more=0):
             first = b * BLOCK
             n = min(BLOCK, count - first)
             gather(n, first, rows, wide, x, v, c, s0, stressed, lanes)
-            stress(b, n, first, rows, small, beta, obeys, lanes)
+            stress(b, n, first, rows, small, beta, own_law, lanes)
             _gather_edge(n, first, 0, x, partner, law, flat_table, lanes)
             _edge_loop_0(n, lanes)
             _gather_edge(n, first, 1, x, partner, law, flat_table, lanes)
@@ -402,7 +402,7 @@ def triangles(threads, *args):
     (count, 12), see `TRIANGLE`; s0 (count, 4) [Pa]: initial stress xx, yy, xy, zz, read if `stressed`; small: small
     strains; partner (3 count,) i4: where in x the partner's edge begins, law (3 count,) i4: row of the table of joint
     laws as long as the joint is before its peak, else 0; kind: that row whatever its state; state, history: see
-    joints.py; head (blocks,), follow (3 count,) i4: lists of joints behind their peak; contact_*: which contact forces
+    joints.py; head (blocks,), follow (3 count,) i4: lists of joints past their peak; contact_*: which contact forces
     `pushed` (k, 8) fall on which lane of which block; special (count,), some_special (blocks,) bool; force, of_joints
     (n, 8) [N/m]; drag [1/s], beta [s]: Rayleigh damping; alpha: local damping; tally (threads, 8) i8.
     """
@@ -682,7 +682,7 @@ def _gather_quad_edge(n, item, base, k, x, partner, law, table, lanes):
 def _slow_quad_joints(
     n, first, rows, x, v, c, partner, law, kind, base, state, history, table, beyond, step, lanes, room, tally
 ):  # fmt: skip
-    """Joints of n quads behind their peak, and those that get there now."""
+    """Joints of n quads past their peak, and those that get there now."""
     soft, slots, edges = room
     m = 0
     for e in range(n):
@@ -817,7 +817,7 @@ def quad_blocks(stress, more=0):
 
     @njit(nogil=True, error_model="numpy")
     def work(
-        obeys, t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
+        own_law, t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
         beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
     ):  # fmt: skip
         lanes = np.zeros(size)
@@ -833,7 +833,7 @@ def quad_blocks(stress, more=0):
             whole = (n + 3) // 4 * 4
             name_quads(first, n, rows, item, row)
             gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
-            stress(whole, item, row, small, beta, obeys, lanes)
+            stress(whole, item, row, small, beta, own_law, lanes)
             tied = finish_quads(
                 first, n, item, row, tied, rows, flat_x, v, c, base, partner, law, kind, state, history, flat_table,
                 flat_beyond, slot_of, pushed, flat_force, flat_of_joints, keep_joints, gx, gy, drag, step, lanes, room,

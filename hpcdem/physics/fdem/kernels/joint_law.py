@@ -17,7 +17,7 @@ stiffnesses per area, whatever the length of the joint.
         m from path / peak: (0.3, 0), (0.6, 0.75), (1, 1), (2, 0.85), (4, 0.7), (10, 0.5), (25, 0.4), (100, 0);
         below 0.3, where it would be negative, phi_m grows with the path from nothing to phi_r (m = -phi_r / i at 0)
 
-path: way rubbed, without its elastic part; d: opening by dilation. An open joint has neither stress.
+path: slip path, without its elastic part; d: opening by dilation. An open joint has neither stress.
 
 Sources: Munjiza 2004 (softening), Lei et al. 2016 and Lisjak & Grasselli 2014 (intrinsic cohesive zone with friction);
 Barton & Choubey 1977 (strength), Bandis et al. 1983 (closure), Barton et al. 1985 (mobilised JRC, dilation).
@@ -38,7 +38,7 @@ from hpcdem.physics.fdem.kernels.laws import TINY
 KOP, TENSILE, OVERLAY, TAN_PHI, COHESION, HALF_SHEAR = range(6)
 PER_O_T, PER_S_T, PER_KOP, PER_HALF_SHEAR = range(4)
 
-# What a joint remembers behind its peak, per Gauss point from a to b: largest opening and slip, damage; then how it
+# History of a joint past its peak, per Gauss point from a to b: largest opening and slip, damage; then how it
 # broke (0: it has not), at which step, and the kinetic energy of the element at that moment; and step and kinetic
 # energy when it passed its peak.
 OPENED, SLIPPED, DAMAGE, MODE, STEP, KINETIC, PEAK_STEP, PEAK_KINETIC = 0, 3, 6, 9, 10, 11, 12, 13
@@ -260,10 +260,10 @@ def intact_slopes(o, s, law):
     peak = max(limit if sigma < 0.0 else cohesion, TINY)
     q = abs(s) * half_shear / peak
     shear = limit * half_shear / peak * 2.0 * max(1.0 - q, LEAST)
-    rub = 0.0
+    skew = 0.0
     if q < 1.0 and limit > 0.0:
-        rub = -tan_phi * (q * q if sigma < 0.0 else q * (2.0 - q)) * (1.0 if s > 0.0 else -1.0)
-    return normal, rub * normal, shear, left, tau
+        skew = -tan_phi * (q * q if sigma < 0.0 else q * (2.0 - q)) * (1.0 if s > 0.0 else -1.0)
+    return normal, skew * normal, shear, left, tau
 
 
 @njit(cache=True, error_model="numpy")

@@ -76,7 +76,7 @@ def _look(x, own, over, per_h, law, history, n, o, s, m):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _slopes(o, s, h, law, beyond, history, g):
-    """Derivatives [Pa/m] of sigma and tau at point g behind the peak by opening and slip, less what stays of it: sigma
+    """Derivatives [Pa/m] of sigma and tau at point g past the peak by opening and slip, less what stays of it: sigma
     by o, by s, tau by o, by s; and tau [Pa]."""
     if law[LAW] == COHESIVE:
         return joint_law.slopes(o, s, h, law, beyond, history, g)
@@ -110,7 +110,7 @@ def _add(weight, share, n, m, sigma_o, sigma_s, tau_o, tau_s, aside, c, out):
 def stiffness(slots, own, over, per_h, kind, state, history, x, table, beyond, softening, out, left):
     """K (n, m, m) [N/m, in the plane per m] of joints, see `hpcdem.physics.fdem.joints.Joints`, for the corners in the
     order of `EDGE` or `TRIANGLE`, and how much is left (n,) to the peak at the worst point; negative behind it, also
-    where a joint has a history of that. softening: joints go, or are, behind their peak by their histories (slots, 14);
+    where a joint has a history of that. softening: joints pass, or are past, their peak by their histories (slots, 14);
     those that slide always."""
     dim = own.shape[1]
     share, weights = (EDGE, OF_EDGE) if dim == 2 else (TRIANGLE, OF_TRIANGLE)
@@ -124,10 +124,10 @@ def stiffness(slots, own, over, per_h, kind, state, history, x, table, beyond, s
         if not slides and (left[i] > 0.0 or not softening):
             per = 1.0 / h
             for g in range(POINTS):
-                normal, rub, shear, here, tau = joint_law.intact_slopes(o[g] * per, s[g] * per, law)
+                normal, skew, shear, here, tau = joint_law.intact_slopes(o[g] * per, s[g] * per, law)
                 left[i] = min(left[i], here)
                 aside = abs(tau / s[g]) if abs(s[g]) > laws.TINY else shear * per
-                _add(size * weights[g], share[g], n, m[g], normal * per, 0.0, rub * per, shear * per, aside, c, out[i])
+                _add(size * weights[g], share[g], n, m[g], normal * per, 0.0, skew * per, shear * per, aside, c, out[i])
         if left[i] < 0.0 and (slides or softening):
             out[i] = 0.0
             for g in range(POINTS):

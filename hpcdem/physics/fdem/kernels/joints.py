@@ -22,8 +22,8 @@ AT_NEAR, AT_MIDDLE, AT_FAR = 5.0 / 18.0 * NEAR, 8.0 / 18.0 * 0.5, 5.0 / 18.0 * F
 """Weight of a point times shape function of an end: the nearer outer point, the middle, the farther one."""
 
 NONE, INTACT, YIELDED, BROKEN = 0, 1, 2, 3
-"""State of an edge. BROKEN: its strength is gone; it presses and rubs until contact takes over at the next rebuild.
-Joints that slide (joint_law.slide) have a state above it, BROKEN + the number of their law, all the time."""
+"""State of an edge. BROKEN: its strength is gone; its compression and friction act until contact takes over at the next
+rebuild. Joints that slide (joint_law.slide) have a state above it, BROKEN + the number of their law, all the time."""
 
 
 @njit(cache=True, error_model="numpy")

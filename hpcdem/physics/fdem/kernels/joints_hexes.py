@@ -141,7 +141,7 @@ def _kinetic(i, place, h, v):
 def _slow(
     n, first, slot, hexahedron, weights, place, h, v, kind, state, history, table, beyond, step, lanes, room, tally
 ):  # fmt: skip
-    """Joints behind their peak, and those that get there now."""
+    """Joints past their peak, and those that get there now."""
     own, over, out, part, moved = room
     for e in range(n):
         s, k = slot[first + e], U(e)

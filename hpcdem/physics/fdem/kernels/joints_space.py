@@ -231,7 +231,7 @@ def _slides(dx, dy, dz, nx, ny, nz, mid, law, beyond, history, g):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _behind(dx, dy, dz, nx, ny, nz, h, mid, law, beyond, history, g, part):
-    """Traction at point g behind the peak [Pa]; what it remembers moves on; part (2,): largest squares of both parts
+    """Traction at point g past the peak [Pa]; updates the history; part (2,): largest squares of both parts
     of the damage."""
     if law[joint_law.LAW] > COHESIVE:
         return _slides(dx, dy, dz, nx, ny, nz, mid, law, beyond, history, g)
@@ -274,7 +274,7 @@ def _slow_joints(
     b, k, n, first, rows, x, c, link, law, kind, state, history, head, follow, table, beyond, kinetic, step, lanes,
     room, tally,
 ):  # fmt: skip
-    """Joints behind their peak on face k: those on the list of block b, and those that get there now. A joint is BROKEN
+    """Joints past their peak on face k: those on the list of block b, and those that get there now. A joint is BROKEN
     when two of its three points have no strength left, see `softening.yielded_edges`."""
     list_ = 4 * b + k
     if _any_past_peak(n, lanes) < 0:
@@ -324,7 +324,7 @@ def add_joints(
 ):  # fmt: skip
     """Forces of the joints of a block of tetrahedra, into the lanes of forces from at_force on; and, if they are to be
     kept, into the rows `force` (n, 16). x, sizes, flat_table: flat; kinetic: see `_kinetic`; the others as in
-    `elements.triangles`, with a list of joints behind their peak for each face of a block."""
+    `elements.triangles`, with a list of joints past their peak for each face of a block."""
     flat_link = link.reshape(link.size)
     for e in range(U(0), U(n), _4):
         q = (U(first) + e) * _4

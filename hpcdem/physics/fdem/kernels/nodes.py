@@ -1,4 +1,4 @@
-"""Nodes that do not move by themselves alone: corners that hang together, boundary conditions, quads.
+"""Nodes that do not move independently: connected corners, boundary conditions, quads.
 
 A node is a set of corners at one place that move as one; its corners stand in the order of elements, and their forces
 are added in that order. A rank treats every node of which it owns a corner, from the forces of all its corners (those
@@ -113,7 +113,7 @@ def _move(
             elif table[q, CONSTRAINT] == ALONG:
                 along = wx * table[q, WAY_X] + wy * table[q, WAY_Y]
                 if drag > 0.0 and table[q, DOES_X] == FREE and table[q, DOES_Y] == FREE:
-                    # Damping sees the force along the line alone: that across it is carried, and would rub.
+                    # Damping sees the force along the line alone: that across it is carried, and would act as friction.
                     along = vx * table[q, WAY_X] + vy * table[q, WAY_Y]
                     along += k * laws.damped(fx * table[q, WAY_X] + fy * table[q, WAY_Y], along, drag)
                 wx, wy = along * table[q, WAY_X], along * table[q, WAY_Y]

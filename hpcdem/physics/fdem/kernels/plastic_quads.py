@@ -100,7 +100,7 @@ def _gather_yield(n, item, law, table, lanes):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _gather(n, item, row, first_row, base, law, table, memory, filled, lanes):
     """Initial stress, yield surfaces and what is remembered of n quads into lanes. filled: the row of the table that is
-    in all of the lanes, negative if there is none; returned as it is then."""
+    in all of the lanes, negative if they differ; returned as it is then."""
     only, same = law[_FOUR * U(item[0])], True
     for e in range(U(n)):
         for p in range(U(4)):
@@ -437,6 +437,6 @@ def _yielding(
 @on_threads
 def yielding(threads, soft, *args):
     """`elements.quads` for quads some of which can yield, after their `flow`. Arguments of both, in this order; of the
-    second: soft, which comes first, and first_row, base (as initial), law (as yields), memory, table (as surfaces)."""
+    second: soft, which leads, and first_row, base (as initial), law (as yields), memory, table (as surfaces)."""
     for t in prange(threads):
         _yielding(t, threads, soft, *args)

@@ -1,4 +1,4 @@
-"""Plastic flow after Mohr and Coulomb with a tension cut-off: where stresses outside the yield surface return to.
+"""Mohr-Coulomb plastic flow with a tension cut-off: the return of stresses from outside the yield surface.
 
 Principal stresses s1 <= s2 <= s3 (tension positive; in plane strain the one out of the plane is among them),
 N_a = (1 + sin a) / (1 - sin a), friction angle phi, dilation angle psi, cohesion c, tensile strength T <= c / tan(phi):
@@ -17,13 +17,13 @@ symmetry f_s also holds for the pairs (s2, s3), (s1, s2), and f_t for s2, s1. So
 - the line of both planes, s3 = T, s1 = N_phi T - 2 c sqrt(N_phi), and its two ends s2 = s1 and s2 = s3.
 
 They are tried in this order. Where two planes meet the matrix of their multipliers has positive principal minors (both
-planes: a^2 - b^2), so that there is one answer (Cottle, Pang & Stone 1992, theorem 3.3.7). The plastic work is not
+planes: a^2 - b^2), so that the solution is unique (Cottle, Pang & Stone 1992, theorem 3.3.7). The plastic work is not
 negative as long as psi <= phi. Formulas of the planes: Itasca, FLAC; of edges and corners: Clausen, Damkilde & Andersen
 2007 (Computers & Structures 85, 1795).
 
 In plane stress the third principal stress is held at 0 and the strain across the plane is what it takes. Of the two in
 the plane, l <= h, the six planes leave a polygon; their parts in the plane of D dg/ds have a' = lambda' + 2 G and b' =
-lambda' (moduli.py) in the place of a and b:
+lambda' (moduli.py) instead of a and b:
 
     h, l > 0    h <= t = min(T, 2 c sqrt(N_phi) / N_phi)  (tension, or shear with the stress 0 as the low one)
     l < 0 < h   N_phi h - l <= 2 c sqrt(N_phi)
@@ -280,7 +280,7 @@ _rotate_23 = _rotation(T22, T33, T23, T12, T13, X2, X3)
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def find_axes(n, lanes):
-    """Principal stresses of the first n, in the place of the diagonal of the stress, and their axes."""
+    """Principal stresses of the first n, instead of the diagonal of the stress, and their axes."""
     for e in range(U(n)):
         lanes[X1 + e], lanes[Y1 + e], lanes[Z1 + e] = 1.0, 0.0, 0.0
         lanes[X2 + e], lanes[Y2 + e], lanes[Z2 + e] = 0.0, 1.0, 0.0

@@ -1,4 +1,4 @@
-"""Joints behind their peak: the law of joint_law.py as loops over lanes (numerics/lanes.py), and how they break.
+"""Joints past their peak: the law of joint_law.py as loops over lanes (numerics/lanes.py), and how they break.
 
 Each loop has no jumps and no calls, so it becomes vector instructions; only the exponential of the softening curve is
 computed one by one, in a loop of its own.

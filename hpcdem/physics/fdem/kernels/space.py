@@ -1,5 +1,5 @@
 """Everything of tetrahedra but their forces: tables, nodes and conditions, limits of stability. What `build`, `nodes`
-and `limits` are in the plane; what is said there is not said again.
+and `limits` are in the plane; their comments are not repeated here.
 
 omega^2 of a corner of mass m is at most (4 / rho) (lambda + 2 mu) sum |grad N_l|^2 of its element.
 """
@@ -216,7 +216,7 @@ def _move(
             f[0], f[1], f[2] = fx, fy, fz
             before[0], before[1], before[2] = vx, vy, vz
             w[0], w[1], w[2] = wx, wy, wz
-            _obey(k, drag, table[q], f, before, w, drawn, outside[i])
+            _apply_condition(k, drag, table[q], f, before, w, drawn, outside[i])
             wx, wy, wz = w[0], w[1], w[2]
         felt[i, 0], felt[i, 1], felt[i, 2], felt[i, 3], felt[i, 4], felt[i, 5] = fx, fy, fz, ex, ey, ez
         for m in range(begin[i], begin[i + 1]):
@@ -225,7 +225,7 @@ def _move(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _obey(k, alpha, condition, f, before, w, drawn, outside):
+def _apply_condition(k, alpha, condition, f, before, w, drawn, outside):
     """The velocity w of a node with conditions, and what they had to add so that it moves like that."""
     for c in range(3):
         drawn[c] = 0.0
@@ -249,7 +249,7 @@ def _obey(k, alpha, condition, f, before, w, drawn, outside):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _bind(kind, k, alpha, condition, f, before, w, drawn):
     """The velocity w of a node that moves along a vector only, or across it only; drawn: the part of its force that is
-    carried. Damping sees the other part alone: what is carried would rub."""
+    carried. Damping acts on the other part alone: on a carried force it would act as friction."""
     free = condition[DOES] == FREE and condition[DOES + 1] == FREE and condition[DOES + 2] == FREE
     along = pull = 0.0
     for c in range(3):

@@ -46,7 +46,7 @@ class Strength(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _at(strain, number, otherwise, begin, points):
-    """Value of a table, or `otherwise` if there is none; it is constant beyond its ends."""
+    """Value of a table, or `otherwise` without a table; it is constant beyond its ends."""
     if number == 0:
         return otherwise
     k, end = begin[number - 1], begin[number] - 1

@@ -356,7 +356,7 @@ def forces(threads, *args):
     8) [Pa]: stress without strain, unless not `stressed`; small: no rotations; force (n, 16) [N]; gx, gy, gz [m/s2];
     drag [1/s], beta [s]: Rayleigh damping. With `jointed`, four slots per tetrahedron: sizes, link, see
     `joints_space.links`; law, kind, state, history, follow, table, beyond, tally: see `elements.triangles`; head (4
-    blocks,): lists of joints behind their peak by block and face; keep: forces of joints into of_joints (n, 16) [N].
+    blocks,): lists of joints past their peak by block and face; keep: forces of joints into of_joints (n, 16) [N].
     """
     for t in prange(threads):
         _forces(t, threads, *args)
