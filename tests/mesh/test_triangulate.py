@@ -275,6 +275,18 @@ def test_the_same_input_makes_the_same_mesh(kind):
     same(one.mesh, other.mesh)
 
 
+def test_quads_in_a_circle_do_not_depend_on_what_the_process_did_before():
+    """Gmsh decides ties of its fronts by addresses in memory: in this process every second mesh was another one."""
+    square = geometry.rectangle((-2.0, -2.0), (2.0, 2.0))
+    curves = {"o": square, "h": geometry.circle((0.0, 0.0), 0.6)}
+    regions = [*ROCK, Region("h", "core")]
+    first, *others = (
+        meshed(curves, regions, 1.0, kind="quad", refine=[Refinement("h", 0.12)]).mesh for _ in range(3)
+    )
+    for other in others:
+        same(first, other)
+
+
 def test_a_closed_pipe_is_an_error_after_meshing(gmsh):
     """Gmsh resets SIGPIPE to its default, which would end the process without a message."""
     meshed({"o": BOX})

@@ -9,7 +9,7 @@ from hpcdem.core.errors import HpcdemError
 
 
 def run(module: str, *words: str, sent: str = "", failed: str) -> None:
-    """`python -m module words`, with `said` on its input. HpcdemError `failed`: its last line, or how it ended."""
+    """`python -m module words`, with `sent` on its input. HpcdemError `failed`: its last line, or how it ended."""
     done = subprocess.run(
         [sys.executable, "-m", module, *words], input=sent, text=True, capture_output=True, check=False
     )

@@ -2,22 +2,27 @@
 
 Lines are cut into edges here (`planar`), each of which becomes one edge of the mesh; gmsh fills the areas between.
 So an edge of the mesh that lies on a layer or carries a crack is known by its end points, whatever gmsh does. Input,
-scaled to edges of length 1 about the origin, goes to gmsh in one fixed order, on one thread: the same input makes the
-same mesh.
+scaled to edges of length 1 about the origin, goes to gmsh in one fixed order, on one thread. Its algorithm for quads
+decides ties, as in a circle, by addresses in memory: it runs in a process of its own, whose memory does not depend on
+what this one did before. So the same input makes the same mesh.
 """
 
 from __future__ import annotations
 
 import math
+import pickle
+import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.physics.fdem.mesh import Mesh, check
-from hpcdem.pre.mesh import optional
+from hpcdem.pre.mesh import apart, optional
 from hpcdem.pre.mesh.fractures import Fractures, clipped, joined
 from hpcdem.pre.mesh.geometry import Layers, sampled
 from hpcdem.pre.mesh.planar import Plane
@@ -121,7 +126,8 @@ def triangulate(layers: Layers, settings: MeshSettings) -> Meshed:
     xy = np.column_stack([plane.x, plane.y])
     notes += _moved(plane, xy, traces)
     surfaces = _surfaces(plane, xy, areas)
-    mesh = _filled(plane, xy, surfaces, points, settings, sizes, notes)
+    fill = _filled if settings.kind == "tri" else _filled_apart
+    mesh = fill(plane, xy, surfaces, points, settings, sizes, notes)
     check(mesh, "mesh made by gmsh")
     found = quality(mesh)
     if found.angle_least < SHARP:
@@ -332,6 +338,29 @@ def _surfaces(plane: Plane, xy: np.ndarray, areas: list[_Area]) -> list[_Surface
     for surface in surfaces:
         surface.edges.sort()
     return surfaces
+
+
+def _filled_apart(*request: Any) -> Mesh:
+    """`_filled` in a process of its own."""
+    with tempfile.TemporaryDirectory(prefix="hpcdem-") as folder:
+        file = Path(folder) / "mesh"
+        file.write_bytes(pickle.dumps(request))
+        apart.run("hpcdem.pre.mesh.triangulate", str(file), failed="gmsh could not make the mesh")
+        found, request[-1][:] = pickle.loads(file.read_bytes())
+    if isinstance(found, Exception):
+        raise found
+    return found
+
+
+def _answer(file: Path) -> None:
+    """In that process: a mesh, or the error, with the notes in place of what is asked for."""
+    request = pickle.loads(file.read_bytes())
+    found: Mesh | HpcdemError
+    try:
+        found = _filled(*request)
+    except HpcdemError as error:
+        found = error
+    file.write_bytes(pickle.dumps((found, request[-1])))
 
 
 def _filled(
@@ -592,3 +621,8 @@ def _only_existing(mesh: Mesh, edges: Any) -> Mesh:
 
 
 __all__ = ["GROWTH", "MeshSettings", "Meshed", "Refinement", "Region", "triangulate"]
+
+if __name__ == "__main__":
+    from hpcdem.pre.mesh import triangulate as module  # what is read names this module, not __main__
+
+    module._answer(Path(sys.argv[1]))
