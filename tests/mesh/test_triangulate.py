@@ -280,9 +280,7 @@ def test_quads_in_a_circle_do_not_depend_on_what_the_process_did_before():
     square = geometry.rectangle((-2.0, -2.0), (2.0, 2.0))
     curves = {"o": square, "h": geometry.circle((0.0, 0.0), 0.6)}
     regions = [*ROCK, Region("h", "core")]
-    first, *others = (
-        meshed(curves, regions, 1.0, kind="quad", refine=[Refinement("h", 0.12)]).mesh for _ in range(3)
-    )
+    first, *others = (meshed(curves, regions, 1.0, kind="quad", refine=[Refinement("h", 0.12)]).mesh for _ in range(3))
     for other in others:
         same(first, other)
 
