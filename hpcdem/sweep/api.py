@@ -33,6 +33,7 @@ class Options(TypedDict, total=False):
     length: float
     skin: float
     increment: bool
+    over_time: bool
     ids: tuple[int, ...]
     points: tuple[tuple[float, float], ...]
     number: int

@@ -350,7 +350,7 @@ def test_a_frame_of_zdem(play, tmp_path):
         and m["density"].tolist() == [2500.0] * 3
     )
     assert sim.walls.id.tolist() == [100, 0] and sim.walls.v[1].tolist() == [2.0, 0.0]
-    assert sim.bonds == 1 and sim.bond_types.rows[1].tolist() == (2.0, 0.0, 0.0, 5e5, 7e5, 1.0, 0.0)
+    assert sim.bonds == 1 and sim.bond_types.rows[1].tolist() == (2.0, 0.0, 0.0, 5e5, 7e5, 1.0, 0.0, 0.0)
     assert sim.settings.gy == -9.81 and sim.settings.lsm == 0.25
     (tmp_path / "a.dat").write_text(with_bond("0.0 0.0"))
     sim, log = play(begin="LOAD a.dat")

@@ -137,6 +137,10 @@ SAME: list[tuple[str, str]] = [
      "seed=7)"),
     ("pcdc geometry import 'a.dxf' as-layer 'l' dxf-layer 'k' scale 0.001",
      "sim.geometry.import_file(Path('a.dxf'), 'l', dxf_layer='k', scale=0.001)"),
+    ("pcdc geometry import 'a.geojson' as-layer 'l' named origin (1,0) to (0,2) line (0,0) (1,1) legend 'k.csv' "
+     "attribute 'unit' simplify 2",
+     "sim.geometry.import_file('a.geojson', 'l', named=True, origin=(1, 0), to=(0, 2), line=((0, 0), (1, 1)), "
+     "legend='k.csv', attribute='unit', simplify=2)"),
     ("pcdc geometry transform 'l' scale 2 rotate 30 about (0,1) move (1,0)",
      "sim.geometry.transform('l', scale=2, rotate=30, about=(0, 1), move=(1, 0))"),
     ("pcdc geometry delete 'l' 'm'", "sim.geometry.delete('l', 'm')"),
@@ -145,6 +149,8 @@ SAME: list[tuple[str, str]] = [
     ("pcdc geometry scale (2,1) layer 'l' 'm'", "sim.geometry.scale((2, 1), ['l', 'm'])"),
     ("pcdc geometry translate (2,1) layer 'l'", "sim.geometry.translate((2, 1), ['l'])"),
     ("pcdc geometry export 'l' 'm' file 'a.dxf'", "sim.geometry.export(['l', 'm'], 'a.dxf')"),
+    ("pcdc geometry export 'l' file 'a.csv' scale 2 origin (1,0) to (0,2) line (0,0) (1,1)",
+     "sim.geometry.export(['l'], 'a.csv', scale=2, origin=(1, 0), to=(0, 2), line=((0, 0), (1, 1)))"),
     ("pcdc mesh create from-layer 'o' size 0.5 type quad refine-layer 'h' size 0.05 refine-layer 'i' size 0.1 distance "
      "2 hole 'h' region 'r' region 'q' group 'w' embed 'e' crack 'c' irregular smooth group 'rock' set 'd'",
      "sim.mesh.create('o', 0.5, 'quad', refine_layer=[('h', 0.05), ('i', 0.1, 2)], hole=['h'], region=['r', ('q', 'w')]"

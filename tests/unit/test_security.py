@@ -77,6 +77,7 @@ KNOWN = {
     # The same to compile kernels; what is pickled goes from the parent to its child through a pipe.
     ("runtime/compilers.py", "subprocess.Popen"),
     ("runtime/compilers.py", "import pickle"),
+    ("pre/mesh/apart.py", "import pickle"),  # from the parent to its child, in a folder of this user alone
     ("runtime/kernels.py", "import pickle"),
     # Compiled laws of the user in his own cache folder, beside the kernels of hpcdem; the
     # name of a folder follows from the law that the script has just named.

@@ -432,9 +432,8 @@ class Simulation(Model):
 
     def bonds_left(self) -> int:
         """Bonds that hold. Collective."""
-        if not self.closed:
-            return self.bonds
-        return self.bonds - int(self.comm.sum_into(self.uncollected_breaks().sum(keepdims=True))[0])
+        broken = int(self.comm.sum_into(self.uncollected_breaks().sum(keepdims=True))[0]) if self.closed else 0
+        return self.bonds - broken
 
     def used(self, column: np.ndarray, table: PropertyTable) -> np.ndarray:
         """Which rows of a property table occur among these owned row numbers, on any rank; (rows,) bool. Collective."""

@@ -403,7 +403,7 @@ class Blocks(Edited):
         self.histories = self.histories.take(order)
         self.cold = {name: values[order] for name, values in self.cold.items()}
         number, v = self.number[order], self.v[order]
-        self.x = self._connect(np.ascontiguousarray(self.x), order, cell, boxes=self._boxes(order))
+        self.x = self._connect(np.ascontiguousarray(self.x), order, cell, boxes=_boxes(self, order))
         halo = self.halo
         self.n_left, self.n_own = halo.n_left, len(order)
         n = len(self.x)
@@ -418,25 +418,6 @@ class Blocks(Edited):
         if self.options.collision:
             halo.add_ghost_field(self.v)
         self.where[self.number] = np.arange(n)
-
-    def _boxes(self, order: np.ndarray) -> np.ndarray | None:
-        """Boxes (n, 6) [m] of the elements in this order, in the plane None: those of elements that one rank must hold
-        overlap. Middles lie in boxes, so boxes of partners of a joint are not farther apart than these."""
-        if self.dim == 2 or self.comm.size == 1:
-            return None
-        boxes = np.empty((len(order), 6))
-        detect_space.boxes(tets.ROW * order[:, None] + tets.STRIDE * np.arange(4), self.x, self._apart, boxes)
-        mesh = self.the_mesh()
-        if len(mesh.macros):  # all parts of one go together
-            of = mesh.macro_of()[self.number[order]]
-            some = np.flatnonzero(of >= 0)
-            which = np.unique(of[some], return_inverse=True)[1]
-            whole = np.full((len(some), 6), np.inf)
-            boxes[:, 3:] *= -1.0
-            np.minimum.at(whole, which, boxes[some])
-            boxes[some] = whole[which]
-            boxes[:, 3:] *= -1.0
-        return boxes
 
     def _build_lists(self, order: np.ndarray, cell: np.ndarray, frozen: bool) -> None:
         self.local = self._tables()(self)
@@ -486,3 +467,23 @@ def _nodes_of_corners(mesh: Mesh, alive: np.ndarray, node: np.ndarray, lead: np.
     at_points = np.bincount(cells[cells >= 0], minlength=len(mesh.points))
     # A rank has pages of its own of the table only around the elements that it holds.
     return node, shared, begin, member, at_points, np.full(len(mesh.cells), -1, np.int64)
+
+
+def _boxes(sim: Blocks, order: np.ndarray) -> np.ndarray | None:
+    """Boxes (n, 6) [m] of the elements in this order, in the plane None: those of elements that one rank must hold
+    overlap. Middles lie in boxes, so boxes of partners of a joint are not farther apart than these."""
+    if sim.dim == 2 or sim.comm.size == 1:
+        return None
+    boxes = np.empty((len(order), 6))
+    detect_space.boxes(tets.ROW * order[:, None] + tets.STRIDE * np.arange(4), sim.x, sim._apart, boxes)
+    mesh = sim.the_mesh()
+    if len(mesh.macros):  # all parts of one go together
+        of = mesh.macro_of()[sim.number[order]]
+        some = np.flatnonzero(of >= 0)
+        which = np.unique(of[some], return_inverse=True)[1]
+        whole = np.full((len(some), 6), np.inf)
+        boxes[:, 3:] *= -1.0
+        np.minimum.at(whole, which, boxes[some])
+        boxes[some] = whole[which]
+        boxes[:, 3:] *= -1.0
+    return boxes

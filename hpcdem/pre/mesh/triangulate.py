@@ -10,12 +10,8 @@ what this one did before. So the same input makes the same mesh.
 from __future__ import annotations
 
 import math
-import pickle
-import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -341,26 +337,13 @@ def _surfaces(plane: Plane, xy: np.ndarray, areas: list[_Area]) -> list[_Surface
 
 
 def _filled_apart(*request: Any) -> Mesh:
-    """`_filled` in a process of its own."""
-    with tempfile.TemporaryDirectory(prefix="hpcdem-") as folder:
-        file = Path(folder) / "mesh"
-        file.write_bytes(pickle.dumps(request))
-        apart.run("hpcdem.pre.mesh.triangulate", str(file), failed="gmsh could not make the mesh")
-        found, request[-1][:] = pickle.loads(file.read_bytes())
-    if isinstance(found, Exception):
-        raise found
-    return found
+    """Run `_filled` in a process of its own."""
+    mesh, request[-1][:] = apart.called(_with_notes, *request, failed="gmsh could not make the mesh")
+    return mesh
 
 
-def _answer(file: Path) -> None:
-    """In that process: a mesh, or the error, with the notes in place of what is asked for."""
-    request = pickle.loads(file.read_bytes())
-    found: Mesh | HpcdemError
-    try:
-        found = _filled(*request)
-    except HpcdemError as error:
-        found = error
-    file.write_bytes(pickle.dumps((found, request[-1])))
+def _with_notes(*request: Any) -> tuple[Mesh, list[str]]:
+    return _filled(*request), request[-1]
 
 
 def _filled(
@@ -621,8 +604,3 @@ def _only_existing(mesh: Mesh, edges: Any) -> Mesh:
 
 
 __all__ = ["GROWTH", "MeshSettings", "Meshed", "Refinement", "Region", "triangulate"]
-
-if __name__ == "__main__":
-    from hpcdem.pre.mesh import triangulate as module  # what is read names this module, not __main__
-
-    module._answer(Path(sys.argv[1]))

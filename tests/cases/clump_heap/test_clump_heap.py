@@ -60,6 +60,8 @@ def test_the_budget_closes(tmp_path):
         "loss_laws",
         "elastic_bonds",
         "loss_stiffness",
+        "elastic_rolling",
+        "loss_rolling",
         "closing",
     )  # stiffness is constant (linear law)
     for name in NAMES[:-1]:
