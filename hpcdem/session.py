@@ -1,4 +1,4 @@
-"""What one process shares among all that it computes: ranks, threads, log, signals, compiled kernels.
+"""State that one process shares among all its simulations: ranks, threads, log, signals, compiled kernels.
 
 The program `hpcdem` opens a session for the script it runs. A Python program that was started by itself
 (``python study.py``, ``mpiexec -n 4 python study.py``) gets one when it makes its first simulation; the session then
@@ -109,7 +109,7 @@ class Session:
                 self.stop.install(self.comm.rank)
 
     def _counted(self) -> AbstractContextManager[None]:
-        """What blocks wait for that are there already stands in their table of stages."""
+        """Time the loading of kernels in the table of stages of the last blocks, if there are any."""
         return self.projects[-1].blocks.timers.around("kernels") if self.projects else nullcontext()
 
     def finish(self, sim: Simulation) -> None:

@@ -33,7 +33,7 @@ Writer = Callable[[Path], object]
 
 @dataclass(frozen=True)
 class Style:
-    """How files are written. layout and angle_factor: of the PPDEM file ("full": polygons with the roundness of their
+    """Format of the files. layout and angle_factor: of the PPDEM file ("full": polygons with the roundness of their
     edges); gap: between outlines and discs of clumps, over the size; formats of the figures; falling: sizes of the
     grading curve fall to the right."""
 

@@ -52,7 +52,7 @@ class Frame:
 
     @property
     def objects(self) -> dict[str, int]:
-        """How many objects there are of each kind: particles, contacts, bonds, walls, elements, joints, ..."""
+        """Number of objects of each kind: particles, contacts, bonds, walls, elements, joints, ..."""
         return {kind: objects.count for kind, objects in self._moment.objects.items()}
 
     def fields(self, object: str | None = None) -> list[str]:

@@ -83,8 +83,8 @@ def selection(where: str | Selection | None) -> Selection | None:
 
 @dataclass(frozen=True)
 class Taken:
-    """How a method accepts an argument of a function. type: in a signature, in the words of `hpcdem.api.types`; make:
-    converts the given value for the function, from the simulation and the value."""
+    """Conversion of one argument of a method. type: in a signature, in the words of `hpcdem.api.types`; make: converts
+    the given value for the function, from the simulation and the value."""
 
     type: str
     make: Callable[[Any, Any], Any]
@@ -108,7 +108,7 @@ WRITTEN = Taken("File", lambda sim, file: sim.directory / file)
 
 @dataclass(frozen=True)
 class Function:
-    """Which function of `hpcdem.commands.dem` a method is.
+    """Method made from a function of `hpcdem.commands.dem`.
 
     order: arguments that may be given by their place, if it is not that of the function; ``name?`` may be left out
     though the function needs it, ``name!`` may not; the others are keywords. file: how a file is taken; alone: not for

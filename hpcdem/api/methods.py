@@ -99,7 +99,7 @@ def tokens(order: str) -> Iterator[tuple[str, str, str]]:
 
 @dataclass(frozen=True)
 class Row:
-    """Which command a method is.
+    """Method made from a command of the table.
 
     order: arguments that may be given by their place, in this order; ``name?`` may be left out, ``name=True`` is that
     when it is, ``*names`` are all that follow. The others of the command are keywords. model: the constitutive model or

@@ -200,7 +200,8 @@ class GroupedElsewhere(Objects):
     grouped = ""
 
     def group(self, group: str, set: str | None = None, *, where: Where = None) -> None:
-        """They have the groups of nodes, or joints: `sim.nodes.group`, `sim.joints.group`."""
+        """Raise CommandError: these objects belong to the groups of nodes or joints, see `sim.nodes.group`,
+        `sim.joints.group`."""
         name = self._word.replace("_", " ")
         raise CommandError(f"{name} have the groups of {self.grouped}: sim.{self.grouped}.group")
 

@@ -61,7 +61,7 @@ def _wrong(text: str, names: Collection[str]) -> str:
 
 
 def raised_by_the_user(error: BaseException) -> bool:
-    """Whether a function of the program, called by us, raised it: then it is the program's affair."""
+    """Return whether a function of the user's program, called by hpcdem, raised the error."""
     trace, inside = error.__traceback__, False
     while trace is not None:
         ours = trace.tb_frame.f_code.co_filename.startswith(PACKAGE)

@@ -133,12 +133,12 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @staticmethod
     def _untouched(engine: Engine) -> bool:
-        """Whether the model has no particles, walls or settings of particles yet. Collective."""
+        """Return whether the model has no particles, walls or settings of particles yet. Collective."""
         return engine.clock.step == 0 and len(engine.walls) == 0 and engine.count(len(engine.particles)) == 0
 
     @property
     def _only_blocks(self) -> bool:
-        """Whether the model has blocks and no particles. Collective."""
+        """Return whether the model has blocks and no particles. Collective."""
         return self._project is not None and (self._engine is None or self._untouched(self._engine))
 
     @property
@@ -358,7 +358,7 @@ class Simulation(ParticleCommands, BlockCommands):
         return comm.bcast(str(found[0]) if found else None)
 
     def _kind(self, path: str) -> str:
-        """Of a checkpoint: "" of particles, or what is none; checked by rank 0."""
+        """Return the kind of a checkpoint, read by rank 0: "" for particles and for files that are no checkpoint."""
         comm, kind = self._session.comm, ""
         if comm.rank == 0:
             try:
@@ -522,7 +522,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @property
     def rank(self) -> int:
-        """Which of the ranks this is."""
+        """Number of this rank, from 0."""
         return self._session.comm.rank
 
     @property
@@ -620,9 +620,9 @@ class Simulation(ParticleCommands, BlockCommands):
     # ---- ours ------------------------------------------------------------------------------------------------------
 
     def _asked(self, told: tuple[Any, ...], make: Callable[[], Any], again: bool = False) -> Any:
-        """What `make` returns. In a PCDC script its journal keeps it, with a checksum of what was `told`, so that a run
-        that resumes from a checkpoint finds the way back: particles that come out of the checkpoint do nothing until
-        then, and receive the same values as before. again: done in any case."""
+        """Return the result of `make`. In a PCDC script the journal stores it, with a checksum of what was `told`, so
+        that a run that resumes from a checkpoint finds the way back: particles that come out of the checkpoint do
+        nothing until then, and receive the same values as before. again: done in any case."""
         running = self._session.interpreter
         if running is None:
             return make()
@@ -641,8 +641,8 @@ class Simulation(ParticleCommands, BlockCommands):
         return running is not None and running.replays and running.project.asleep == self.engine.number
 
     def _of_this_rank(self, what: str, make: Callable[[], Any]) -> Any:
-        """What `make` returns, which another number of ranks would have otherwise. UsageError if that cannot be asked
-        again, where the answer must be that of the run before."""
+        """Return the result of `make`, which depends on the number of ranks. Raises UsageError if a resumed run needs
+        the result of the run before and cannot compute it again."""
         running = self._session.interpreter
         if running is None:
             return make()

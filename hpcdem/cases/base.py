@@ -1,4 +1,4 @@
-"""What all cases have: parameters that are checked, the text made from them, and the way it is carried out.
+"""Base of all cases: checked parameters, the script text made from them, and its execution.
 
 A case is a pydantic model. Its fields become the first lines of the script (``width = 0.052   # m, ...``), except
 choices, which choose between pieces of text. `model` and `loading` are the rest: constant text in which the fields are
@@ -96,7 +96,7 @@ class Case(BaseModel):
         return "".join(self._pieces())
 
     def _pieces(self) -> tuple[str, str]:
-        """What `build` and what `load` carry out."""
+        """Return the text executed by `build` and the text executed by `load`."""
         head = [f"# {line}".rstrip() for line in self._head()]
         parameters = [self._parameter(name, field) for name, field in self._variables()]
         model = "\n".join([*head, "", _divider("parameters"), *parameters, "", _divider("model"), self.model().strip()])
@@ -166,7 +166,7 @@ class Case(BaseModel):
 
 
 def explained(kind: type[Case], error: ValidationError) -> str:
-    """What is wrong with the parameters, the first of them."""
+    """Explain the first error of the parameters."""
     first = error.errors()[0]
     if not first["loc"]:  # several that do not go together
         return f"{kind.__name__}: {validation.message(first)}"

@@ -11,7 +11,7 @@ from hpcdem.lang.pcdc.execute import Interpreter
 
 
 class Carrier:
-    """Where the text of a case is carried out: in the script that runs, or in the model of a Python program.
+    """Executes the text of a case, in the running script or in the model of a Python program.
 
     file: what messages call the text; outdir: a folder for a model of its own; CommandError in a PCDC script. names:
     the variables of the text. Collective.

@@ -71,7 +71,7 @@ class Wedge(Case):
         return self
 
     def plunge(self) -> float:
-        """Of the line of intersection, as seen in the plane upright to the face [degrees]."""
+        """Return the plunge of the line of intersection, as seen in the plane perpendicular to the face [degrees]."""
         (ax, ay, az), (bx, by, bz) = (
             (math.sin(d) * math.sin(t), math.sin(d) * math.cos(t), math.cos(d))
             for d, t in ((math.radians(dip), math.radians(towards)) for dip, towards in

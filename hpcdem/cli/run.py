@@ -65,7 +65,7 @@ class Options:
 
     @property
     def retention(self) -> Retention:
-        """Which checkpoints stay."""
+        """Return the rules for checkpoints to keep."""
         return Retention(self.keep, self.keep_steps or 0, self.keep_every or 0.0, self.keep_at)
 
 
@@ -290,8 +290,8 @@ _SETS = re.compile(rb"\w+\s*=\s*[-+.\d]")
 
 
 def speaks_zdem(path: Path) -> bool:
-    """Whether a script begins as a ZDEM script must, with START, RESTORE or LOAD: a look at it before anything is
-    loaded (lang/detect.py decides later). False if it cannot be read."""
+    """Return whether a script begins as a ZDEM script must, with START, RESTORE or LOAD: a quick check before anything
+    is loaded (lang/detect.py decides later). False if it cannot be read."""
     try:
         with open(path, "rb") as file:
             lines = (line.strip().removeprefix(b"\xef\xbb\xbf").strip() for line in file)

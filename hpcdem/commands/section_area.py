@@ -1,4 +1,4 @@
-"""How large the polygons of a section are, for estimates before a run."""
+"""Areas of the polygons of a section, for estimates before a run."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ MESSAGES: tuple[tuple[str, str], ...] = (
 
 
 def wanted(environ: Mapping[str, str] | None = None, encoding: str | None = None) -> bool:
-    """Whether messages are to have Chinese beside them, and the terminal can show it."""
+    """Return whether messages need a Chinese translation and the terminal can display it."""
     environ = os.environ if environ is None else environ
     names = ("HPCDEM_LANG", "LC_ALL", "LC_MESSAGES", "LANG")
     chosen = next((environ[name] for name in names if environ.get(name)), "")
@@ -80,7 +80,7 @@ def wanted(environ: Mapping[str, str] | None = None, encoding: str | None = None
 
 
 def meaning(message: str) -> str:
-    """What a message means, in Chinese; "" if it is none that is known."""
+    """Translate a message into Chinese; "" if it is unknown."""
     for pattern, text in MESSAGES:
         if found := re.search(pattern, message, re.MULTILINE):
             return _filled(text, found)

@@ -10,5 +10,5 @@ KNOWN = ", ".join([*DRAWINGS, *IMAGES])
 
 
 def is_section(file: str | Path) -> bool:
-    """Whether the name ends like that of a section."""
+    """Return whether the file name has an ending of section files."""
     return Path(file).suffix.lower() in (*DRAWINGS, *IMAGES)

@@ -1,4 +1,4 @@
-"""Which particles a command acts on: the RANGE of the ZDEM language and the ``where=`` of the Python API.
+"""Selection of the particles that a command acts on: RANGE of the ZDEM language and ``where=`` of the Python API.
 
 A selection is a small immutable object. ``selection.mask(p)`` gives one bool per particle; tests look at centres only::
 
@@ -104,7 +104,8 @@ class Selection:
         raise NotImplementedError
 
     def resolve(self, extents: Mapping[str, float]) -> Selection:
-        """This selection with numbers instead of expressions; CommandError where one has no value."""
+        """Return this selection with numbers instead of expressions. Raises CommandError for an expression without a
+        value."""
         return replace(self, **{f.name: _resolved(getattr(self, f.name), extents) for f in fields(self)})  # type: ignore
 
     def __and__(self, other: Selection) -> Selection:
@@ -135,7 +136,7 @@ class Interval(Selection):
 
 
 def even_odd(rings: Sequence[np.ndarray], x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Which points (n,) are inside rings of corners (m, 2), by the even-odd rule.
+    """Flag the points (n,) inside rings of corners (m, 2), by the even-odd rule.
 
     Like an interval, an area includes its lower and left boundary and excludes its upper and right one: where two areas
     share an edge, every point belongs to exactly one of them.
@@ -230,7 +231,7 @@ class Chain(Selection):
 
 
 def _sides(first: Selection, second: Selection) -> bool:
-    """Whether these two intervals are the sides of a rectangle."""
+    """Return whether these two intervals form a rectangle."""
     both = isinstance(first, Interval) and isinstance(second, Interval)
     return both and first.axis != second.axis  # type: ignore[attr-defined]
 

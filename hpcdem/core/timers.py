@@ -84,8 +84,8 @@ class Timers:
 
     @staticmethod
     def joined(parts: Mapping[str, Timers], shared: Mapping[str, str]) -> Timers:
-        """Those of models that run together, for one table: stages get the name of their model before them, `shared`
-        ones (whatever the model) that in `shared`. Wall time counts from the first model on; no steps."""
+        """Merge the timers of models that run together into one table: names of stages get a prefix with the model,
+        `shared` ones (whatever the model) the name in `shared`. Wall time counts from the first model on; no steps."""
         made = Timers()
         made._began = min(timers._began for timers in parts.values())
         for model, timers in parts.items():

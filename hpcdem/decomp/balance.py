@@ -1,4 +1,4 @@
-"""When and how to move strip borders. Balancing may change speed, never the answer."""
+"""Decide when and how to move strip boundaries. Balancing may change speed, never results."""
 
 from __future__ import annotations
 

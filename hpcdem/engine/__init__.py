@@ -1,1 +1,1 @@
-"""What models of any physics share: the step, rebuilds of lists, storage and energy budgets."""
+"""Common base of models of any physics: the step, rebuilds of lists, storage and energy budgets."""

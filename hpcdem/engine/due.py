@@ -29,7 +29,7 @@ class Task:
         return min(regular, self.also) if self.also > step else regular
 
     def due_at(self, step: int) -> bool:
-        """Whether the task is due at this step."""
+        """Return whether the task is due at this step."""
         return self.next_after(step - 1) == step
 
 

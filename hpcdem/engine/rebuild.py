@@ -1,4 +1,4 @@
-"""When lists must be rebuilt: the state on which this depends in every physics, and the steps between two checks."""
+"""Schedule of rebuilds of the lists: the state that determines them in every physics, and the steps between checks."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class CheckInterval:
         return CHECK if left <= 0 else UNSEEN if left % GLANCE else AT_A_GLANCE
 
     def is_too_late(self, room: float, stride: float) -> bool:
-        """Whether a margin [m] is used up before the next glance or check at this stride [m] per step."""
+        """Return whether a margin [m] is used up before the next glance or check at this stride [m] per step."""
         return stride * min(GLANCE, self.countdown) > room
 
     def wait(self, *limits: float) -> None:

@@ -169,7 +169,8 @@ class MpiComm(Comm):
 
 
 def _more_ranks_than_cores(mpi: Any, host: Any) -> bool:
-    """Whether any host has more ranks than cores that they may use; host: communicator of the ranks of this host."""
+    """Return whether any host has more ranks than cores that they may use; host: communicator of the ranks of this
+    host."""
     from mpi4py import MPI
 
     mine = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set(range(os.cpu_count() or 1))

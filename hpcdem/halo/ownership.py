@@ -1,4 +1,4 @@
-"""Which rank owns which cells: cuts of one line during the life of a model, and when they move.
+"""Distribution of cells to ranks: cuts of one line during the life of a model, and when they move.
 
 The line consists of the columns (`Ownership`: discs, blocks in the plane), or is a curve through the cells of space
 (`Curve`: blocks in space). Cuts determine which rank computes, never the result. Measured times may therefore enter

@@ -148,7 +148,7 @@ def read(
 
 
 def _of_all(comm: Comm, values: np.ndarray) -> np.ndarray:
-    """What rank 0 has read, once per node of the machine."""
+    """Share the values that rank 0 has read, with one copy per node of the machine."""
     return comm.per_node(lambda: values, once=True)
 
 
@@ -173,7 +173,7 @@ def _compare(path: str | os.PathLike, columns: Mapping[str, _Column], sums: Sequ
 
 @dataclass(frozen=True)
 class _Column:
-    """Where a dataset lies in the file: first byte of its rows, which follow one another; shape; type; checksum."""
+    """Location of a dataset in the file: first byte of its contiguous rows; shape; type; checksum."""
 
     first: int
     shape: tuple[int, ...]

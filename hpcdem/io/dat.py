@@ -277,7 +277,8 @@ _RawTable = dict[str, np.ndarray]
 
 
 def is_frame(path: str | os.PathLike) -> bool:
-    """Whether a text file is a frame of ZDEM or hpcdem, by its first lines; False if it cannot be read. Serial."""
+    """Return whether a text file is a frame of ZDEM or hpcdem, by its first lines; False if it cannot be read.
+    Serial."""
     try:
         with open(path, "rb") as file:
             return b"parameter data ..." in file.read(4096)
@@ -439,13 +440,13 @@ def _split(data: bytes | mmap.mmap, wanted: set[str]) -> tuple[dict[str, str], l
 
 
 def _let_go(data: bytes | mmap.mmap, end: int) -> None:
-    """What was read of a mapped file need not stay in memory."""
+    """Let the system release memory of the part of a mapped file that was read."""
     if not isinstance(data, bytes) and hasattr(mmap, "MADV_DONTNEED"):
         data.madvise(mmap.MADV_DONTNEED, 0, end)
 
 
 def _tables(comm: Comm, path: str, places: list[_Place], in_place: bool) -> dict[str, list[_RawTable]]:
-    """Of each table the rows of this rank, by section; all of those of walls. Collective."""
+    """Read the rows of this rank of each table, by section; all rows of tables of walls. Collective."""
     raw: dict[str, list[_RawTable]] = {}
     error, texts = None, {}
     shared_out = in_place and comm.size > 1

@@ -43,7 +43,7 @@ def write_sections(
 
 
 def _places(comm: Comm, sections: Sequence[Section]) -> list[Places]:
-    """Where the text of each rank goes; on rank 0 only. Collective."""
+    """Return the locations of the text of each rank in the file; on rank 0 only. Collective."""
     sizes = [rows * width for rows, width in map(size_of, sections)]
     of_ranks = [sizes] if comm.size == 1 else comm.gather(sizes)
     if of_ranks is None:

@@ -48,7 +48,8 @@ class FolderLock:
 
     @property
     def descriptors(self) -> tuple[int, ...]:
-        """What a child has to inherit to hold the lock as well, until it ends; none where there are no locks."""
+        """Return the descriptors that a child process must inherit to hold the lock until it ends; none on systems
+        without locks."""
         return (self._handle,) if self._handle >= 0 else ()
 
     def release(self) -> None:
@@ -64,7 +65,7 @@ class FolderLock:
 
 
 def holder_of(folder: Path) -> dict[str, Any] | None:
-    """What the process that holds the lock says of itself; None if the lock is free. Changes nothing."""
+    """Return the record of the process that holds the lock; None if the lock is free. Changes nothing."""
     try:
         handle = os.open(folder / NAME, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:

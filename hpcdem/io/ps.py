@@ -51,7 +51,7 @@ def write_ps(path: str | os.PathLike, frame: Frame, comm: Comm, later: Deliverie
 
 @dataclass(frozen=True)
 class _Page:
-    """Where the view lies on the page: points per metre, and the axes' box in points."""
+    """Position of the view on the page: points per metre, and the axes' box in points."""
 
     seen: View
     scale: float

@@ -38,7 +38,7 @@ def put(path: str | os.PathLike, rows: Iterable[tuple[int, int]]) -> None:
 
 
 def check(path: str | os.PathLike) -> bool:
-    """Whether the file has a seal; Broken if it has one and is not what was sealed. OSError as for any file."""
+    """Return whether the file has a seal. Raises Broken if the contents do not match it, OSError as for any file."""
     with open(path, "rb") as file:
         size = file.seek(0, os.SEEK_END)
         if size < _END.size:

@@ -40,12 +40,12 @@ class Record:
 
     @property
     def label(self) -> str:
-        """What it is called in a chart: histories of particles have numbers for names."""
+        """Return the name of the record in charts; numbered histories of particles show their title instead."""
         return self.title if self.name.isdigit() else self.name
 
 
 class Curves:
-    """Of a folder of results."""
+    """Read histories, tables and charts of a results folder for the page."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -71,7 +71,7 @@ class Curves:
         return sorted(name for name, head in heads.items() if head[:1] == ["curve"] and len(head) == 3)
 
     def state(self) -> dict[str, Any]:
-        """What there is to draw."""
+        """List the records and charts that can be drawn."""
         return {"records": [[one.name, one.title, one.label] for one in self.records()], "charts": self.charts()}
 
     def presets(self) -> list[dict[str, Any]]:
@@ -233,7 +233,7 @@ class Curves:
 
 
 def as_csv(told: dict[str, Any]) -> str:
-    """What was drawn, as the charts of scripts are written: curve, x, y."""
+    """Write the drawn curves as CSV with columns curve, x, y, like the charts of scripts."""
 
     def cell(text: str) -> str:
         return f'"{text}"'.replace('"', '""')[1:-1] if set(text) & set(',"\n') else text
@@ -280,7 +280,7 @@ def _parted(title: str, brackets: str = "[") -> tuple[str, str]:
 
 
 def _told(x: tuple[str, str], curves: list[tuple], whole: bool) -> dict[str, Any]:
-    """What the page gets. size, shown: what values are divided by where they are written, and the unit then."""
+    """Assemble the answer for the page. size, shown: divisor of the displayed values, and their unit."""
 
     def part(title: str, unit: str, columns: list[np.ndarray]) -> dict[str, Any]:
         largest = max((float(np.abs(c[np.isfinite(c)]).max(initial=0.0)) for c in columns), default=0.0)

@@ -1,5 +1,5 @@
-"""What `hpcdem view --run` lets the page do besides: edit the scripts of one folder, have them checked, and carry out
-commands in a process of its own.
+"""Serve the additional calls of `hpcdem view --run`: edit the scripts of one folder, check them, and execute commands
+in a separate process.
 
 Whoever may open the page may run programs with it, as at a terminal. Therefore it must be requested on the command
 line, and why the page's key, loopback and the check of the origin (server.py) stand before all of it.
@@ -55,7 +55,7 @@ class Console:
 
     @property
     def busy(self) -> bool:
-        """It starts, or carries something out."""
+        """Return whether the process is starting or executing commands."""
         return self.alive and (not self.ready or self.waiting > 0)
 
     def said_since(self, number: Any) -> dict[str, Any]:
@@ -106,7 +106,7 @@ class Console:
             threading.Thread(target=self._listen, args=[self.process], daemon=True).start()
 
     def interrupt(self) -> None:
-        """As Ctrl-C does: a run is saved and stops; a second one stops at once."""
+        """Interrupt the run like Ctrl-C: the run is saved and stops; a second call stops it at once."""
         with self.lock:
             if not self.busy or self.process is None:
                 raise HpcdemError("nothing is running")
@@ -161,7 +161,7 @@ class Desk:
         self.console = Console(folder, outdir, threads)
 
     def calls(self) -> dict[str, Call]:
-        """What POST answers."""
+        """Return the handlers of POST requests by name."""
         return {
             "console": lambda wanted: as_json(self.console.said_since(wanted.get("since"))),
             "say": self._say,
@@ -200,7 +200,7 @@ class Desk:
     # ---- scripts ---------------------------------------------------------------------------------------------------
 
     def names(self) -> list[str]:
-        """Of the scripts of the folder."""
+        """List the file names of the scripts in the folder."""
         with os.scandir(self.folder) as found:
             return sorted(entry.name for entry in found if entry.is_file() and SCRIPT.fullmatch(entry.name))
 
@@ -278,8 +278,8 @@ def _umask() -> int:
 
 
 def whole(text: Any, language: Any) -> bool:
-    """Whether the input can be executed, or continues in another line: a block of Python ends with an empty
-    one."""
+    """Return whether the input can be executed as it stands. A block of Python that continues ends with an empty
+    line."""
     if not isinstance(text, str) or len(text) > LARGEST_SCRIPT:
         raise HpcdemError("text: expected commands")
     if language == "zdem":
@@ -307,7 +307,7 @@ def complete(line: Any, language: Any) -> dict[str, Any]:
 
 
 def check(text: Any, name: str) -> dict[str, Any]:
-    """What `hpcdem --check` says of a script: its language, a summary, or the wrong line."""
+    """Check a script like `hpcdem --check`. Returns its language and a summary, or the wrong line and its problem."""
     if not isinstance(text, str):
         raise HpcdemError("text: expected a script")
     told: dict[str, Any] = {"language": None, "summary": "", "line": None, "problem": ""}

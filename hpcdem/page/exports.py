@@ -40,7 +40,7 @@ _filming = threading.Lock()
 
 
 def kinds() -> list[str]:
-    """What can be saved here: MP4 only where there is ffmpeg."""
+    """List the formats in which a picture can be saved; MP4 only where ffmpeg is installed."""
     return [kind for kind in (*FORMATS, "mv") if kind != "mp4" or movie.ffmpeg() is not None]
 
 

@@ -78,7 +78,7 @@ def live(server: PageServer, browser: bool, say: Callable[[str], None]) -> None:
 
 
 def texts(values: dict[str, Any], style: Mapping[str, Any]) -> dict[str, Answer]:
-    """What GET answers: the files of the page, and what it begins with."""
+    """Return the answers to GET requests by path: the files of the page and its initial values."""
     found = static(KINDS)
     return found | {
         "": found["index.html"],
@@ -103,7 +103,7 @@ def limits() -> dict[str, Any]:
 
 
 def calls(drawing: Worker, files: Worker, style: Mapping[str, Any]) -> dict[str, Call]:
-    """What POST answers. The style is the command line's: requests do not reach it."""
+    """Return the handlers of POST requests. The style comes from the command line; requests cannot change it."""
     own = {"style": dict(style)}
     return {
         "specimen": lambda wanted: Answer(drawing.ask("specimen", wanted | own), BINARY),
@@ -112,7 +112,8 @@ def calls(drawing: Worker, files: Worker, style: Mapping[str, Any]) -> dict[str,
 
 
 def can_open() -> bool:
-    """Whether a browser would open in a window; without one, programs are found that take over the terminal."""
+    """Return whether a browser would open in a window; without a display, webbrowser finds programs that occupy the
+    terminal."""
     return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 

@@ -1,4 +1,4 @@
-"""What the page may ask for. The command line alone makes larger specimens."""
+"""Limits of what the page may request. Larger specimens are made on the command line only."""
 
 from __future__ import annotations
 

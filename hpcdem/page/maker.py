@@ -136,7 +136,8 @@ def _text(rows: Any) -> str:
 
 
 def specimen(wanted: dict[str, Any]) -> bytes:
-    """What the page draws: 4 bytes with the length of a header, the header, arrays; see static/server.js."""
+    """Make a specimen and pack it for the page: 4 bytes with the length of a header, the header, arrays (see
+    static/server.js)."""
     from hpcdem.pre.specimen import make_specimen
 
     request = request_of(wanted)
@@ -147,12 +148,12 @@ def specimen(wanted: dict[str, Any]) -> bytes:
 
 
 def contents(made: Specimen, style: dict[str, Any]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """What the page says, and what it draws."""
+    """Return the header (description and names of files) and the arrays that the page draws."""
     return described(made) | {"files": list(written(made, style))}, drawn(made)
 
 
 def described(made: Specimen) -> dict[str, Any]:
-    """What the page says about a specimen; lengths in mm."""
+    """Describe a specimen for the page; lengths in mm."""
     from hpcdem.physics.polyarc.outlines import boxes
     from hpcdem.post.specimen import class_colours
 

@@ -65,8 +65,7 @@ HEADERS = {
 
 @dataclass(frozen=True)
 class Answer:
-    """What the browser gets. kind: media type; location: where the
-    browser shall go instead."""
+    """Answer to one request. kind: media type; location: address to which the browser is redirected."""
 
     body: bytes
     kind: str = "application/json; charset=utf-8"
@@ -113,7 +112,7 @@ class PageServer(ThreadingHTTPServer):
             raise UsageError(f"--port {port}: cannot listen: {reason}. Without --port a free port is used") from None
 
     def server_bind(self) -> None:
-        """As TCPServer does it: HTTPServer would ask the name service for the name of 127.0.0.1."""
+        """Bind like TCPServer: HTTPServer would query the name service for the name of 127.0.0.1."""
         socketserver.TCPServer.server_bind(self)
         self.server_name, self.server_port = LOOPBACK, self.server_address[1]
 
@@ -166,7 +165,7 @@ class _Refused(Exception):
 
 
 class _Incoming(io.RawIOBase):
-    """What a client sends: so many bytes, until a deadline. What is beyond is not read; TimeoutError after it."""
+    """Stream of at most `count` bytes from a client. It ends after them, and raises TimeoutError after the deadline."""
 
     def __init__(self, connection: socket.socket, seconds: float, count: int) -> None:
         super().__init__()
@@ -174,11 +173,11 @@ class _Incoming(io.RawIOBase):
         self.allow(seconds, count)
 
     def allow(self, seconds: float, count: int) -> None:
-        """So much from now on."""
+        """Allow `count` more bytes within the next `seconds`."""
         self.until, self.left = time.monotonic() + seconds, count
 
     def readable(self) -> bool:
-        """It is."""
+        """Return True."""
         return True
 
     def readinto(self, buffer: Any) -> int:
@@ -231,7 +230,7 @@ class Conversation(BaseHTTPRequestHandler):
         return False
 
     def _knows(self, path: str) -> bool:
-        """Whether an address begins with the key."""
+        """Return whether an address begins with the key."""
         key = path.partition("?")[0].removeprefix("/").partition("/")[0]
         return secrets.compare_digest(key.encode(), self.server.key.encode())
 

@@ -1,4 +1,4 @@
-"""What `hpcdem view` shows: frames of folders and single files, which grow during a run, and its histories."""
+"""Sources of `hpcdem view`: frames in folders and single files, which grow during a run, and its histories."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Sources:
 
     @staticmethod
     def _to_be_made(path: Path) -> bool:
-        """Whether a run that has just been started may make this folder: kernels are compiled before."""
+        """Return whether a run that has just been started may still create this folder: it compiles kernels before."""
         nothing = not any(path.iterdir()) if path.is_dir() else not (path.exists() or path.suffix)
         return nothing and bool(kernels.builder())
 
@@ -110,7 +110,8 @@ class Sources:
         return frames[place]
 
     def moment(self, file: FrameFile) -> tuple[tuple[str, int, int], Moment]:
-        """What a frame holds, and by what it is known: a file that was written again is another. HpcdemError."""
+        """Return the contents of a frame and its key in the store, which changes when the file is rewritten. Raises
+        HpcdemError."""
         key = self._key(file)
         with self.lock:
             if key not in self.moments:
@@ -121,7 +122,7 @@ class Sources:
             return key, self.moments[key]
 
     def kept(self, file: FrameFile) -> bool:
-        """Whether a frame is in memory."""
+        """Return whether a frame is in memory."""
         return self._key(file) in self.moments
 
     @staticmethod
@@ -162,7 +163,7 @@ class Sources:
         return told
 
     def waiting(self) -> dict[str, Any]:
-        """Why there is no frame yet: kernels are compiled, a run is active, or nothing is."""
+        """Explain why there is no frame yet: kernels are being compiled, a run is active, or the folder is empty."""
         folder = self.folders()[0] if self.folders() else self.paths[0]
         holder = run_folder.running(folder) if folder.is_dir() else None
         if holder is not None:
@@ -171,7 +172,7 @@ class Sources:
         return {"kind": "compiling" if who else "empty", "who": who, "folder": str(folder)}
 
     def curves(self) -> Curves:
-        """What the run of the first folder has recorded."""
+        """Return the curves that the run of the first folder has recorded."""
         folder = next(iter(self.folders()), self.paths[0])
         if self._curves is None or self._curves.folder != folder:
             self._curves = Curves(folder)
@@ -205,7 +206,7 @@ def _stamp(path: Path) -> str:
 
 
 def _progress(folder: Path) -> dict[str, Any] | None:
-    """How far the run is, as it noted itself."""
+    """Read the progress that the run has noted in its folder; None if there is no valid note."""
     try:
         told = json.loads((folder / PROGRESS).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -214,7 +215,7 @@ def _progress(folder: Path) -> dict[str, Any] | None:
 
 
 def _run(folder: Path) -> dict[str, Any] | None:
-    """What run.json says, and who holds the folder."""
+    """Summarize run.json and the process that holds the folder; None if neither exists."""
     try:
         record = run_folder.read(folder)
     except HpcdemError as problem:

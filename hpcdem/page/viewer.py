@@ -106,7 +106,7 @@ class Viewer:
         """The last request, its picture and scene: a click is looked up there."""
 
     def calls(self) -> dict[str, Call]:
-        """What POST answers."""
+        """Return the handlers of POST requests by name."""
         return {
             "state": lambda wanted: as_json(self.state()),
             "about": self._in_turn(self.about),
@@ -231,7 +231,7 @@ class Viewer:
         return Answer(packed(header, {"image": bytes_}), "application/octet-stream")
 
     def pick(self, wanted: dict[str, Any]) -> dict[str, Any]:
-        """What the pixel at column and row shows: layer, number, and all values of the object."""
+        """Identify the object at a pixel (column, row): its layer, number, and all values."""
         shown, picture = self._painted(wanted | {"fine": False})
         column, row = (wanted.get(name) for name in ("column", "row"))
         h, w = picture.layer.shape
@@ -332,7 +332,7 @@ class Viewer:
         return shown, picture
 
     def _scene(self, key: tuple, moment: Moment, view: ModelView) -> Scene:
-        """As scene.scene, with layers that were put together before."""
+        """Build the scene like `scene.scene`, but reuse layers that were assembled before."""
         seen = seen_of(moment, view)
         shifted, plane = None, plane_of(moment, view)
         cut, alone = None if plane is None else tuple(np.concatenate(plane).tolist()), sliced(view)
@@ -375,7 +375,7 @@ def _box(moment: Moment) -> list[list[float]] | None:
 
 
 def _in_chinese(moment: Moment) -> dict[str, dict[str, str]]:
-    """What fields, colours and classes are called in Chinese."""
+    """Translate the names of fields, colours and legend entries into Chinese."""
     names = {name for objects in moment.objects.values() for name in (*objects.fields, *objects.of_vectors())}
     return {
         "fields": {name: chinese.field_name(name) for name in sorted(names)}, "colours": chinese.COLOURS,
@@ -384,7 +384,7 @@ def _in_chinese(moment: Moment) -> dict[str, dict[str, str]]:
 
 
 def _older(layers: OrderedDict[tuple, Painted], key: tuple) -> bool:
-    """Whether the oldest layer is of another frame than this one, and layers of this one are many bytes."""
+    """Return whether the layers exceed BYTES and the oldest belongs to another frame than `key`."""
     return _size(layers) > BYTES and next(iter(layers))[0] != key
 
 

@@ -75,7 +75,7 @@ class Maker:
 
     @property
     def alive(self) -> bool:
-        """Whether it has not ended."""
+        """Return whether the process is still running."""
         return self.process.poll() is None
 
     def end(self) -> str:
@@ -86,7 +86,7 @@ class Maker:
 
 
 def _read(pipe: IO[bytes], length: int) -> bytes:
-    """So many bytes. BrokenPipeError if the other end has gone."""
+    """Read exactly `length` bytes. Raises BrokenPipeError if the other end has closed."""
     content = pipe.read(length)
     if len(content) != length:
         raise BrokenPipeError
@@ -196,7 +196,7 @@ class Worker:
                 self._end()
 
     def _why(self, number: int, maker: Maker) -> HpcdemError:
-        """What to say when the maker has gone."""
+        """Return the error to report after the process that makes specimens has ended."""
         how = maker.end()
         with self.turn:
             if self.closed:

@@ -23,7 +23,7 @@ def class_of(kind: str) -> type[Structure]:
 
 
 def of(blocks: Any, kind: str) -> Structure:
-    """Those of a model that have the objects of this kind. CommandError if missing."""
+    """Return the supports of the model that have objects of this kind. Raises CommandError if it has none."""
     support = class_of(kind)
     found = support.there(blocks)
     if found is None:

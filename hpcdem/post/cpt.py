@@ -62,7 +62,7 @@ class ColourTable:
 
     @property
     def categorical(self) -> bool:
-        """Whether single values have colours, instead of slices."""
+        """Return whether the table colours single values (categories) instead of intervals."""
         return self.slices[0].low == self.slices[0].high
 
     @property
@@ -72,7 +72,7 @@ class ColourTable:
         return np.array(low if self.categorical else [*low, self.slices[-1].high])
 
     def position(self, values: np.ndarray) -> np.ndarray:
-        """Where values lie on a colour bar on which every slice is one unit long (NaN where off the table).
+        """Locate values on a colour bar on which every slice is one unit long (NaN outside the table).
 
         Piecewise linear between the breaks; a categorical value lies in the middle of its unit.
         """
@@ -107,7 +107,7 @@ class ColourTable:
         return result
 
     def stretched(self, low: float, high: float) -> ColourTable:
-        """This table scaled to another range."""
+        """Scale this table to another range."""
         a, b = self.breaks[[0, -1]]
 
         def moved(z: float) -> float:

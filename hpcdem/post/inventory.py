@@ -1,4 +1,5 @@
-"""What is in a file of a run, and whether it is whole: facts about checkpoints and frames, for `hpcdem info`."""
+"""Inventory of a file of a run and a check that it is complete: facts about checkpoints and frames for `hpcdem
+info`."""
 
 from __future__ import annotations
 
@@ -72,7 +73,7 @@ def _of_particles(state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]
 
 
 def _of_blocks(state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]]) -> Facts:
-    """Of a PCDC script, or of a program that saved its blocks."""
+    """Collect the facts of a checkpoint of blocks, saved by a PCDC script or a Python program."""
     clock, extra = state["clock"], state["extra"]
     project, run = extra.get("project"), extra.get("run") or {}
     facts: Facts = _moment(clock)

@@ -1,5 +1,5 @@
-"""What can be drawn of a frame, each thing by its word: layers over one another in axes whose data
-unit is the metre. Frames are whole (all rows on this rank); particles are in the order of ids."""
+"""Drawing layers of a frame by keyword, on top of one another, in axes whose data unit is the metre. Frames are
+complete (all rows on this rank); particles are in the order of ids."""
 
 from __future__ import annotations
 

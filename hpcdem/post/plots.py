@@ -39,7 +39,7 @@ _MOST_TICKS = 1000
 
 @dataclass(frozen=True)
 class Style:
-    """How a picture looks. Lengths of the model in metres, `page` (width of the picture) in cm, `font` and lines in
+    """Appearance of a picture. Lengths of the model in metres, `page` (width of the picture) in cm, `font` and lines in
     points, `dpi` dots per inch."""
 
     what: tuple[str, ...] = MODEL

@@ -92,7 +92,7 @@ class Section:
 
     @property
     def initial(self) -> bool:
-        """Whether it is the frame before the first step of a command."""
+        """Return whether this is the frame before the first step of a command."""
         return self.name.endswith("_ini")
 
 

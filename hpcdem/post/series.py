@@ -39,7 +39,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """What progress calls it."""
+        """Return the name shown by the progress report."""
         return self.source.stem
 
     def __call__(self) -> None:
@@ -67,7 +67,7 @@ class ViewJob:
 
     @property
     def name(self) -> str:
-        """What progress calls it."""
+        """Return the name shown by the progress report."""
         return self.source.stem
 
     def __call__(self) -> None:
@@ -86,7 +86,7 @@ class Task(Protocol):
 
     @property
     def name(self) -> str:
-        """What progress calls it."""
+        """Return the name shown by the progress report."""
 
     def __call__(self) -> None:
         """Do it. Raises HpcdemError."""
@@ -156,7 +156,7 @@ def _done(task: Task) -> str | None:
 
 
 class Progress:
-    """What is done and how long it will take: a bar on a terminal, else a line every second at most."""
+    """Progress of a series and its remaining time: a bar on a terminal, otherwise at most one line per second."""
 
     def __init__(self, total: int, mine: int, report: Report | None) -> None:
         self._total, self._mine, self._report = total, mine, report

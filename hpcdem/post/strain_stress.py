@@ -119,7 +119,7 @@ def _frames(folder: Path, log: Any) -> list[FrameFile]:
 
 
 class _Output(NamedTuple):
-    """Where the results go, and the spacing of their nodes [m]."""
+    """Folder of the results and spacing of their nodes [m]."""
 
     folder: Path
     spacing: float
@@ -184,7 +184,7 @@ def _tried(action: Callable[[], _T]) -> tuple[_T | None, str | None]:
 
 @dataclass
 class Snapshot:
-    """What is needed of a frame: particles (in the order of ids) and walls, after --xmove and --ymove.
+    """Data of a frame: particles (in the order of ids) and walls, after --xmove and --ymove.
 
     inside: not beyond --leftwallid or --rightwallid, and of the requested groups; moments (n, 4): V s [N m]; volume
     (n,); thickness [m]; held (n,): in contact with anything; fixed (n,): along x and y.
@@ -466,7 +466,7 @@ def _rounds(
 
 
 class _Last(NamedTuple):
-    """What rank 0 keeps of the last frame of a round: particles as `packed`, and F."""
+    """Data of the last frame of a round, kept by rank 0: particles as `packed`, and deformation gradient F."""
 
     packed: np.ndarray = np.zeros((0, 5))
     f: np.ndarray = np.zeros((0, 6))

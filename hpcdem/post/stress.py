@@ -67,7 +67,7 @@ def moments(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _members(p: dict[str, np.ndarray]) -> np.ndarray:
-    """Which particles (n,) belong to a clump; a .dat does not say."""
+    """Flag the particles (n,) that belong to a clump; a .dat does not contain this information."""
     return p["clump"] >= 0 if "clump" in p else np.zeros(len(p["gid"]), bool)
 
 
@@ -102,7 +102,7 @@ def _force(table: dict[str, np.ndarray], name: str) -> tuple[np.ndarray, np.ndar
 
 
 def _among(keys: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Which of the keys are among the others (not empty)."""
+    """Flag the keys that occur among the others (not empty)."""
     others = np.sort(others)
     return others[np.minimum(np.searchsorted(others, keys), len(others) - 1)] == keys
 

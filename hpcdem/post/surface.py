@@ -1,4 +1,4 @@
-"""Which particles are the bed, and the line over the top of them."""
+"""Selection of the particles of the bed, and the line along its top."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def bed(x: np.ndarray, y: np.ndarray, radius: np.ndarray, fixed: np.ndarray) -> 
 
 
 def in_large_pieces(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Whether each disc is in a piece of at least LOOSE of all. Discs are connected where the squares of a grid, as
-    wide as the largest diameter, do."""
+    """Flag the discs in connected pieces of at least the share LOOSE of all discs. Discs are connected if their cells
+    of a grid, as wide as the largest diameter, are."""
     from scipy import ndimage
 
     if len(x) == 0:

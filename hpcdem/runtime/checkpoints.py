@@ -71,5 +71,5 @@ def _ranked(folders: list[Path]) -> tuple[list[tuple[tuple[int, int, int], float
 
 
 def _position(state: dict[str, Any]) -> int:
-    """How far in its script: commands done. Of blocks it is in `extra`, what their simulation saves for others."""
+    """Return the number of script commands executed. Checkpoints of blocks store it in `extra`."""
     return int((state.get("extra") or state).get("position") or 0)

@@ -1,4 +1,4 @@
-"""How many threads a model steps with when nobody has said how many: by its size first, then by what steps have cost.
+"""Choice of the number of threads if the user gives none: first from the size of the model, then from measured times.
 
 Threads wait for each other several times a step. Where a model is small, or other programs want the same cores, that
 costs more than the threads save, up to twenty times as much. So from time to time half or twice as many are tried; the

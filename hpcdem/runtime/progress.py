@@ -1,4 +1,4 @@
-"""What the user sees during a run: plain lines in a log file, a bar on a terminal, a table at the end.
+"""Output during a run: plain lines in a log file, a bar on a terminal, a table at the end.
 
 Only rank 0 prints; on all other ranks the same calls do nothing, so callers never ask for the rank. What only
 another rank knows has to be brought to rank 0 first.
@@ -192,7 +192,7 @@ class Log:
         self._warnings.clear()
 
     def results(self, folder: Path) -> None:
-        """Where results are, and how to view them: the last line of a run."""
+        """Report where the results are and how to view them: the last line of a run."""
         where = shlex.quote(str(folder))
         self.info(f"results: {folder}; `hpcdem view {where}` shows them, `hpcdem measure {where}` measures them")
 
@@ -203,7 +203,7 @@ class Log:
             self.warn(text)
 
     def has_warned(self, key: str) -> bool:
-        """Whether `warn_once` has been called with this key; ask rank 0."""
+        """Return whether `warn_once` has been called with this key; meaningful on rank 0 only."""
         return key in self._warned
 
     def _print(self, text: str) -> None:

@@ -21,7 +21,7 @@ States = dict[tuple[int, int], dict[str, str]]
 
 
 def line(step: int, model: int, parts: Mapping[str, str]) -> str:
-    """What the log says about a state."""
+    """Format the log line of a state."""
     of = f" of model {model}" if model > 1 else ""
     return f"state {step}{of}: " + " ".join(f"{name}={value}" for name, value in parts.items())
 

@@ -47,7 +47,8 @@ _entered: set[Path] = set()
 
 @dataclass(frozen=True)
 class Job:
-    """What was started. script: path as given, "" for a Python session; language: "zdem", "pcdc", "python" or ""."""
+    """Program that was started. script: path as given, "" for a Python session; language: "zdem", "pcdc", "python" or
+    ""."""
 
     script: str = ""
     language: str = ""
@@ -55,7 +56,7 @@ class Job:
     threads: int = 1
 
     def about(self) -> dict[str, Any]:
-        """Who is writing, for those who find the folder locked."""
+        """Describe the writing process for others that find the folder locked."""
         return {"host": socket.gethostname(), "pid": os.getpid(), "script": self.script, "began": _now()}
 
 
@@ -143,9 +144,9 @@ def checkpoint_name(step: int, automatic: bool = False) -> str:
 
 @dataclass(frozen=True)
 class Retention:
-    """Which checkpoints stay: the last numbered ones (0: all), the last two automatic ones; and of all that are older
-    the last at or before each multiple of `steps` steps and of `period` [s], and at or before each of `times` [s] (0,
-    (): none). Times are the model's."""
+    """Rules for checkpoints to keep: the last numbered ones (0: all), the last two automatic ones; and of all older
+    ones the last at or before each multiple of `steps` steps and of `period` [s], and at or before each of `times` [s]
+    (0, (): none). Times are the model's."""
 
     last: int = 0
     steps: int = 0
@@ -153,7 +154,7 @@ class Retention:
     times: tuple[float, ...] = ()
 
     def spares(self, path: Path, following: Path) -> bool:
-        """Whether an old checkpoint stays; following: the next one that is there."""
+        """Return whether an old checkpoint is kept; following: the next existing one."""
         if self.steps and _step_of(following) > math.ceil(_step_of(path) / self.steps) * self.steps:
             return True
         if not self.period and not self.times:
@@ -208,7 +209,7 @@ def set_aside(folder: Path, later: Collection[Path], step: int) -> None:
 
 
 def _step_of(path: Path) -> int:
-    """Of a numbered checkpoint."""
+    """Return the step of a numbered checkpoint."""
     return int(path.stem.removeprefix("auto_"))
 
 

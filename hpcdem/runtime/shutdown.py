@@ -1,4 +1,4 @@
-"""How a run ends: all ranks together, with one message and one exit code, whatever happened on which rank.
+"""End of a run: all ranks stop together, with one message and one exit code, whatever happened on which rank.
 
 An error may come to all ranks at once (a bad script line), or to one of them while the others wait for it inside
 MPI. A failing rank cannot know which; so it enters the abort barrier, which does not block, and when the others do not
@@ -36,7 +36,7 @@ EXIT_TIMEOUT = 30
 
 @dataclass(frozen=True)
 class Failure:
-    """What one rank has to say about its end."""
+    """Error of one rank at its end."""
 
     code: int
     text: str
@@ -44,7 +44,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class ExitStatus:
-    """How the job ends, for this rank: exit code of the job, rank, and (host, process id) of the other ranks."""
+    """Final status of the job for this rank: exit code of the job, rank, and (host, process id) of the other ranks."""
 
     code: int = EXIT_OK
     rank: int = 0
@@ -192,7 +192,7 @@ def wait_for_end_of(others: tuple[tuple[str, int], ...]) -> None:
 
 
 def runs(pid: int) -> bool:
-    """Whether a process is there and not just waiting to be counted (a zombie)."""
+    """Return whether a process exists and is not a zombie."""
     try:
         with open(f"/proc/{pid}/stat") as file:
             return file.read().rpartition(")")[2].split()[0] not in "ZX"

@@ -1,4 +1,4 @@
-"""How fast this machine is: the rate of the last run here, kept beside the compiled kernels.
+"""Speed of this machine: the rate of the last run here, stored with the compiled kernels.
 
 The rate is in particle-steps per second and core. It depends on the model (contacts, bonds, output), so it is kept for
 Hertz and linear particles apart, and good for "minutes or days", not for more.
@@ -29,7 +29,7 @@ def _file() -> Path:
 
 
 def _known() -> dict[str, float]:
-    """What is on the disk; empty if there is nothing, or nothing that makes sense."""
+    """Read the stored rates; empty without a file or plausible values."""
     try:
         found = json.loads(_file().read_text(encoding="utf-8"))
         return {kind: float(found[kind]) for kind in KINDS if kind in found and _sensible(float(found[kind]))}

@@ -175,7 +175,7 @@ class StopRequests:
     # -- the questions of the step loop ----------------------------------------------------------------------
 
     def local_request(self) -> int:
-        """What this rank knows of: one of the codes above."""
+        """Return the request known to this rank: one of the codes above."""
         if not self._stop:
             now = time.monotonic()
             for end, _, name in self._limits:
@@ -249,7 +249,8 @@ class StopRequests:
 
 
 def in_the_script(frame: FrameType | None) -> bool:
-    """Is this frame, or the first around it that belongs to either, one of the script or program, not of hpcdem?"""
+    """Return whether this frame, or the nearest outer one that belongs to either, is of the user's program, not of
+    hpcdem."""
     while frame is not None:
         if frame.f_code.co_filename.startswith(_PACKAGE):
             return False

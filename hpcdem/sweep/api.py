@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Options(TypedDict, total=False):
-    """Of a report: the options of `hpcdem measure`, lengths in m."""
+    """Options of a report, those of `hpcdem measure`; lengths in m."""
 
     walls: tuple[int, ...]
     groups: tuple[str, ...]
@@ -113,7 +113,7 @@ class Sweep:
 
     @property
     def folder(self) -> Path:
-        """Where everything is."""
+        """Folder of the sweep."""
         return self.plan.folder
 
     @property
@@ -126,7 +126,7 @@ class Sweep:
         return driver.run(self.plan, log or _log(), jobs, tries)
 
     def submit(self, options: Sequence[str] = (), at_once: int | None = None) -> str:
-        """As a job array of Slurm; returns its number, "" if there is nothing to do."""
+        """Submit the sweep as a job array of Slurm; returns its number, "" if all runs are complete."""
         path = array.write(self.plan, options, at_once)
         return "" if path is None else array.submit(path)
 

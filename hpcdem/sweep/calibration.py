@@ -83,7 +83,7 @@ class Result:
         return found
 
     def cautions(self) -> list[str]:
-        """What the targets cannot tell, and targets that no parameters meet."""
+        """List the parameters that the targets do not determine, and the targets that no parameters meet."""
         found = []
         width = self.samples.std(axis=0) * np.sqrt(12.0)
         for name, one in zip(self.names, width):

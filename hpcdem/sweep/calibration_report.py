@@ -1,4 +1,4 @@
-"""What a calibration found: tables, a page and a figure."""
+"""Results of a calibration: tables, a page and a figure."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How ranges are sampled. method: "latin" or "sobol"; seed: of the sampling itself."""
+    """Sampling of ranges. method: "latin" or "sobol"; seed: of the sampling itself."""
 
     method: str
     number: int

@@ -53,7 +53,7 @@ def all_of(report: Report) -> Iterator[tuple[str, Any]]:
 
 
 def _changes(report: Report, column: Column) -> bool:
-    """Whether there is anything to be seen: over time, or between members."""
+    """Return whether a column changes over time or between members."""
     values = np.concatenate([one.y.ravel() for one in report.bands[column].values()])
     known = values[np.isfinite(values)]
     return len(known) > 0 and bool(np.ptp(known) > 0.0)
@@ -67,7 +67,7 @@ def _chosen(name: str, columns: Sequence[Column]) -> list[Column]:
 
 
 def _groups(report: Report, there: dict[tuple[Value, ...], Band]) -> list[tuple[tuple[Value, ...], Band]]:
-    """What is drawn: the groups, if there are few, else all members."""
+    """Choose the curves to draw: the groups, if there are few, otherwise all members."""
     some = [(group, one) for group, one in there.items() if group]
     return some if 1 < len(some) <= GROUPS else [(group, one) for group, one in there.items() if not group]
 

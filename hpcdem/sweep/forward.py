@@ -95,7 +95,7 @@ class Settings:
 
     @property
     def targets(self) -> tuple[Target, ...]:
-        """Of all tests, in order."""
+        """Return the targets of all tests, in order."""
         return tuple(one.target for test in self.tests for one in test.measured)
 
 

@@ -40,19 +40,19 @@ class Member:
 
     @property
     def state(self) -> str:
-        """Of DONE, FAILED, STOPPED, RUNNING, WAITING, as the disk has it now."""
+        """Return the state of the member on disk: DONE, FAILED, STOPPED, RUNNING or WAITING."""
         if holder_of(self.folder) is not None:
             return RUNNING
         return str(read_json(self.folder / STATE, {"state": WAITING})["state"])
 
     def label(self) -> str:
-        """As messages show it."""
+        """Return the name and values of the member for messages."""
         return f"{self.name} ({', '.join(f'{name}={value}' for name, value in self.values.items())})"
 
 
 @dataclass
 class Plan:
-    """What is run. script: name of the file in each member's folder; digest: of the script without other values;
+    """Plan of a sweep. script: name of the file in each member's folder; digest: of the script without other values;
     sampling: None, or method, number and seed, with `wanted` as given."""
 
     folder: Path

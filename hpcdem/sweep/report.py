@@ -80,7 +80,7 @@ def _cleared(folder: Path) -> None:
 
 
 def _frames_in(data: Path) -> bool:
-    """Whether there is more to measure than histories."""
+    """Return whether the folder contains more than histories to measure."""
     return bool(list_frames(data) or list_mesh_frames(data) or (data / emission.TABLE).is_file())
 
 

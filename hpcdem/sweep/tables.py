@@ -1,4 +1,4 @@
-"""What the members measured, beside each other: values by member, bands over time, dependence on parameters."""
+"""Comparison of the measurements of members: values by member, bands over time, dependence on parameters."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 
 def measured(folder: Path, data: Path) -> tuple[dict[Column, Series], Series | None, dict[str, float]]:
-    """Of the tables in `folder`, and the histories in `data`: measures over time; the last profile of the surface;
+    """Read the tables in `folder` and the histories in `data`: measurements over time; the last profile of the surface;
     single numbers."""
     found: dict[Column, Series] = {}
     for name, keys in SERIES.items():

@@ -270,8 +270,8 @@ def start(
 
 
 def _is_surely_small(sim: Simulation) -> bool:
-    """Whether the time step is far below its limit whatever touches: springs are linear, and many times as stiff ones
-    could be borne. Collective."""
+    """Return whether the time step is far below its limit in any state of contact: springs are linear, and much stiffer
+    ones would still be stable. Collective."""
     rows = _laws_in_use(sim)
     if (rows[:, 0] != LINEAR).any():
         return False
@@ -351,7 +351,8 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
 
 
 class Due:
-    """What is due while the running command (sim.progress) steps the particles; used by every loop that does.
+    """Output and checks that are due while the running command (sim.progress) steps the particles; used by every such
+    loop.
 
     checkpoint: writes one at the SET save intervals, last of all, so that it knows everything else was written; None:
     somebody else does. at_reports: is called where rows of walls.csv are written.

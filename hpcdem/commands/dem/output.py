@@ -1,4 +1,4 @@
-"""What a run writes: frames, pictures, histories, wall forces, checkpoints, progress.
+"""Output of a run: frames, pictures, histories, wall forces, checkpoints, progress.
 
 All functions are collective and need a closed model. The folder is made when the first file is written, so a script
 that fails before leaves nothing behind.

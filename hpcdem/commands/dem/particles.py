@@ -83,7 +83,7 @@ def load(
 
 
 def _read_xyr(sim: Simulation, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """This rank's share of a file of particles: rows x, y, r (n, 3), and groups (n,) str. Collective."""
+    """Read this rank's share of a file of particles: rows x, y, r (n, 3), and groups (n,) str. Collective."""
     size, error = 0, None
     if sim.comm.rank == 0:
         try:

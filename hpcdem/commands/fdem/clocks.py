@@ -93,7 +93,8 @@ def _physics(project: Project, part: str) -> Any:
 
 
 def time(project: Project, part: str) -> float:
-    """What the clock of a part shows [s], of blocks in static runs that of creep. CommandError if it goes by itself."""
+    """Return the time of a part [s]; in static runs, that of blocks is creep time. Raises CommandError if the part has
+    no clock of its own."""
     blocks = project.blocks
     if part == MECHANICAL:
         return float(blocks.clock.time if project.dynamic else blocks.creep.time)

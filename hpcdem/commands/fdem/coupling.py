@@ -199,7 +199,7 @@ def next_checkpoint(project: Project) -> float:
 
 
 def checkpoint_is_due(project: Project) -> bool:
-    """Whether SET save of the particles asks for one at this step."""
+    """Return whether SET save of the particles requires a checkpoint at this step."""
     every = _save_interval(project)
     return bool(every) and project.coupled is not None and project.coupled.particles.clock.step % every == 0
 

@@ -75,7 +75,8 @@ def clock(
     project: Project, field: str, flows: bool | None = None, sub_steps: int | None = None,
     time_step: float | None = None, current_time: float | None = None,
 ) -> None:  # fmt: skip
-    """Whether the field flows; sub-steps of a cycle; their length [s]; what its clock shows now [s]."""
+    """Set whether the field flows, the sub-steps of a cycle, their length [s], and the present time of its clock
+    [s]."""
     found = of(project, field)
     found.clock(flows, sub_steps, time_step)
     if current_time is not None:

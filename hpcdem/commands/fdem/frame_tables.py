@@ -53,8 +53,8 @@ def _on_root(blocks: Blocks, columns: Columns | None) -> Columns | None:
 
 
 def _contacts(blocks: Blocks) -> Columns | None:
-    """Of two elements that touch, however many of their faces and parts do: force on the first [N/m, in space N], and
-    the mean of the places. Sums go in an order that no rank changes."""
+    """Return one row per pair of touching elements, whatever the number of touching faces and parts: force on the first
+    [N/m, in space N], and mean position. The order of sums does not depend on the ranks."""
     if not blocks.options.collision:
         return None
     found = diagnostics.contacts(blocks)

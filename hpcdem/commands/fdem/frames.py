@@ -70,7 +70,7 @@ def settle(project: Project) -> None:
 
 
 def _particles_just_wrote(project: Project) -> bool:
-    """Whether the particles of a coupled model have just written the frame of this step."""
+    """Return whether the particles of a coupled model have just written the frame of this step."""
     both = project.coupled
     return both is not None and both.particles.last_frame == (both.particles.clock.step, False)
 
@@ -120,9 +120,9 @@ _OF_FIELDS = {f"mean_{name}": name for name in diagnostics.DIFFUSING} | {
 
 
 def _names(blocks: Blocks, kind: str) -> list[str]:
-    """What is written of elements and joints: neither where they are, which the points say, nor single points of
-    joints; of properties those that a table or a field has made different from object to object; of plastic flow and
-    creep only where elements can yield or creep; all state variables of user laws."""
+    """Select the columns of elements or joints: without positions, which the points contain, and without integration
+    points of joints; properties only if a table or a field makes them differ between objects; plastic flow and creep
+    only if elements can yield or creep; all state variables of user laws."""
     yields = "plastic" in blocks.cold or bool(blocks.yielding().any())
     creeps = "creep" in blocks.cold or bool(blocks.creeping().any())
     varied = {name for on, name in blocks.varied if on == {"joint": JOINT}.get(kind, kind)}

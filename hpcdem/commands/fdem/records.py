@@ -122,7 +122,7 @@ class History:
 
     @property
     def waits(self) -> bool:
-        """Whether the record of this step needs the forces of the next one."""
+        """Return whether the record of this step needs the forces of the next one."""
         return self._waits is not None
 
     def record(self, blocks: Blocks, goes_on: bool) -> None:

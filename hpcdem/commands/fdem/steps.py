@@ -294,8 +294,8 @@ def _heat_on(project: Project, run: Implicit, progress: dict[str, Any]) -> None:
 
 
 def _explicit_is_cheaper(project: Project, flow: Flow, time: float, dt: float | None, solver: str) -> bool:
-    """Whether so much flow time [s] is to pass by explicit steps: they cost less, or implicit ones are refused; said in
-    the log. A command that resumes from a checkpoint does what it did before. Collective."""
+    """Choose explicit steps for flow time [s] if they cost less or implicit steps are refused, and log the choice. A
+    command that resumes from a checkpoint keeps its choice. Collective."""
     if project.progress is not None:
         return bool(project.progress["command"][0] != "solve hydraulic")
     blocks, refused = project.blocks, None

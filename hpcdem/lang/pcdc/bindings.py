@@ -1,6 +1,5 @@
-"""How a command of a script calls its function of `hpcdem.commands.fdem`: the row of the table names the function
-(`does`), which receives the arguments under their names. This module contains the further conversions.
-"""
+"""Calls of the functions of `hpcdem.commands.fdem` by commands of a script: the row of the table names the function
+(`does`), which receives the arguments under their names. This module contains the further conversions."""
 
 from __future__ import annotations
 
@@ -251,7 +250,7 @@ def node_field(call: Call) -> None:
 
 
 def _removed(call: Call, *conditions: Model) -> list[bool]:
-    """Which of these conditions are taken back: those that are named, or all."""
+    """Flag the conditions to remove: the named ones, or all if none is named."""
     return [one.keyword.name in call.arguments or not call.arguments for one in conditions]
 
 
@@ -323,7 +322,7 @@ def initial_fluid(call: Call) -> None:
 
 @converter
 def node_history(call: Call) -> None:
-    """Of the temperature."""
+    """Record the temperature of a node."""
     fdem.histories.create(call.project, call["name"], g.NODE, "temperature", how="mean", every=call.get("every", 1),
                           where=call.where)  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""What `hpcdem --check` finds out about a script without running it."""
+"""Check of a script by `hpcdem --check`, without running it."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ class Console:
 
 
 def is_whole(text: str) -> bool:
-    """Whether a text can be carried out, or lacks its end: a block continues until an empty line."""
+    """Return whether a text can be executed, or is incomplete: a block continues until an empty line."""
     last = text.split("\n")[-1].rstrip()
     if last.lstrip().startswith("pcdc") and last.endswith("\\"):
         return False

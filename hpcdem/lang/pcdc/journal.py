@@ -172,7 +172,7 @@ class Journal:
 
     @property
     def replays(self) -> bool:
-        """Whether the journal still replays recorded entries."""
+        """Return whether the journal still replays recorded entries."""
         if self.failure is not None:
             raise self.failure
         return self._at < len(self._past)

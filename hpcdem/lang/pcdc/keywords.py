@@ -34,7 +34,7 @@ class Keyword:
         return "-".join(full for _, full in self._parts[0])
 
     def accepts(self, typed: str) -> bool:
-        """Is `typed` this word, or short for it?"""
+        """Return whether `typed` is this word or an abbreviation of it."""
         segments = typed.lower().split("-")
         return any(_match(segments, parts) for parts in self._parts)
 
@@ -44,7 +44,7 @@ class Keyword:
         return tuple("-".join(full for _, full in parts) for parts in self._parts)
 
     def is_exactly(self, typed: str) -> bool:
-        """Is `typed` this word in full?"""
+        """Return whether `typed` is this word in full."""
         return typed.lower() in self.fulls
 
     def spellings(self) -> list[str]:

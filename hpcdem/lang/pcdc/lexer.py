@@ -109,8 +109,8 @@ def tokens(line: str) -> list[Token]:
 
 
 def _listed(line: str, token: Token, at: int) -> tuple[Token, int]:
-    """What a comma at `at` makes of the token before it: numbers and expressions are components of a vector, others
-    items of a list, which stand by themselves."""
+    """Extend a token by the values after the comma at `at`: numbers and expressions become components of a vector,
+    other tokens become items of a list."""
     items = [token]
     while line[at : at + 1] == ",":
         after = _skip_blanks(line, at + 1)

@@ -25,7 +25,7 @@ LONGEST = 1_000_000
 
 
 def collected(namespace: Mapping[str, Any], sources: Mapping[str, Source]) -> tuple[dict[str, Any], list[str]]:
-    """What of a namespace is saved, as JSON values, and why other m_ names are not.
+    """Collect the variables of a namespace to be saved, as JSON values, and the reasons why other m_ names are not.
 
     sources: scripts by file name, to find the text of functions in. CommandError for a function that could not be
     restored.

@@ -162,7 +162,7 @@ class _Line:
                 return self._allowed(ways[0])
 
     def _is_unknown(self, command: Command) -> bool:
-        """Is the next word none that this command may continue with, where its last word is left out?"""
+        """Return whether the next word cannot continue this command when its last word is omitted."""
         token = self.peek()
         rows: tuple[Any, ...] = (*command.options, *command.models)
         return token is None or (isinstance(token, Word) and not matching(token.text, rows))

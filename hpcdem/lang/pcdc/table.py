@@ -706,7 +706,7 @@ def _leading(name: str, kind: Kind, doc: str, unit: str = "", required: bool = T
 
 
 def _removed(*conditions: Model) -> tuple[Option, ...]:
-    """Which conditions are taken back; none that is named: all."""
+    """Make the options that select conditions to remove; without any, all are removed."""
     return tuple(Option(one.notation, (), "only this condition", also=one.also, dims=one.dims) for one in conditions)
 
 

@@ -93,13 +93,13 @@ class Model(Accounts):
 
     @property
     def solved(self) -> dict[str, Any]:
-        """How the last `model solve` ended: "reason" (ratio, cycles, time; without equilibrium: no progress, limit,
-        runaway), "ratio" at the end (NaN if nobody looked), "steps" it took. Empty before the first."""
+        """Outcome of the last `model solve`: "reason" (ratio, cycles, time; without equilibrium: no progress,
+        limit, runaway), "ratio" at the end (NaN if nobody looked), "steps" it took. Empty before the first."""
         return self._look(lambda: dict(self._project.solved))
 
     @property
     def rank(self) -> int:
-        """This rank, from 0."""
+        """Number of this rank, from 0."""
         return int(self._project.comm.rank)
 
     @property

@@ -36,7 +36,7 @@ class Outputs:
 
 @dataclass(frozen=True)
 class Report:
-    """What is known beforehand; None stands for unknown.
+    """Facts known before the run; None stands for unknown.
 
     runs: the CYC and IMPLE commands; made: particles that each statement makes, by index; rough: indices of `made` that
     are estimates; particles: most at once; work: particle-steps; certain: neither is an estimate; folder: of the
@@ -96,7 +96,8 @@ def examine(script: Script, outdir: Path | None = None) -> Report:
 
 
 def _restored(script: Script) -> dict[str, Any] | None:
-    """What the file of RESTORE holds, if it is there and whole: "plan": time step and walls, "particles"."""
+    """Read the part of the file of RESTORE that is known before a run, if it exists and is complete: "plan": time step
+    and walls, "particles"."""
     for statement in script.statements[:2]:
         path = find(script.directory, statement.get("file")) if statement.command == "RESTORE" else None
         if path is None:

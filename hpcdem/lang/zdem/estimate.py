@@ -1,4 +1,4 @@
-"""How many particles there will be: an estimate from the script alone, good to some per cent.
+"""Estimate of the number of particles from the script alone, accurate to some per cent.
 
 GEN is followed by the kinetics of random sequential insertion. What falls is taken as a flat bed between its outermost
 sides, of known density, that gets wider or narrower with the wall that moves; DEL takes its share of it. Rows, single

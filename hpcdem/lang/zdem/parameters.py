@@ -36,7 +36,8 @@ class Parameters:
         self.used: set[str] = set()
 
     def take(self, line: Line) -> bool:
-        """Whether the line sets a parameter, which is known from now on. ScriptError if it cannot be one."""
+        """Store the parameter if the line is an assignment, and return whether it is. Raises ScriptError for an invalid
+        parameter."""
         if _ASSIGNMENT.fullmatch(line.text) is None or len(line.tokens) != 2:
             return False
         name, value = line.tokens[0].word, line.tokens[1]

@@ -153,8 +153,8 @@ class _LineParser:
         self.fail(f"read {token}, expected a command{near}{known}")
 
     def rest(self, token: Token) -> str:
-        """What to add where the line may be the second half of the one before it: lines that a PDF broke in two are
-        copied so. Empty otherwise."""
+        """Return a hint if the line may be the second half of the one before it: lines that a PDF broke in two are
+        copied like this. Empty otherwise."""
         command = None if self.before is None else self.table.command(self.before.command.lower())
         if command is None or self.before is None:
             return ""
@@ -400,7 +400,7 @@ class _LineParser:
         return tuple(piece.text for piece in self.either(kind, name, None))
 
     def either(self, kind: t.Kind, name: str, number: int | None) -> list[Token]:
-        """So many words (None: any number) separated by |, with or without blanks; the tokens contain the words
+        """Parse `number` words (None: any number) separated by |, with or without blanks; the tokens contain the words
         alone."""
         pieces: list[Token] = []
         bars = 0

@@ -1,4 +1,4 @@
-"""What a script alone tells about its run: the steps of every CYC and IMPLE, and lines that cannot work.
+"""Steps of every CYC and IMPLE of a script, and lines that cannot work, found without running it.
 
 The statements are followed as the solver will follow them, knowing only what stands in the script. After RESTORE the
 time step, the walls and the histories of the file are not known here; they count as unknown, not as missing.
@@ -51,14 +51,14 @@ class Run:
         return frame + (start + steps) // every - start // every
 
     def rough(self, kind: str) -> bool:
-        """Whether `files` may be one too few, as the step at the start is unknown."""
+        """Return whether `files` may be one too few because the step at the start is unknown."""
         every, steps = self.every[kind], self.steps
         return bool(every and steps and steps % every) and self.start is None and not self.imple
 
 
 @dataclass
 class _Known:
-    """What is known at a point of the script. complete: the calculation began in this script, nothing is hidden."""
+    """Facts known at a point of the script. complete: the calculation began in this script, nothing is hidden."""
 
     complete: bool = True
     step: int | None = 0
@@ -116,7 +116,7 @@ def expected_steps(
 
 
 def _names_a_frame(statement: Statement) -> bool:
-    """Whether LOAD reads a frame, which brings walls and a time step; False for a file that is not there yet."""
+    """Return whether LOAD reads a frame, which contains walls and a time step; False if the file does not exist yet."""
     path = find(Path(statement.file).parent, statement.get("file"))
     return path is not None and is_frame(path)
 

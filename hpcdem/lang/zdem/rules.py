@@ -1,4 +1,4 @@
-"""What must hold between the words of one line, and where a command may stand."""
+"""Rules for the words of one line and for the order of commands."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def _hist(s: Statement) -> None:
 
 
 def recorded(s: Statement) -> str:
-    """What a HIST line follows, in the words of `commands.history.hist`: ``kinetic``, ``gstrain group a|b``,
+    """Return the quantity of a HIST line in the words of `commands.history.hist`: ``kinetic``, ``gstrain group a|b``,
     ``ystress wall 3``."""
     name = next(name for name in RECORDED if name in s.arguments)
     if s.arguments[name] is True:

@@ -42,7 +42,7 @@ class Statement:
 
 
 def find(directory: Path, name: str) -> str | None:
-    """Where a file to be read is: in `directory`, or in the folder data below it; None if in neither."""
+    """Find an input file in `directory`, or in the folder data below it; None if it is in neither."""
     for path in (directory / name, directory / "data" / name):
         try:
             if path.is_file():

@@ -195,7 +195,7 @@ VALUES = Values("<name> <float> ...", "names with a number each")
 
 @dataclass(frozen=True)
 class Row:
-    """What commands and options have in common.
+    """Common base of commands and options.
 
     name: as the manual writes it; longest: the longest spelling of which an abbreviation may be the beginning
     (default: the name itself); also: other accepted spellings, misprints of the manual among them.
@@ -215,7 +215,7 @@ class Row:
         return word == full or word in self.also or (len(full) > 3 and len(word) >= 3 and full.startswith(word))
 
     def named(self, word: str) -> bool:
-        """Is this (lower-case) word one of its full spellings?"""
+        """Return whether this (lower-case) word is one of the full spellings."""
         return word in (self.name.lower(), self.full, *self.also)
 
     @property

@@ -172,8 +172,8 @@ def coordinates(at: np.ndarray, corners: np.ndarray, four: bool) -> np.ndarray:
 
 
 def carriers(bar: np.ndarray, arc: np.ndarray, host: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Who carries nodes without a host across the bar: the nodes with one before and after them on the same bar (n, 2),
-    -1: none, and the share of the second (n,), by the distance arc along the bar."""
+    """Find the nodes that carry those without a host across the bar: the next nodes with a host before and after them
+    on the same bar (n, 2), -1: none, and the share of the second (n,), by the distance arc along the bar."""
     carrier, share = np.full((len(bar), 2), -1, np.int64), np.zeros(len(bar))
     for one in np.unique(bar[host < 0]).tolist():
         members = np.flatnonzero(bar == one)

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Condition:
-    """What is prescribed at nodes of bolts: does_x, does_y, does_z (kernels.FREE, VELOCITY, ACCELERATION) with its
-    value; the force [N] on one bolt. See kernels.DOES for the order."""
+    """Prescribed motion and force of nodes of bolts: does_x, does_y, does_z (kernels.FREE, VELOCITY, ACCELERATION) with
+    its value; the force [N] on one bolt. See kernels.DOES for the order."""
 
     does_x: int = kernels.FREE
     at_x: Number = 0.0

@@ -1,4 +1,4 @@
-"""Who meets whom: discs near free faces, and the messages between those who own them, from one search to the next.
+"""Pairs of discs and nearby free faces, and the messages between their owners, from one search to the next.
 
 The strips of the particles and those of the blocks stay what they are. At a search all ranks learn the boxes around
 each one's discs, the free faces in a box go there, and the owners of discs answer which faces have a disc near. Every
@@ -93,8 +93,8 @@ class Link:
     # ---- search ------------------------------------------------------------------------------------------------------
 
     def _reached(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which rectangles from `low` to `high` (n, 2) [m] overlap the box of a rank's discs and the room around them:
-        rows (m,) and ranks (m,) i8, row by row. Collective.
+        """Find the rectangles from `low` to `high` (n, 2) [m] that overlap the box of a rank's discs and the margin
+        around them: rows (m,) and ranks (m,) i8, row by row. Collective.
 
         Ranks own strips from left to right: to the left of those that can be meant all boxes end before the rectangle,
         to their right all begin behind it.

@@ -163,7 +163,7 @@ class Coupled(SurfaceLoad):
         return self.link
 
     def _link_holds(self) -> bool:
-        """Whether rows, owners and free faces are those for which contacts were found."""
+        """Return whether rows, owners and free faces are those for which contacts were found."""
         particles, blocks = self.particles, self.blocks
         return self.link is not None and self.link.made_for == (particles.rebuilds, blocks.rebuilds, particles.closed)
 
@@ -183,9 +183,9 @@ class Coupled(SurfaceLoad):
         self._check_rebuild()
 
     def _check_rebuild(self, glance: bool = False) -> bool:
-        """How far has anyone gone since the search? Sets the step of the next look; a glance does so only if somebody
-        has sped up too much for it. Returns whether it is time for a search. PhysicsError if a disc went through a
-        face."""
+        """Measure the displacements since the search and set the step of the next check; a glance does so only if
+        something has accelerated too much for it. Returns whether a search is due. Raises PhysicsError if a disc went
+        through a face."""
         particles, blocks, link = self.particles, self.blocks, self.links()
         p, mesh, dt = particles.particles, blocks.the_mesh(), particles.clock.dt
         of_discs, of_blocks = np.zeros(4), np.zeros(4)
@@ -405,11 +405,11 @@ class Coupled(SurfaceLoad):
     # ---- state -------------------------------------------------------------------------------------------------------
 
     def known(self) -> Touching:
-        """What contacts remember."""
+        """Return the histories of contacts."""
         return self.link.touching() if self.link is not None else self._known
 
     def state(self) -> dict[str, Any]:
-        """What else is saved, as JSON values."""
+        """Return the other saved values, as JSON values."""
         friction = None if math.isinf(self.friction) else self.friction
         return {"friction": friction, **self._work.state(), "late": self.late}
 
@@ -419,7 +419,7 @@ class Coupled(SurfaceLoad):
         self.mesh_replaced()
 
     def end_restore(self, state: Mapping[str, Any], known: Touching) -> None:
-        """They have been."""
+        """Take over the state and the histories of contacts from a checkpoint."""
         self.friction = math.inf if state["friction"] is None else float(state["friction"])
         self._work.restore(state)
         self.late = int(state["late"])

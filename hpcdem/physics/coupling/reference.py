@@ -1,5 +1,4 @@
-"""What `disc_faces.forces` computes, written plainly for one disc. To be read beside it; tests hold the two against
-each other."""
+"""Plain form of `disc_faces.forces` for one disc. Read it beside the kernel; tests compare both."""
 
 from __future__ import annotations
 
@@ -12,8 +11,8 @@ from hpcdem.physics.dem.kernels import laws
 
 
 class Meeting(NamedTuple):
-    """Where a disc meets a face (FACE, END1, END2), share of the second end, on which side of it the centre is (outside
-    positive), distance and overlap [m], normal (2,) to the face."""
+    """Contact of a disc and a face: part that is met (FACE, END1, END2), share of the second end, side of the face on
+    which the centre is (outside positive), distance and overlap [m], normal (2,) to the face."""
 
     where: int
     t: float
@@ -34,8 +33,8 @@ def meet(p1: np.ndarray, p2: np.ndarray, x: np.ndarray, r: float) -> Meeting:
 
 
 def counts(m: Meeting, before: Meeting | None, after: Meeting | None) -> bool:
-    """Whether this is a local minimum of the distance to the surface; before, after: the neighbours along it, None
-    where they are not near."""
+    """Return whether this is a local minimum of the distance to the surface; before, after: the neighbours along it,
+    None if they are not near."""
     if m.where == FACE or m.u <= 0.0:
         return m.u > 0.0 and m.side > 0.0
     other, facing = (before, END2) if m.where == END1 else (after, END1)

@@ -19,8 +19,8 @@ ON_DISCS, ON_FACES = 0, 1
 
 
 class Work:
-    """That of a coupled model. start: what contacts stored when it was stepped first [J], None before. Integers are
-    those of exact_sum.as_integer, and this rank's share."""
+    """Work between discs and blocks of a coupled model. start: energy stored by contacts before the first step [J],
+    None before. Integers are those of exact_sum.as_integer, and this rank's share."""
 
     def __init__(self, both: Any) -> None:
         self.both = both

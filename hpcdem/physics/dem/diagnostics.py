@@ -172,7 +172,7 @@ def _stiffnesses(sim: Simulation) -> tuple[np.ndarray, float]:
 
 
 def _extremes_of_clumps(sim: Simulation, stiffness: np.ndarray) -> tuple[float, float]:
-    """What totals.extremes says of the clumps of this rank; stiffness (n_own,) [N/m]: of the particles. Collective."""
+    """Compute `totals.extremes` for the clumps of this rank; stiffness (n_own,) [N/m]: of the particles. Collective."""
     p, c, s = sim.particles, sim.clumps.bodies, sim.settings
     member, total = np.zeros(len(p.hot)), np.zeros(c.n)
     member[p.owned] = stiffness
@@ -390,8 +390,8 @@ def _storage_rows(sim: Simulation, gid: np.ndarray) -> np.ndarray:
 
 
 def _law_columns(law: np.ndarray, poisson: np.ndarray, out: np.ndarray, opened: np.ndarray) -> dict[str, np.ndarray]:
-    """What frames of ZDEM say of the law of each contact: kn, ks of linear pairs, the smaller friction, 1 where it
-    slips, secant normal and tangent shear stiffness [N/m].
+    """Compute the columns of frames of ZDEM for the law of each contact: kn, ks of linear pairs, the smaller friction,
+    1 if it slips, secant normal and tangent shear stiffness [N/m].
 
     law (m, 4): rows of a law table; poisson (m,): mean of the two; out: as contact_rows; opened (m,): bonds in tension,
     whose stiffness is that of the bond. Of Hertz pairs ks = 3 (1 - nu) / (2 - nu) K sqrt(U) (Mindlin).

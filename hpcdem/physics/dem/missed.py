@@ -1,5 +1,4 @@
-"""Whether the contact search missed a contact: asked where a particle went farther than the lists allow, before they
-are rebuilt.
+"""Check for missed contacts before a rebuild, if a particle went farther than the lists allow.
 
 Lists hold all pairs that can meet while nobody goes farther than half the skin (a fast particle: its reach). Where one
 has gone farther, most often nothing has happened: a pair is missed only if both went towards each other. If one was,

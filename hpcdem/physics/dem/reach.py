@@ -122,7 +122,7 @@ def _choose_fast(sim: Any, first_class: int | None, limit: float) -> None:
 
 
 def look_at_fast(sim: Any, fall: float, found: np.ndarray) -> None:
-    """What fast.survey says of the owned ones into found (4,)."""
+    """Write the result of fast.survey for the owned fast particles into found (4,)."""
     if not len(sim._fast_rows):
         return
     p, at = sim.particles, sim._fast_at

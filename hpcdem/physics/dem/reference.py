@@ -1,5 +1,5 @@
-"""What pair_forces.py, walls.py and motion.py compute, written plainly: one pair, wall contact or particle after the
-other, without lanes, blocks and threads. To be read beside them; tests hold the two against each other."""
+"""Plain form of pair_forces.py, walls.py and motion.py: one pair, wall contact or particle at a time, without lanes,
+blocks and threads. Read it beside them; tests compare both."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def pair_forces(
 def wall_contact(
     wall: np.ndarray, x: np.ndarray, r: float, side: float
 ) -> tuple[int, np.ndarray, float, float, np.ndarray]:
-    """Where a disc meets a wall (NONE, FACE, END1, END2), normal (2,) to it, overlap [m], side (0, +1 left, -1 right;
-    as given: the one stored), nearest point (2,) [m]."""
+    """Locate the contact of a disc and a wall: part (NONE, FACE, END1, END2), normal (2,) to it, overlap [m], side (0,
+    +1 left, -1 right; as given: the one stored), nearest point (2,) [m]."""
     p1, p2 = wall[P1X : P1X + 2], wall[P2X : P2Y + 1]
     length = float(np.linalg.norm(p2 - p1))
     e = (p2 - p1) / length

@@ -13,7 +13,7 @@ from hpcdem.physics.dem.kernels.motion import KICK_X
 
 
 class Dashpots:
-    """Of a closed model (physics.dem.simulation.Simulation), as its tables are."""
+    """Dashpots of the contacts of a closed model (physics.dem.simulation.Simulation), valid until its tables change."""
 
     def __init__(self, sim: Any) -> None:
         """Collective. CommandError for a model with contacts that would not follow."""

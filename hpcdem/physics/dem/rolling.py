@@ -29,7 +29,7 @@ def begin(sim: Any, given: Mapping[str, float]) -> None:
 
 
 class Rolling:
-    """Of a closed model (physics.dem.simulation.Simulation), as its tables are."""
+    """Rolling resistance of a closed model (physics.dem.simulation.Simulation), valid until its tables change."""
 
     def __init__(self, sim: Any) -> None:
         """Collective. CommandError for a model with contacts that would not follow."""

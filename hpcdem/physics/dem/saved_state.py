@@ -273,7 +273,7 @@ def _take_particles(sim: Simulation, tables: checkpoint.Tables) -> np.ndarray:
 def histories(
     comm: Comm, gid: np.ndarray, pairs: Mapping[str, np.ndarray], walls: Mapping[str, np.ndarray]
 ) -> Histories:
-    """What the particles of this rank remember, gid (n,) i8: ascending over all ranks. Collective.
+    """Assemble the histories of the particles of this rank, gid (n,) i8: ascending over all ranks. Collective.
 
     pairs: each pair once, on any rank: gid < partner, fs, extra, bond, memory; walls: gid, wall, fs, extra,
     memory (see `Histories`).

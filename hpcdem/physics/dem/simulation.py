@@ -436,7 +436,8 @@ class Simulation(Model):
         return self.bonds - broken
 
     def used(self, column: np.ndarray, table: PropertyTable) -> np.ndarray:
-        """Which rows of a property table occur among these owned row numbers, on any rank; (rows,) bool. Collective."""
+        """Flag the rows of a property table that occur among these owned row numbers, on any rank; (rows,) bool.
+        Collective."""
         flags = np.zeros(len(table), np.int64)
         flags[column] = 1
         return self.comm.max_into(flags).astype(bool)

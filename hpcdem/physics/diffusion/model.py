@@ -40,7 +40,7 @@ class Diffusion:
                 raise CommandError(f"diffusion: {name} must be a positive number, got {value!r}")
 
     def parameters(self) -> dict[str, float]:
-        """What it was made with."""
+        """Return the parameters of the constructor."""
         return asdict(self)
 
     def diagnostics(self) -> dict[str, tuple[str, Callable[[Simulation], float]]]:
@@ -52,7 +52,7 @@ class Diffusion:
         return exact_sum(self.capacity * sim.body[:, 0] * sim.particles["temperature"], sim.comm)
 
     def heat_given(self, sim: Simulation) -> float:
-        """What sources have given [J]. Collective."""
+        """Sum the heat supplied by sources [J]. Collective."""
         return exact_sum(sim.particles["heat_given"].copy(), sim.comm)
 
     def prepare(self, sim: Simulation) -> None:

@@ -45,7 +45,7 @@ SLIDING = (COULOMB_JOINT.name, BARTON_BANDIS.name)
 
 
 class Assignments(Settings):
-    """Which model and properties each object has: rows of tables, and the row of each. Methods that assign raise
+    """Models and properties assigned to objects: rows of tables, and the row of each object. Methods that assign raise
     CommandError, alike on all ranks, and change nothing then."""
 
     tables: dict[str, Table]
@@ -114,7 +114,7 @@ class Assignments(Settings):
         return there() & rows[row] if rows.any() else sparse_zeros(len(row), bool)
 
     def softens(self) -> bool:
-        """Whether an element that is there can yield, and has a strength that follows a table."""
+        """Return whether an existing element can yield and has a strength that follows a table."""
         rows = softening_rows(self.element_rows)
         return bool(self._of_rows(rows, self.element_row, lambda: self.alive).any())
 
@@ -413,7 +413,7 @@ def _follows_field(value: Value) -> bool:
 
 
 def _differs(value: Value) -> bool:
-    """Whether a value differs from object to object."""
+    """Return whether a value differs between objects."""
     return isinstance(value, Drawn) or (isinstance(value, Over) and value.axis < PLASTIC_STRAIN)
 
 
@@ -426,7 +426,8 @@ def _can_be_number(value: Any) -> bool:
 
 
 def _keep_moduli(old: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Which two moduli stay when some are changed: Young's modulus and Poisson's ratio, or shear and bulk modulus."""
+    """Choose the two moduli that stay when some are changed: Young's modulus and Poisson's ratio, or shear and bulk
+    modulus."""
     creeps = "maxwell_shear" in old
     rigidities = ["maxwell_shear" if creeps else "shear", "bulk"]
     moduli = ["young", "poisson_ratio", *rigidities]

@@ -1,4 +1,4 @@
-"""Where elements lie that come back after they were removed: pure functions of arrays.
+"""Positions of elements that are filled back after excavation: pure functions of arrays.
 
 Points that they share with elements that stayed are where these are now. The others follow by the harmonic extension of
 their displacement (Laplace's equation on the elements that come back, linear triangles or tetrahedra): a field that is

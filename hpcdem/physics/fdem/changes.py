@@ -294,9 +294,9 @@ def reset_displacement(sim: Blocks, nodes: Numbers = None) -> None:
 
 
 def reset_state(sim: Blocks, elements: Numbers = None) -> None:
-    """That elements have yielded is forgotten: their state bits, and plastic strain is counted from here on. Stresses
-    stay, and so does the plastic strain that they depend on. State variables of user laws take their initial
-    values. Where no element has a model that remembers something the log says that nothing was changed."""
+    """Reset the yielding of elements: their state bits, and the zero of plastic strain. Stresses stay, and so does the
+    plastic strain that they depend on. State variables of user laws take their initial values. If no element has a
+    model with memory, the log reports that nothing was changed."""
     at = sim.numbers_of_elements(elements)
     if "plastic" in sim.cold:
         sim.before_change()

@@ -228,7 +228,7 @@ class Conditions(InitialStress):
         return 1 + most[cells[at]]
 
     def _make_older(self, others: np.ndarray, changes: dict[str, Any]) -> None:
-        """What was assigned before to other corners of these nodes gives way, as long as they are one node."""
+        """Overrule earlier assignments at other corners of these nodes, as long as the corners are one node."""
         for row in np.unique(self.corner_row[others]).tolist():
             one, older = self.conditions[row], 0
             for k, axis in enumerate("xyz"):
@@ -280,7 +280,7 @@ class Conditions(InitialStress):
         return row, part
 
     def _together(self, nodes: np.ndarray, node: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of these nodes, rows of `acting` and parts, see `rows_of_nodes`; node (4 ne,): of all corners."""
+        """Find the rows of `acting` and the parts of these nodes, see `rows_of_nodes`; node (4 ne,): of all corners."""
         acting, cells = self.acting(), self._mesh().cells.reshape(-1)
         some = np.zeros(int(node.max(initial=-1)) + 2, bool)
         some[nodes[nodes >= 0]] = True
@@ -439,7 +439,7 @@ class Conditions(InitialStress):
         return out
 
     def conditions_vary(self) -> bool:
-        """Whether a node condition follows a table or a function."""
+        """Return whether a node condition follows a table or a function."""
         return any(isinstance(value, str) for one in self.acting() for value in asdict(one).values())
 
     def loads_at(self, time: float) -> np.ndarray:
@@ -448,7 +448,7 @@ class Conditions(InitialStress):
         return np.array([[self._now(getattr(one, name), time) for name in names] for one in self.loads])
 
     def stressed(self, faces: np.ndarray) -> np.ndarray:
-        """Whether a stress is prescribed on each of these faces (k,) bool, counting all loads there."""
+        """Flag the faces (k,) bool on which a stress is prescribed, counting all loads there."""
         names = ("normal", "dip", *COMPONENTS[self.dim])
         rows = [any(getattr(one, name) != 0.0 for name in names) for one in self.loads]
         return np.array(rows)[self.load_row[faces]]

@@ -43,7 +43,7 @@ class Solved:
 
 @dataclass
 class Watch:
-    """Whether a run towards a ratio gets anywhere. It goes by global numbers, so it says the same on all ranks.
+    """Progress of a run towards a ratio. It uses global numbers, so it decides alike on all ranks.
 
     window: steps in which the least ratio must fall by a tenth, 0: any number. Since what came slowly so far may
     continue slowly, it is never shorter than the way from the beginning to the last progress. When a joint breaks that
@@ -60,7 +60,7 @@ class Watch:
     broken: int = -1
 
     def failed(self, step: int, ratio: float, broken: int) -> str:
-        """Why there is no hope at this step, "" if there is; broken: joints so far."""
+        """Return the reason why the run cannot reach the ratio, "" if it may; broken: joints so far."""
         if broken != self.broken:
             self.least, self.progress, self.broken = ratio, step, broken
             self.changed = step

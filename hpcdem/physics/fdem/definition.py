@@ -1,4 +1,4 @@
-"""What a model of blocks is made of: mesh (topology.py), options (settings.py), models of elements, faces and joints
+"""Definition of a model of blocks: mesh (topology.py), options (settings.py), models of elements, faces and joints
 (assignments.py), boundary conditions (conditions.py).
 
 All of it is known to every rank, by the numbers of the mesh: what is given once is the same everywhere, whoever owns an

@@ -270,7 +270,7 @@ def columns_of(sim: Blocks, on: str, names: Sequence[str], at: np.ndarray | None
 
 
 def rows_of(sim: Blocks, on: str, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which of these numbers (n,) this rank has, and how `columns_of` calls them. Not collective."""
+    """Select the numbers (n,) that this rank has, and their rows for `columns_of`. Not collective."""
     own = sim.owned
     if on == "node":
         lead = leads_of(sim, numbers)
@@ -546,7 +546,8 @@ def _places_of(sim: Blocks, corners: np.ndarray) -> np.ndarray:
 
 
 def _last_events(sim: Blocks, lower: np.ndarray, broken: np.ndarray) -> dict[str, np.ndarray]:
-    """How, when and with what kinetic energy these joints broke; `broken`: those that are. Collective."""
+    """Return mode, time and kinetic energy of the events in which these joints broke; `broken`: those that are.
+    Collective."""
     rows = crack_rows(sim)
     last = np.full(len(sim.partner), -1, np.int64)
     last[[row.joint for row in rows]] = np.arange(len(rows))

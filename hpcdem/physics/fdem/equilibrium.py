@@ -209,8 +209,8 @@ def solve_elastic(
 
 @dataclass
 class Memory:
-    """What elements and joints remember, and which joints are broken: numbers of the owned elements, their columns, the
-    rows of their joints and contacts and whose they are; open faces, broken joints, number of cracks in the log."""
+    """Histories of elements and joints, and which joints are broken: numbers of the owned elements, their columns, the
+    rows of their joints and contacts with their owners; open faces, broken joints, number of cracks in the log."""
 
     number: np.ndarray
     cold: dict[str, np.ndarray]

@@ -1,4 +1,4 @@
-"""What counts as nothing: forces so small that a model at rest has them by rounding.
+"""Limits below which forces count as rounding errors of a model at rest.
 
 A body that nobody loads is in balance, though the forces of its nodes, all of them rounding, are not. Loads are nothing
 if they would strain the softest rock by less than `NOTHING` in the mean; then balance is what positions rounded to the

@@ -203,7 +203,7 @@ class FreeField(SurfaceLoad):
         return found
 
     def _complaint(self) -> str | None:
-        """Why no step can be done with these sides, and what drives their bases. Not collective."""
+        """Return why no step is possible with these sides, and determine what drives their bases. Not collective."""
         blocks, o = self.blocks, self.blocks.options
         element = self.faces["face"][:, 0] // 4
         if not o.dynamic:
@@ -245,8 +245,8 @@ class FreeField(SurfaceLoad):
         return out
 
     def _drive(self, base: np.ndarray, points: np.ndarray) -> str | None:
-        """What the lowest nodes follow: per component a condition of the node of the model there, else the quiet face
-        below; or why they cannot. base, points (k,): nodes, and points of the mesh."""
+        """Bind the lowest nodes to their drive: per component the condition of the model's node there, otherwise the
+        quiet face below. Returns the reason if that is impossible. base, points (k,): nodes, and points of the mesh."""
         blocks, mesh = self.blocks, self.blocks.the_mesh()
         self._base, k = base, len(base)
         self._given = np.zeros((k, 2), bool)
@@ -334,7 +334,7 @@ class FreeField(SurfaceLoad):
         u += dt * v
 
     def uses_table(self, name: str) -> bool:
-        """What drives the bases are conditions of nodes and faces. Not collective."""
+        """Return False: the bases are driven by conditions of nodes and faces, which use the tables. Not collective."""
         return False
 
     def mesh_replaced(self) -> None:

@@ -188,9 +188,9 @@ class Hexes:
         )
 
     def other_cuts(self, corner: np.ndarray, element: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of loaded triangles: which of them (k,) are half a side of a hexahedron, and where the corners of a half of
-        the same side begin that is cut the other way (k, 3); both halves have another one each. corner (m, 3): where
-        theirs begin in x; element (m,): indices among the owned elements."""
+        """Find the loaded triangles (k,) that are halves of sides of hexahedra, and for each the first words in x (k,
+        3) of the corners of a half of the same side that is cut the other way; both halves have another one each.
+        corner (m, 3): where theirs begin in x; element (m,): indices among the owned elements."""
         hex_of = self.numbers()
         of = np.flatnonzero(hex_of[element] >= 0)
         which = hex_of[element[of]]

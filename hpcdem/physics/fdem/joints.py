@@ -52,9 +52,9 @@ def laws_of(rows: Rows) -> np.ndarray:
 
 
 class Joints(NamedTuple):
-    """What kernels ask of joints (n,): slots; own, over (n, dim) i8: where the corners of this side, and those of the
-    other in its own order, begin in x, flat; per_h (n,) [1/m], in space: one over the length; by slots: row of the law,
-    state, history."""
+    """Tables of joints (n,) for kernels: slots; own, over (n, dim) i8: offsets in x, flat, of the corners of this side
+    and of the other in its own order; per_h (n,) [1/m], in space: one over the length; by slots: row of the law, state,
+    history."""
 
     slots: np.ndarray
     own: np.ndarray

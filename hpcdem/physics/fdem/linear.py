@@ -48,8 +48,8 @@ class Pieces:
 
 @dataclass
 class Unknowns:
-    """What nodes can do. number (nn, dim): of the unknowns of a node along way[:, :, k], -1: none there; given
-    (nn, dim) [m]: prescribed movement."""
+    """Degrees of freedom of nodes. number (nn, dim): of the unknowns of a node along way[:, :, k], -1: none there;
+    given (nn, dim) [m]: prescribed movement."""
 
     number: np.ndarray
     way: np.ndarray
@@ -264,7 +264,7 @@ class Condensed:
         return None
 
     def solve(self, force: np.ndarray, share: float) -> np.ndarray:
-        """As `Direct.solve`; nothing may be prescribed. Collective."""
+        """Solve like `Direct.solve`; prescribed movements are not supported. Collective."""
         from scipy.linalg import lu_solve
 
         moved = None
@@ -290,7 +290,7 @@ class Petsc:
     flows = False
 
     def __init__(self, comm: Comm, unknowns: Unknowns, owner: np.ndarray, x: np.ndarray | None = None) -> None:
-        """Of each node: owner (nn,): its rank; x (nn, 3) [m]: in space, where it is."""
+        """Set up the rows of each rank. owner (nn,): rank of each node; x (nn, 3) [m]: its position, in space."""
         from petsc4py import PETSc
 
         self.comm, self.unknowns, self._petsc, self._x = comm, unknowns, PETSc, x
@@ -432,7 +432,7 @@ class Petsc:
 
 
 def _symmetric(one: Pieces) -> bool:
-    """But for rounding."""
+    """Return whether the stiffness is symmetric, except for rounding."""
     k = one.stiffness
     return bool(np.abs(k - k.transpose(0, 2, 1)).max(initial=0.0) <= 1e-12 * np.abs(k).max(initial=0.0))
 

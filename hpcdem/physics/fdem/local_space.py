@@ -118,7 +118,7 @@ class LocalSpace(Local):
             self.slot_law[self.sides.slot] = 0
 
     def _in_loops(self) -> np.ndarray:
-        """Those on sides of hexahedra are left out."""
+        """Return the states of slots, with NONE for slots on sides of hexahedra."""
         if self.sides is None:
             return self.slot_state
         out = self.slot_state.copy()
@@ -211,8 +211,8 @@ class LocalSpace(Local):
         self, before: np.ndarray, after: np.ndarray, a: float, b: float, of_joints: np.ndarray, pushed: np.ndarray,
         felt: np.ndarray, outside: np.ndarray, work: np.ndarray,
     ) -> None:  # fmt: skip
-        """As in the plane. Forces of elements are linear in the velocities: damping is what they are more than at
-        rest."""
+        """Book damping, dissipation and work of a step as in the plane. Forces of elements are linear in the
+        velocities: the damping force is their difference from the forces at rest."""
         sim, o, pairs, dt = self.sim, self.sim.options, self.pairs, self.sim.clock.dt
         damping, at_rest = (np.zeros((len(sim.number), tets.ROW)) for _ in range(2))
         for force, v in ((damping, before), (at_rest, np.zeros_like(before))):
@@ -227,11 +227,12 @@ class LocalSpace(Local):
         )
 
     def kinetic(self, before: np.ndarray, after: np.ndarray, out: np.ndarray) -> None:
-        """As in the plane."""
+        """Sum the kinetic energy as in the plane."""
         energy_space.kinetic(self.sim.n_left, self.sim.n_own, before, after, self.masses.of_motion, out)
 
     def handed_over(self) -> tuple[np.ndarray, np.ndarray]:
-        """As in the plane: the shear force on this side, half to each of the two faces."""
+        """Return the shear forces handed over by broken joints as in the plane: the force on this side, half to each of
+        the two faces."""
         slots = np.flatnonzero(self.slot_state == BROKEN)
         found = self._joints_now(slots)
         slots, shear = slots[found[:, 2] < 0.0], found[found[:, 2] < 0.0, joints_space.SHEAR :]

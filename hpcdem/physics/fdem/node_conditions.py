@@ -1,4 +1,4 @@
-"""What is prescribed at nodes, and what several such things come to at one node.
+"""Prescribed motions, forces and constraints of nodes, and their combination at one node.
 
 A move constraint leaves a subspace of motions: all, a plane (across a vector), a line (along one), none. Constraints of
 one node meet in their common part; components of motion that are prescribed besides must lie in it.
@@ -30,12 +30,11 @@ class Contradiction(Exception):
 
 @dataclass(frozen=True)
 class NodeCondition:
-    """What is prescribed at nodes. does_x, _y, _z: moving.FREE, VELOCITY, ACCELERATION; at_x, _y, _z: its value; force;
+    """Condition of nodes. does_x, _y, _z: moving.FREE, VELOCITY, ACCELERATION; at_x, _y, _z: its value; force;
     constraint (moving.UNBOUND, ..., in space space.ACROSS too) and its unit vector. older: bits of the components of
     motion (1, 2, 4) and force (8, 16, 32) that were set anew of other corners of the node: they count once these are
     nodes of their own. side_x, _y, _z: of the force, 0: shared by all corners at the point, else by those there with
-    the same number. part_x, _y, _z: factors of the force. damp: local damping, negative: that of
-    the model."""
+    the same number. part_x, _y, _z: factors of the force. damp: local damping, negative: that of the model."""
 
     does_x: int = moving.FREE
     at_x: Number = 0.0

@@ -63,8 +63,8 @@ def warn_of_flow(sim: Any) -> None:
 
 
 def _tell_beyond(sim: Any, least: float, of: np.ndarray, what: str) -> None:
-    """How many of these elements (ne,) bool are outside their strength by this part of their stress, and which one
-    is farthest; once for one state. Collective."""
+    """Report the number of these elements (ne,) bool outside their strength by this part of their stress, and the
+    farthest one; once for one state. Collective."""
     if not sim.local.yielding.on:
         return
     stress = sim.local.stresses(energies=False, flow=False)[0]

@@ -1,4 +1,4 @@
-"""Whether a model of blocks can be stepped: what it lacks, and what was assigned to parts that it does not have."""
+"""Check that a model of blocks can be stepped: nothing is missing, and nothing is assigned to parts that it lacks."""
 
 from __future__ import annotations
 

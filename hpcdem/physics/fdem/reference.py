@@ -1,6 +1,5 @@
-"""What elements.py, tets.py, hexes.py, plasticity.py, creep.py, joints.py, joints_space.py and nodes.py compute,
-for one element, joint or node and in small matrices, written plainly. To be read beside them; tests hold the two
-against each other."""
+"""Plain form of elements.py, tets.py, hexes.py, plasticity.py, creep.py, joints.py, joints_space.py and nodes.py, for
+one element, joint or node and in small matrices. Read it beside them; tests compare both."""
 
 from __future__ import annotations
 
@@ -30,9 +29,9 @@ class Solid(NamedTuple):
 
 
 class Deformation(NamedTuple):
-    """Of a triangle: strain U - 1 and its rate [1/s] in the turned frame, rotation R, all (2, 2), and gradients (3, 2)
-    [1/m] of the shape functions and area [m2], both of the present triangle, or of the mesh if strains are small. Of a
-    tetrahedron (3, 3), (4, 3) and its volume [m3]."""
+    """Deformation of a triangle: strain U - 1 and its rate [1/s] in the turned frame, rotation R, all (2, 2), and
+    gradients (3, 2) [1/m] of the shape functions and area [m2], both of the present triangle, or of the mesh if strains
+    are small. For a tetrahedron (3, 3), (4, 3) and its volume [m3]."""
 
     strain: np.ndarray
     rate: np.ndarray
@@ -182,8 +181,8 @@ def yielded_tetrahedron(
 def yielded_quad(
     mesh: np.ndarray, x: np.ndarray, stress0: np.ndarray, zz: float, rock: MohrCoulomb, small: bool
 ) -> list[tuple[Deformation, np.ndarray, bool]]:
-    """Of the four triangles of a quad that has not flowed before, the deformation, the stress (3, 3) [Pa] after its
-    flow, and whether it flowed; stress0 (2, 2), zz: initial stress [Pa].
+    """Compute the plastic flow of the four triangles of a quad that has not flowed before: for each the deformation,
+    the stress (3, 3) [Pa] after its flow, and whether it flowed; stress0 (2, 2), zz: initial stress [Pa].
 
     The pressure in the plane is the mean of the two triangles of an overlay, by volumes that change against each other.
     """

@@ -1,5 +1,5 @@
-"""What kernels/contact_space.py computes, written plainly for one face and one tetrahedron, in points of space. To be
-read beside it; tests hold the two against each other."""
+"""Plain form of kernels/contact_space.py for one face and one tetrahedron, in points of space. Read it beside the
+kernel; tests compare both."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hpcdem.physics.fdem.tetrahedra import FACES
 
 
 class Touch(NamedTuple):
-    """What a target does to a face: normal force [N], centre of the force (3,) [m], area inside [m2], largest phi."""
+    """Action of a target on a face: normal force [N], centre of the force (3,) [m], area inside [m2], largest phi."""
 
     normal: float
     centre: np.ndarray
@@ -42,7 +42,8 @@ def sides(target: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def touch(face: np.ndarray, target: np.ndarray, length: float, penalty: float) -> Touch | None:
-    """Of a face (3, 3) with outward normal counter-clockwise and a target (4, 3); None: they do not touch."""
+    """Compute the contact of a face (3, 3), whose outward normal is counter-clockwise, and a target (4, 3); None: they
+    do not touch."""
     normals, offsets = sides(target, length)
     force, moment, area, deepest = 0.0, np.zeros(3), 0.0, 0.0
     for k in range(4):

@@ -137,7 +137,7 @@ def restore_part(sim: Blocks, path: Path | str) -> dict[str, Any] | None:
 
 
 def _replicated(table: str) -> bool:
-    """Whether all ranks have all of this table: what is assigned to the model, see definition.py."""
+    """Return whether all ranks have all of this table: it is assigned to the model, see definition.py."""
     return table not in ("state", "memories", checkpoint.LINKS, *SHARED_OUT) and not table.startswith(
         checkpoint.OF_PARTICLES
     )

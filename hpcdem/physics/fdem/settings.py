@@ -132,8 +132,8 @@ class Settings(Topology):
         thermal: bool | None = None,
         proppant: bool | None = None,
     ) -> None:
-        """What is computed: motion of the blocks (on), flow (on), heat (on), grains in the fluid (on); one_way (off):
-        fluid does not push on blocks."""
+        """Switch parts of the computation: motion of the blocks (on), flow (on), heat (on), grains in the fluid (on);
+        one_way (off): fluid does not push on blocks."""
         given = {
             "mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way, "thermal": thermal,
             "proppant": proppant,
@@ -172,8 +172,8 @@ class Settings(Topology):
         safety: float | None = None,
         mass_scaling: float | None = None,
     ) -> None:
-        """How the time step of the dynamic mode is found. Without anything said: estimated at the first step and after
-        changes of the model.
+        """Choose how the time step of the dynamic mode is found. Default: estimated at the first step and after changes
+        of the model.
 
         value [s]: it is this. mass_scaling [s]: it is this, and nodes get the mass that makes it stable. auto on: it is
         estimated again every 100 steps (`estimate_every`), too. Of these three the one that was set last holds and
@@ -249,5 +249,5 @@ class Settings(Topology):
         return -(self.options.gz if self.dim == 3 else self.options.gy)
 
     def time_now(self) -> float:
-        """What tables and functions of conditions are read at, see `State.time_now`."""
+        """Return the argument of tables and functions of conditions, see `State.time_now`."""
         return 0.0

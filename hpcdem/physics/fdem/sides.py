@@ -12,7 +12,7 @@ SIDE = 1 << 40
 
 
 def are_there(numbers: np.ndarray) -> bool:
-    """Whether some of these numbers are sides."""
+    """Return whether some of these numbers are sides."""
     return bool(len(numbers)) and int(numbers.max()) >= SIDE
 
 

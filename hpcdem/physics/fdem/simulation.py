@@ -428,7 +428,7 @@ class Blocks(Edited):
             self._note_time()
 
     def renew_topology(self) -> None:
-        """Which corners are one node."""
+        """Determine again which corners are one node."""
         self._acting = None
         self.share_changes()
         self.node, self.shared_nodes, self.member_begin, self.member, self.point_corners, self.where = self.per_node(
@@ -455,8 +455,8 @@ class Blocks(Edited):
 
 
 def _nodes_of_corners(mesh: Mesh, alive: np.ndarray, node: np.ndarray, lead: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Of corners their node, of nodes whether they have several corners, and which (`build.cluster_members`); elements
-    at each point; and an empty table for the places of elements."""
+    """Return the node of each corner; whether each node has several corners, and which (`build.cluster_members`);
+    elements at each point; and an empty table for the positions of elements."""
     sizes = np.bincount(node[node >= 0], minlength=len(lead))
     shared, node = sizes > 1, node.astype(np.int32, copy=False)
     begin = np.zeros(len(lead) + 1, np.int32)

@@ -162,7 +162,7 @@ class State(ModelDefinition, Model):
 
     @property
     def wide(self) -> bool:
-        """Whether there are quads: rows of positions and velocities then have twelve columns."""
+        """Return whether there are quads: rows of positions and velocities then have twelve columns."""
         return self.x.shape[1] == 12
 
     @property
@@ -200,9 +200,9 @@ class State(ModelDefinition, Model):
     """Static steps that are about to be done at once."""
 
     def time_now(self) -> float:
-        """What tables and functions of conditions of blocks, bolts and liners are read at: model time [s]; in static
-        mode, where it is at rest, the static steps since the mode was switched on besides, each a unit of time, or
-        with creep the creep time at the end of the creep step."""
+        """Return the argument of tables and functions of conditions of blocks, bolts and liners: model time [s]; in
+        static mode, where it is at rest, the static steps since the mode was switched on besides, each a unit of time,
+        or with creep the creep time at the end of the creep step."""
         if self.options.dynamic:
             return self.clock.time
         if self.creep.on:

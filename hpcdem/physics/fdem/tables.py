@@ -44,7 +44,7 @@ class Table:
         return float(np.interp(time, self.times, self.values))
 
     def changes_after(self, time: float) -> bool:
-        """Whether a later value is another one than that of this time [s]."""
+        """Return whether a later value differs from the value at this time [s]."""
         return bool((self.values[self.times > time] != self(time)).any())
 
     def at(self, coordinates: np.ndarray) -> np.ndarray:

@@ -234,8 +234,8 @@ class Topology:
 
     @property
     def reference(self) -> Mesh:
-        """Where elements are free of strain: the mesh, and for those that came back where they did, with points of
-        their own there (macro-elements share those of their parts)."""
+        """Return the mesh in which elements are free of strain: the original one, with points of their own for elements
+        that were filled back (macro-elements share those of their parts)."""
         mesh = self._mesh()
         if self._reference is None:
             self._reference = mesh.with_own_points(self.born, self.birthplace) if len(self.born) else mesh

@@ -1,1 +1,1 @@
-"""What fields on blocks share: heat in elements, fluid in joints, proppant in fluid, moisture of soil."""
+"""Common base of fields on blocks: heat in elements, fluid in joints, proppant in fluid, moisture of soil."""

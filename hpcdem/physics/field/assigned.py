@@ -57,21 +57,21 @@ def checked(tables: Mapping[str, Table], value: Number, what: str) -> np.ndarray
 
 
 def now(tables: Mapping[str, Table], value: Number, time: float) -> float:
-    """What it is at this time [s]; 0 where nobody follows a table that is gone."""
+    """Evaluate a value at this time [s]; 0 for a deleted table, which no object follows any more."""
     if not isinstance(value, str):
         return value
     return tables[value](time) if value in tables else 0.0
 
 
 def row_of(rows: list[T], wanted: T, first: int = 0) -> int:
-    """Of a condition among these from `first` on, to which it is added if it is not there."""
+    """Return the row of a condition among these from `first` on; append it if it is new."""
     if wanted not in rows[first:]:
         rows.append(wanted)
     return first + rows[first:].index(wanted)
 
 
 def in_use(rows: Sequence[T], row: np.ndarray, first: int = 0) -> list[T]:
-    """Those of these conditions, from `first` on, that objects have, by their rows (n,)."""
+    """Return the conditions from `first` on that occur in the rows (n,) of objects."""
     return [rows[k] for k in np.unique(row).tolist() if k >= first]
 
 

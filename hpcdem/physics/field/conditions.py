@@ -170,7 +170,7 @@ class Conditions(Assigned, Field):
             self.held[at] = row
 
     def _row_of(self, value: Number) -> int:
-        """Of this prescribed value."""
+        """Return the row of this prescribed value; append it if it is new."""
         what = f"the {self.quantity} of a node"
         self._check_values(assigned.checked(self.blocks.tables, value, what), what)
         return assigned.row_of(self.prescribed, value, 1)
@@ -217,7 +217,7 @@ class Conditions(Assigned, Field):
         return f"element c-model {self.model.name.replace('_', '-')}"
 
     def uses_table(self, name: str) -> bool:
-        """Whether a node or a face follows this table. Not collective."""
+        """Return whether a node or a face follows this table. Not collective."""
         of_faces = (asdict(one).values() for one in assigned.in_use(self.exposed.conditions, self.exposed.row))
         held = assigned.in_use(self.prescribed, self._all_held(), 1)
         return name in held or any(name in of_face for of_face in of_faces)
@@ -242,15 +242,15 @@ class Conditions(Assigned, Field):
         return closed(found, less)
 
     def _booked(self) -> np.ndarray:
-        """What conditions gave, on this rank."""
+        """Return the amounts supplied by conditions, on this rank."""
         return self.blocks.cold[self.given].reshape(-1)
 
     def _stored_besides(self) -> dict[str, float]:
-        """Where else some is."""
+        """Return amounts that are stored elsewhere, by name."""
         return {}
 
     def elements_removed(self, elements: np.ndarray) -> None:
-        """What is in them is gone with them."""
+        """Discard the contents of removed elements."""
         blocks = self.blocks
         self._expands = None
         if self.quantity not in blocks.cold:

@@ -67,7 +67,7 @@ class Diffusing(Conditions):
 
     @property
     def on(self) -> bool:
-        """It flows. Not collective."""
+        """Return whether the field flows. Not collective."""
         return self.switched_on and bool(self.rows)
 
     @property
@@ -78,8 +78,8 @@ class Diffusing(Conditions):
         """Find where the field crosses from surface to surface now; the model is closed. Not collective."""
 
     def clock(self, on: bool | None = None, steps: int | None = None, dt: float | None = None) -> None:
-        """Whether it flows; sub-steps of a cycle, 0: as many as are needed; their length [s], 0: by the clock of the
-        blocks."""
+        """Set whether the field flows; sub-steps of a cycle, 0: as many as are needed; their length [s], 0: by the
+        clock of the blocks."""
         if (steps is not None and steps < 0) or (dt is not None and not 0.0 <= dt < math.inf):
             raise CommandError(f"sub-steps of {self.name} and their length must not be negative")
         with self.changing():
@@ -189,7 +189,7 @@ class Diffusing(Conditions):
             )
 
     def _make_nodes(self) -> None:
-        """As faces are connected now, and what follows from it. Collective."""
+        """Make the nodes for the present connections of faces, and update what depends on them. Collective."""
         self.at = Nodes(self.blocks, self.name, self._corner_capacity, self.held)
         self._tell_obtuse()
         self.exposed.bind(self.t.shape[1])
@@ -227,7 +227,7 @@ class Diffusing(Conditions):
         return self.own_steps, self.own_dt
 
     def _cycle_time(self) -> float:
-        """Of a cycle by the clock of others [s], 0: it has one of its own."""
+        """Return the length of a cycle by the clock of others [s]; 0: the field has its own clock."""
         o = self.blocks.options
         if o.mechanical:
             return self._period() if o.dynamic else 0.0
@@ -316,7 +316,7 @@ class Diffusing(Conditions):
         """There is another mesh: `of_mesh` says that this is gone with the one before."""
 
     def follow(self) -> None:
-        """It flows for as long as the step that the elements have moved by."""
+        """Advance the field by the step that the elements have moved."""
         blocks = self.blocks
         if not self.on:
             return
@@ -413,7 +413,7 @@ class Diffusing(Conditions):
 
     @property
     def _assigned_rows(self) -> dict[str, np.ndarray]:
-        """What is saved of elements, nodes and faces, of all ranks, by the names of tables."""
+        """Return the saved rows of elements, nodes and faces, of all ranks, by names of tables."""
         rows = {"elements": self.row, "points": self.held, "faces": self.exposed.row}
         return {f"{self.name}_{name}": row for name, row in rows.items()}
 

@@ -43,9 +43,9 @@ class Exposed:
         self._kinds: list[tuple[int, float]] = []
 
     def parts_of(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of faces (n,): numbers (m,), their corners (m, 2), in space (m, 3), element * 4 + k, and the part of the face
-        of each: half the length [m], in space a third of the area [m2]. Those of hexahedra come twice, as both ways to
-        cut their sides have it."""
+        """Split faces (n,) into parts: numbers (m,), their corners (m, 2), in space (m, 3), element * 4 + k, and the
+        share of each: half the length [m], in space a third of the area [m2]. Sides of hexahedra occur twice, once for
+        each way to cut them."""
         mesh = self.blocks.the_mesh()
         if len(mesh.hexes):
             ends, area, of = with_other_cuts(mesh, faces)
@@ -85,7 +85,7 @@ class Exposed:
         self._kinds = [(int(condition), h) for condition, h in pairs.tolist()]
 
     def _table_at(self, time: float) -> np.ndarray:
-        """Of conditions (rows, 3) at a time of the field."""
+        """Evaluate the conditions, (rows, 3), at a time of the field."""
         table, tables = np.zeros((len(self._kinds), 3)), self.blocks.tables
         for row, (condition, h) in enumerate(self._kinds):
             one = self.conditions[condition]

@@ -102,7 +102,7 @@ class Assigned:
         return np.array([0.0, *(row[k] for row in self.rows)])
 
     def constant(self, name: str) -> float:
-        """Whether all objects have the same value. Not collective."""
+        """Return the value of a property that all objects have in common. Not collective."""
         return self.rows[self.row[np.argmax(self.row > 0)] - 1][self._names.index(name)]
 
     def _saved_properties(self) -> list[list[float | None]]:
@@ -173,7 +173,7 @@ class Travelling(ABC):
 
     @abstractmethod
     def _book_gone(self, gone: np.ndarray) -> None:
-        """What nodes (n,) bool hold is gone with them. Collective."""
+        """Book the content of removed nodes (n,) bool. Collective."""
 
     def _refresh(self) -> None:
         if self._copies is not None:
@@ -254,19 +254,19 @@ class Field(SurfaceLoad):
         self.blocks.changed(stiffness=False)
 
     def _sum(self, column: np.ndarray, gone: float = 0.0) -> float:
-        """Of what all ranks hold and what is gone."""
+        """Sum the contents of all ranks and the removed amount."""
         comm = self.blocks.comm
         return exact_sum(np.append(column, gone if comm.rank == 0 else 0.0), comm)
 
     def _blown_up(self, what: str, stable: float) -> PhysicsError:
-        """What is raised where `what` is not finite; stable: the longest sub-step [s]."""
+        """Return the error for `what` that is not finite; stable: the longest sub-step [s]."""
         return PhysicsError(
             f"step {self.blocks.clock.step}: {what} is not finite; the {self.word} time step {self.dt:g} s is probably "
             f"too large (stable: {stable:g} s)"
         )
 
     def _lowest(self, numbers: np.ndarray) -> int:
-        """Of numbers (n,) of all ranks; -1: none."""
+        """Return the lowest of the numbers (n,) of all ranks; -1: none."""
         most = np.iinfo(np.int64).max
         found = int(self.blocks.comm.min_into(np.array([numbers.min(initial=most)], np.int64))[0])
         return found if found < most else -1

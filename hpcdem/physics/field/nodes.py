@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Nodes:
-    """Those that the elements of a rank have.
+    """Nodes of the elements of a rank.
 
     number (4 ne,), leads (nodes of the model,): the node of each corner of the mesh, -1: none, and their lowest
     corners; ids (n,): the numbers of those here; begin (n + 1,), corner: where their corners are in the table of

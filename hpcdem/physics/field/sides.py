@@ -48,8 +48,8 @@ def facing(mesh: Mesh, faces: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray
 
 
 def _cut_otherwise(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which of the faces (n,) are half a side of a hexahedron (k,), numbers (k,) of these sides, and corners (k, 3),
-    element * 4 + k, of a half that is cut the other way; both halves have another one each."""
+    """Find the faces (n,) that are halves of sides of hexahedra (k,), the numbers (k,) of these sides, and the corners
+    (k, 3), element * 4 + k, of a half that is cut the other way; both halves have another one each."""
     of = mesh.macro_of()[faces // 4]
     at = np.flatnonzero(of >= 0)
     hexes = mesh.hexes[of[at]]

@@ -34,7 +34,7 @@ BY_CONDITION, BY_WELL = 1, 2
 
 @dataclass(frozen=True)
 class Condition:
-    """What is prescribed at a flow node: kernels.FREE, PRESSURE [Pa], SURFACE (its height [m] against gravity) or RATE
+    """Condition of a flow node: kernels.FREE, PRESSURE [Pa], SURFACE (its height [m] against gravity) or RATE
     [m2/s]."""
 
     does: int = kernels.FREE
@@ -140,8 +140,8 @@ class FlowAssignments(Assigned, Field):
     # ---- conditions --------------------------------------------------------------------------------------------------
 
     def prescribe(self, nodes: np.ndarray | None, does: int, value: Number) -> None:
-        """What holds at flow nodes among these points (None: all) from now on, see `Condition`. A pressure or a level
-        wets free faces all of whose corners are among the points; without points it is assigned to joints alone."""
+        """Assign a condition to flow nodes among these points (None: all), see `Condition`. A pressure or a level wets
+        free faces all of whose corners are among the points; without points it is assigned to joints alone."""
         at = self.flow_nodes(nodes)
         nodes_with_condition = np.flatnonzero(self.condition) if nodes is None else self.blocks.numbers_of_nodes(nodes)
         beside = nodes_with_condition[~self.network.there[nodes_with_condition]]
@@ -183,7 +183,7 @@ class FlowAssignments(Assigned, Field):
         return table
 
     def uses_table(self, name: str) -> bool:
-        """Whether a node or a stage that is not over follows this table. Not collective."""
+        """Return whether a node or an unfinished stage follows this table. Not collective."""
         stages = (one for well in self.wells for one in well.stages)
         return any(one.value == name and one.end > self.time for one in stages) or any(
             one.value == name for one in assigned.in_use(self.conditions, self.condition)
@@ -268,8 +268,8 @@ class FlowAssignments(Assigned, Field):
             log.info(f"well '{well.name}': {f'stage {stage}, ' * bool(stage)}{does}, at {after:.6g} s of flow")
 
     def asked_of(self, well: Well, time: float, dt: float, passes: bool) -> Asked:
-        """What a well does in an implicit step of dt [s] from this time on; passes: time does, else in so long by what
-        it does now. Not collective."""
+        """Return the action of a well in an implicit step of dt [s] from this time on; passes: its stages advance with
+        time, otherwise the present one lasts. Not collective."""
         value = partial(assigned.now, self.blocks.tables)
         if passes:
             return well.asked(time, time + dt, value)

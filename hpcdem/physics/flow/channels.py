@@ -28,7 +28,8 @@ _ACCOUNT = {"given": kernels.GIVEN, "leaked": kernels.LEAKED, "removed": kernels
 
 
 class Slurry(Protocol):
-    """What grains in the fluid do to it; rows of nodes and channels are those of the flow. values: their properties."""
+    """Interface to the grains in the fluid; rows of nodes and channels are those of the flow. values: their
+    properties."""
 
     values: dict[str, float]
 
@@ -321,9 +322,9 @@ class Channels(Travelling, FlowAssignments):
         return self.channel_table[:: LINKS[self.blocks.dim], kernels.APERTURE]
 
     def fluxes(self) -> np.ndarray:
-        """What flows in this rank's channels (m,) [m2/s] at `_q`: from the first corner on, in space its size: that of
-        sum q_ij (x_j - x_i) / A, exact for a pressure that is linear, as half of sum cot(angle) e e^T over the sides of
-        a triangle is A. Not collective."""
+        """Compute the flow in this rank's channels (m,) [m2/s] from `_q`: from the first corner on, in space its size:
+        that of sum q_ij (x_j - x_i) / A, exact for a pressure that is linear, as half of sum cot(angle) e e^T over the
+        sides of a triangle is A. Not collective."""
         if LINKS[self.blocks.dim] == 1:
             return self._q
         x, (one, other) = self.blocks.x.reshape(-1), (of[..., None] + np.arange(3) for of in self.sides)

@@ -44,8 +44,8 @@ def _length(seconds: float) -> str:
 
 
 def explicit(flow: Flow, time: float) -> Cost | str:
-    """So much flow time [s] by the sub-steps that were set, or are stable now (fractures that open need shorter
-    ones); or why that cannot be. Of a closed model; collective."""
+    """Estimate the cost of flow time [s] by sub-steps as set, or as stable now (fractures that open need shorter ones).
+    Returns the reason if that is impossible. The model is closed. Collective."""
     o, blocks = flow.blocks.options, flow.blocks
     if not o.mechanical and not o.dynamic:
         return "without mechanics the time of flow advances in dynamic runs only"
@@ -76,8 +76,8 @@ def cycles(flow: Flow, time: float) -> int:
 
 
 def implicit(time: float, dt: float, unknowns: int, kept: int) -> Cost:
-    """So much flow time [s] by steps of at most dt [s], without those that joints need to break one after the other.
-    kept: unknowns that are left by condensation, 0: without it."""
+    """Estimate the cost of flow time [s] by steps of at most dt [s], without additional ones for joints that break in
+    sequence. kept: unknowns left by condensation, 0: without it."""
     steps = math.ceil(time / dt * (1.0 - 1e-12))
     iteration = ITERATION + (FORCES * unknowns + DENSE * kept**3 if kept else UNKNOWN * unknowns)
     return Cost(steps, time / steps, 0.0, steps * ITERATIONS * iteration)

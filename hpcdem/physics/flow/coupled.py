@@ -242,7 +242,8 @@ class Coupled(System):
         )
 
     def _tried(self, dt: float, passes: bool = True) -> Found:
-        """This time step [s], taken if it finds balance. passes: conditions are those at its end, else those of now."""
+        """Try a time step of dt [s], which is taken if equilibrium is found. passes: use the conditions at its end,
+        otherwise the present ones."""
         sim, (step, u) = self.sim, self.fluid.begin(dt, self.x, passes)
         found = self._newton(step, self.x, u)
         if not found.error and found.past > self.front and dt > TOGETHER * self.longest:

@@ -64,8 +64,8 @@ def of_blocks(
 def of_fluid(
     fluid: Fluid, step: Step, before: np.ndarray, volume: np.ndarray, now: Balance, given: np.ndarray
 ) -> dict[str, float]:
-    """Of the fluid in a step. before: state of the nodes (n, kernels.STATE), volume (n,) [m2] at its beginning; given
-    (n,) [m2]: what came in. The fluid of `Fluid` is that of the end."""
+    """Compute the energies of the fluid in a step. before: state of the nodes (n, kernels.STATE), volume (n,) [m2] at
+    its beginning; given (n,) [m2]: inflow. The fluid of `Fluid` is that of the end."""
     mean = 0.5 * (before[:, kernels.P] + before[:, kernels.E] + now.state[:, kernels.P] + now.state[:, kernels.E])
     gone = np.bincount(fluid.end, now.lost[fluid.both], fluid.n)
 

@@ -144,7 +144,8 @@ class Faces(Channels):
         self._loads = [self._bound(sides, at[: len(sides)]), self._bound(self._wet, self._wet_rows)]
 
     def _bound(self, faces: np.ndarray, nodes: np.ndarray) -> list[tuple[np.ndarray, ...]]:
-        """What `kernels.loads` takes of these faces (m,), with the rows of the state at their corners (m, dim)."""
+        """Make the arguments of `kernels.loads` for these faces (m,), with the rows of the state at their corners (m,
+        dim)."""
         mesh, of, where = self.blocks.the_mesh(), self.blocks.local, self.blocks.where
         corner, (half, fourth, *weights) = mesh.face_corners(faces), mesh.on_sides(faces)
         at, all_of = self._begins(corner), np.column_stack([corner[half], fourth])
@@ -156,8 +157,8 @@ class Faces(Channels):
         ]
 
     def _shore_of(self, faces: np.ndarray) -> tuple[Shore, np.ndarray]:
-        """Of faces (m,) that fluid pushes on; and which of all their corners belong to it, flat, bool. Rows of the
-        state come with `storage_rebuilt`."""
+        """Make the shore of faces (m,) loaded by fluid, and flag their corners that belong to it, flat, bool. Rows of
+        the state are set by `storage_rebuilt`."""
         network, mesh, o = self.network, self.blocks.the_mesh(), self.blocks.options
         points, corner = (of.reshape(-1) for of in (mesh.face_points(faces), mesh.face_corners(faces)))
         beyond = ~network.there[points]

@@ -193,7 +193,8 @@ class Fluid:
         return state
 
     def _own(self, u: np.ndarray, energy: np.ndarray) -> np.ndarray:
-        """What the variable of each node would be by itself (n,)."""
+        """Return the variable of each node (n,); nodes of a well follow that of its first node, less their height above
+        the lowest."""
         own = u.copy()
         for _, rows in self.wells:
             y, above = u[rows[0]], (energy[rows] - energy[rows].min()) / self.p0

@@ -1,4 +1,4 @@
-"""Where fluid can be: pure functions of the mesh and of which joints have a hydraulic model, the same on all ranks.
+"""Network of possible flow: pure functions of the mesh and of the joints with a hydraulic model, equal on all ranks.
 
 A *channel* is a joint with a hydraulic model, broken or not, between two elements that are there; it has the number of
 the joint, its lower face. A *flow node* is a point of the mesh at which a channel ends, and has the number of the
@@ -69,9 +69,9 @@ def normals(corners: np.ndarray) -> np.ndarray:
 
 
 def conducting(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of the links (l,) of channels with these corners (m, dim, dim): from end to end (l, dim) [m]; length over width
-    of what conducts along them [m, in space 1], below 0 opposite an obtuse angle; part of a wall at each end [m, in
-    space m2]."""
+    """Return the geometry of links (l,) of channels with these corners (m, dim, dim): vectors from end to end (l, dim)
+    [m]; length over width of the conducting part [m, in space 1], below 0 opposite an obtuse angle; part of a wall at
+    each end [m, in space m2]."""
     ends = links_of(np.arange(corners.shape[1])[None])
     sides = corners[:, ends[:, 1]] - corners[:, ends[:, 0]]
     if len(ends) == 1:
@@ -138,7 +138,7 @@ def around(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def sides_and_free(
     partner: np.ndarray, faces: np.ndarray, closed: np.ndarray, channel: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Those of these faces (k,) that are sides of channels, and the free ones among the others.
+    """Split faces (k,) into sides of channels and free faces; the others are omitted.
 
     closed (4 ne,) bool: faces that are connected with their partner; channel (4 ne,) bool: lower faces of channels.
     """

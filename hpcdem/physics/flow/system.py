@@ -25,7 +25,7 @@ MOST, HALVINGS = 25, 6
 
 @dataclass
 class Found:
-    """What Newton's method came to: positions (nn, dim), variables (nf,), the balance of the fluid, what is lacking,
+    """Result of Newton's method: positions (nn, dim), variables (nf,), the balance of the fluid, the residual,
     iterations, joints that pass their peak; error: why this is no balance, "" if it is; storing: fluid that is stored
     over what flows; still: nothing has changed."""
 
@@ -133,7 +133,7 @@ class System:
         return made
 
     def _condenses(self) -> bool:
-        """Whether most unknowns are those of elements."""
+        """Return whether most unknowns are those of elements."""
         return self.moves and Condensed.suits(self.unknowns, self._of_joints())
 
     def _of_joints(self) -> np.ndarray:
@@ -213,7 +213,8 @@ class System:
         self.flow.condensed = x.copy()
 
     def _lacking(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
-        """What forces and fluid lack, over what contributes; the right-hand side (nn + nf, dim); the fluid."""
+        """Evaluate the residual of forces and fluid, relative to the contributions; the right-hand side (nn + nf, dim);
+        the fluid."""
         with self.sim.timers.around("balance"):
             return self._evaluated(step, x, u)
 

@@ -57,7 +57,8 @@ class Tangent:
         return made
 
     def _pack_pieces(self, now: Balance, x: np.ndarray, packs: np.ndarray, mine: slice) -> list[Pieces]:
-        """Of w - w(V) by w itself, and by the corners of the channels around each node. packs (n,): their "nodes"."""
+        """Make the derivatives of w - w(V) by w itself, and by the corners of the channels around each node. packs
+        (n,): their "nodes"."""
         assert now.packs is not None
         dim, ends = self.of.dim, self.of.ends[mine]
         own = np.zeros((len(packs[mine]), dim, dim))
@@ -80,7 +81,7 @@ class Tangent:
         return np.where(pressed, self.of.p0, 0.0), np.where(full, 0.0, 1.0)
 
     def _own_pieces(self, now: Balance, u: np.ndarray, first: int) -> list[Pieces]:
-        """Of storage; and nodes whose variable is another's are no unknowns of their own."""
+        """Make the derivatives of storage; nodes that follow the variable of another node are no unknowns."""
         p_u, s_u = self._rises(u, now)
         room = np.maximum(now.volume, 1e-300)
         diagonal = np.where(now.held, room, now.volume * (s_u + p_u / self.of.bulk))
@@ -95,7 +96,8 @@ class Tangent:
     def _channel_pieces(
         self, step: Step, now: Balance, u: np.ndarray, x: np.ndarray, first: int, mine: slice
     ) -> Pieces:
-        """Of flow, leak-off and volume of channels by the variables at their ends and the corners of their faces."""
+        """Make the derivatives of flow, leak-off and volume of channels by the variables at their ends and the corners
+        of their faces."""
         ends, state = self.of.ends[mine], now.state
         delta, conduct, half, weight = now.table[mine].T
         m, dt = len(ends), step.dt
@@ -143,9 +145,9 @@ class Tangent:
         return Pieces(self.of.channels[self.of.of][mine], nodes, out)
 
     def _turbulent_pieces(self, step: Step, now: Balance, u: np.ndarray, first: int, mine: slice) -> Pieces:
-        """Of turbulent flow by the pressures in a channel, beside those of its conductance: this goes with the size of
-        the gradient to the power -3/7, so with the flows F into its nodes and the heads h along its links, -3/7 F F^T /
-        sum(q h)."""
+        """Make the derivatives of turbulent flow by the pressures in a channel, beside those of its conductance: it is
+        proportional to the size of the gradient to the power -3/7, so with the flows F into its nodes and the heads h
+        along its links, -3/7 F F^T / sum(q h)."""
         assert now.slow is not None
         links = LINKS[self.of.dim]
         ends, q = self.of.ends[mine].reshape(-1, links, 2), now.q[mine].reshape(-1, links)
@@ -168,8 +170,9 @@ class Tangent:
         return Pieces(self.of.channels[mine], first + self.of.first[nodes], out)
 
     def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, variable: np.ndarray, count: int) -> list[Pieces]:
-        """Of the forces on the first `count` faces by variables at their ends: kernels.loads, and in space those on
-        sides of hexahedra. p_u (n,): derivatives of pressures by them; variable (n,): their "nodes"."""
+        """Make the derivatives of the forces on the first `count` faces by variables at their ends: kernels.loads,
+        and in space those on sides of hexahedra. p_u (n,): derivatives of pressures by them; variable (n,): their
+        "nodes"."""
         if len(self.of.shore_node):  # there pressures follow the lowest node of a well, or nothing that is unknown
             shore = self.of.flow.state[len(self.of.held_rows) :, kernels.P]
             p_u = np.append(p_u, np.where((self.of.shore_node >= 0) & (shore > 0.0), p_u[self.of.shore_node], 0.0))
@@ -190,7 +193,8 @@ class Tangent:
     def _pushed(
         self, of: np.ndarray, weight: np.ndarray, normal: np.ndarray, ends: np.ndarray, variable: np.ndarray
     ) -> Pieces:
-        """Of some faces (k,): weight (k, ends, dim) of each variable on each end, ends (k, ends): their nodes."""
+        """Make the derivatives for some faces (k,): weight (k, ends, dim) of each variable on each end, ends (k, ends):
+        their nodes."""
         (k, m, dim), key = weight.shape, self.of.face_key[of]
         out = np.zeros((k, (m + dim) * dim, (m + dim) * dim))
         for end in range(m):

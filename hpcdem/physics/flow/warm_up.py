@@ -19,7 +19,7 @@ def warm_up(threads: int = 1) -> None:
 
 
 def in_space(threads: int = 1) -> None:
-    """The same between two tetrahedra."""
+    """Call the kernels of flow between two tetrahedra."""
     _flow(3, threads)
 
 

@@ -80,7 +80,7 @@ class Well:
         return next((k for k, one in enumerate(self.stages, 1) if one.begin < time <= one.end), 0)
 
     def will_act(self, time: float) -> bool:
-        """Whether something is pumped or held from this time on."""
+        """Return whether the well pumps or holds a pressure at or after this time [s]."""
         return any(one.does != SHUT and one.end > time for one in self.stages)
 
     def next_change(self, time: float) -> float:
@@ -104,7 +104,7 @@ class Well:
         return Asked(None, *self.pumped(before, after, value))
 
     def asked_now(self, time: float, dt: float, value: Callable[[Number, float], float]) -> Asked:
-        """What it would do for so long [s] by the stage that is on from this time on."""
+        """Return the action for dt [s] of the stage that is active at this time [s]."""
         one = next((one for one in self.stages if one.begin <= time < one.end), Stage(SHUT))
         if one.does == PRESSURE:
             return Asked(value(one.value, time), 0.0, math.inf)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 class Rock(Protocol):
-    """What the fluid asks of the heat of elements, see `Heat`."""
+    """Interface to the heat of elements that the fluid uses, see `Heat`."""
 
     blocks: Blocks
     t: np.ndarray
@@ -157,7 +157,7 @@ class FluidHeat(Assigned, Travelling):
         self._tell_obtuse()
 
     def _tell_obtuse(self) -> None:
-        """Where flat triangles conduct from cold to warm, as flat tetrahedra do (model.py). Rank 0 alone."""
+        """Report flat triangles that conduct from cold to warm, as flat tetrahedra do (model.py). Rank 0 only."""
         log, network = self.blocks.log, self.flow.network
         if self._told_obtuse or log is None or self.links == 1 or self.constant("conductivity") == 0.0:
             return
@@ -217,8 +217,8 @@ class FluidHeat(Assigned, Travelling):
         return conducting(self.blocks.reference.points[self.blocks.the_mesh().face_points(channels)])
 
     def lengths(self, sides: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """How far links (l,) lead along what flows in their channels [m], not quite 0; sides (l, dim): from end to end
-        [m]. Not collective."""
+        """Compute the lengths of links (l,) along the flow in their channels [m], never exactly 0; sides (l, dim): from
+        end to end [m]. Not collective."""
         length = reduce(np.hypot, sides.T)
         if self.links == 1:
             return length
@@ -261,10 +261,10 @@ class FluidHeat(Assigned, Travelling):
     def crossing(
         self, q: np.ndarray, s: np.ndarray, ends: np.ndarray, points: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What links (l,) carry of these flows, and the least saturation of their channels; s (n,): of nodes, ends
-        (l, 2): rows of them, points (l, 2): of the mesh. In a full triangle it is what crosses the medians; the less
-        a corner holds, the less of what only goes around, as that would have to pass through it. Between held nodes,
-        which have inflow at the same place, nothing is carried: a front begins at them. Not collective."""
+        """Compute the flows along links (l,) and the least saturation of their channels; s (n,): of nodes, ends (l, 2):
+        rows of them, points (l, 2): of the mesh. In a full triangle it is what crosses the medians; the less a corner
+        holds, the less of what only goes around, as that would have to pass through it. Between held nodes, which have
+        inflow at the same place, nothing is carried: a front begins at them. Not collective."""
         least = np.minimum(s[ends[:, 0]], s[ends[:, 1]])
         if self.links > 1:
             least = np.repeat(least.reshape(-1, self.links).min(axis=1), self.links)

@@ -170,8 +170,8 @@ class Implicit:
         return self.heat.at.sums(self.heat.inflow(time, dt))
 
     def _book(self, dt: float, time: float, old: np.ndarray, new: np.ndarray, walls: np.ndarray) -> None:
-        """What conditions brought, beside heat (n,) [W/m] from fluid: on the way to a steady state all that has come
-        in."""
+        """Book the amounts supplied by conditions, beside heat (n,) [W/m] from fluid: in a step to the steady state,
+        all inflow."""
         sim, heat = self.sim, self.heat
         at = heat.at
         brought = at.capacity * (new - old)
@@ -183,7 +183,7 @@ class Implicit:
     # ---- the matrix ------------------------------------------------------------------------------------------------
 
     def _prepare(self, dt: float, fluid: Fluid | None) -> None:
-        """Who is unknown, and factors of the matrix, if it is another one than before."""
+        """Determine the unknowns, and factorize the matrix if it has changed."""
         sim, heat = self.sim, self.heat
         at = heat.at
         row = at.first() // heat.t.shape[1]
@@ -250,7 +250,7 @@ class Implicit:
         return found
 
     def _contact_pieces(self) -> Pieces:
-        """Of faces that touch, the first of which belongs to this rank, by the numbers of its element."""
+        """Make the pieces of touching faces, by the numbers of elements, if the first face belongs to this rank."""
         sim, heat = self.sim, self.heat
         corner, weight, pass_on = heat.contacts
         width = heat.t.shape[1]

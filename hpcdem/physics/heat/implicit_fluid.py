@@ -83,7 +83,7 @@ class Fluid:
         return self.of.constant("second_order") > 0.0
 
     def upstream(self, t: np.ndarray) -> np.ndarray:
-        """Of temperatures (n,) of nodes those (m,) upstream in the channels."""
+        """Select the temperatures (m,) of the upstream nodes of the channels from those of all nodes (n,)."""
         return t[np.where(self.q > 0.0, *self.ends.T)]
 
     def beyond(self, t: np.ndarray) -> np.ndarray:
@@ -110,7 +110,7 @@ class Fluid:
         return got, out
 
     def pieces(self, dt: float, first: int) -> list[Pieces]:
-        """Of channels and of nodes, whose numbers begin with `first`, for rank 0."""
+        """Make the pieces of channels and of nodes, whose numbers begin with `first`, for rank 0."""
         mine = slice(None) if self.of.blocks.comm.rank == 0 else slice(0, 0)
         ends, q = self.ends[mine], self.of.rho_c * self.q[mine]
         conduct, exchange = self.conduct[mine], self.exchange[mine]

@@ -82,7 +82,7 @@ class Heat(Diffusing):
         return self.fluid if self.fluid is not None and self.fluid.on else None
 
     def initial(self, nodes: np.ndarray | None, value: float) -> None:
-        """As of any field, and of the fluid at these nodes."""
+        """Set the initial value of the field, and of the fluid at these nodes."""
         super().initial(nodes, value)
         if (fluid := self.flowing) is not None:
             fluid.initial(self.blocks.numbers_of_nodes(nodes), value)
@@ -207,7 +207,7 @@ class Heat(Diffusing):
         return self._touch
 
     def _add_most_of_contacts(self, corner: np.ndarray) -> None:
-        """What free faces pass on to corners (n, w) where they touch all along, whatever they touch."""
+        """Add the transfer of free faces to corners (n, w) under the assumption that they are in contact everywhere."""
         blocks, h = self.blocks, self._transfers
         most = h[blocks.alive].max()
         at = np.flatnonzero(blocks.face_exists() & ~blocks.closed_faces() & np.repeat(h > 0.0, 4))
@@ -251,7 +251,7 @@ class Heat(Diffusing):
         return self.every if self._may_wait else self.blocks.options.flow_every
 
     def check_elements(self) -> None:
-        """As of any field; and of transfer coefficients that nothing takes. Not collective."""
+        """Check the elements like those of any field, and that every transfer coefficient is used. Not collective."""
         self.check_complete()
         blocks = self.blocks
         passes = np.flatnonzero((self._transfers > 0.0) & blocks.alive)

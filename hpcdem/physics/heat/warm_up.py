@@ -25,7 +25,7 @@ def warm_up(threads: int = 1) -> None:
 
 
 def in_space(threads: int = 1) -> None:
-    """The same between two tetrahedra."""
+    """Call the kernels of heat between two tetrahedra."""
     _heated(3, threads)
     pairs, one = np.zeros(1, np.int64), np.ones(1)
     kernels_space.friction_heat(

@@ -15,7 +15,7 @@ from hpcdem.physics.fdem.structures import Columns
 
 @dataclass(frozen=True)
 class Laid:
-    """Where new elements lie. order: of the faces; ends (m, k): their nodes, new ones from len(liners) on; parted: how
+    """Layout of new elements. order: of the faces; ends (m, k): their nodes, new ones from len(liners) on; parted: how
     many points of the mesh, or edges, part them; about: what else their kind knows."""
 
     order: np.ndarray
@@ -75,7 +75,7 @@ class Elements(ABC):
 
     @abstractmethod
     def areas(self, elements: np.ndarray) -> np.ndarray:
-        """What of the rock belongs to a point of these elements [m2, in the plane m]."""
+        """Return the area of rock that belongs to a point of these elements [m2, in the plane m]."""
 
     @abstractmethod
     def sizes(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Which faces make up a liner, and in which order: functions of the mesh."""
+"""Faces of a liner and their order: functions of the mesh."""
 
 from __future__ import annotations
 

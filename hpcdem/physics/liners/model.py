@@ -25,9 +25,9 @@ KINDS: dict[int, type[Elements]] = {2: Beams, 3: Shells}
 
 @dataclass(frozen=True)
 class Condition:
-    """What is prescribed at nodes of liners: whether x, y, z and rotations about them (turn: about z, in the plane the
-    only one) are led (structures.VELOCITY), at which velocity [m/s, rad/s]; forces [N] and moments [N m], in the plane
-    per metre. See kernels.DOES for the order."""
+    """Condition of nodes of liners: whether x, y, z and rotations about them (turn: about z, in the plane the only one)
+    are led (structures.VELOCITY), at which velocity [m/s, rad/s]; forces [N] and moments [N m], in the plane per metre.
+    See kernels.DOES for the order."""
 
     does_x: int = FREE
     at_x: Number = 0.0
@@ -319,7 +319,7 @@ class Liners(Structure):
         kernels.add(self._mine, self._rows, self._corner, self._on_rock, self.blocks.stride, applied)
 
     def _seen(self) -> np.ndarray:
-        """Where the rock is [m] at each point."""
+        """Return the position of the rock at each point [m]."""
         seen = np.zeros_like(self._on_rock)
         kernels.host_points(self._mine, self._rows, self._corner, self.blocks.x, self.blocks.stride, seen)
         return seen

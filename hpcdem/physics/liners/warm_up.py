@@ -20,7 +20,7 @@ def warm_up(threads: int = 1) -> None:
 
 
 def in_space(threads: int = 1) -> None:
-    """The same of those of a model in space. Writes nothing."""
+    """Call the kernels of liners in a model in space. Writes nothing."""
     _step(3, threads)
 
 

@@ -46,8 +46,8 @@ class Moisture(Diffusing):
             raise CommandError(f"{what} must not be negative, got {values.min():g}")
 
     def suction(self) -> np.ndarray:
-        """Of owned elements (n_own,) [Pa] at their mean moisture, 0 where they are saturated; the model is closed. Not
-        collective."""
+        """Compute the suction of owned elements (n_own,) [Pa] at their mean moisture, 0 if saturated. The model is
+        closed. Not collective."""
         row = self.row[self.blocks.number[self.blocks.owned]]
         names = ("moisture_residual", "moisture_saturated", "air_entry", "pore_index")
         least, most, entry, n = (self.column(name)[row] for name in names)

@@ -100,7 +100,7 @@ class Proppant(ProppantAssignments):
 
     @property
     def on(self) -> bool:
-        """It moves. Not collective."""
+        """Return whether proppant moves. Not collective."""
         return self.blocks.options.proppant and self.blocks.options.hydraulic and len(self.flow.network.channels) > 0
 
     def account(self) -> dict[str, float]:
@@ -215,7 +215,7 @@ class Proppant(ProppantAssignments):
         self.time = self.flow.time
 
     def _find_rooms(self) -> np.ndarray:
-        """That for slurry is returned."""
+        """Update the volume of each node and its space for slurry, and return the latter."""
         volume = self.flow.nodes[:, flowing.V]
         self.nodes[:, kernels.VOLUME] = volume
         self.nodes[:, kernels.ROOM] = room = np.minimum(self.flow.nodes[:, flowing.W], volume)

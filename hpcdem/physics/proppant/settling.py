@@ -44,5 +44,5 @@ def terminal(size: float, density: float, fluid: float, viscosity: float, gravit
 
 
 def reynolds(v: float, size: float, fluid: float, viscosity: float) -> float:
-    """Of a grain of this speed [m/s]."""
+    """Compute the Reynolds number of a grain of this speed [m/s]."""
     return fluid * abs(v) * size / viscosity

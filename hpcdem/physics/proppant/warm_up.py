@@ -20,7 +20,7 @@ def warm_up(threads: int = 1) -> None:
 
 
 def in_space(threads: int = 1) -> None:
-    """The same between two tetrahedra."""
+    """Call the kernels of proppant between two tetrahedra."""
     _settles(3, threads)
 
 

@@ -582,7 +582,7 @@ def _frequencies(axes: Any, found: Emission) -> None:
 
 
 def _places(axes: Any, found: Emission, kinds: np.ndarray) -> None:
-    """Where events were, the size of the circles by magnitude."""
+    """Draw the positions of events; the size of a circle follows the magnitude."""
     e = found.events
     m = np.nan_to_num(found.magnitude, nan=float(np.nanmin(found.magnitude, initial=0.0)))
     part = (m - m.min()) / max(float(np.ptp(m)), 1e-12)

@@ -1,4 +1,4 @@
-"""What frames of blocks tell of cracks and fragments, and the table of joints that broke: tables of `hpcdem measure`.
+"""Cracks and fragments in frames of blocks, and the table of broken joints: tables of `hpcdem measure`.
 
 Damage index: length of the joints times their damage (0 before the peak, 1 broken, between as softening has gone) over
 the length of all joints. P21: length of broken joints per area (Dershowitz & Herda 1992, Proc. 33rd US Symp. Rock
@@ -104,7 +104,7 @@ class Fluid:
 
 @dataclass(frozen=True)
 class Part:
-    """What is taken from a frame: joints, in the plane always; regions and surface in space."""
+    """Measurements of one frame: joints (always in the plane); regions and surface in space."""
 
     step: int
     time: float
@@ -194,7 +194,7 @@ def channels(state: MeshState, wanted: np.ndarray) -> np.ndarray:
 
 
 def fluid_of(state: MeshState, wanted: np.ndarray) -> Fluid:
-    """What is in the channels between elements that are wanted (ne,)."""
+    """Measure the fluid in the channels between the `wanted` elements (ne,)."""
     rows = channels(state, wanted)
     if not len(rows):
         return Fluid(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -301,8 +301,8 @@ def orientation(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def parted(state: MeshState, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far both sides of joints in space (rows) have come apart across them and along them (n,) [m], as means of the
-    three corners; NaN where one side was removed."""
+    """Measure the opening and the slip of joints in space (rows), (n,) [m], as means of their three corners; NaN if one
+    side was removed."""
     lower, node = faces_of_joints(state)[rows], state.of_points["node"].astype(np.int64)
     upper = tetrahedra.face_partners(node[state.cells])[lower]
     mine, other = (tetrahedra.face_points(state.cells, faces) for faces in (lower, np.maximum(upper, 0)))

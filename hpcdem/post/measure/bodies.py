@@ -1,4 +1,4 @@
-"""What frames of tetrahedra tell: volumes, mean stress and strain of groups and of a box, and how far surfaces moved.
+"""Volumes, mean stress and strain of groups and of a box in frames of tetrahedra, and displacements of surfaces.
 
 Means are weighted by volume in the mesh. Strain is that of Green and Lagrange, E = (F' F - 1) / 2, from the place of
 the corners in the mesh (where they are less what they have moved): rotations do not count, and where it is small it is

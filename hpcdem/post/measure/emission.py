@@ -66,7 +66,7 @@ class Events:
         return len(self.step)
 
     def take(self, keep: np.ndarray) -> Events:
-        """Those chosen by a mask or by rows."""
+        """Select events by a mask or by rows."""
         return Events(**{name: values[keep] if len(values) else values for name, values in vars(self).items()})
 
     @property
@@ -169,7 +169,7 @@ def rates(at: np.ndarray, kinds: np.ndarray, energy: np.ndarray, span: tuple[flo
 
 @dataclass(frozen=True)
 class Curve:
-    """What a history has recorded: name, value, unit; step, time [s], values (n,)."""
+    """Record of one history: name, value, unit; step, time [s], values (n,)."""
 
     name: str
     value: str

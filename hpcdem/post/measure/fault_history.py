@@ -80,7 +80,7 @@ class Fault:
 
     @property
     def dip(self) -> float:
-        """Of its last bands, by their length [degrees]."""
+        """Return the dip of the longest of the last bands [degrees]."""
         return max(self.seen[self.last], key=lambda one: one.band.length).band.dip
 
 
@@ -203,8 +203,9 @@ def plane(fault: Fault, reference: Grains, cell: float, names: np.ndarray) -> Pl
 def _horizons(
     g: Grains, names: np.ndarray, near: np.ndarray, centre: np.ndarray, along: np.ndarray, cell: float
 ) -> dict[str, float]:
-    """Where the horizons cross the line: "UPPER over LOWER" of two layers, and the distance from the centre. A horizon
-    is the line through the middles between neighbours of the two; left out where these scatter."""
+    """Locate the intersections of horizons with the line: "UPPER over LOWER" of two layers, and the distance from the
+    centre. A horizon is the line through the midpoints between neighbours of the two layers; horizons with scattered
+    midpoints are omitted."""
     rows = np.flatnonzero(near)
     points = np.column_stack([g.x, g.y])[rows]
     try:
@@ -271,8 +272,8 @@ class Profile:
         return float(known.mean()) if len(known) else float("nan")
 
     def slid(self, vergence: int) -> float:
-        """How far the sides went past each other in this sense of shear, the median along the line [m]; steep lines
-        have either sense."""
+        """Return the relative displacement of both sides in this sense of shear, the median along the line [m]; steep
+        lines have either sense."""
         known = self.slip[np.isfinite(self.slip)]
         middle = float(np.median(known)) if len(known) else 0.0
         return abs(middle) if abs(self.dip) > STEEP else middle * vergence * (1.0 if self.dip >= 0.0 else -1.0)
@@ -299,7 +300,7 @@ class History:
         return np.array(frames, np.int64), np.array(slip)
 
     def active(self, fault: Fault, frame: int, steps: Sequence[int]) -> bool:
-        """Whether it has a band; two frames of one step are one state."""
+        """Return whether the fault has a band in the frame; two frames of one step are one state."""
         return frame in fault.seen or (frame > 0 and steps[frame] == steps[frame - 1] and frame - 1 in fault.seen)
 
 

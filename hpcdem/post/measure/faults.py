@@ -33,7 +33,7 @@ class Band:
 
     @property
     def reverse(self) -> bool:
-        """Whether the upper side went up: a thrust, not a normal fault."""
+        """Return whether the upper side moved up: a thrust, not a normal fault."""
         return self.dip * self.vergence > 0.0
 
 

@@ -98,7 +98,7 @@ def label(ax: Any, x: str | None, y: str) -> None:
 
 
 def key(ax: Any, columns: int = 1, **more: Any) -> None:
-    """What the lines are."""
+    """Add a legend of the lines."""
     options = {"loc": "best", "frameon": False, "handlelength": 1.6, "columnspacing": 1.2} | more
     ax.legend(fontsize=plots.FONT - 1.5, ncol=columns, **options)
 

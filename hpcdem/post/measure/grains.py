@@ -154,7 +154,7 @@ def middle(walls: Walls, wall: int) -> np.ndarray:
 
 
 def gone(first: Walls, last: Walls, wall: int) -> float:
-    """How far the middle of a wall went along x [m]; 0 where it is not in both."""
+    """Return the displacement of the midpoint of a wall along x [m]; 0 if a frame lacks the wall."""
     return abs(float(middle(last, wall)[0] - middle(first, wall)[0])) if wall in first and wall in last else 0.0
 
 

@@ -152,7 +152,7 @@ def faults_part(scene: Scene) -> Faults | None:
 
 
 def drawn(parts: Sequence[Faults | None]) -> Faults | None:
-    """What is drawn: the last with a band, else the last, of those that still have their field."""
+    """Choose the part to draw: the last with a band, otherwise the last, of those that still have their field."""
     some = [part for part in parts if part is not None and part.strain is not None]
     return next((part for part in reversed(some) if part.bands), some[-1] if some else None)
 

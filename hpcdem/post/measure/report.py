@@ -33,7 +33,8 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class Kind:
-    """How one measurement is done. part: of a frame; sheets and figure: of all; previous: it needs the frame before."""
+    """Functions of one measurement. part: measures one frame; sheets and figure: use all parts; previous: part needs
+    the preceding frame."""
 
     part: Callable[[Scene], Any]
     sheets: Callable[..., list[Sheet]]
@@ -114,7 +115,7 @@ def _tell_of_no_wedge(log: Any, done: Done) -> None:
 
 
 def _tried(work: Callable[[], list[Path]], must: bool) -> tuple[list[Path], str | None]:
-    """What was written, or why nothing was; failures are raised if it must be."""
+    """Return the written files, or why nothing was written; if `must`, raise the failure."""
     try:
         return work(), None
     except _NothingThere as failure:

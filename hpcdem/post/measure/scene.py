@@ -100,9 +100,9 @@ class Request:
 
 @dataclass(frozen=True)
 class Plan:
-    """What holds for all frames: in the order of time, which have sections, width of columns [m], the wall that pushes,
-    or the ids of the row of particles that does; the direction +1 or -1 into which it pushes, its place in the first
-    frame [m], ids of particles to follow."""
+    """Settings for all frames: frames in order of time, those with sections, width of columns [m], the wall or the ids
+    of the row of particles that pushes, its direction +1 or -1, its position in the first frame [m], and ids of
+    particles to follow."""
 
     request: Request
     frames: list[FrameFile]
@@ -249,13 +249,13 @@ class Scene:
 
     @property
     def stamp(self) -> Stamp:
-        """When it is."""
+        """Return the time of the frame."""
         return Stamp(self.all.step, self.all.ini, self.all.time, self.plan.shortening(self.all))
 
 
 @dataclass(frozen=True)
 class Stamp:
-    """When a frame is: step, whether before the first step of a command, time [s], shortening [m]."""
+    """Time of a frame: step, whether before the first step of a command, time [s], shortening [m]."""
 
     step: int
     ini: bool

@@ -1,4 +1,4 @@
-"""Which particles to follow."""
+"""Selection of the particles whose paths are measured."""
 
 from __future__ import annotations
 

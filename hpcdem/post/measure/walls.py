@@ -16,7 +16,7 @@ HEADER = "step,time,wall,x1,y1,x2,y2,fx,fy"
 
 @dataclass(frozen=True)
 class Curve:
-    """What happened to one wall, a row per time.
+    """Record of one wall, a row per time.
 
     step, time [s]; place (n, 2): of its middle [m]; force (n, 2): of the particles on it [N].
     """

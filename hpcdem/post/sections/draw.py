@@ -108,7 +108,7 @@ class OneSection:
 
     @property
     def name(self) -> str:
-        """Of the section."""
+        """Return the name of the section."""
         return self.path.stem
 
     def __call__(self) -> None:
@@ -159,7 +159,7 @@ def _of_this_run(folder: Path, log: Any) -> list[Path]:
 
 
 def _is_newer(folder: Path, section: Path) -> bool:
-    """Whether the frame of a section has been written after it."""
+    """Return whether the frame of a section was written after the section."""
     frames = [folder / f"{section.stem}.{kind}" for kind in FORMATS]
     return any(path.is_file() and path.stat().st_mtime_ns > section.stat().st_mtime_ns for path in frames)
 
@@ -218,7 +218,7 @@ def _without_date(path: str) -> None:
 
 
 def _collective(comm: Comm, read: Callable[[], Any]) -> Any:
-    """What rank 0 reads, on all ranks; its HpcdemError on all ranks, of its own class."""
+    """Read on rank 0 and broadcast the result; an HpcdemError is raised on all ranks with its class."""
     result = None
     if comm.rank == 0:
         try:

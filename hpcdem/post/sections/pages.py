@@ -30,8 +30,8 @@ MINUS = "\N{MINUS SIGN}"
 
 @dataclass(frozen=True)
 class Style:
-    """How pages look. width [cm]; bars: whether colour bars are drawn; labels: off, on or abc; tables: colours of each
-    kind by key; stress_bars: square [m] and scale of the bars along the largest principal stress, or None."""
+    """Appearance of pages. width [cm]; bars: whether colour bars are drawn; labels: off, on or abc; tables: colours of
+    each kind by key; stress_bars: square [m] and scale of the bars along the largest principal stress, or None."""
 
     tables: Mapping[str, ColourTable]
     width: float = 14.0
@@ -84,7 +84,7 @@ def _stress_bars(section: Section, kind: Kind, ax: Any, style: Style) -> str:
 
 
 def panels_of_a_page(seen: View, style: Style) -> int:
-    """How many panels of full width with captions there is room for on a page, at least one."""
+    """Count the panels of full width with captions that fit on a page, at least one."""
     page = _Sizes(seen, style, int(style.bars), captions=True)
     return max(1, int((style.most - page.rest + page.gap) / (page.height + page.gap)))
 
@@ -277,7 +277,7 @@ def _heading(kinds: Sequence[Kind]) -> str:
 
 
 def text_widths(texts: Sequence[str], font: float) -> list[float]:
-    """How long texts are [cm]."""
+    """Measure the widths of texts [cm]."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 
@@ -286,8 +286,8 @@ def text_widths(texts: Sequence[str], font: float) -> list[float]:
 
 
 def thinned(ticks: list[tuple[float, str]], scale: float, font: float) -> list[tuple[float, str]]:
-    """As many of the ticks as can be read side by side, the middle one among them; "more than" at the ends goes first.
-    scale: cm per unit of place."""
+    """Thin out ticks until their labels can be read side by side, with the middle one among them; "more than" at the
+    ends is dropped first. scale: cm per unit of position."""
     widths = text_widths([text for _, text in ticks], 0.85 * font)
     numbered = range(ticks[0][1].startswith("<"), len(ticks) - ticks[-1][1].startswith(">")) if ticks else ()
     strides = (range(len(ticks) // 2 % step, len(ticks), step) for step in range(2, len(ticks)))

@@ -38,7 +38,7 @@ VECTOR_DISCS, DISC_PIXELS = 30000, 2400
 
 @dataclass(frozen=True)
 class Kind:
-    """What a panel can show. key: field of the section; unit: of the colour bar, one is `scale` SI units; squared:
+    """Quantity of a panel. key: field of the section; unit: of the colour bar, one is `scale` SI units; squared:
     whether the square is drawn, with the sign of the field."""
 
     key: str
@@ -54,7 +54,7 @@ class Kind:
         return f"{self.title} ({self.unit})" if self.unit else self.title
 
     def shown(self, values: np.ndarray) -> np.ndarray:
-        """What is drawn of values of the field, in `unit`."""
+        """Convert values of the field to those drawn, in `unit`."""
         return (values * np.abs(values) if self.squared else values) / self.scale
 
 

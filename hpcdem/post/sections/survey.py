@@ -1,4 +1,4 @@
-"""What all pages of a folder have in common: the part of the plane they show, and the displacement of each frame."""
+"""Data common to all pages of a folder: the visible part of the plane, and the displacement of each frame."""
 
 from __future__ import annotations
 

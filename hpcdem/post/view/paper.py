@@ -257,7 +257,7 @@ def handles_of(layer: Painted) -> list[Any]:
 
 
 def _swatches() -> Any:
-    """What draws the colours of a class side by side before its word, as wide as they need."""
+    """Make the legend handler that draws the colours of a class side by side before its label, as wide as they need."""
     from matplotlib.legend_handler import HandlerTuple
 
     class Swatches(HandlerTuple):

@@ -13,8 +13,9 @@ SIDES = 6
 
 
 class Skin(NamedTuple):
-    """What is seen of some elements: points (k, 3) [m]; cells (m, 4) rows of points, -1 in the fourth column of
-    triangles; of (m,): whose faces these are, as places among these elements; cut (m,): whether the plane made it."""
+    """Visible surface of elements: points (k, 3) [m]; cells (m, 4) rows of points, -1 in the fourth column of
+    triangles; of (m,): elements of the faces, as positions in the selection; cut (m,): whether the plane made the
+    face."""
 
     points: np.ndarray
     cells: np.ndarray

@@ -88,8 +88,8 @@ class Keyword:
 
 @dataclass
 class Entry:
-    """What an entry of a set names: numbers, or another set; nodes_of: the points of that set of elements; instance:
-    whose; side: of a surface."""
+    """One entry of a set: its element or node numbers, or the name of another set. nodes_of: take the points of that
+    element set; instance: to which it belongs; side: of a surface."""
 
     value: np.ndarray | range | str
     line: Line
@@ -139,7 +139,7 @@ class Scope:
 
 
 def read(path: Path) -> FileMesh:
-    """What an input file holds; HpcdemError, with the line, for what cannot be used."""
+    """Read an Abaqus input file. Raises HpcdemError with file and line for anything that cannot be used."""
     return _Reader(path).read()
 
 
@@ -450,7 +450,7 @@ class _Reader:
         return max(DIMENSIONS.get(block.kind, 3) for block in self.made.blocks)
 
     def _outside(self, faces: np.ndarray) -> np.ndarray:
-        """Those of these sides of elements that no other element has."""
+        """Select the element sides that belong to no other element."""
         if not hasattr(self, "sides"):
             dim = self._dim()
             self.sides = Counter(

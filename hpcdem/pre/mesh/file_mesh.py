@@ -1,4 +1,4 @@
-"""What a mesh file holds, by the numbers that stand in it, before it becomes a mesh of the model.
+"""Contents of a mesh file, under the numbers of the file, before they become a mesh of the model.
 
 Readers (`abaqus.py`, `gmsh_file.py`, `imported.py` for what meshio reads) make a `FileMesh`; `imported.py` makes a mesh
 of it.
@@ -81,7 +81,7 @@ class FileMesh:
 
 
 def lines(content: bytes) -> list[str]:
-    """Of a text in UTF-8, or in what programs on Chinese and on western systems write: names that differ stay so."""
+    """Decode a text as UTF-8, GB 18030 or Latin-1 and split it into lines. Names that differ stay different."""
     for encoding in ("utf-8-sig", "gb18030", "latin-1"):
         with contextlib.suppress(UnicodeDecodeError):
             return content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n").split("\n")

@@ -1,4 +1,4 @@
-"""Whether the faces of a mesh fit together: free faces that lie on others, and why they are not connected."""
+"""Check that the faces of a mesh fit together: find free faces that lie on others, and why they are not connected."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ class Fit:
     parts: np.ndarray
 
     def description(self) -> str:
-        """What does not fit, "" if all does."""
+        """Describe what does not fit; "" if everything does."""
         found = [
             f"{len(at)} {what}, at {places(at)}"
             for at, what in (
@@ -163,7 +163,7 @@ class Fit:
 
 
 def fit(mesh: Mesh, since: int = 0) -> Fit:
-    """How the faces of elements from `since` on fit together, and to those before."""
+    """Compare the faces of elements from `since` on with each other and with earlier faces."""
     free = free_faces(mesh)
     empty = np.empty((0, mesh.dim))
     tolerance = free.tolerance()

@@ -47,7 +47,7 @@ def discs(one: DiscSet, bodies: Sequence[Any], seed: int, number: int = 0) -> li
 
 
 def area(of: Sequence[Disc]) -> float:
-    """Of all of them together [m2]."""
+    """Sum the areas of discs [m2]."""
     return math.fsum(math.pi * disc.radius**2 for disc in of)
 
 
@@ -100,7 +100,7 @@ def _until_reached(
 
 
 def _volume(bodies: Sequence[Any]) -> float:
-    """Of bodies together [m3]: the part of their box that lies inside, by a lattice of points."""
+    """Estimate the volume of bodies [m3] as the share of lattice points of their bounding box that lie inside."""
     bounds = np.array([body.bounds() for body in bodies])
     low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
     n = np.maximum(np.round((high - low) * (VOLUME / np.prod(high - low)) ** (1.0 / 3.0)), 1).astype(int)

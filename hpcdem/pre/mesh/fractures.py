@@ -194,7 +194,8 @@ def _ended(ends: np.ndarray, older: np.ndarray, share: float, seed: int, number:
 
 
 def crossings(a: np.ndarray, b: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the segment a-b crosses segments `others` (m, 2, 2): fractions of a-b, and which of the others."""
+    """Intersect the segment a-b with the segments `others` (m, 2, 2). Returns fractions (k,) of a-b and rows (k,) of
+    others."""
     u, v, w = b - a, others[:, 1] - others[:, 0], others[:, 0] - a
     cross = u[0] * v[:, 1] - u[1] * v[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):

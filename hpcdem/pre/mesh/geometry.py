@@ -36,7 +36,7 @@ class Curve:
 
     @property
     def segments(self) -> int:
-        """How many segments there are; 0 for a point."""
+        """Return the number of segments; 0 for a point."""
         return len(self.points) - (0 if self.closed else 1)
 
     def segment(self, i: int) -> tuple[np.ndarray, np.ndarray, float]:
@@ -281,7 +281,7 @@ def sampled(curve: Curve, spacing: float) -> np.ndarray:
 
 
 def least_steps(bulge: float) -> int:
-    """How many edges a segment has at least."""
+    """Return the least number of edges of a segment, from the angle of its arc (bulge: tangent of a quarter of it)."""
     return max(1, math.ceil(abs(4.0 * math.atan(bulge)) / (2.0 * math.pi) * STEPS_PER_CIRCLE - 1e-9))
 
 

@@ -63,7 +63,8 @@ class _Text:
 
 
 def _whole(values: np.ndarray) -> np.ndarray:
-    """As integers; ValueError for what is none, or too large for a double to tell it from the next."""
+    """Convert floats to integers. Raises ValueError for fractions and for magnitudes of 2**53 or more, which are not
+    exact."""
     if not (np.abs(values) < 2.0**53).all() or (values != np.rint(values)).any():
         raise ValueError
     return values.astype(np.int64)
@@ -102,7 +103,7 @@ class _Binary:
 
 
 def read(path: Path) -> FileMesh:
-    """What a mesh file of Gmsh holds; HpcdemError, with the section, for what cannot be used."""
+    """Read a mesh file of Gmsh. Raises HpcdemError with the section for anything that cannot be used."""
     return _Reader(path).read()
 
 
@@ -169,7 +170,7 @@ class _Reader:
         return made
 
     def _sections(self, content: bytes) -> dict[str, bytes]:
-        """What stands between $Name and $EndName."""
+        """Split the file into the contents between $Name and $EndName, by name."""
         out: dict[str, bytes] = {}
         at = 0
         while True:

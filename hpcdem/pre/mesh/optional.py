@@ -108,13 +108,13 @@ OWN_READERS = (".msh", ".inp")
 
 
 def of_mesh(file: str) -> tuple[Load, ...]:
-    """What reads a mesh file of this name."""
+    """Return the packages needed to read a mesh file, by its ending."""
     ending = Path(file).suffix.lower()
     return (meshio,) if ending and ending not in OWN_READERS else ()
 
 
 def of_drawing(file: str) -> tuple[Load, ...]:
-    """What reads a drawing, or a file of bodies, of this name."""
+    """Return the packages needed to read a drawing or a file of bodies, by its ending."""
     ending = Path(file).suffix.lower()
     return _OF_DRAWINGS.get(ending, ())
 

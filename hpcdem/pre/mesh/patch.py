@@ -21,9 +21,9 @@ def settings(
     tolerance: float,
     group: tuple[str, str],
 ) -> tuple[Layers, MeshSettings]:
-    """What triangulate.py takes: the layers, those of pieces without a name among them, and settings. pieces: with the
-    curves of their shapes; group: (set, group)
-    of the elements. CommandError for pieces that bound nothing or have no size."""
+    """Prepare the input of triangulate.py: the layers (unnamed pieces included) and settings. pieces: with the curves
+    of their shapes; group: (set, group) of the elements. Raises CommandError for pieces that bound nothing or have no
+    size."""
     if not any(piece.role == OUTLINE for piece, _ in pieces):
         raise CommandError("no piece is given as boundary of the mesh")
     sizes = [piece.size for piece, _ in pieces if piece.size is not None]

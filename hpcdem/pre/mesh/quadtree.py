@@ -127,7 +127,7 @@ class _Tree:
                 self.leaves[e] = new
 
     def _deep(self, a: int, b: int) -> bool:
-        """Has this side more than one point on it?"""
+        """Return whether the side a-b carries more than one hanging point."""
         m = self.middles.get((min(a, b), max(a, b)))
         return m is not None and any((min(p, m), max(p, m)) in self.middles for p in (a, b))
 

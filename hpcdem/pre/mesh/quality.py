@@ -1,4 +1,4 @@
-"""What a mesh is like: sizes, angles, shapes, and where the worst element is."""
+"""Quality of a mesh: element sizes, angles and shapes, and the position of the worst element."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def _in_plane(mesh: Mesh, free: fit.Free, pairs: np.ndarray, tolerance: float) -
 
 
 def _between(points: np.ndarray, a: int, b: int, others: set[int], tolerance: float) -> list[int]:
-    """Those of the others that lie on the line from a to b and not at its ends, in order."""
+    """Select the other points strictly between a and b on their line, in order."""
     some = np.array(sorted(others - {a, b}), np.int64)
     if not len(some):
         return []

@@ -23,7 +23,7 @@ class Remade:
 
 @dataclass(frozen=True)
 class Moved:
-    """Where faces are now: by their points before, see `faces`."""
+    """Map from faces before a change of the mesh to faces after it, by their points, see `faces`."""
 
     points: np.ndarray
     """(np,) the number now of each point before, -1 where it is gone."""

@@ -1,4 +1,4 @@
-"""How long edges are to be, as a function of place: a base size, and smaller ones near layers; or along a line."""
+"""Target edge lengths: a base size with refinement near layers as a function of position, or a size along a line."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class SizeField:
         return out
 
     def parts_of(self, points: np.ndarray, length: float, most: float = math.inf) -> np.ndarray:
-        """Where to cut a line: (n + 1,) fractions of its length, 0 and 1 included.
+        """Divide a line by the target size: return fractions (n + 1,) of its length, 0 and 1 included.
 
         points (m, 2): the line, in equal steps; length: its true length, along arcs [m]; most: a bound of the size
         there. It gets the least number n of edges such that none is longer than the size allows: n = ceil(integral of

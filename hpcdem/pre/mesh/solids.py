@@ -287,7 +287,7 @@ class Revolved(Body):
 
 @dataclass(frozen=True)
 class Shell(Body):
-    """What a closed shell of triangles (corners of all, three by three) encloses, of a file."""
+    """Body enclosed by a closed shell of triangles that was read from a file (three corners per triangle)."""
 
     corners: tuple[Point, ...]
 
@@ -368,7 +368,7 @@ class Brep(Body):
         return self.shell().bounds()
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Of the triangles: as near as these come to curved faces."""
+        """Return distances to the triangles, which approximate curved faces."""
         return self.shell().distance(points)
 
     def parts(self, points: np.ndarray) -> list[np.ndarray]:
@@ -395,7 +395,7 @@ class Surface:
         return np.hypot(off, np.maximum(self.beyond(points), 0.0))
 
     def parts(self, points: np.ndarray) -> list[np.ndarray]:
-        """As of a body."""
+        """Return the distances (n,) to each part; a surface has one."""
         return [self.distance(points)]
 
     def plane(self) -> tuple[np.ndarray, np.ndarray]:
@@ -568,7 +568,7 @@ def on_surface(solid: Any, points: np.ndarray, slack: float) -> np.ndarray:
 
 
 def state(solids: Sequence[Any]) -> list[list[Any]]:
-    """As JSON values."""
+    """Convert solids to JSON values: name of the kind and field values of each."""
     names = {of: name for name, of in KINDS.items()}
     return [[names[type(one)], list(asdict(one).values())] for one in solids]
 

@@ -70,7 +70,7 @@ class Region:
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """What to mesh. Layers are named; sizes in metres."""
+    """Input of the triangulation: layers by name, sizes in metres."""
 
     regions: Sequence[Region]
     size: float
@@ -276,7 +276,7 @@ def _lines_inside(
 
 
 def _moved(plane: Plane, xy: np.ndarray, traces: np.ndarray) -> list[str]:
-    """How far lines lie from where they were meant to."""
+    """Report how far the meshed traces deviate from their prescribed lines."""
     rows = [(*key, label[1]) for key, labels in plane.edges.items() for label in labels if isinstance(label, tuple)]
     if not rows:
         return []
@@ -439,7 +439,7 @@ def _described(
 
 
 def _surface_at(surfaces: list[_Surface], plane: Plane, i: int) -> int:
-    """Which surface a point lies in; -1 if in none."""
+    """Return the index of the surface that contains point i; -1 if none does."""
     shapely = optional.shapely()
     at = shapely.Point(plane.x[i], plane.y[i])
     return next((k for k, s in enumerate(surfaces) if s.area.polygon.contains(at)), -1)

@@ -1,4 +1,4 @@
-"""What is wrong with the polygons and lines of a section: crossings are refused, overlaps and gaps reported."""
+"""Checks of the polygons and lines of a section: crossings are rejected, overlaps and gaps are reported."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def _gaps(made: np.ndarray) -> list[str]:
 
 
 def _place(area: Any) -> str:
-    """Where an area is, how long and how wide: of the narrowest rectangle about it."""
+    """Describe position, length and width of an area by its narrowest enclosing rectangle."""
     shapely = optional.shapely()
     at = shapely.point_on_surface(area)
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(area))

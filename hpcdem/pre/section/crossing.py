@@ -1,4 +1,4 @@
-"""Which pairs of discs lie on either side of a line."""
+"""Search for pairs of discs on opposite sides of a line."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def crossing(first: np.ndarray, second: np.ndarray, lines: Iterable[np.ndarray])
 
 
 def _left(a: np.ndarray, b: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Whether p lies left of the line from a to b."""
+    """Return whether p lies left of the line from a to b."""
     ab, ap = b - a, p - a
     left: np.ndarray = ab[..., 0] * ap[..., 1] - ab[..., 1] * ap[..., 0] > 0.0
     return left

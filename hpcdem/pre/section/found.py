@@ -1,4 +1,4 @@
-"""What a reader gathers from a file, and what it leaves out."""
+"""Shapes that a reader has gathered from a file, and entities that it has skipped."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Found:
             raise self.refuse(f"more than {MOST_POINTS} points; simplify the drawing first")
 
     def left_out(self) -> str:
-        """What was left out, in words."""
+        """Describe the skipped entities by count, kind and layer."""
         return ", ".join(
             f"{count} {kind}{f' of {layer!r}' if layer else ''}" for (kind, layer), count in self.dropped.items()
         )

@@ -1,4 +1,4 @@
-"""What a section is made of, and how coordinates of its file become those of the model."""
+"""Parts of a section, and the conversion of file coordinates to model coordinates."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class Section:
 
     @property
     def deviation(self) -> float:
-        """How far polylines may be from arcs [m]."""
+        """Return the tolerance of polylines for arcs [m]."""
         points = np.concatenate([ring.points for shape in self.shapes for ring in shape.rings])
         return FLAT * float(np.ptp(points, axis=0).max())
 

@@ -35,7 +35,7 @@ MM = 1e-3
 
 @dataclass(frozen=True)
 class Request:
-    """What a specimen shall be like. Raises CommandError, with one clear sentence, for what cannot be.
+    """Specification of a specimen. Raises CommandError if it cannot be fulfilled.
 
     sizes [mm] and percents (mass finer) are the rows of the grading, in falling or rising order. Either `number` (of
     grains) is given, and the box follows, or `width` [m] with number None. slenderness: height over width of the box;
@@ -108,9 +108,9 @@ class ClassRow:
 
 @dataclass(frozen=True)
 class Density:
-    """How the grains were placed. room [m]: width and height of the rectangle they lie in; void_ratio of that
-    rectangle; added: grains that found room by trying; moved: those that had to be made room for; sweeps: rounds of
-    that; raised: height of the room over that of the box."""
+    """Result of placing the grains. room [m]: width and height of the rectangle that contains them; void_ratio of that
+    rectangle; added: grains that fitted into free space; moved: grains for which others were displaced; sweeps: rounds
+    of that displacement; raised: height of the rectangle over that of the box."""
 
     room: tuple[float, float]
     void_ratio: float

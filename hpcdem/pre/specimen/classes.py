@@ -1,4 +1,4 @@
-"""What kinds and sizes of grains a file of outlines holds."""
+"""Count kinds and sizes of grains in a file of outlines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many grains of each size make a grading.
+"""Numbers of grains of each size that fulfil a grading.
 
 Class k has the share f_k of the mass, and a grain of it the mass c d_k^q with the same c in all classes (one shape):
 q = 2 for grains of the plane, whose mass goes with their area, q = 3 to take over the numbers of a sieve curve of real

@@ -1,4 +1,4 @@
-"""What is wrong with a place before a run finds out: `hpcdem doctor`, and the warnings at the start of a run.
+"""Checks of host, job and folders before a run meets their faults: `hpcdem doctor` and the warnings at the start.
 
 One table of checks drives both. A check is a function of a `Machine` that yields findings; those that cost next to
 nothing and write no file are made at every start, and what is wrong goes into the log. Checks of the job look at all
@@ -65,7 +65,8 @@ Found = list[tuple[int, bool, Finding]]
 
 
 def look(machine: Machine, at_start: bool = False) -> Found:
-    """What this rank finds. A check that fails is a finding of the doctor and nothing to a run."""
+    """Run the checks of this rank. A check that fails is a finding of the doctor and is ignored at the start of a
+    run."""
     found: Found = []
     for number, check in enumerate(CHECKS):
         if (at_start and not check.at_start) or not (machine.first_of_host if check.each_host else machine.rank == 0):

@@ -75,7 +75,7 @@ def cpu_quota(machine: Machine) -> Findings:
 
 
 def mapping(machine: Machine) -> Findings:
-    """Where each rank may run."""
+    """List the cores that each rank may use."""
     masks = [p.mask for p in machine.places]
     ranks = [f"rank {rank} cores {core_list(mask)}" for rank, mask in enumerate(masks[:8])] + ["..."] * (len(masks) > 8)
     yield ok("cores", "; ".join(ranks) if len(set(masks)) > 1 else f"each rank may use cores {core_list(masks[0])}")
@@ -113,7 +113,7 @@ def sbatch_cores(machine: Machine) -> Findings:
 
 
 def slurm_end(machine: Machine) -> Findings:
-    """Whether the run can save itself before the job is ended."""
+    """Check that the run can save itself before the job ends."""
     if not machine.in_job:
         return
     job, end = machine.environ["SLURM_JOB_ID"], slurm_end_time(machine.environ)
@@ -130,7 +130,7 @@ def slurm_end(machine: Machine) -> Findings:
 
 
 def memory(machine: Machine) -> Findings:
-    """What each rank may take, by the control group, by Slurm (in MiB, 0 for all of the node), and by what is free."""
+    """Compare the memory limits of each rank: control group, Slurm (in MiB, 0 for all of the node), and free memory."""
     slurm = machine.slurm("MEM_PER_NODE") or machine.slurm("MEM_PER_CPU") * machine.slurm("CPUS_ON_NODE")
     free = re.search(r"^MemAvailable:\s+(\d+)", cgroups.read(machine.root / "proc/meminfo"), re.MULTILINE)
     found = {
@@ -181,7 +181,7 @@ def clocks(machine: Machine) -> Findings:
 
 
 def text(machine: Machine) -> Findings:
-    """Whether the log and names of files can hold letters that are not ASCII."""
+    """Check that the log and file names can contain characters that are not ASCII."""
     codes = {"output": getattr(sys.stdout, "encoding", None) or "utf-8", "file names": sys.getfilesystemencoding()}
     wrong = [f"{what}: {code}" for what, code in codes.items() if codecs.lookup(code).name != "utf-8"]
     if wrong:

@@ -1,4 +1,4 @@
-"""What the checks look at, and what they say."""
+"""Subject of the checks (the machine) and their results (findings)."""
 
 from __future__ import annotations
 

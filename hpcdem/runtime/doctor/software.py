@@ -48,7 +48,7 @@ def packages(machine: Machine) -> Findings:
 
 
 def _needs(package: str) -> Iterator[Requirement]:
-    """What an installed package requires here, without its extras; nothing of one that is not described."""
+    """List the requirements of an installed package on this machine, without its extras; none if it has no metadata."""
     from packaging.requirements import InvalidRequirement, Requirement
 
     try:
@@ -76,7 +76,7 @@ def _version(name: str) -> str | None:
 
 
 def libraries(machine: Machine) -> Findings:
-    """Whether the packages can be loaded, how long it takes, and what files and films they can write."""
+    """Check that the packages load and how long that takes, and list the files and films that they can write."""
     began, loaded = time.perf_counter(), dict[str, Any]()
     for name in MODULES:
         try:
@@ -107,7 +107,7 @@ def libraries(machine: Machine) -> Findings:
 
 
 def petsc(machine: Machine) -> Findings:
-    """Whether the solver of large static problems can be loaded, in another process, which it may end."""
+    """Check that the solver of large static problems loads, in a separate process, which it may end."""
     if find_spec("petsc4py") is None:
         yield ok("PETSc", "petsc4py is not installed: static problems are solved on one rank")
         return
@@ -149,7 +149,7 @@ def mpi_library(machine: Machine) -> Findings:
 
 
 def mpi_launcher(machine: Machine) -> Findings:
-    """Where no launcher is at work: whether the one in the PATH starts ranks that know each other."""
+    """Without a running launcher: check that the launcher in PATH starts ranks that find each other."""
     library, error = ("", "refused") if machine.refusal else machine.mpi_library
     if error or machine.launcher or machine.in_job or len(machine.here[0].mask) < 2:  # some start no more than cores
         return
@@ -175,7 +175,7 @@ def mpi_launcher(machine: Machine) -> Findings:
 
 
 def slurm_mpi_type(machine: Machine) -> Findings:
-    """How srun will tell the ranks about each other, against what the MPI library understands."""
+    """Compare the process manager interface that srun will use with the one that the MPI library supports."""
     if not machine.in_job or len(machine.places) > 1 or machine.refusal or machine.mpi_library[1]:
         return  # ranks that see each other need no advice
     library, chosen = machine.mpi_library[0], machine.environ.get("SLURM_MPI_TYPE", "")

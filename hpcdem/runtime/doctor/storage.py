@@ -33,7 +33,8 @@ SLOW, SOON = 0.5, 5.0
 
 
 def kind_of(path: Path, mountinfo: str) -> str:
-    """What the kernel calls the file system of a path, by its table (see proc(5)); empty where that does not tell."""
+    """Return the kernel's name of the file system of a path, from its mount table (see proc(5)); "" if it is
+    unknown."""
     real, best = f"{os.path.realpath(path)}/", ("", "")
     for found in re.finditer(r"^(?:\S+ ){4}(\S+) \S.*? - (\S+)", mountinfo, re.MULTILINE):
         point = re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), found[1])  # a blank is \040
@@ -44,7 +45,7 @@ def kind_of(path: Path, mountinfo: str) -> str:
 
 
 def is_network(kind: str) -> bool:
-    """Whether a file system works over a network. FUSE hides many of them: all but the local ones count."""
+    """Return whether a file system is a network file system. FUSE hides many of them: all but the local ones count."""
     return kind in NETWORK or (kind.startswith("fuse") and kind not in LOCAL_FUSE)
 
 
@@ -92,7 +93,7 @@ def _room(topic: str, path: Path, cure: str) -> Findings:
 
 
 def _trial(machine: Machine, topic: str, path: Path, cure: str) -> Findings:
-    """What a run asks of a folder, tried in a folder of its own there that is removed again."""
+    """Try the file operations of a run in a temporary folder inside `path`."""
     folder, doing, taken = existing(path), "make a folder in", []
     name = _where(machine, folder)[1]
     try:
@@ -123,7 +124,7 @@ def _trial(machine: Machine, topic: str, path: Path, cure: str) -> Findings:
 
 
 def _locks_work(folder: Path) -> bool:
-    """Whether a folder can be locked, once."""
+    """Return whether a folder can be locked exclusively."""
     lock = FolderLock(folder, {})
     try:
         FolderLock(folder, {}).release()
@@ -135,7 +136,7 @@ def _locks_work(folder: Path) -> bool:
 
 
 def shared(machine: Machine) -> Findings:
-    """Whether this host sees what rank 0 wrote among the results: within some seconds, as caches forget."""
+    """Check that this host sees a file that rank 0 wrote among the results; wait some seconds for caches to expire."""
     end = time.monotonic() + SOON
     while not (seen := machine.token.exists()) and len(machine.hosts) > 1 and time.monotonic() < end:
         time.sleep(0.1)
@@ -145,7 +146,7 @@ def shared(machine: Machine) -> Findings:
 
 
 def quota(machine: Machine) -> Findings:
-    """What the program quota says, where there is one: a * stands behind a number that is over its limit."""
+    """Report exceeded quotas from the program quota, if it is installed: it marks a number over its limit by a *."""
     code, out, _ = machine.run(["quota", "-w"])
     over = next((line.split() for line in out.splitlines() if "*" in line), None)
     if code and over:
@@ -191,7 +192,7 @@ def cache_owner(machine: Machine) -> Findings:
 
 
 def _private(group: int) -> bool:
-    """Whether it is the group that many systems give each user for himself, or root's."""
+    """Return whether the group is the user's private group, which many systems create, or root's."""
     try:
         return group == 0 or grp.getgrgid(group).gr_name == pwd.getpwuid(os.getuid()).pw_name
     except KeyError:
@@ -199,7 +200,7 @@ def _private(group: int) -> bool:
 
 
 def cache(machine: Machine) -> Findings:
-    """Where the kernels are kept and whether they are there."""
+    """Check the kernel store: its location, and whether the kernels are present."""
     base, (folder, writable), hosts = cache_base(machine.environ), store_of(machine.environ), len(machine.hosts)
     kind, name = _where(machine, base)
     if not writable:

@@ -84,7 +84,7 @@ class UserLaws:
                 of.s0[at, :, : self.initial.shape[1]] = self.initial[of.first[at], None]
 
     def before(self, k: int) -> bool:
-        """Whether a law of block k is evaluated before the loop over forces."""
+        """Return whether a law of block k is evaluated before the loop over forces."""
         runs = self.with_forces[k]
         return any(len(one.who[k]) and (runs is None or one is not runs[0]) for one in self.here)
 

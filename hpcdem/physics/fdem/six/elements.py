@@ -36,7 +36,7 @@ def check(sim: State) -> None:
 
 
 class SixNodes:
-    """Of the `Local` that makes it. rows (n, 4): storage rows of their parts; parts (n, 4): of these in the table of
+    """Six-node triangles of a `Local`. rows (n, 4): storage rows of their parts; parts (n, 4): of these in the table of
     triangles; from_v, to (n, 6): where the velocity of each node is, and its forces go, of the first corner at it;
     block: themselves; c (n, 23), s0 (n, 3, 4): constants and stress without strain [Pa], see kernels.py."""
 
@@ -121,8 +121,8 @@ class SixNodes:
         s0[self.parts] = 0.0
 
     def gather(self, energy: np.ndarray) -> None:
-        """What the parts store by their heat (n_own,) [J/m] is that at the Gauss points, a third of the area each; a
-        quarter of it goes to each part."""
+        """Share the energy stored by heat (n_own,) [J/m], given at the Gauss points with a third of the area each,
+        among the parts, a quarter each."""
         at = self.rows - self.sim.n_left
         energy[at] = (energy[at[:, : kernels.GAUSS]].sum(axis=1) / kernels.GAUSS)[:, None]
 
