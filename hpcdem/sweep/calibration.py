@@ -25,6 +25,8 @@ TIED = 0.8
 """Correlation above which only a combination of two parameters is determined."""
 APART = 0.02
 """Least distance of two points of a round, in the unit cube."""
+MORE = 3
+"""Points beyond the number of parameters that an emulator needs."""
 FAR = 3.0
 """Standard deviations from a target at which it is called out of reach."""
 
@@ -110,6 +112,9 @@ class Result:
 
 
 def _at(r: Range, u: float) -> float:
+    """The value at u in [0, 1], of whole numbers one of them."""
+    if r.whole:
+        return int(r.at(min(u, 1.0 - 1e-12)))
     return float(r.low * (r.high / r.low) ** u if r.log else r.low + u * (r.high - r.low))
 
 
@@ -125,6 +130,8 @@ def calibrate(
     if not ranges or not targets:
         raise UsageError("a calibration needs at least one parameter with a range, and one target")
     d = len(ranges)
+    if first < d + MORE:
+        raise UsageError(f"first = {first}: {d} parameters need at least {d + MORE} points before the first round")
     random = np.random.default_rng(seed)
     points = _hypercube(d, first, seed)
     values = forward(points)
@@ -154,7 +161,7 @@ def _fitted(points: np.ndarray, values: np.ndarray, targets: Sequence[Target]) -
     for k, target in enumerate(targets):
         y = values[:, :, k].reshape(-1)
         known = np.isfinite(y)
-        if len(np.unique(repeated[known], axis=0)) < points.shape[1] + 3:
+        if len(np.unique(repeated[known], axis=0)) < points.shape[1] + MORE:
             raise HpcdemError(
                 f"target {target.name}: {int(known.sum())} of {len(y)} runs gave a number, too few for "
                 f"{points.shape[1]} parameters; look at the failed members, or narrow the ranges"

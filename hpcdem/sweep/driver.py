@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -33,8 +33,9 @@ def jobs_at_once(plan: Plan, jobs: int | None) -> int:
     return jobs or cores // each
 
 
-def run(plan: Plan, log: Any, jobs: int | None = None, tries: int = 2) -> dict[str, str]:
-    """Carry out all members that are not done; returns the state of each. tries: how often a member is started now."""
+def run(plan: Plan, log: Any, jobs: int | None = None, tries: int = 2, without: Collection[str] = ()) -> dict[str, str]:
+    """Carry out all members that are not done; returns the state of each. tries: how often a member is started now;
+    without: names of members that are left as they are."""
     at_once = jobs_at_once(plan, jobs)
     try:
         lock = FolderLock(plan.folder, {"host": socket.gethostname(), "pid": os.getpid()})
@@ -43,7 +44,7 @@ def run(plan: Plan, log: Any, jobs: int | None = None, tries: int = 2) -> dict[s
         raise UsageError(f"{plan.folder}: {who} already runs this sweep") from None
     try:
         with _signals() as asked:
-            return _Driver(plan, log, at_once, tries, asked).run()
+            return _Driver(plan, log, at_once, tries, asked, without).run()
     finally:
         lock.release()
 
@@ -64,12 +65,15 @@ def _signals() -> Iterator[Callable[[], bool]]:
 class _Driver:
     """One pass over the members."""
 
-    def __init__(self, plan: Plan, log: Any, at_once: int, tries: int, asked: Callable[[], bool]) -> None:
+    def __init__(
+        self, plan: Plan, log: Any, at_once: int, tries: int, asked: Callable[[], bool], without: Collection[str] = ()
+    ) -> None:
         self.plan, self.log, self.at_once, self.tries, self.asked = plan, log, at_once, tries, asked
         self.mine: dict[str, subprocess.Popen[bytes]] = {}
         self.left = dict.fromkeys((member.name for member in plan.members), tries)
-        self.open = [member for member in plan.members if member.state != DONE]
-        self.done = len(plan.members) - len(self.open)
+        unfinished = [member for member in plan.members if member.state != DONE]
+        self.open = [member for member in unfinished if member.name not in without]
+        self.done = len(plan.members) - len(unfinished)
 
     def run(self) -> dict[str, str]:
         """Until all are done, have failed, or somebody asks to stop."""

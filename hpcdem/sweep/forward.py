@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,13 +20,35 @@ from hpcdem.sweep.design import Range
 
 OF = ("max", "min", "end", "mean", "slope")
 """What is taken of a history: a number of y, or the slope of y over x while y is within part of its maximum."""
-_KEYS = {
-    "": {"test", "parameters", "search", "write"},
-    "test": {"script", "seeds", "ranks", "threads", "with", "target"},
-    "target": {"name", "history", "y", "x", "of", "part", "value", "tolerance", "log"},
-    "search": {"first", "rounds", "batch", "seed"},
-    "write": {"lines"},
-}
+_NUMBER = "a number", lambda v: isinstance(v, int | float) and not isinstance(v, bool)
+_WHOLE = "a whole number above 0", lambda v: _whole(v) and v > 0
+_NATURAL = "a whole number from 0 on", lambda v: _whole(v) and v >= 0
+_TEXT = "a text", lambda v: isinstance(v, str)
+_TEXTS = "a list of texts", lambda v: isinstance(v, list) and all(isinstance(one, str) for one in v)
+_TABLE = "a table", lambda v: isinstance(v, dict)
+_TABLES = "tables in double brackets", lambda v: isinstance(v, list) and all(isinstance(one, dict) for one in v)
+_SEEDS = (
+    "a list of different whole numbers",
+    lambda v: isinstance(v, list) and all(map(_whole, v)) and len({*v}) == len(v),
+)
+_PART = "two numbers", lambda v: isinstance(v, list) and len(v) == 2 and all(map(_NUMBER[1], v))
+_KEYS: dict[str, dict[str, tuple[str, Callable[[Any], bool]]]] = {
+    "": {"test": _TABLES, "parameters": _TABLE, "search": _TABLE, "write": _TABLE},
+    "test": {
+        "script": _TEXT, "seeds": _SEEDS, "ranks": _WHOLE, "threads": _WHOLE, "with": _TEXTS, "target": _TABLES,
+    },
+    "target": {
+        "name": _TEXT, "history": _TEXT, "y": _TEXT, "x": _TEXT, "of": _TEXT, "part": _PART, "value": _NUMBER,
+        "tolerance": _NUMBER, "log": ("true or false", lambda v: isinstance(v, bool)),
+    },
+    "search": {"first": _WHOLE, "rounds": _NATURAL, "batch": _WHOLE, "seed": _NATURAL},
+    "write": {"lines": _TEXTS},
+}  # fmt: skip
+"""Keys of each table: what their values are."""
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True)
@@ -42,24 +64,25 @@ class Measured:
     log: bool = True
 
     def read(self, data: Path) -> float:
-        """The number of a run, NaN where it has none."""
+        """The number of a run that is done, NaN where it has none. UsageError without the history."""
         try:
             rows = tables.rows(data / f"{self.history}.csv")
-        except OSError:
-            return float("nan")
+        except FileNotFoundError:
+            known = ", ".join(sorted(path.stem for path in data.glob("*.csv"))) or "no tables"
+            raise UsageError(f"target {self.target.name}: {data} has no {self.history}.csv ({known})") from None
         if not rows or self.y not in rows[0] or (self.x and self.x not in rows[0]):
             known = ", ".join(rows[0]) if rows else "no rows"
             raise UsageError(f"{data / self.history}.csv has no column '{self.x or self.y}' or '{self.y}' ({known})")
         number = self._number(
-            np.array([float(row[self.y]) for row in rows]),
-            np.array([float(row[self.x]) for row in rows]) if self.x else np.zeros(0),
+            np.array([tables.number(row[self.y]) for row in rows]),
+            np.array([tables.number(row[self.x]) for row in rows]) if self.x else np.zeros(0),
         )
         if not self.log:
             return number
         return float(np.log(number)) if number > 0.0 else float("nan")
 
     def _number(self, y: np.ndarray, x: np.ndarray) -> float:
-        if not np.isfinite(y).all():
+        if not (np.isfinite(y).all() and np.isfinite(x).all()):
             return float("nan")
         if self.of == "slope":
             top = int(np.argmax(y))
@@ -116,23 +139,24 @@ def read_settings(path: Path) -> Settings:
     if len(set(names)) < len(names):
         raise UsageError(f"{path}: two targets have the same name")
     ranges = {name: _range(path, tests, name, words) for name, words in given["parameters"].items()}
-    search = given.get("search", {})
-    for name, value in search.items():
-        if not isinstance(value, int) or value < (0 if name in ("rounds", "seed") else 1):
-            raise UsageError(f"{path}: search.{name} = {value!r}: expected a whole number above 0")
+    if "seed" in ranges and any(test.seeds for test in tests):
+        raise UsageError(f"{path}: seed is a parameter with a range and has seeds: omit one of them")
     lines = tuple(given.get("write", {}).get("lines", ()))
     for line in lines:
         try:
-            line.format(**dict.fromkeys(ranges, 1.0))
+            line.format(**{name: 1 if r.whole else 1.0 for name, r in ranges.items()})
         except (KeyError, ValueError, IndexError, AttributeError) as problem:
             raise UsageError(f"{path}: write line '{line}': {problem}; parameters are {', '.join(ranges)}") from None
-    return Settings(path, tests, ranges, search, lines)
+    return Settings(path, tests, ranges, given.get("search", {}), lines)
 
 
 def _known(path: Path, table: str, given: Mapping[str, Any]) -> None:
-    for key in given:
+    for key, value in given.items():
         if key not in _KEYS[table]:
             raise UsageError(f"{path}: unknown key '{key}'; known: {', '.join(sorted(_KEYS[table]))}")
+        expected, fits = _KEYS[table][key]
+        if not fits(value):
+            raise UsageError(f"{path}: {table + '.' if table else ''}{key} = {repr(value)[:40]}: expected {expected}")
 
 
 def _test(path: Path, given: Mapping[str, Any]) -> Test:
@@ -149,7 +173,7 @@ def _test(path: Path, given: Mapping[str, Any]) -> Test:
         script.parameter("seed")
     links = tuple(path.parent / name for name in given.get("with", ()))
     measured = tuple(_measured(path, one) for one in given["target"])
-    return Test(script, seeds, measured, int(given.get("ranks", 1)), int(given.get("threads", 1)), links)
+    return Test(script, seeds, measured, given.get("ranks", 1), given.get("threads", 1), links)
 
 
 def _measured(path: Path, given: Mapping[str, Any]) -> Measured:
@@ -162,14 +186,12 @@ def _measured(path: Path, given: Mapping[str, Any]) -> Measured:
         raise UsageError(f"{path}: target {name}: of = '{of}': expected {', '.join(OF)}")
     if of == "slope" and "x" not in given:
         raise UsageError(f"{path}: target {name}: a slope needs x")
-    if not isinstance(value, int | float) or not isinstance(tolerance, int | float):
-        raise UsageError(f"{path}: target {name}: value and tolerance are numbers")
     log = bool(given.get("log", value > 0.0))
     if log and not value > 0.0:
         raise UsageError(f"{path}: target {name}: a logarithm needs a value above 0; give log = false")
     target = Target(name, float(np.log(value)), tolerance / value) if log else Target(name, float(value), tolerance)
     part = tuple(map(float, given.get("part", (0.1, 0.5))))
-    if len(part) != 2 or not 0.0 <= part[0] < part[1] <= 1.0:
+    if not 0.0 <= part[0] < part[1] <= 1.0:
         raise UsageError(f"{path}: target {name}: part = {part}: two shares of the maximum, rising, are needed")
     return Measured(target, given["history"], given["y"], given.get("x", ""), of, (part[0], part[1]), log)
 
@@ -191,6 +213,7 @@ class Forward:
 
     def __init__(self, settings: Settings, folder: Path, log: Any, jobs: int | None = None, tries: int = 2) -> None:
         self.settings, self.folder, self.log, self.jobs, self.tries = settings, folder, log, jobs, tries
+        self._failed: dict[Path, set[str]] = {}
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """(n, seeds, targets) at points (n, d)."""
@@ -214,10 +237,13 @@ class Forward:
         ]  # fmt: skip
         for one in values:
             test.script.with_values(one)
-        plan, new = plans.make(folder, test.script, values, {}, None, test.ranks, test.threads, test.links)
+        once = [one for k, one in enumerate(values) if one not in values[:k]]  # of whole numbers some are the same
+        plan, new = plans.make(folder, test.script, once, {}, None, test.ranks, test.threads, test.links)
         if new:
             self.log.info(f"{folder}: {new} new members, {len(plan.values)} in all")
-        states = driver.run(plan, self.log, self.jobs, self.tries)
+        failed_before = self._failed.setdefault(folder, set())
+        states = driver.run(plan, self.log, self.jobs, self.tries, failed_before)
+        failed_before.update(name for name, state in states.items() if state == plans.FAILED)
         if plans.STOPPED in states.values() or plans.WAITING in states.values():
             raise HpcdemError(f"{folder}: stopped; repeat the command to continue")
         by_values = {tuple(sorted(member.values.items())): member for member in plan.members}

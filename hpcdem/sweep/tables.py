@@ -103,12 +103,10 @@ def measured(folder: Path, data: Path) -> tuple[dict[Column, Series], Series | N
         found |= _series(path.stem, rows(path), ())
     single: dict[str, float] = {}
     if (folder / "emission_b.csv").exists():
-        single = {
-            f"emission.{n}": _number(v) for n, v in rows(folder / "emission_b.csv")[-1].items() if n in ("b", "a")
-        }
+        single = {f"emission.{n}": number(v) for n, v in rows(folder / "emission_b.csv")[-1].items() if n in ("b", "a")}
     if (folder / "faults_summary.csv").exists():
         for row in rows(folder / "faults_summary.csv"):  # the n-th to appear in each member
-            single |= {f"fault {row['fault']}.{n}": _number(row[n]) for n in OF_FAULTS}
+            single |= {f"fault {row['fault']}.{n}": number(row[n]) for n in OF_FAULTS}
     return found, _profile(folder / "surface.csv"), single
 
 
@@ -120,7 +118,7 @@ def _series(name: str, table: list[dict[str, str]], keys: tuple[str, ...]) -> di
         parts.setdefault(" ".join(row[key] for key in keys), []).append(row)
     found: dict[Column, Series] = {}
     for part, lines in parts.items():
-        columns = {n: np.array([_number(line[n]) for line in lines]) for n in lines[0] if n not in keys}
+        columns = {n: np.array([number(line[n]) for line in lines]) for n in lines[0] if n not in keys}
         times = {n: c for n, c in columns.items() if n.replace(" ", "") in TIMES or re.match(r"(from|to)\b", n)}
         changing = {n.split("[")[0].strip(): n for n, c in times.items() if np.isfinite(c).all() and np.ptp(c) > 0.0}
         axis = next((changing[n] for n in ("shortening", "time", "to", "step") if n in changing), "step")
@@ -138,7 +136,7 @@ def moments(folder: Path) -> list[tuple[float, float]]:
     for name in ("layers", "surface", "wedge", "faults"):
         if (folder / f"{name}.csv").exists():
             table = rows(folder / f"{name}.csv")
-            return sorted({(float(row["step"]), _number(row["time[s]"])) for row in table})
+            return sorted({(float(row["step"]), number(row["time[s]"])) for row in table})
     return []
 
 
@@ -164,7 +162,7 @@ def _faults(table: list[dict[str, str]], when: list[tuple[float, float]]) -> dic
     for name, kind in FAULTS.items():
         found["faults", name] = Series(axis, x, np.array([float(sum(map(kind, part))) for part in each]))
     for name in ("dip[deg]", "length[m]", "mean_strain"):
-        mean = [np.mean([_number(row[name]) for row in part]) if part else np.nan for part in each]
+        mean = [np.mean([number(row[name]) for row in part]) if part else np.nan for part in each]
         found["faults", name] = Series(axis, x, np.array(mean, dtype=float))
     return found if len(x) else {}
 
@@ -175,12 +173,13 @@ def _profile(path: Path) -> Series | None:
     if not table:
         return None
     last = [row for row in table if (row["step"], row["ini"]) == (table[-1]["step"], table[-1]["ini"])]
-    x, y = (np.array([_number(row[name]) for row in last]) for name in ("x[m]", "height[m]"))
+    x, y = (np.array([number(row[name]) for row in last]) for name in ("x[m]", "height[m]"))
     order = np.argsort(x)
     return Series("x[m]", x[order], y[order])
 
 
-def _number(word: str | None) -> float:
+def number(word: str | None) -> float:
+    """A number of a table, NaN for what is none."""
     try:
         return float(word or "nan")
     except ValueError:

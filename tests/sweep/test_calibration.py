@@ -7,6 +7,8 @@ import pytest
 
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.runtime.progress import Log
+from hpcdem.sweep import driver
+from hpcdem.sweep import plan as plans
 from hpcdem.sweep.calibration import Target, calibrate
 from hpcdem.sweep.calibration_report import write
 from hpcdem.sweep.design import Range
@@ -63,10 +65,24 @@ def test_a_target_out_of_reach_and_failed_runs():
     one = lambda points: np.log(0.6e9 * 100.0**points)[:, None, :]  # noqa: E731
     told = " ".join(calibrate(one, {"ebmod": RANGES["ebmod"]}, target, first=6, rounds=1, batch=2).cautions())
     assert "target E is out of reach" in told and "ebmod lies at the upper end" in told
+    with pytest.raises(UsageError, match="first = 3: 1 parameters need at least 4 points"):
+        calibrate(one, {"ebmod": RANGES["ebmod"]}, target, first=3)
     with pytest.raises(HpcdemError, match="target E: 0 of 6 runs gave a number"):
         calibrate(lambda points: np.full((len(points), 1, 1), np.nan), {"ebmod": RANGES["ebmod"]}, target, first=6)
     with pytest.raises(UsageError, match="tolerance above 0"):
         Target("E", 1.0, 0.0)
+
+
+def test_whole_numbers_stay_whole():
+    seen = []
+
+    def runs(points):
+        seen.extend(whole.at(min(float(u), 1.0 - 1e-12)) for u in points[:, 0])
+        return np.floor(points * 4.0)[:, None, :]
+
+    whole = Range(2, 5, whole=True)
+    result = calibrate(runs, {"layers": whole}, [Target("t", 3.0, 0.1)], first=8, rounds=1, batch=2)
+    assert result.best == {"layers": 5} and set(result.parameters[:, 0].tolist()) <= {2, 3, 4, 5} == set(seen)
 
 
 def test_the_emulator_against_a_known_function():
@@ -154,6 +170,11 @@ def written(folder, text=SETTINGS):
         ("[search]", "[seek]", "unknown key 'seek'"),
         ('name = "life"', 'name = "energy"', "two targets have the same name"),
         ('"pull.py"', '"none.py"', "none.py: No such file"),
+        ('"pull.py"', '"pull.py"\nseeds = 3', "test.seeds = 3: expected a list of different whole numbers"),
+        ('"pull.py"', '"pull.py"\nseeds = [1, 1]', "expected a list of different whole numbers"),
+        ('"pull.py"', '"pull.py"\nranks = 0', "test.ranks = 0: expected a whole number above 0"),
+        ('of = "max"', 'of = "max"\npart = ["a", 1]', "target.part = .* expected two numbers"),
+        ('lines = ["PROP ebmod {ebmod:.4g} tstrength {tstrength:.4g}"]', 'lines = "PROP"', "expected a list of texts"),
     ],
 )
 def test_settings_that_make_no_sense(tmp_path, old, new, message):
@@ -174,9 +195,30 @@ def test_numbers_of_a_history(tmp_path):
 
     assert number("max") == pytest.approx(30.0) and number("end") == pytest.approx(22.0)
     assert number("slope") == pytest.approx(50.0) and number("min") == 0.0
-    assert np.isnan(Measured(target, "none", "stress").read(tmp_path))
+    with pytest.raises(UsageError, match=r"target E: .* has no none.csv \(h\)"):
+        Measured(target, "none", "stress").read(tmp_path)
     with pytest.raises(UsageError, match="has no column 'force'"):
         Measured(target, "h", "force").read(tmp_path)
+
+
+def test_members_that_failed_are_tried_again_by_the_next_call_only(tmp_path, monkeypatch):
+    settings = read_settings(written(tmp_path))
+    left = []
+
+    def run(plan, log, jobs, tries, without):
+        left.append(sorted(without))
+        for member in plan.members:
+            (member.folder / "state.json").write_text('{"state": "failed"}')
+        return {member.name: member.state for member in plan.members}
+
+    monkeypatch.setattr("hpcdem.sweep.driver.run", run)
+    model = Forward(settings, tmp_path / "out", Log())
+    for _ in range(2):
+        assert np.isnan(model(np.array([[0.2, 0.3], [0.5, 0.5]]))).all()
+    assert left == [[], ["0000", "0001"]]
+    monkeypatch.undo()
+    plan = plans.load(tmp_path / "out" / "test_1")
+    assert set(driver.run(plan, Log(), 1, 1, {"0000", "0001"}).values()) == {"failed"}
 
 
 @pytest.mark.slow
