@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import sys
 from types import ModuleType
 
@@ -9,7 +11,7 @@ import pytest
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.lang.pcdc import check
-from hpcdem.pre.mesh import geometry, optional
+from hpcdem.pre.mesh import apart, geometry, optional
 from hpcdem.pre.mesh.dxf import read_dxf
 from hpcdem.pre.mesh.imported import import_mesh
 from hpcdem.pre.mesh.triangulate import MeshSettings, Region, triangulate
@@ -86,3 +88,19 @@ def test_all_that_is_missing_is_said_at_once_and_by_check(monkeypatch):
     assert [said.count(f"the package {name},") for name in ("ezdxf", "gmsh", "shapely")] == [1, 1, 1]
     (warned,) = [line for line in check.summary(text, "script.sc").splitlines() if "package" in line]
     assert warned.startswith("warning: line 1: ") and warned.count("the package") == 3
+
+
+def test_a_process_apart_finds_the_modules_of_this_one_and_is_in_no_group_of_it(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    (tmp_path / "json.py").write_text("raise SystemExit('a script of the user')")
+    (tmp_path / "here" / "asked.py").write_text(
+        "import json, os, pathlib, sys\npathlib.Path(sys.argv[1]).write_text(json.dumps([os.getpgrp(), __name__]))"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path / "here")
+    monkeypatch.setattr("sys.path", [one for one in sys.path if one])
+    apart.run("asked", str(tmp_path / "out"), failed="not asked")
+    group, name = json.loads((tmp_path / "out").read_text())
+    assert group != os.getpgrp() and name == "__main__"
+    with pytest.raises(HpcdemError, match=r"not there: .*nowhere"):
+        apart.run("nowhere", failed="not there")

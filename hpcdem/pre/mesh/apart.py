@@ -15,10 +15,16 @@ from hpcdem.core.errors import HpcdemError
 
 
 def run(module: str, *words: str, sent: str = "", failed: str) -> None:
-    """`python -m module words`, with `sent` on its input. HpcdemError `failed`: its last line, or how it ended."""
+    """`python -m module words`, with `sent` on its input. HpcdemError `failed`: its last line, or how it ended.
+
+    It finds modules where this process does, not also in the working folder, where scripts may be called like them.
+    Signals to the group of this process (Ctrl-C) do not end it: the run answers them after it.
+    """
+    code = f"import sys; sys.path[:] = {sys.path!r}; import runpy; runpy.run_module({module!r}, None, '__main__', True)"
     done = subprocess.run(
-        [sys.executable, "-m", module, *words], input=sent, text=True, capture_output=True, check=False
-    )
+        [sys.executable, "-c", code, *words], input=sent, text=True, capture_output=True, check=False,
+        start_new_session=True,
+    )  # fmt: skip
     if done.returncode:
         told = [line for line in done.stderr.splitlines() if line.strip()]
         why = told[-1].removeprefix("Exception: ") if told else f"it ended with {done.returncode}"
