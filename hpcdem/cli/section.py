@@ -117,10 +117,12 @@ def of_run(options: dict[str, Any]) -> Section:
         Shape(name, (made_curve(line, False, name),), False, {"kind": "horizon", "step": g.step}, f"top of {name}")
         for name, lines in horizons(g).items() for line in lines
     ]  # fmt: skip
-    faults = _faults(folder, g.step)
-    warnings = () if faults else (
+    faults, short = _faults(folder, g.step)
+    warnings = () if faults or short else (
         f"no faults of step {g.step}: `hpcdem measure {folder} faults` finds them first",
     )  # fmt: skip
+    if short:
+        warnings = (f"ignored: {', '.join(short)}, of which one point was measured only",)
     shapes += faults
     if not shapes:
         raise HpcdemError(f"{folder}: the frame of step {g.step} has no particles")
@@ -129,8 +131,8 @@ def of_run(options: dict[str, Any]) -> Section:
     return replace(found, notes=(f"{frames[-1].path.name}, step {g.step}", *summary(found)), warnings=warnings)
 
 
-def _faults(folder: Path, step: int) -> list[Shape]:
-    """Straight bands of measure/faults.csv at a step."""
+def _faults(folder: Path, step: int) -> tuple[list[Shape], list[str]]:
+    """Straight bands of measure/faults.csv at a step, and the names of faults of one point."""
     import csv
 
     import numpy as np
@@ -140,8 +142,9 @@ def _faults(folder: Path, step: int) -> list[Shape]:
 
     path = folder / "measure" / "faults.csv"
     if not path.is_file():
-        return []
+        return [], []
     found: list[Shape] = []
+    short: list[str] = []
     with path.open(newline="", encoding="utf-8") as file:
         for row in csv.DictReader(line for line in file if not line.startswith("#")):
             try:
@@ -151,11 +154,14 @@ def _faults(folder: Path, step: int) -> list[Shape]:
             except (KeyError, TypeError, ValueError):
                 raise HpcdemError(f"{path}: not a table of faults; repeat hpcdem measure {folder} faults") from None
             name = f"fault {row.get('fault', len(found) + 1)}"
+            if (ends[0] == ends[1]).all():
+                short.append(name)
+                continue
             about = {k: row[k] for k in ("sense", "dip[deg]", "mean_strain") if row.get(k)}
             found.append(
                 Shape(name, (made_curve(ends, False, name),), False, {"kind": "fault", "step": step, **about}, name)
             )
-    return found
+    return found, short
 
 
 def draw(found: Section, path: Path) -> None:

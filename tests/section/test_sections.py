@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from hpcdem.cli import section as program
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.pre.mesh import dxf, geometry, optional
 from hpcdem.pre.section import check, fill
@@ -345,3 +346,27 @@ def test_discs_keep_inside_their_polygons(tmp_path):
         fill.filled(section, np.array([400.0]), 0.3, 5, 0, "s")
     with pytest.raises(CommandError, match="porosity"):
         fill.filled(section, radii, 0.01, 5, 0, "s")
+
+
+def test_an_area_hardly_larger_than_a_disc_gets_one(tmp_path):
+    side = 2.2
+    section = read(polygons(tmp_path, [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side], [0.0, 0.0]]))
+    rows = fill.filled(section, np.array([1.0]), 0.5, 0, 0, "f").rows
+    assert len(rows) == 1 and (np.abs(rows[0, :2] - 0.5 * side) <= 0.1 + 1e-9).all()
+
+
+def test_a_closed_line_is_no_ring_that_lacks_a_side(tmp_path):
+    turn = np.linspace(0.0, 2.0 * np.pi, 41)
+    ring = np.column_stack([np.cos(turn), np.sin(turn)])
+    ring[-1] = ring[0]
+    assert not read(polygons(tmp_path, ring.tolist(), kind="LineString")).warnings
+    assert "close it in the drawing" in read(polygons(tmp_path, ring[:-1].tolist(), kind="LineString")).warnings[0]
+
+
+def test_a_fault_of_one_point_is_named_and_no_line(tmp_path):
+    (tmp_path / "measure").mkdir()
+    (tmp_path / "measure" / "faults.csv").write_text(
+        "step,fault,x1[m],y1[m],x2[m],y2[m]\n9,1,0,0,30,40\n9,2,5,5,5,5\n8,3,0,0,1,1\n"
+    )
+    shapes, short = program._faults(tmp_path, 9)
+    assert [shape.name for shape in shapes] == ["fault 1"] and shapes[0].length() == 50.0 and short == ["fault 2"]

@@ -85,6 +85,8 @@ def warnings(section: Section, file: str) -> list[str]:
 def _nearly_closed(section: Section) -> list[str]:
     found = []
     for shape in section.lines:
+        if shape.rings[0].closed:
+            continue
         first, last = shape.rings[0].points[[0, -1]]
         gap = math.dist(first, last)
         if 0.0 < gap < NEARLY * shape.length() and len(shape.rings[0].points) > 3:

@@ -85,7 +85,7 @@ def _fill(
         )
     draws = uniforms(seed, stream, np.arange(4 * expected + 8))
     r = radii[np.minimum((draws * len(radii)).astype(np.int64), len(radii) - 1)]
-    r = r[: int(np.searchsorted(np.cumsum(np.pi * r * r), wanted, side="right"))]
+    r = r[: max(int(np.searchsorted(np.cumsum(np.pi * r * r), wanted, side="right")), 1)]
     return _relaxed(area, _scattered(inner, len(r), seed, stream + 1), r)
 
 
