@@ -374,8 +374,8 @@ class Structure(Prescribed):
         self._find_forces()
         if self._account is not blocks.budget:
             self._account = blocks.budget
+            self.commands, self._stored_at_start = 0.0, self._stored()  # sets the masses of this time step
             self.work[:] = -self._half_step(blocks.clock.dt) if self._account is not None else 0.0
-            self.commands, self._stored_at_start = 0.0, self._stored()
 
     def _held_here(self) -> tuple[np.ndarray, np.ndarray]:
         """Which of its points are held by an element that this rank owns, and the storage rows of these."""

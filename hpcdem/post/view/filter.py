@@ -59,7 +59,7 @@ def chosen(text: str, count: int, fields: Mapping[str, np.ndarray], groups: Grou
 
 
 def amount(text: str, fields: Mapping[str, np.ndarray], source: str) -> Any:
-    """The value of an expression of numbers and fields, a number or one per object. said: what the user wrote, for
+    """The value of an expression of numbers and fields, a number or one per object. source: what the user wrote, for
     HpcdemError."""
     try:
         return _Evaluation(text, fields, lambda *_: np.zeros(0, bool))._amount(parsed(text), 0)
