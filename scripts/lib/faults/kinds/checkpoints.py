@@ -62,7 +62,7 @@ def cut(case: Case) -> None:
     _damaged(case, lambda data: data[: case.rng.randrange(len(data))])
 
 
-@kind(".sav with a wrong bit", "one bit of the last checkpoints, anywhere in the file, is the other one")
+@kind(".sav with a wrong bit", "one bit of the last checkpoints, anywhere in the file, is inverted")
 def bit(case: Case) -> None:
     def flip(data: bytearray) -> bytearray:
         data[case.rng.randrange(len(data))] ^= 1 << case.rng.randrange(8)
@@ -71,7 +71,7 @@ def bit(case: Case) -> None:
     _damaged(case, flip)
 
 
-@kind(".sav with a wrong byte", "one byte of the last checkpoints is another one")
+@kind(".sav with a wrong byte", "one byte of the last checkpoints is changed")
 def byte(case: Case) -> None:
     def change(data: bytearray) -> bytearray:
         data[case.rng.randrange(len(data))] ^= case.rng.randint(1, 255)
@@ -80,7 +80,7 @@ def byte(case: Case) -> None:
     _damaged(case, change)
 
 
-@kind(".sav with an empty page", "4 KiB of the last checkpoints are zeros, as a lost page of the disk leaves them")
+@kind(".sav with an empty page", "4 KiB of the last checkpoints are zeros, as after the loss of a page of the disk")
 def page(case: Case) -> None:
     def blank(data: bytearray) -> bytearray:
         first = case.rng.randrange(len(data) // 4096) * 4096
@@ -106,7 +106,8 @@ def future(case: Case) -> None:
     _goes_on(case, found)
 
 
-@kind(".sav missing", "the last checkpoints were removed: the one before is taken; without any, the beginning")
+@kind(".sav missing", "the last checkpoints were removed: the run resumes from the one before, or from the "
+      "beginning if there is none")  # fmt: skip
 def missing(case: Case) -> None:
     found = _stopped(case)
     case.moments.append(case.reached())
@@ -114,8 +115,8 @@ def missing(case: Case) -> None:
         path.unlink()
 
 
-@kind(".sav of another script", "a later checkpoint of another script lies in the folder: refused by the line in which "
-      "the two differ, and the run resumes when it is gone")  # fmt: skip
+@kind(".sav of another script", "the folder contains a later checkpoint of another script: the program refuses it "
+      "and names the line in which the scripts differ; the run resumes when that checkpoint is removed")  # fmt: skip
 def another(case: Case) -> None:
     _stopped(case)
     if case.done():  # before it could be killed: nobody will look at checkpoints any more

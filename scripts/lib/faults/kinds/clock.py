@@ -14,8 +14,8 @@ def _jumps(case: Case) -> list[list[float]]:
     return [[case.rng.uniform(0.0, 3.0), case.rng.uniform(-20.0, 20.0) * 3600.0] for _ in range(case.rng.randint(1, 4))]
 
 
-@kind("clock jumps, with a limit", "the wall clock of the process jumps by hours, back and forth; a time limit far "
-      "away is not taken for reached, a near one is kept")  # fmt: skip
+@kind("clock jumps, with a limit", "the wall clock of the process jumps by hours, back and forth; a distant time "
+      "limit does not stop the run, a near one does")  # fmt: skip
 def jumping(case: Case) -> None:
     near = case.rng.random() < 0.5
     began = time.monotonic()
@@ -26,8 +26,8 @@ def jumping(case: Case) -> None:
         case.problem("the time limit was not kept", end)
 
 
-@kind("clock of the disk jumps", "after kill -9 the checkpoints get random times of change; the last step counts, not "
-      "the last time")  # fmt: skip
+@kind("clock of the disk jumps", "after kill -9 the checkpoints get random modification times; the run resumes "
+      "from the largest step, not from the latest time")  # fmt: skip
 def times(case: Case) -> None:
     job = case.start()
     if case.moment(job, 1000, begins=False):

@@ -72,8 +72,8 @@ class SmallDisk:
         return done.returncode == 0
 
 
-@kind("disk full", "the disk of the output folder is made so small in mid-run that a random number of bytes is left; "
-      "the run ends with a message, and resumes when there is space again")  # fmt: skip
+@kind("disk full", "during the run the disk of the output folder is reduced until a random number of bytes is "
+      "free; the run ends with a message, and resumes when there is space again")  # fmt: skip
 def full(case: Case) -> None:
     disk = SmallDisk(case)
     job = case.start()
@@ -86,7 +86,7 @@ def full(case: Case) -> None:
     disk.size("64m")
 
 
-@kind("disk full from the beginning", "the disk has a random size from the first file on")
+@kind("disk full from the beginning", "the disk has a random size from the beginning")
 def small(case: Case) -> None:
     disk = SmallDisk(case)
     disk.size(str(disk.used() + case.rng.randint(1, 400) * 4096))
@@ -123,7 +123,7 @@ def error(case: Case) -> None:
         case.moments.append(case.reached())
 
 
-@kind("disk becomes read-only", "the file system is remounted read-only in mid-run; the run ends with a message")
+@kind("disk becomes read-only", "the file system is remounted read-only during the run; the run ends with a message")
 def readonly(case: Case) -> None:
     disk = SmallDisk(case)
     job = case.start()
@@ -135,7 +135,7 @@ def readonly(case: Case) -> None:
 
 @kind(
     "output folder renamed",
-    "the output folder gets another name in mid-run; the run ends with a message; it is given back",
+    "the output folder is renamed during the run, and gets its name back afterwards; the run ends with a message",
 )
 def renamed(case: Case) -> None:
     job = case.start()
@@ -151,8 +151,8 @@ def renamed(case: Case) -> None:
         away.rename(case.data)
 
 
-@kind("output folder removed", "the output folder is removed in mid-run; the run ends with a message, and the next one "
-      "starts at the beginning")  # fmt: skip
+@kind("output folder removed", "the output folder is removed during the run; the run ends with a message, and the "
+      "next run starts from the beginning")  # fmt: skip
 def removed(case: Case) -> None:
     job = case.start()
     if case.moment(job, begins=False):
@@ -165,8 +165,8 @@ def removed(case: Case) -> None:
     shutil.rmtree(case.data, ignore_errors=True)
 
 
-@kind("a folder in the place of a file", "a folder has the name of a later frame, checkpoint, series, or of its "
-      "temporary file; the run ends with a message, and resumes when the folder is gone")  # fmt: skip
+@kind("a folder in the place of a file", "a folder has the name of a later frame, checkpoint or series, or of its "
+      "temporary file; the run ends with a message, and resumes when the folder has been removed")  # fmt: skip
 def folder(case: Case) -> None:
     job = case.start()
     if not case.until(lambda: case.reached() > 0, job):

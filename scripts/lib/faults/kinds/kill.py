@@ -30,7 +30,7 @@ def everyone(case: Case) -> None:
     case.end(job, quiet=True)
 
 
-@kind("kill the launcher", "kill -9 of mpiexec; the ranks end, or come to the end of the run by themselves", least=2)
+@kind("kill the launcher", "kill -9 of mpiexec; the ranks end, or complete the run", least=2)
 def launcher(case: Case) -> None:
     job = case.start()
     if case.moment(job):
@@ -63,7 +63,7 @@ def _while_writing(case: Case, suffix: str) -> None:
     case.end(job, quiet=job.ranks > 1)
 
 
-@kind("kill while .sav.tmp is there", "kill -9 of all ranks when the temporary file of a checkpoint is seen")
+@kind("kill while .sav.tmp is there", "kill -9 of all ranks when the temporary file of a checkpoint appears")
 def seen_checkpoint(case: Case) -> None:
     _while_writing(case, ".sav")
 

@@ -27,7 +27,7 @@ def _stop(case: Case, number: int) -> None:
     case.end(job, {DONE, STOPPED} if at_work else {DONE}, ASKED)
 
 
-@kind("SIGTERM", "to one rank or all: a checkpoint, exit code 85")
+@kind("SIGTERM", "sent to one rank or all: a checkpoint is written, exit code 85")
 def sigterm(case: Case) -> None:
     _stop(case, signal.SIGTERM)
 
@@ -42,7 +42,7 @@ def sigint(case: Case) -> None:
     _stop(case, signal.SIGINT)
 
 
-@kind("SIGUSR2", "to one rank or all: a checkpoint, and the run continues to its end")
+@kind("SIGUSR2", "sent to one rank or all: a checkpoint is written, and the run continues to completion")
 def sigusr2(case: Case) -> None:
     job = case.start()
     if case.moment(job, begins=False):
@@ -50,7 +50,7 @@ def sigusr2(case: Case) -> None:
     case.end(job, {DONE})
 
 
-@kind("SIGINT twice", "to all ranks: the job ends at once, nothing is saved")
+@kind("SIGINT twice", "sent to all ranks: the job ends at once without saving")
 def twice(case: Case) -> None:
     job = case.start()
     if case.moment(job, begins=False):
@@ -63,7 +63,7 @@ def twice(case: Case) -> None:
 
 @kind(
     "signal to the launcher",
-    "SIGTERM, SIGINT, SIGUSR1 or SIGUSR2 to mpiexec, which does with it what it likes",
+    "SIGTERM, SIGINT, SIGUSR1 or SIGUSR2 is sent to mpiexec, which may forward it or end the job",
     least=2,
 )
 def launcher(case: Case) -> None:
@@ -74,8 +74,8 @@ def launcher(case: Case) -> None:
     case.end(job, quiet=True)
 
 
-@kind("SIGTERM twice while ranks hang", "one rank is stopped (SIGSTOP), so the others wait in MPI; they get "
-      "SIGTERM, which they cannot answer, and another one, which ends the job with a message", least=2)  # fmt: skip
+@kind("SIGTERM twice while ranks hang", "one rank is stopped (SIGSTOP), so the others wait in MPI and cannot "
+      "respond to a SIGTERM; another SIGTERM ends the job with a message", least=2)  # fmt: skip
 def hanging(case: Case) -> None:
     job = case.start()
     if case.moment(job, begins=False):
@@ -99,7 +99,8 @@ def hanging(case: Case) -> None:
         case.problem("took 20 s to end", end)
 
 
-@kind("suspended", "all ranks stopped for a while (SIGSTOP, SIGCONT), as a queue suspends a job: the run continues")
+@kind("suspended", "all ranks are stopped for a while (SIGSTOP, SIGCONT), as when a queue suspends a job: the run "
+      "continues")  # fmt: skip
 def suspended(case: Case) -> None:
     job = case.start()
     if case.moment(job, begins=False):
@@ -111,7 +112,7 @@ def suspended(case: Case) -> None:
     case.end(job, {DONE})
 
 
-@kind("--time-limit", "a random limit: a checkpoint in time, exit code 85")
+@kind("--time-limit", "a random limit: a checkpoint is written in time, exit code 85")
 def limit(case: Case) -> None:
     seconds = case.rng.uniform(1.5, 4.0)
     began = time.monotonic()

@@ -79,15 +79,15 @@ def _chain(case: Case, *words: str) -> None:
     case.kept(before)
 
 
-@kind("Slurm: --signal=USR1", "the job template gets SIGUSR1 by Slurm at a random moment: checkpoint, exit code 85, "
-      "the job puts itself back into the queue and comes to the same end", rare=True)  # fmt: skip
+@kind("Slurm: --signal=USR1", "Slurm sends SIGUSR1 to the job template at a random moment: a checkpoint is "
+      "written, exit code 85, and the job requeues itself and reaches the same result", rare=True)  # fmt: skip
 def usr1(case: Case) -> None:
     _chain(case, "scancel", "--signal=USR1")
 
 
 @kind(
     "Slurm: requeue",
-    "scontrol requeue in mid-run: Slurm ends the ranks as it likes and starts the job again",
+    "scontrol requeue during the run: Slurm ends the ranks and starts the job again",
     rare=True,
 )
 def requeue(case: Case) -> None:

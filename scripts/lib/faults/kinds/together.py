@@ -13,8 +13,8 @@ from faults.kind import kind
 from faults.model import files
 
 
-@kind("two runs in one folder", "a second run is started while the first one writes: it is refused, the first one goes "
-      "on; or the first one is killed then, and leaves no lock behind", most=2)  # fmt: skip
+@kind("two runs in one folder", "a second run is started while the first one writes: the second is refused and "
+      "the first continues, or the first is killed and leaves no lock behind", most=2)  # fmt: skip
 def two(case: Case) -> None:
     job = case.start(ranks=1)
     case.until(lambda: case.reached() > 0, job)
@@ -34,8 +34,8 @@ def two(case: Case) -> None:
     case.end(job, {DONE, -signal.SIGKILL})
 
 
-@kind("a new run in an old folder", "the folder holds later checkpoints and frames of another script; the run is "
-      "killed and resumed: its own checkpoint is used")  # fmt: skip
+@kind("a new run in an old folder", "the folder contains later checkpoints and frames of another script; the run "
+      "is killed and resumes from its own checkpoint")  # fmt: skip
 def old_folder(case: Case) -> None:
     if case.data.exists():
         raise AssertionError("must be the first fault of a case")
