@@ -713,8 +713,8 @@ class Elements(Stressed):
         friction : friction angle of its surfaces where they have no contact model [degrees] (default: 0).
         penalty : contact penalty of its surfaces where they have no contact model; 0: that of its joints, or 10 E
             [Pa] (default: 0).
-        damp_b : exponent of the overlap of its surfaces while they part, where they have no contact model; above 1
-            contacts lose energy (default: 1).
+        damp_b : exponent of the overlap of its surfaces while they separate, where they have no contact model; above
+            1 contacts lose energy (default: 1).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     @overload
@@ -760,14 +760,14 @@ class Elements(Stressed):
         friction : internal friction angle; also that of its surfaces where they have no contact model [degrees]
             (default: 0).
         cohesion : cohesion [Pa] (default: 0).
-        tensile : tensile strength; no more than cohesion / tan(friction) counts [Pa] (default: 0).
+        tensile : tensile strength; limited to cohesion / tan(friction) [Pa] (default: 0).
         dilation : dilation angle, at most the friction angle [degrees] (default: 0).
         damp_factor : viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs (default:
             0).
         penalty : contact penalty of its surfaces where they have no contact model; 0: that of its joints, or 10 E
             [Pa] (default: 0).
-        damp_b : exponent of the overlap of its surfaces while they part, where they have no contact model; above 1
-            contacts lose energy (default: 1).
+        damp_b : exponent of the overlap of its surfaces while they separate, where they have no contact model; above
+            1 contacts lose energy (default: 1).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     @overload
@@ -1164,10 +1164,10 @@ class Elements(Stressed):
             mechanical-mohr-coulomb [degrees].
         penalty : contact penalty of its surfaces where they have no contact model; 0: that of its joints, or 10 E
             [Pa].
-        damp_b : exponent of the overlap of its surfaces while they part, where they have no contact model; above 1
-            contacts lose energy.
+        damp_b : exponent of the overlap of its surfaces while they separate, where they have no contact model; above
+            1 contacts lose energy.
         cohesion : cohesion [Pa].
-        tensile : tensile strength; no more than cohesion / tan(friction) counts [Pa].
+        tensile : tensile strength; limited to cohesion / tan(friction) [Pa].
         dilation : dilation angle, at most the friction angle [degrees].
         kelvin_shear : shear modulus of the Kelvin unit; 0: no Kelvin unit [Pa].
         kelvin_viscosity : viscosity of the Kelvin unit; 0: no Kelvin unit [Pa s].
@@ -1308,9 +1308,9 @@ class Faces(Fluxed):
         shear_stiffness : as penalty-shear.
         damping_t : largest normal stress while surfaces approach; contacts that reach it lose energy [Pa] (default:
             never).
-        damping_b : exponent of the overlap while surfaces part; above 1 contacts lose energy (default: 1).
-        damping_ratio : normal dashpot, part of the critical damping of two elements; the larger of two surfaces
-            counts; without effect in static runs (default: 0).
+        damping_b : exponent of the overlap while surfaces separate; above 1 contacts lose energy (default: 1).
+        damping_ratio : normal dashpot, part of the critical damping of two elements; the larger value of two
+            surfaces applies; without effect in static runs (default: 0).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def property(
@@ -1336,9 +1336,9 @@ class Faces(Fluxed):
         penalty_shear : shear penalty [Pa].
         shear_stiffness : as penalty_shear.
         damping_t : largest normal stress while surfaces approach; contacts that reach it lose energy [Pa].
-        damping_b : exponent of the overlap while surfaces part; above 1 contacts lose energy.
-        damping_ratio : normal dashpot, part of the critical damping of two elements; the larger of two surfaces
-            counts; without effect in static runs.
+        damping_b : exponent of the overlap while surfaces separate; above 1 contacts lose energy.
+        damping_ratio : normal dashpot, part of the critical damping of two elements; the larger value of two
+            surfaces applies; without effect in static runs.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def tell(self, *, where: Where | None = None) -> None:
@@ -1380,7 +1380,7 @@ class Faces(Fluxed):
         dip : shear stress along the surface, counter-clockwise about the body [Pa] (in the plane).
         quiet : dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress given with it
             enters as a wave of half its size.
-        incoming_x : velocity along x of a plane wave that comes in through quiet faces [m/s].
+        incoming_x : velocity along x of a plane wave that enters through quiet faces [m/s].
         incoming_y : velocity along y of that wave [m/s].
         incoming_z : velocity along z of that wave [m/s] (in three dimensions).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
@@ -1486,10 +1486,10 @@ class Joints(Objects):
         normal_stiffness : normal stiffness; of Barton and Bandis at zero stress [Pa/m].
         shear_stiffness : shear stiffness [Pa/m].
         friction : friction angle [degrees] (default: 0).
-        cohesion : cohesion; a point that is torn open has none any more [Pa] (default: 0).
-        tensile_strength : tensile strength; a point that is torn open has none any more [Pa] (default: 0).
+        cohesion : cohesion; 0 at a point that has failed in tension [Pa] (default: 0).
+        tensile_strength : tensile strength; 0 at a point that has failed in tension [Pa] (default: 0).
         dilation : dilation angle, at most the friction angle [degrees] (default: 0).
-        dilation_limit : path of sliding up to which it dilates [m] (default: no end).
+        dilation_limit : sliding distance up to which it dilates [m] (default: no end).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     @overload
@@ -1520,8 +1520,9 @@ class Joints(Objects):
         residual_friction : residual friction angle [degrees].
         jrc : joint roughness coefficient JRC.
         jcs : strength of the walls JCS [Pa].
-        joint_size : length of joint that JRC and JCS belong to [m] (default: 0.1).
-        dilation_part : part of the mobilised roughness angle that dilates; 0: it does not (default: 0.5).
+        joint_size : length of joint for which JRC and JCS are given [m] (default: 0.1).
+        dilation_part : part of the mobilised roughness angle by which the joint dilates; 0: no dilation (default:
+            0.5).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     @overload
@@ -1775,13 +1776,13 @@ class Joints(Objects):
         residual_friction : residual friction angle [degrees].
         jrc : joint roughness coefficient JRC.
         jcs : strength of the walls JCS [Pa].
-        joint_size : length of joint that JRC and JCS belong to [m].
-        dilation_part : part of the mobilised roughness angle that dilates; 0: it does not.
+        joint_size : length of joint for which JRC and JCS are given [m].
+        dilation_part : part of the mobilised roughness angle by which the joint dilates; 0: no dilation.
         friction : friction angle [degrees].
         cohesion : cohesion; 0: friction alone [Pa].
         tensile_strength : tensile strength; 0: none [Pa].
         dilation : dilation angle, at most the friction angle [degrees].
-        dilation_limit : path of sliding up to which it dilates [m].
+        dilation_limit : sliding distance up to which it dilates [m].
         gf1 : fracture energy, mode I [N/m].
         gf2 : fracture energy, mode II [N/m].
         penalty_overlay : penalty of a closed joint [Pa].
@@ -1945,8 +1946,8 @@ class Nodes(Moved):
 
         Parameters
         ----------
-        proppant_volumetric_concentration : concentration of the slurry that conditions and wells bring: volume of
-            grains over that of the slurry.
+        proppant_volumetric_concentration : concentration of the slurry that conditions and wells supply: volume of
+            grains over volume of slurry.
         proppant_volumetric_flow_rate : volume of grains that enters each node, added to its slurry; in space m3/s
             [m2/s].
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
@@ -2705,17 +2706,17 @@ class BlockCommands(Clocks):
 
         Parameters
         ----------
-        value : the time step; 0: estimated again; a table over time is evaluated every 100 steps [s].
+        value : the time step; 0: estimated automatically; a table over time is evaluated every 100 steps [s].
         auto : True: estimated again every 100 steps; False: at the first step and after changes of the model only; a
             value stays.
         update_frequency : with auto: steps after which it is estimated again (default: 100).
         safety : part of the stability limit that estimates and mass_scaling use (default: 0.8).
         mass_scaling : mass is added to nodes as this time step requires; 0: none, and the step is estimated again
             [s].
-        hydraulic : sub-step of flow, which then has a clock of its own; 0: those of a cycle take the time of the
-            steps of the blocks, or without motion half of what is stable [s] (default: 0).
-        thermal : sub-step of heat, which then has a clock of its own; 0: those of a cycle take the time of the steps
-            of the blocks, or without motion 0.9 of what is stable [s] (default: 0).
+        hydraulic : sub-step of flow, which then has its own clock; 0: the sub-steps of a cycle cover the time of the
+            steps of the blocks or, without motion, are half of the stable sub-step [s] (default: 0).
+        thermal : sub-step of heat, which then has its own clock; 0: the sub-steps of a cycle cover the time of the
+            steps of the blocks or, without motion, are 0.9 of the stable sub-step [s] (default: 0).
         """
     def sub_step(
         self,
@@ -2729,9 +2730,9 @@ class BlockCommands(Clocks):
         Parameters
         ----------
         mechanical : steps of the blocks between two cycles of flow, and of heat (default: 1).
-        thermal : sub-steps of a cycle of heat; 0: as many as are stable, and where heat is that slow, without fluid
-            or friction, a cycle every ten steps of blocks in motion (default: 0).
-        hydraulic : sub-steps of a cycle of flow; 0: as many as are stable (default: 0).
+        thermal : sub-steps of a cycle of heat; 0: as many as stability requires; if heat is slow, without fluid and
+            frictional heat, moving blocks have a cycle of heat every ten steps (default: 0).
+        hydraulic : sub-steps of a cycle of flow; 0: as many as stability requires (default: 0).
         """
     def field_clock(
         self,
@@ -2748,9 +2749,9 @@ class BlockCommands(Clocks):
         ----------
         field : its name.
         flows : False: values and the stress that they cause are frozen (default: True).
-        time_step : sub-step of the field, which then has a clock of its own; 0: those of a cycle take the time of
-            the steps of the blocks, or without motion 0.9 of what is stable [s] (default: 0).
-        sub_steps : in a cycle; 0: as many as are stable (default: 0).
+        time_step : sub-step of the field, which then has its own clock; 0: the sub_steps of a cycle cover the time
+            of the steps of the blocks or, without motion, are 0.9 of the stable sub-step [s] (default: 0).
+        sub_steps : in a cycle; 0: as many as stability requires (default: 0).
         current_time : present time of its clock [s].
         """
     def run_time(self, time: float) -> None:
@@ -2852,7 +2853,8 @@ class BlockCommands(Clocks):
 
         Parameters
         ----------
-        ratio : unbalanced over all forces of the nodes; with elastic: 1e-8, and as far below as rounding allows.
+        ratio : unbalanced forces over all forces of the nodes; with elastic: 1e-8, or less as far as rounding
+            allows.
         cycles : steps; with elastic: units of time (1) for which prescribed velocities act.
         time : simulated time; in static runs creep time, with each creep step solved to its ratio (1e-5), or
             directly with elastic [s].

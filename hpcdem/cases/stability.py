@@ -45,9 +45,7 @@ class SlopeStability(Case):
     cohesion: float = quantity(10e3, "Pa", "cohesion", gt=0)
     friction: float = quantity(20.0, "degrees", "friction angle", ge=0, lt=90)
     dilation: float = quantity(0.0, "degrees", "dilation angle", ge=0, lt=90)
-    tensile_strength: float = quantity(
-        1e6, "Pa", "tensile strength; no more than cohesion / tan(friction) counts", ge=0
-    )
+    tensile_strength: float = quantity(1e6, "Pa", "tensile strength; limited to cohesion / tan(friction)", ge=0)
     first: float = quantity(1.0, "1", "the factor that is tried first", gt=0)
     precision: float = quantity(0.01, "1", "the factor lies in a range of this width over itself", gt=0, le=0.2)
     balance: float = quantity(1e-6, "1", "unbalanced ratio below which the slope is stable", gt=0, le=1e-3)

@@ -110,7 +110,7 @@ def targets(options: dict[str, Any]) -> list[tuple[str, Path]]:
 
     kind, output = options["kind"], options["output"] or options["folder"] / "movie"
     if not options["folder"].is_dir():
-        raise HpcdemError(f"cannot read the folder {options['folder']}: there is no such folder")
+        raise HpcdemError(f"folder not found: {options['folder']}")
     if not output.parent.is_dir():
         raise HpcdemError(f"cannot make {output}: the folder does not exist")
     suffix = output.suffix.lower().removeprefix(".")

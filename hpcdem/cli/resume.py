@@ -64,5 +64,5 @@ def _folder(named: Path | None) -> Path:
         if (folder / run_folder.RECORD).is_file() or any(folder.glob("*.sav")):
             return folder.resolve()
     if not start.is_dir():
-        raise UsageError(f"{start}: there is no such folder")
+        raise UsageError(f"folder not found: {start}")
     raise UsageError(f"{start.resolve()}: nothing to resume: found neither {run_folder.RECORD} nor a .sav file")

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--volume", type=click.Choice(("mean", "nearest", "page")), help="Volumetric strain of the nodes: mean change of "
-    "volume around each, over SIZE; that of the nearest particle; or the quantity on the pages of the manual, which is "
-    "no change of volume [mean].",
+         "volume around each, over SIZE; that of the nearest particle; or the quantity in the figures of the ZDEM "
+         "manual, which is not a change of volume [mean].",
 )  # fmt: skip
 @click.option("-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [value of srun -c, else 1].")
 def strain_stress(**options: Any) -> None:

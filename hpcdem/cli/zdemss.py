@@ -84,12 +84,13 @@ def _ends(options: dict[str, Any], axis: str) -> tuple[float | None, float | Non
 @_switch("--strainvol", "ON", "Draw volumetric strain")
 @click.option(
     "--strainshear", type=Switch("root"), default="ON",
-    help="Draw distortional strain as the manual's pages do, the second invariant J2; root: its square root [ON].",
+    help="Draw distortional strain as in the figures of the ZDEM manual, the second invariant J2; root: its square "
+         "root [ON].",
 )  # fmt: skip
 @_switch("--stressmean", "ON", "Draw mean stress")
 @click.option(
     "--stressshear", type=Switch("half"), default="ON",
-    help="Draw shear stress as the manual's pages do, sigma1 - sigma3; half: (sigma1 - sigma3)/2 [ON].",
+    help="Draw shear stress as in the figures of the ZDEM manual, sigma1 - sigma3; half: (sigma1 - sigma3)/2 [ON].",
 )  # fmt: skip
 @_switch("--sigma1", "OFF", "Draw the largest principal stress as bars over the distortional strain")
 @_length("--scale", 1.0, "Length of these bars: gridsize times this where the stress is largest")

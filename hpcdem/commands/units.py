@@ -26,9 +26,9 @@ def declared(before: str, name: str, log: Any, late: bool) -> str:
         if new != units.SI.name:
             log.warn_once(
                 f"units {new}",
-                f"units {units.CHOICES[new]}: histories, charts and the energy table have these units; pictures and "
-                "tables that are made of frames name those of SI, and so do defaults in the reference: their numbers "
-                "count in the units declared",
+                f"units {units.CHOICES[new]}: histories, charts and the energy table have these units. Pictures and "
+                "tables made from frames show SI units; the numbers of default values in the reference are in the "
+                "declared units",
             )
     return new
 

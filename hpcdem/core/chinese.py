@@ -33,7 +33,7 @@ MESSAGES: tuple[tuple[str, str], ...] = (
     (r"'(.+)' lacks (.+)$", "{1} 缺少必需的参数:{2}"),
     (r"(\S+) missing;", "缺少 {1}"),
     (r"(\S+): no such script", "没有脚本文件 {1}"),
-    (r"(\S+): there is no such folder", "没有目录 {1}"),
+    (r"folder not found: (\S+)", "没有目录 {1}"),
     (r"there is no file (\S+)", "没有文件 {1}"),
     (r"cannot read (?:the script )?(\S+?):", "无法读取 {1}"),
     (r"cannot write (\S+?):", "无法写入 {1}"),

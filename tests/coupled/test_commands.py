@@ -283,8 +283,8 @@ def test_the_tables_of_energy_close_together(tmp_path):
     assert sum(between.values()) == pytest.approx(0.0, abs=1e-4)
     of_discs = sum(v for name, v in discs.items() if name.startswith(("stored", "lost"))) - falling
     of_blocks = sum(v for name, v in blocks.items() if name.startswith(("stored", "lost")))
-    left = of_discs + of_blocks + between["lost by friction, less overlaps at first"]
-    left += between["stored in the contacts, more than at first"]
+    left = of_discs + of_blocks + between["lost by friction, minus initial overlaps"]
+    left += between["stored in the contacts since the beginning"]
     assert abs(left) < 1e-4 * falling and found["relative"] < 1e-6
     assert found["lost"] == pytest.approx(-0.5 * 1e7 * 0.0005**2, rel=0.02)  # sticks; begins with an overlap of 0.5 mm
     assert "energy of both: closing error" in told

@@ -316,7 +316,7 @@ def test_nothing_to_resume(resident, tmp_path):
     done = resident(1, "resume", cwd=tmp_path)
     assert done.returncode == 2 and "nothing to resume" in done.stderr
     done = resident(1, "resume", tmp_path / "nowhere", cwd=tmp_path)
-    assert done.returncode == 2 and "no such folder" in done.stderr
+    assert done.returncode == 2 and "folder not found" in done.stderr
 
 
 def test_two_runs_in_one_folder(launch, script, undisturbed, wait_until):

@@ -19,7 +19,7 @@ def test_what_is_not_carried_out_is_marked():
     import dataclasses
 
     some = dataclasses.replace(t.ZDEM, commands=(dataclasses.replace(t.COMMANDS[0], executed=False),))
-    assert "**not carried out yet**" in page(some)
+    assert "**not supported yet**" in page(some)
 
 
 def test_tables_have_six_columns():

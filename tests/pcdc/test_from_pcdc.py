@@ -39,7 +39,7 @@ pcdc node boundary mech-vel-b-c velocity-y table 'pull' range y 0.08 0.08
 pcdc model time-step value 1e-7
 pcdc model solve time 1.2e-4
 """,
-    "A slope of which a part is taken out, with water": """\
+    "A slope with an excavation and water": """\
 pcdc geometry create polygon (4,2) (8,2) (8,4) (4,4) as-layer 'cut'
 pcdc mesh structured (0,0) (8,4) cells 16 8 type tri
 pcdc element c-model mech-m-c property density 2000 young 5e7 poisson-ratio 0.3 friction 25 cohesion 2e4 tensile 5e3

@@ -97,7 +97,7 @@ def test_bodies_are_groups(bench, tmp_path: Path):
          "fixed or fisher, not normal"),
         ("geometry create fractures orientation fixed 3 radius fixed 1 p32 1 inside 'fault' seed 1 as-layer 'd'",
          "fractures need a layer with bodies"),
-        ("geometry create extrude layer 'rock' along (0,0,1) as-layer 'd'", "something beside polygons"),
+        ("geometry create extrude layer 'rock' along (0,0,1) as-layer 'd'", "other shapes than polygons"),
         ("geometry create cone (0,0,0) (0,0,1) 1 1 as-layer 'd'", "two radii that differ"),
         ("geometry create arc (0,0,0) 1 0 90 as-layer 'd'", "'geometry create arc' is for two dimensions"),
         ("mesh create from-layer 'fault' size 1", "the outline is a body, but the layer has a plane"),

@@ -133,7 +133,7 @@ def test_run_time_and_whatever_comes_first(tmp_path):
     assert rock.blocks.clock.time == pytest.approx(1e-3) and rock.project.solved["steps"] == 15
     rock("pcdc model solve\n")
     assert rock.blocks.clock.step == 100 and rock.project.solved["steps"] == 0
-    assert "run-time 0.001 s from 0 s on has passed: no step is done" in rock.blocks.log.lines[-1]
+    assert "run-time 0.001 s, counted from 0 s, has passed: no step is executed" in rock.blocks.log.lines[-1]
     rock("pcdc model solve run-time 1.2e-3\npcdc model run-time 0\npcdc model solve cycle 3\n")
     assert rock.blocks.clock.step == 123
     rock("pcdc model run-time 1\npcdc model dynamic off\npcdc model solve cycle 2\n")

@@ -177,7 +177,7 @@ def test_several_bodies_are_one_mesh(bench):
     [((g.Ids(3, 2),), "the first number is above the last"),
      ((g.Span(0, 2, 1),), "the first bound is above the second"),
      ((g.Span(0, 0, 1), g.Span(0, 2, 3)), "selects no element; each of its terms alone selects some"),
-     ((g.OnCrack(),), "makes no sense for elements")],
+     ((g.OnCrack(),), "does not apply to elements")],
 )  # fmt: skip
 def test_ranges_that_make_no_sense(bench, terms, message):
     bench(BOX)

@@ -180,7 +180,7 @@ def test_a_real_mp4(folder: Path) -> None:
 def test_errors(folder: Path, tmp_path: Path, no_ffmpeg: None) -> None:
     with pytest.raises(UsageError, match="--format mp4 does not make"):
         make(folder, "--format=mp4", "-o", "a.gif")
-    with pytest.raises(HpcdemError, match="there is no such folder"):
+    with pytest.raises(HpcdemError, match="folder not found"):
         make(tmp_path / "none")
     with pytest.raises(HpcdemError, match="the folder does not exist"):
         make(folder, "-o", str(tmp_path / "none" / "a.gif"))

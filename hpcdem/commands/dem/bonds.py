@@ -169,7 +169,7 @@ def _warn_of_overstretched(sim: Simulation, which: np.ndarray) -> None:
     if number and sim.log is not None:
         sim.log.warn(
             f"{number} of these bonds exceed their tensile limit and will break in the next step: a gap counts as "
-            f"strain, also with tolerate. The widest gap that one of them can carry is {widest[0]:g} m"
+            f"tensile strain, also with tolerate. The widest gap at which such a bond stays intact is {widest[0]:g} m"
         )
 
 
@@ -213,14 +213,14 @@ def warn_of_stiffnesses(sim: Simulation) -> None:
     _, a, b, bond_ks, contact_ks, by_modulus, by_hertz = worst[0]
     shown = partial(with_prefix, unit="N/m", system=sim.settings.units)
     text = (
-        f"{number} bonds have another shear stiffness open than touching, that of particles {a} and {b} most: "
-        f"{shown(bond_ks)} ({'G A/L of the bond' if by_modulus else 'ks at the moment of bonding'}) and "
-        f"{shown(contact_ks)} (ks of the contact{', which goes to 0 with the overlap' if by_hertz else ''}). Pairs "
-        "that open and close under shear create energy; add the word `conserving` to the line of the bonds to prevent "
-        "this (docs/physics.md, Bonds)"
+        f"the shear stiffness of {number} bonds changes when they open or close, most between particles {a} and {b}: "
+        f"{shown(bond_ks)} open ({'G A/L of the bond' if by_modulus else 'ks at the moment of bonding'}), "
+        f"{shown(contact_ks)} closed (ks of the contact{', which tends to 0 with the overlap' if by_hertz else ''}). "
+        "Pairs that open and close under shear create energy; add the word `conserving` to the line of the bonds to "
+        "prevent this (docs/physics.md, Bonds)"
     )
     if undamped:
-        sim.log.warn_once("two shear stiffnesses", f"{text}. Nothing damps {undamped} of these pairs")
+        sim.log.warn_once("two shear stiffnesses", f"{text}. {undamped} of these pairs have no damping")
     else:
         sim.log.info(f"{text}. Damping dissipates energy but may be insufficient under small loads")
 
@@ -232,7 +232,7 @@ def _warn_of_loose_bonds(sim: Simulation, ids: list[list[int]]) -> None:
         a, b = min(one for part in firsts for one in part)
         sim.log.warn_once(
             f"{number} loose bonds",
-            f"{number} bonds have no normal stiffness, that of particles {a} and {b} among them: they carry "
+            f"{number} bonds have no normal stiffness, for example that of particles {a} and {b}: they carry "
             "no tension and never break in tension. Assign ebmod with tstrength, or kn with n_bond",
         )
 

@@ -67,10 +67,11 @@ def imple(
     way = float(xmove if xmove is not None else ymove or 0.0)
     speed = float(sim.walls.v[sim.walls.row(wall), axis])
     if speed == 0.0:
-        raise CommandError(f"wall {wall} does not move: {name} is 0, so it never gets {way:g} m far")
+        raise CommandError(f"wall {wall} does not move: {name} is 0, so it never reaches a displacement of {way:g} m")
     if way * speed < 0.0 and sim.log is not None:
         sim.log.warn(
-            f"IMPLE: wall {wall} moves with {name} {speed:g}, against {way:g}; the distance is taken as positive"
+            f"IMPLE: wall {wall} moves with {name} {speed:g}, opposite to the distance {way:g}; the sign of the "
+            "distance is ignored"
         )
     prepare(sim)
     per_step = abs(speed) * sim.clock.dt
@@ -138,7 +139,7 @@ def _check_materials(sim: Simulation) -> None:
     # Fixed ones may be out of reach; if not, Hertz particles have no common law with them.
     if (in_use & hertz).any() and sim.comm.any(bool(without_law.any())):
         text = _described(
-            sim, without_law, f"that are fixed have no contact law {cure}; a touch of Hertz particles is an error"
+            sim, without_law, f"that are fixed have no contact law {cure}; contact with a Hertz particle is an error"
         )
         if sim.log is not None:
             sim.log.warn_once(f"lawless {text}", text)

@@ -306,8 +306,8 @@ ENERGY_WORDS = {
     "loss_stiffness": "lost by change of shear stiffness",
     "loss_laws": "lost in pairs with a user law",
     "loss_rolling": "lost by rolling resistance",
-    "commands": "brought by commands",
-    "box": "brought by leaving the BOX",
+    "commands": "supplied by commands",
+    "box": "removed with particles that left the BOX",
     "work_blocks": ACROSS,
     "closing": "closing error",
 }

@@ -235,11 +235,11 @@ class _Objects:
     def mask(self, term: g.Term) -> np.ndarray:
         """(n,) bool: which of them a term holds for."""
         if isinstance(term, _ONLY_JOINTS) and self.kind != g.JOINT:
-            raise CommandError(f"{term} makes no sense for {self.kind}s")
+            raise CommandError(f"{term} does not apply to {self.kind}s")
         if isinstance(term, _NOT_SUPPORTS) and self.kind in g.SUPPORTS:
-            raise CommandError(f"{term} makes no sense for {self.kind}s")
+            raise CommandError(f"{term} does not apply to {self.kind}s")
         if isinstance(term, _NOT_ELEMENTS) and self.kind == g.ELEMENT:
-            raise CommandError(f"{term} makes no sense for elements")
+            raise CommandError(f"{term} does not apply to elements")
         return _MASKS[type(term)](self, *vars(term).values())
 
     def _around(self, elements: np.ndarray) -> np.ndarray:

@@ -66,7 +66,7 @@ def revolve(
 def _polygons(project: Project, layer: str) -> list[solids.Polygon]:
     found = project.layers[layer]
     if not all(isinstance(one, solids.Polygon) for one in found):
-        raise CommandError(f"layer '{layer}' has something beside polygons")
+        raise CommandError(f"layer '{layer}' contains other shapes than polygons")
     return found
 
 
@@ -101,10 +101,10 @@ def import_file(
         if given:
             raise CommandError(f"{given[0]} of geometry import is for two dimensions")
         if dxf_layer is not None and path.suffix.lower() != ".dxf":
-            raise CommandError(f"{path}: layers are of DXF files")
+            raise CommandError(f"{path}: layer selects a layer of a DXF file only")
     elif given or path.suffix.lower() != ".dxf":
         if dxf_layer is not None and path.suffix.lower() != ".dxf":
-            raise CommandError(f"{path}: layers are of DXF files")
+            raise CommandError(f"{path}: layer selects a layer of a DXF file only")
         placement = Placement(
             scale, _pair(origin), _pair(to), None if line is None else (_pair(line[0]), _pair(line[1]))
         )

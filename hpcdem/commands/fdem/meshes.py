@@ -253,7 +253,7 @@ def import_file(
         project.groups[ELEMENT].assign(range(cells, cells + len(mesh.cells)), group, set_name)
     low, high = (", ".join(f"{c:g}" for c in at) for at in (mesh.points.min(axis=0), mesh.points.max(axis=0)))
     apart = project.comm.per_node(lambda: int(bodies_of(mesh.face_partners()).max()) + 1)
-    note = f"{apart} bodies, which meet by contact" if apart > 1 else "one body"
+    note = f"{apart} bodies, which interact by contact" if apart > 1 else "one body"
     _say(project, f"{path.name}: from ({low}) to ({high}) m, {note}")
     for kind, sets in ((ELEMENT, mesh.groups), (NODE, found.nodes), (FACE, found.faces)):
         names = [f"set '{name}': " + ", ".join(f"'{group}'" for group in of) for name, of in sets.items()]
@@ -340,8 +340,9 @@ def glue(
         before, after = (quality.altitudes(one).min() for one in (mesh, made.mesh))
         _say(
             project,
-            f"glue: {made.cut} elements were cut, which makes {len(made.mesh.cells) - len(mesh.cells)} more, at "
-            f"hanging nodes; the least altitude was {before:.3g} m and is {after:.3g} m",
+            f"glue: {made.cut} elements were cut at hanging nodes, which adds "
+            f"{len(made.mesh.cells) - len(mesh.cells)} elements; the smallest altitude was {before:.3g} m and is now "
+            f"{after:.3g} m",
         )
 
 

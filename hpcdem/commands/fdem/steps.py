@@ -153,7 +153,7 @@ def _tell_no_time(project: Project, run: float) -> None:
     project.solved = {"reason": "time", "ratio": math.nan, "steps": 0}
     if project.log is not None:
         begins = " and ".join(f"{begin:g} s" for begin in project.began.values())
-        project.log.warn(f"{_where(project)}run-time {run:g} s from {begins} on has passed: no step is done")
+        project.log.warn(f"{_where(project)}run-time {run:g} s, counted from {begins}, has passed: no step is executed")
 
 
 def solve_elastic(
@@ -474,7 +474,7 @@ def _run(
     _settle_time_step(project)
     creeps, log = time is not None and not project.dynamic, project.log
     if time is not None and not creeps and project.progress is None and time <= 0.5 * clock.dt and log is not None:
-        log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is done")
+        log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is executed")
     if project.progress is None:
         project.blocks.drop_creep_step()
         _tell_of_thin(project, steps, time)

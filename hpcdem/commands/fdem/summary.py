@@ -37,42 +37,43 @@ ENERGY_WORDS = {
     "work_discs": output.ACROSS,
     "work_bolts": "work of bolts on the rock",
     "work_liners": "work of liners on the rock",
-    "work_heat": "brought by thermal stress",
-    "commands": "brought by commands",
+    "work_heat": "work of thermal stress",
+    "commands": "supplied by commands",
     "closing": "closing error",
 }
 """What the table at the end calls the entries of the energy budget."""
 SUPPORT_WORDS = {
-    "stored": "stored, and as motion",
-    "at_start": "of it at the beginning",
+    "stored": "stored, with kinetic energy",
+    "at_start": "part of it at the beginning",
     "lost_in_bars": "lost by yield and rupture",
     "lost_in_grout": "lost by slip in the grout",
     "lost_by_dashpots": "lost by viscous damping",
     "lost_in_beams": "lost by yield",
-    "lost_in_bond": "lost by slip and parting of the bond",
+    "lost_in_bond": "lost by slip and failure of the bond",
     "work_on_rock": "work on the rock",
     "work_of_conditions": "work of conditions",
     "work_of_gravity": "work of gravity",
-    "commands": "brought by commands, as pretension",
+    "commands": "supplied by commands, such as pretension",
     "closing": "closing error",
 }
 """Names of the entries of the budgets of bolts and liners."""
 FLUID_WORDS = {
-    "given": "given by conditions and at the beginning",
+    "given": "supplied by conditions and at the beginning",
     "stored": "in the channels",
     "leaked": "leaked into the rock",
-    "removed": "gone with channels that were taken away",
+    "removed": "removed with channels",
     "closing": "closing error",
 }
 """Names of the entries of the budget of the fluid, volumes at its density at zero pressure."""
 PROPPANT_WORDS = {
-    "came": "came by conditions and at the beginning", "stored": "in the channels", "packed": "of it packed",
-    "left": "left with fluid that was removed", "removed": "gone with channels that were taken away",
+    "came": "supplied by conditions and at the beginning", "stored": "in the channels", "packed": "part of it packed",
+    "left": "removed with fluid", "removed": "removed with channels",
     "closing": "closing error",
 }  # fmt: skip
 """Names of the entries of the budget of proppant."""
 HEAT_WORDS = {
-    "given": "given by conditions", "commands": "brought by commands", "stored": "stored in elements, above zero",
+    "given": "supplied by conditions", "commands": "supplied by commands",
+    "stored": "stored in elements, relative to temperature 0",
     "fluid": "in the fluid",
     "removed": "removed with elements and channels", "closing": "closing error",
 }  # fmt: skip
@@ -80,8 +81,8 @@ HEAT_WORDS = {
 ACROSS_WORDS = {
     "work_on_particles": "work on particles",
     "work_on_blocks": "work on blocks",
-    "stored": "stored in the contacts, more than at first",
-    "lost": "lost by friction, less overlaps at first",
+    "stored": "stored in the contacts since the beginning",
+    "lost": "lost by friction, minus initial overlaps",
 }
 """Names of the entries of the exchange of energy between particles and blocks, whose sum is 0."""
 

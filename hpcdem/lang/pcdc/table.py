@@ -414,7 +414,7 @@ STRESS = Model(
      Option("d{ip}", (TABLED,), "shear stress along the surface, counter-clockwise about the body", "Pa", dims=PLANE),
      Option("q{uiet}", (BOOL,), "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress "
             "given with it enters as a wave of half its size"),
-     Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s"),
+     Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that enters through quiet faces", "m/s"),
      Option("inc{oming}-y", (TABLED,), "velocity along y of that wave", "m/s"),
      Option("inc{oming}-z", (TABLED,), "velocity along z of that wave", "m/s", dims=SPACE)),
     any_of=True, dims=BOTH, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",), does="assignments.stress",
@@ -462,7 +462,7 @@ PROPPANT_CONDITION = Model(
     "hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant inflow at flow nodes, also of wells; give one of the two. "
     "Times of tables are those of flow; a packed node accepts none.",
     (Option("p{roppant}-v{olumetric}-c{oncentration}", (TABLED,), "concentration of the slurry that conditions and "
-            "wells bring: volume of grains over that of the slurry", "1"),
+            "wells supply: volume of grains over volume of slurry", "1"),
      Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (TABLED,), "volume of grains that enters each node, added to its "
             "slurry; in space m3/s", "m2/s")),
     any_of=True, dims=BOTH, does="flow.proppant_condition", by_time=True,
@@ -656,21 +656,21 @@ RANGE_TERMS = (
     Option("a{rea}", (NOT_NEGATIVE, NOT_NEGATIVE), "elements with an area, in space faces, from ... to ...", "m2",
            only=("element", "element-face")),
     Option("not", (), "negates the next term"),
-    Option("in-c{ircle}", (OPTIONAL_VECTOR, OPTIONAL_FLOAT), "all its points lie in the circle, in space the sphere, "
-           "about a centre and of a radius; elements: their centre; in the mesh", "m",
+    Option("in-c{ircle}", (OPTIONAL_VECTOR, OPTIONAL_FLOAT), "all its points lie in the circle (in space the sphere) "
+           "of this centre and radius; elements: their centre; positions in the mesh", "m",
            more=(Option("c{enter}", (VECTOR,), "the centre", "m"), Option("rad{ius}", (POSITIVE,), "the radius", "m"))),
-    Option("geom{etry}", (STRING,), "lies on the lines, in three dimensions on the surfaces, of the geometry layer; "
-           "elements: their centre is inside of it; in the mesh", only=("element", *_FACES)),
-    Option("geom{etry}-a{long}", (STRING,), "lies along the lines, in space the surfaces, of the layer: within a "
-           "distance of them and at an angle to them; elements and nodes by the distance; in the mesh",
+    Option("geom{etry}", (STRING,), "lies on the lines (in three dimensions the surfaces) of the geometry layer; "
+           "elements: their centre is inside it; positions in the mesh", only=("element", *_FACES)),
+    Option("geom{etry}-a{long}", (STRING,), "lies along the lines (in space the surfaces) of the layer: within a "
+           "distance of them and at an angle to them; elements and nodes by the distance only; positions in the mesh",
            only=("element", *_FACES),
-           more=(Option("dis{tance}-offset", (NOT_NEGATIVE,), "distance of its points at most", "m", "0"),
+           more=(Option("dis{tance}-offset", (NOT_NEGATIVE,), "largest distance of its points", "m", "0"),
                  Option("ang{le}-offset", (NOT_NEGATIVE,), "angle at most", "degrees", "0"))),
-    Option("geom{etry}-d{istance}", (STRING,), "all its points are near the lines, in space the surfaces, of the "
-           "layer; elements: their centre; in the mesh", only=("element", *_FACES),
+    Option("geom{etry}-d{istance}", (STRING,), "all its points are near the lines (in space the surfaces) of the "
+           "layer; elements: their centre; positions in the mesh", only=("element", *_FACES),
            more=(Option("within", (NOT_NEGATIVE,), "distance at most", "m", "0"),)),
-    Option("geom{etry}-l{ocation}", (STRING,), "a ray from its middle crosses the lines of the layer an odd or an "
-           "even number of times, as count is, and at least so often: with 1 what is inside; in the mesh",
+    Option("geom{etry}-l{ocation}", (STRING,), "a ray from its centre crosses the lines of the layer count times, or "
+           "an even number of times more; count 1 selects what is inside; positions in the mesh",
            only=("element", *_FACES), dims=PLANE,
            more=(Option("ray-dir{ection}", (VECTOR,), "of the ray", "", "(1,0)"),
                  Option("count", (ZERO_OR_MORE,), "crossings", "1", "1"))),
@@ -678,9 +678,9 @@ RANGE_TERMS = (
     Option("use-hidden", (BOOL,), "also selects hidden elements and their nodes, faces and joints", default="off"),
     Option("boundary", (), "lies on a surface of the model", only=("element-face", "node")),
     Option("face-of", (STRING,), "faces, joints or nodes of the elements of the group; joints: both elements are in "
-           "it; nodes: where elements may part, on their side", more=(SET,), only=_FACES),
-    Option("e{lement}", (FIRST_ID, LAST_ID), "faces or nodes of the element, or of those from first to last; without "
-           "a number of any", only=("element", "element-face", "node")),
+           "the group; nodes: at joints and cracks those on the side of the group", more=(SET,), only=_FACES),
+    Option("e{lement}", (FIRST_ID, LAST_ID), "faces or nodes of the element, or of the elements from first to last; "
+           "without a number, of any element", only=("element", "element-face", "node")),
     Option("between", (STRING, STRING), "joints with an element of each of the two groups", more=(SET,),
            only=("face-joint",)),
     Option("crack", (), "joints on a crack of the mesh", only=("face-joint",)),
@@ -819,8 +819,8 @@ _MODEL = (
              "pcdc model time-step table 'dt'", "pcdc model time-step auto update-frequency 20"),
             (_leading("value", TABLED_STEP, "as the word value", "s", False),),
             (
-                Option("value", (TABLED_STEP,), "the time step; 0: estimated again; a table over time is evaluated "
-                       "every 100 steps", "s"),
+                Option("value", (TABLED_STEP,), "the time step; 0: estimated automatically; a table over time is "
+                       "evaluated every 100 steps", "s"),
                 Option("auto", (OPTIONAL_BOOL,), "on: estimated again every 100 steps; off: at the first step and "
                        "after changes of the model only; a value stays", default="off"),
                 Option("u{pdate}-f{requency}", (COUNT,), "with auto: steps after which it is estimated again",
@@ -829,11 +829,13 @@ _MODEL = (
                        "1", "0.8"),
                 Option("mass-s{caling}", (NOT_NEGATIVE,), "mass is added to nodes as this time step requires; 0: none, "
                        "and the step is estimated again", "s"),
-                Option("hyd{raulic}", (NOT_NEGATIVE,), "sub-step of flow, which then has a clock of its own; 0: those "
-                       "of a cycle take the time of the steps of the blocks, or without motion half of what is stable",
+                Option("hyd{raulic}", (NOT_NEGATIVE,), "sub-step of flow, which then has its own clock; 0: the "
+                       "sub-steps of a cycle cover the time of the steps of the blocks or, without motion, are half of "
+                       "the stable sub-step",
                        "s", "0"),
-                Option("therm{al}", (NOT_NEGATIVE,), "sub-step of heat, which then has a clock of its own; 0: those of "
-                       "a cycle take the time of the steps of the blocks, or without motion 0.9 of what is stable", "s",
+                Option("therm{al}", (NOT_NEGATIVE,), "sub-step of heat, which then has its own clock; 0: the sub-steps "
+                       "of a cycle cover the time of the steps of the blocks or, without motion, are 0.9 of the stable "
+                       "sub-step", "s",
                        "0")),
             needs_option=True, manual=True, dims=BOTH, does="settings.time_step"),
     Command("mod{el} step", "Executes a number of steps.", ("pcdc model step 1000",),
@@ -849,8 +851,8 @@ _MODEL = (
              "pcdc model solve hydraulic steady", "pcdc model solve hydraulic auto time 3600",
              "pcdc model solve thermal time 3e7 dt 1e5", "pcdc model solve thermal steady",
              "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
-            options=(Option("r{atio}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
-                            "as far below as rounding allows", "1"),
+            options=(Option("r{atio}", (POSITIVE,), "unbalanced forces over all forces of the nodes; with elastic: "
+                            "1e-8, or less as far as rounding allows", "1"),
                      Option("c{ycles}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
                             "velocities act"),
                      Option("t{ime}", (POSITIVE,), "simulated time; in static runs creep time, with each creep step "
@@ -925,20 +927,21 @@ _MODEL = (
             options=tuple(Option(word, (), doc) for word, doc in (
                 ("bvh", "by a tree of boxes"), ("sap", "along an axis"), ("unif{orm}", "by cells"),
                 ("unform", "by cells, too"), ("b{roken}-j{oint}-p{air}", "between broken faces"))),
-            needs_option=True, dims=BOTH, idle="there is one search, which finds every contact in time"),
+            needs_option=True, dims=BOTH, idle="hpcdem has a single search, which finds every contact in time"),
     Command("mod{el} c{ollision}-c{ompute}", "How the force of a contact is computed.",
             ("pcdc model collision-compute accurate",),
             options=(Option("accurate", (), "over the overlap"), Option("iterate", (), "step by step")),
-            needs_option=True, dims=BOTH, idle="the force of a contact is always that over its whole overlap"),
+            needs_option=True, dims=BOTH, idle="the force of a contact is always computed over its complete overlap"),
     Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.",
             ("pcdc model sub-step mechanical 10 hydraulic 5", "pcdc model sub-step mechanical 100 thermal 1"),
             options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow, and of heat",
                             default="1"),
                      Option("therm{al}", (ZERO_OR_MORE,),
-                            "sub-steps of a cycle of heat; 0: as many as are stable, and where heat is that slow, "
-                            "without fluid or friction, a cycle every ten steps of blocks in motion",
+                            "sub-steps of a cycle of heat; 0: as many as stability requires; if heat is slow, without "
+                                 "fluid and frictional heat, moving blocks have a cycle of heat every ten steps",
                             default="0"),
-                     Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as are stable",
+                     Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as stability "
+                            "requires",
                             default="0")),
             needs_option=True, dims=BOTH, does="flow.sub_step"),
     Command("mod{el} fi{eld}", "The clock of a field that diffuses in elements, as of moisture.",
@@ -946,10 +949,11 @@ _MODEL = (
             (_leading("field", choice(*kinds()), "its name"),),
             options=(Option("fl{ows}", (BOOL,), "off: values and the stress that they cause are frozen",
                             default="on"),
-                     Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "sub-step of the field, which then has a clock of its "
-                            "own; 0: those of a cycle take the time of the steps of the blocks, or without motion 0.9 "
-                            "of what is stable", "s", "0"),
-                     Option("s{ub}-s{teps}", (ZERO_OR_MORE,), "in a cycle; 0: as many as are stable", default="0"),
+                     Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "sub-step of the field, which then has its own clock; 0: "
+                            "the sub-steps of a cycle cover the time of the steps of the blocks or, without motion, "
+                            "are 0.9 of the stable sub-step", "s", "0"),
+                     Option("s{ub}-s{teps}", (ZERO_OR_MORE,), "in a cycle; 0: as many as stability requires",
+                            default="0"),
                      Option("c{urrent}-t{ime}", (FLOAT,), "present time of its clock", "s")),
             needs_option=True, dims=BOTH, does="fields.clock"),
     Command("mod{el} ray{leigh}", "Rayleigh damping of elements in dynamic runs, in addition to their damp-factor: "

@@ -228,7 +228,7 @@ def print_report(report: Report, console: Any = None) -> None:
     for note in report.notes:
         console.print(escape(f"note: {note}"))
     for line, word in report.unexecuted:
-        console.print(escape(f"line {line}: {word} is not carried out yet; the script would be rejected"))
+        console.print(escape(f"line {line}: {word} is not supported yet; the script would be rejected"))
 
 
 def _time(report: Report) -> str:

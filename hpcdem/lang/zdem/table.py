@@ -321,7 +321,7 @@ def _id(doc: str, required: bool = True) -> Option:
 
 
 _COLOR = Option("color", "colour, by name or number", also=("colour",), kind=COLOR, default="lg")
-_GROUP = Option("group", "group the particles are put in", kind=NAME, default="***")
+_GROUP = Option("group", "group of the particles", kind=NAME, default="***")
 _KN = Option("kn", "normal stiffness", kind=NOT_NEGATIVE, unit="N/m", default="0")
 _KS = Option("ks", "shear stiffness", kind=NOT_NEGATIVE, unit="N/m", default="0")
 _FRIC = Option("fric", "friction coefficient", longest="friction", kind=NOT_NEGATIVE, default="0")

@@ -71,7 +71,7 @@ class Loads:
         if sim.log is not None and sim.quiet_faces().any():
             sim.log.warn_once(
                 "quiet",
-                "quiet faces act in dynamic runs only: in this static stage they carry no more than their stress",
+                "quiet faces act in dynamic runs only: in this static stage they only apply their stress",
             )
         return quiet[:0]
 

@@ -47,7 +47,8 @@ def check(sim: State, local: Local) -> None:
     text = f"{len(found)} pairs of elements overlap before the first step, {places}"
     if o.overlap == REFUSE:
         raise CommandError(
-            f"{text}: contact would repel them violently. Separate them, or use model option overlap relax in a static "
+            f"{text}: contact would repel them with a very high force. Separate them, or use model "
+            "option overlap relax in a static "
             "stage (keep: start with the overlap)"
         )
     if o.overlap == RELAX and o.dynamic:

@@ -268,8 +268,8 @@ _ELASTIC = (
              "joints, or 10 E", 0.0),
 )  # fmt: skip
 
-_DAMP_B = Property("damp_b", "1", "exponent of the overlap of its surfaces while they part, where they have no contact "
-                   "model; above 1 contacts lose energy", 1.0, low=1.0)  # fmt: skip
+_DAMP_B = Property("damp_b", "1", "exponent of the overlap of its surfaces while they separate, where they have no "
+                   "contact model; above 1 contacts lose energy", 1.0, low=1.0)  # fmt: skip
 
 MECH_ISO_ELASTIC = Model(
     "mech_iso_elastic",
@@ -284,7 +284,7 @@ _STRENGTH_BY_TEMPERATURE = (
     Property(
         "tensile",
         "Pa",
-        "tensile strength; no more than cohesion / tan(friction) counts",
+        "tensile strength; limited to cohesion / tan(friction)",
         0.0,
         softens=True,
         temperature_dependent=True,
@@ -378,10 +378,10 @@ CONTACT_MOHR_COULOMB = Model(
                  otherwise="the normal penalty"),
         Property("damping_t", "Pa", "largest normal stress while surfaces approach; contacts that reach it lose energy",
                  math.inf, otherwise="never", low_itself=False),
-        Property("damping_b", "1", "exponent of the overlap while surfaces part; above 1 contacts lose energy", 1.0,
+        Property("damping_b", "1", "exponent of the overlap while surfaces separate; above 1 contacts lose energy", 1.0,
                  low=1.0),
-        Property("damping_ratio", "1", "normal dashpot, part of the critical damping of two elements; the larger of "
-                 "two surfaces counts; without effect in static runs", 0.0),
+        Property("damping_ratio", "1", "normal dashpot, part of the critical damping of two elements; the larger value "
+                 "of two surfaces applies; without effect in static runs", 0.0),
     ),
 )  # fmt: skip
 
@@ -424,29 +424,30 @@ _STIFFNESS = (
 COULOMB_JOINT = Model(
     "joint_mohr_coulomb",
     JOINT,
-    "joint that was there before: springs, Coulomb friction",
+    "pre-existing joint: springs, Coulomb friction",
     (
         *_STIFFNESS,
         _friction("friction angle"),
-        Property("cohesion", "Pa", "cohesion; a point that is torn open has none any more", 0.0),
-        Property("tensile_strength", "Pa", "tensile strength; a point that is torn open has none any more", 0.0),
+        Property("cohesion", "Pa", "cohesion; 0 at a point that has failed in tension", 0.0),
+        Property("tensile_strength", "Pa", "tensile strength; 0 at a point that has failed in tension", 0.0),
         Property("dilation", "degrees", "dilation angle, at most the friction angle", 0.0, high=89.0),
-        Property("dilation_limit", "m", "path of sliding up to which it dilates", math.inf, otherwise="no end"),
+        Property("dilation_limit", "m", "sliding distance up to which it dilates", math.inf, otherwise="no end"),
     ),
     lambda values: _no_more_dilation(values),
 )  # fmt: skip
 BARTON_BANDIS = Model(
     "joint_barton_bandis",
     JOINT,
-    "rough joint that was there before, after Barton and Bandis",
+    "pre-existing rough joint after Barton and Bandis",
     (
         *_STIFFNESS,
         Property("closure_maximum", "m", "largest closure V_m", low_itself=False),
         Property("residual_friction", "degrees", "residual friction angle", high=70.0),
         Property("jrc", "1", "joint roughness coefficient JRC", high=20.0),
         Property("jcs", "Pa", "strength of the walls JCS", low_itself=False),
-        Property("joint_size", "m", "length of joint that JRC and JCS belong to", 0.1, low_itself=False),
-        Property("dilation_part", "1", "part of the mobilised roughness angle that dilates; 0: it does not", 0.5,
+        Property("joint_size", "m", "length of joint for which JRC and JCS are given", 0.1, low_itself=False),
+        Property("dilation_part", "1", "part of the mobilised roughness angle by which the joint dilates; 0: no "
+                 "dilation", 0.5,
                  high=1.0),
     ),
     called={"friction": "residual_friction"},

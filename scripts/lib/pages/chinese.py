@@ -48,9 +48,9 @@ _PCDC = """
 
 _IN_ROWS = {
     "| required |": "| 必需 |",
-    "; also read: ": ";也可写作 ",
+    "; also accepted: ": ";也可写作 ",
     "; may be repeated": ";可重复",
-    " (**not carried out yet**)": "(**尚不执行**)",
+    " (**not supported yet**)": "(**尚不执行**)",
     "| all |": "| 全部 |",
     "| that of the law |": "| 由本构而定 |",
     "; joined particles keep theirs": ";所连颗粒保持各自的值",
@@ -177,7 +177,7 @@ def _chinese(table: str) -> str:
         "object": "对象",
         "command": "命令",
         "models": "模型",
-        "not there": "没有的关键字",
+        "not available": "没有的关键字",
         "in three dimensions only": "仅三维有的",
     }
     cells = [names[cell.strip()] for cell in head.strip("|").split("|")]

@@ -12,11 +12,13 @@ from scripts.lib.pages.markdown import escaped
 _TOP = """\
 # Fields
 
-This page is made from the tables of the program; do not edit it (`./scripts/pages`).
-How files are laid out: [Files](files.md). `hpcdem draw FRAME --list` says which of them a frame has.
+This page lists the fields that frames, views and histories can contain. It is generated from the tables of the program
+by `./scripts/pages`; do not edit it. File formats: [Files](files.md). `hpcdem draw FRAME --list` lists the fields of a
+frame.
 
-Scripts of PCDC write hyphens (`stress-xx`), frames and Python underscores; Python takes both. Units are those of
-the plane, in which forces, energies and rates are of a metre of thickness; in space N/m becomes N, J/m J, m2/s m3/s.
+PCDC scripts write names with hyphens (`stress-xx`), frames and Python with underscores; Python accepts both. Units are
+those of two dimensions, where forces, energies and rates are per metre of thickness; in three dimensions N/m becomes N,
+J/m becomes J, and m2/s becomes m3/s.
 
 In views (`hpcdem draw`, the page, `output image`, filters, Python's `sim.frame()`) each vector of a frame is a field by
 its length and by its components: `displacement`, `displacement_x`, `displacement_y`, in space `displacement_z`; so are

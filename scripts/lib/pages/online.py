@@ -23,7 +23,7 @@ from scripts.lib.pages.markdown import escaped
 FILE = Path(__file__).with_name("online.txt")
 ACTS, ALIAS, IDLE, REFUSED, MISSING = "a", "=", "-", "x", "?"
 STATES = {
-    ACTS: "acts", ALIAS: "alias", IDLE: "no effect", REFUSED: "refused", MISSING: "not there",
+    ACTS: "acts", ALIAS: "alias", IDLE: "no effect", REFUSED: "refused", MISSING: "missing",
 }  # fmt: skip
 
 _SAMPLES = {
@@ -36,19 +36,25 @@ _IN_SPACE = {"(1,2)": "(1,2,3)", "(0,0) (1,1)": "(0,0,0) (1,1,1)", "(0,0) (2,0) 
 _TABLE = "|table"
 _VECTOR = re.compile(r"\(([^,()]+,[^,()]+)\)")
 
-_HEAD = "| path | values | in | state | read as |"
+_HEAD = "| command | values | dimensions | state | tested line |"
 _TOP = """\
 # PCDC's online commands
 
-This page is made from `scripts/lib/pages/online.txt`; do not edit it (`./scripts/pages`).
+This page is generated from `scripts/lib/pages/online.txt` by `./scripts/pages`; do not edit it.
 
-The help of PCDC lists its commands word by word. Each of these paths is here, with what becomes of it in hpcdem: it
-**acts**; it is an **alias** of another word, which does the same; it has **no effect** here, which the log says once;
-or it is **refused** by name, with what to write instead. Letters in braces may be left out, from the end on.
+The online help of PCDC lists its commands word by word. The tables give the state of each command and keyword in
+hpcdem:
 
-Of {total} paths (two and three dimensions counted each): {told}. `tests/pcdc/test_online.py` reads a line with each, in
-full and as short as it may be, and holds the state; `tests/pcdc/test_online_acts.py` runs lines and looks at what they
-change.
+- **acts**: it has the effect that PCDC describes;
+- **alias**: it has the effect of another command or keyword, which is named;
+- **no effect**: it is accepted, and the log reports once that it does nothing;
+- **refused**: it is rejected by name before the run, with the command to use instead.
+
+Letters in braces are optional; omit them from the end of a word.
+
+Of {total} entries (two and three dimensions counted separately): {told}. `tests/pcdc/test_online.py` parses a line with
+each entry, in full and in its shortest form, and checks its state; `tests/pcdc/test_online_acts.py` executes lines and
+checks their effects.
 """
 
 

@@ -40,7 +40,7 @@ PROGRAMS: dict[str, click.Command] = {
 _TOP = """\
 # Programs and options
 
-This page is made from the programs themselves; do not edit it (`./scripts/pages`). `--help` says the same, in part in
+This page is generated from the programs by `./scripts/pages`; do not edit it. `--help` shows the same text, in part in
 Chinese ([languages](running.md#language-of-messages)). `zdem` is another name of `hpcdem`. Defaults are in brackets.
 
 ## Exit codes

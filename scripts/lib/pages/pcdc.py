@@ -10,72 +10,71 @@ from scripts.lib.pages.markdown import escaped, first_sentence, overview, wrappe
 _TOP = """\
 # PCDC commands
 
-This page is made from `hpcdem/lang/pcdc/table.py` and `hpcdem/physics/fdem/properties.py`; do not edit it
-(`./scripts/pages`).
+This page is generated from `hpcdem/lang/pcdc/table.py` and `hpcdem/physics/fdem/properties.py` by `./scripts/pages`; do
+not edit it.
 
-## How a script is read
+## Rules of scripts
 
-- A script is Python in which lines whose first word is `pcdc` are commands, in loops and functions too. `pcdc` is no
-  name for a variable. A command that goes on in the next line ends with a backslash; `#` begins a comment.
-- All commands, and the Python between them, are read before anything runs; the first wrong line is reported with file,
-  line and text. `hpcdem --check script.sc` stops there.
-- Three dots at the end of a line go on with the next, too. Vectors may stand without brackets, `0,-9.8`, and lists with
-  commas: this is how PCDC's online help writes ([all its words](pcdc_online.md), [whole scripts](from_pcdc.md)).
-- Words may be shortened: what stands in braces may be left out, from the right, in each part of a word:
-  `a{s}-l{ayer}` is read in `as-layer`, `a-l` and `as-lay`. Upper and lower case are the same. A word that may mean
-  several is refused with the candidates.
-- Values are numbers, texts in quotes, `on` and `off` (`true`, `yes`, `false`, `no`), vectors `(x,y)`. Where a value, or
-  a part of one, is an expression of Python it stands in square brackets: `[m_R/12]`, `([i],0)`, `'layer [i]'`. In a
-  text `[[` and `]]` are brackets.
-- `<f>` a number, `<i>` a whole number, `<s>` a text, `<v>` a vector; where `table <s>` may stand the value is a
+- A script is written in Python; lines whose first word is `pcdc` are commands, also in loops and functions. `pcdc`
+  cannot name a variable. A backslash, or three dots, at the end of a line continues the command in the next line; `#`
+  begins a comment.
+- hpcdem checks all commands, and the Python between them, before anything runs, and reports the first wrong line with
+  file, line and text. `hpcdem --check script.sc` only makes this check.
+- Vectors may be written without brackets, `0,-9.8`, and lists with commas, as in PCDC's online help
+  ([all its commands](pcdc_online.md), [complete scripts](from_pcdc.md)).
+- Words may be shortened: letters in braces may be omitted, from the right, in each part of a word. `a{s}-l{ayer}`
+  accepts `as-layer`, `a-l` and `as-lay`. Upper and lower case are equivalent. An ambiguous word is rejected, and the
+  message lists the candidates.
+- Values are numbers, texts in quotes, `on` and `off` (`true`, `yes`, `false`, `no`), and vectors `(x,y)`. A value, or a
+  part of one, may be a Python expression in square brackets: `[m_R/12]`, `([i],0)`, `'layer [i]'`. In a text, `[[` and
+  `]]` stand for brackets.
+- `<f>` is a number, `<i>` a whole number, `<s>` a text, `<v>` a vector. If `table <s>` is accepted, the value can be a
   function of time.
-- Units: any consistent set; those in the tables are SI. Numbers of objects begin at 0, as in the output. Tension is
-  positive.
-- Files that are read, and those of `model save`, are named relative to the folder of the script. All else goes to the
-  folder of the results (`data` beside the script, or `--outdir`): frames, histories, what `history export` and `chart
-  export` write, whose names do not lead out of it (`../x.csv`) unless they are whole paths. Nothing is written over the
-  script, nor over a file that the run has read and not made itself.
-- A script is a program: it runs with your rights and can do to your files what you can. Run those that you trust.
-- A run that was stopped, by `--time-limit` or a signal, goes on with `--resume` where it was, also in a loop or a
-  function ([how](running.md#stopping-and-going-on)); there is a checkpoint every half hour (`--autosave`).
-- The Python of a script runs on every rank; commands are carried out by all ranks together, which must come to the same
-  commands with the same values. `print` prints once. `math` and `Vector` are there without an import; the random
-  numbers of Python and of numpy begin with the same seed on all ranks.
+- Any consistent system of units works; units in the tables are SI. Objects are numbered from 0, as in the output.
+  Tension is positive.
+- Input files, and those of `model save`, are named relative to the folder of the script. All other files are written to
+  the folder of the results (`data` next to the script, or `--outdir`). `history export` and `chart export` reject a
+  relative name that leads out of this folder (`../x.csv`). No command overwrites the script or an input file.
+- A script is a program that runs with your rights and can change your files. Run only scripts that you trust.
+- A run that was stopped by `--time-limit` or a signal resumes with `--resume` at the same point, also in a loop or a
+  function ([how](running.md#stopping-and-resuming)); a checkpoint is written every half hour (`--autosave`).
+- Every rank executes the Python of a script; all ranks execute each command together, and must reach the same commands
+  with the same values. `print` prints once. `math` and `Vector` are available without an import; the random numbers of
+  Python and numpy start from the same seed on all ranks.
 
 ## Python
 
 `pcdc` is also an object: `pcdc.time`, `pcdc.cycle`, `pcdc.ratio`, `pcdc.energies`, `pcdc.solved`, `pcdc.rank`;
 `pcdc.node(7).displacement.X`, `pcdc.element(3).stress_yy`, `pcdc.joint(12).opening`;
 `pcdc.numbers('element', group='rock', set='domain')`, `pcdc.values('node', 'velocity-x', geometry='rim')`,
-`pcdc.total('node', 'reaction-y', group='top', set='bc')`, `pcdc.history('load')` (rows of step, time, value). Every
-look is made by all ranks together.
+`pcdc.total('node', 'reaction-y', group='top', set='bc')`, `pcdc.history('load')` (rows of step, time, value). All ranks
+must make a query together.
 
-`model save` also keeps the global variables whose names begin with `m_` (whole and other numbers, texts, truth values,
-Vectors) and the functions `def m_...`, as the text of their `def`. `model restore` brings them back: the functions are
-then part of the script like any other, so restore files only from where you would take a script from. Restoring itself
-runs nothing of them: only a plain `def` is accepted, without decorator or annotations, and with plain values as
-defaults.
+`model save` also stores the global variables whose names begin with `m_` (numbers, texts, truth values, Vectors) and
+the functions `def m_...`, as source text. `model restore` restores both. The functions then belong to the script like
+any other, so restore only files whose author you trust as much as that of a script. Restoring does not execute them:
+only a plain `def` is accepted, without decorator or annotations, and with plain values as defaults.
 """
 
 _RANGE = """\
 ## range
 
-Stands last on the line and limits a command to some objects; without it the command acts on all. All terms must hold.
-A range that chooses nothing is an error.
+A range is written at the end of the line and limits a command to some objects; without it the command applies to all.
+An object is selected if it satisfies all terms. A range that selects nothing is an error.
 
-It chooses among what is there: elements that were not taken out, nodes and faces of these, joints between two of
-them. Two kinds of commands reach what was taken out too: `group`, and `element c-model`, which brings elements back.
+A range selects present objects only: elements that were not removed, their nodes and faces, and the joints between
+them. Two kinds of commands also apply to removed elements: `group`, and `element c-model`, which reinstates them.
 
-`x`, `y` and `geometry` go by the places in the mesh, wherever things have moved since: a line of a script means the
-same objects before and after a stage of loading. With `present` they go by where things are at that moment: the
-centre of an element, a node, both ends of a face or joint.
+`x`, `y` and `geometry` refer to positions in the mesh, not to displaced positions, so a line of a script selects the
+same objects before and after a stage of loading. With `present` they refer to the current positions: the centre of an
+element, a node, both ends of a face or joint.
 """
 
 
 def page(table: Table = PCDC) -> str:
     """The whole page, in Markdown."""
     said = {command.name: first_sentence(command.doc) for command in table.commands}
-    parts = [_TOP, overview("Commands", "| command | what it does |", said)]
+    parts = [_TOP, overview("Commands", "| command | effect |", said)]
     parts += [_command(command) for command in table.commands]
     parts += [_RANGE, _options(table.range_terms), "", *_models(table), _recorded(), _dimensions(table)]
     return "\n".join(parts).rstrip("\n") + "\n"
@@ -98,11 +97,11 @@ def _told(command: Command) -> str:
     """What a command does, that it does nothing here or is refused, and other words for it."""
     parts = [command.doc]
     if command.idle:
-        parts.append(f"It is read and has no effect here, which the log says once: {command.idle}.")
+        parts.append(f"It is accepted but has no effect, which the log reports once: {command.idle}.")
     if command.refused:
         parts.append(f"It is rejected: {command.refused}.")
     if command.also:
-        parts.append(f"Also read: {', '.join(f'`{words}`' for words in command.also)}.")
+        parts.append(f"Also accepted: {', '.join(f'`{words}`' for words in command.also)}.")
     return " ".join(parts)
 
 
@@ -135,7 +134,7 @@ def _options(options: Sequence[Option], values: Sequence[Option] = ()) -> str:
 
 def _row(option: Option, word: str, named: bool = False) -> str:
     pattern = _pattern(option)
-    also = f"; also read: {', '.join(f'`{w}`' for w in option.also)}" if option.also else ""
+    also = f"; also accepted: {', '.join(f'`{w}`' for w in option.also)}" if option.also else ""
     several = "; may be repeated" if option.repeated else ""
     default = "required" if option.required and not named else option.default
     cells = [word, f"`{pattern}`" if pattern else "", option.unit, default, option.doc + several + also]
@@ -157,7 +156,7 @@ def _models(table: Table) -> list[str]:
 
 def _model(model: Model, command: Command) -> list[str]:
     origin = f"table {model.number} of the manual; " if model.number else ""
-    also = f"; also read: {', '.join(f'`{w}`' for w in model.also)}" if model.also else ""
+    also = f"; also accepted: {', '.join(f'`{w}`' for w in model.also)}" if model.also else ""
     title = f"`{model.notation}` ({origin}`pcdc {command.name}`{also})"
     lines = [f"### {model.keyword.name}", "", title, "", model.doc]
     if model.one_of:
@@ -166,7 +165,7 @@ def _model(model: Model, command: Command) -> list[str]:
 
 
 def _recorded() -> str:
-    rows = ["## What histories record", "", "| object | value | unit |", "|---|---|---|"]
+    rows = ["## Quantities of histories", "", "| object | value | unit |", "|---|---|---|"]
     rows += [f"| {kind} | `{name}` | {unit} |" for kind, of in RECORDED.items() for name, unit in of.items()]
     return "\n".join([*rows, ""])
 
@@ -185,12 +184,12 @@ def _dimensions(table: Table) -> str:
     rows = [
         "## Three dimensions",
         "",
-        "After `pcdc model new dim 3` vectors have three components, and these commands ",
+        "After `pcdc model new dim 3` vectors have three components. The commands in the table are available with all ",
     ]
-    rows[-1] += "are there, with all of their words but those that are named; others are refused before anything runs."
-    rows += ["", f"Not there are the commands {', '.join(f'`{name}`' for name in missing_in_space(table))}; nor are"]
+    rows[-1] += "keywords except those in the column *not available*; anything else is rejected before the script runs."
+    rows += ["", f"Not available: the commands {', '.join(f'`{name}`' for name in missing_in_space(table))}, and"]
     rows[-1] += f" {', '.join(IN_THE_PLANE)}."
-    rows += ["", "| command | models | not there | in three dimensions only |", "|---|---|---|---|"]
+    rows += ["", "| command | models | not available | in three dimensions only |", "|---|---|---|---|"]
     for command in table.commands:
         if 3 not in command.dims:
             continue

@@ -13,11 +13,9 @@ from hpcdem.sweep import Sweep
 _TOP = """\
 # Python reference
 
-This page is made from the docstrings; do not edit it (`./scripts/pages`).
-How the methods work together, with examples: [Python](python.md). Every method is
-collective: under mpiexec call it on all ranks. Units are SI. What a command does in detail stands with the
-command of the same name ([ZDEM](zdem_reference.md),
-[PCDC](pcdc_reference.md)).
+This page is generated from the docstrings by `./scripts/pages`; do not edit it. [Python](python.md) explains how the
+methods work together, with examples. Every method is collective: under mpiexec all ranks must call it. Units are SI.
+For details of a command see the command of the same name ([ZDEM](zdem_reference.md), [PCDC](pcdc_reference.md)).
 """
 
 OF_BLOCKS = {

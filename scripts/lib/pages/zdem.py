@@ -10,34 +10,36 @@ from scripts.lib.pages.markdown import escaped, first_sentence, overview, wrappe
 _TOP = """\
 # ZDEM commands
 
-This page is made from the table in `hpcdem/lang/zdem/table.py`; do not edit it (`./scripts/pages`).
+This page is generated from the table in `hpcdem/lang/zdem/table.py` by `./scripts/pages`; do not edit it.
 
-## How a script is read
+## Rules of scripts
 
-- One command per line. Upper and lower case are the same, except in file names.
-- `( ) = ,` and blanks only separate: `fric=0.3`, `fric 0.3` and `(fric, 0.3)` are the same.
-- `# ! ;` begin a comment; comments may be in any text encoding, the rest is UTF-8.
+- One command per line. Upper and lower case are equivalent, except in file names.
+- `( ) = ,` and blanks are separators: `fric=0.3`, `fric 0.3` and `(fric, 0.3)` are equivalent.
+- `# ! ;` begin a comment; comments may be in any text encoding, everything else is UTF-8.
 - Whole numbers may be written `100000.0`.
-- A command may be shortened to three letters or more; in the headings below what may be left out stands in brackets.
-  Keywords may be shortened to two letters or more, as long as no other of the command begins so. A longer word that is
-  none, but has the first three letters of just one keyword (`gravtiy`), is taken for that, with a warning.
-- The first command is START, RESTORE or LOAD. What follows STOP is not read.
-- `friction = 0.3` on a line of its own makes a parameter, which is used as `{friction}` where a number stands on later
-  lines ([Sweeps](sweep.md)); ZDEM itself does not know them. Names that stand for a command are none. A parameter that
-  nothing uses is an error.
-- The whole script is read before anything runs. The first wrong line is reported with its number, and nothing is done.
+- Commands may be shortened to three letters or more; in the headings below the optional letters are in brackets.
+  Keywords may be shortened to two letters or more, if no other keyword of the command begins with the same letters. An
+  unknown word whose first three letters are those of a single keyword (`gravtiy`) is interpreted as that keyword, with
+  a warning.
+- The first command is START, RESTORE or LOAD. Lines after STOP are ignored.
+- A separate line `friction = 0.3` defines a parameter; later lines use it as `{friction}` instead of a number
+  ([Sweeps](sweep.md)). ZDEM itself does not support parameters. A parameter must not have the name of a command. A
+  parameter that is never used is an error.
+- hpcdem checks the complete script before anything runs. If a line is wrong, it reports the first one with its number
+  and runs nothing.
 - Units are SI. File names are relative to the folder of the script.
 """
 
 _RANGE = """\
 ## RANGE
 
-Stands last on the line and limits a command to some particles; without it the command acts on all. Terms are joined by
-`and` and `or`, from left to right with equal precedence. `x (a b) y (c d)` is one term, a rectangle: `group sed or
-x (6 8) y (0 2)` chooses the group and all of the rectangle; other terms without a word between them are joined by
-`and`.
-The centres of particles count. A particle is in one group, so group terms joined by `and` next to each other
-select the particles of all these groups.
+RANGE is written at the end of the line and limits a command to some particles; without it the command applies to all.
+Terms are joined by `and` and `or`, from left to right with equal precedence. `x (a b) y (c d)` is one term, a
+rectangle: `group sed or x (6 8) y (0 2)` selects the group and all particles in the rectangle. Other terms without a
+word between them are joined by `and`.
+A particle is selected by the position of its centre. Because a particle is in one group only, adjacent group terms
+joined by `and` select the particles of all these groups.
 """
 
 _VARIABLES = """\
@@ -52,7 +54,7 @@ command. Operators are `+ - * /`; no blanks inside, no parentheses. Example: `DE
 def page(table: Table = ZDEM) -> str:
     """The whole page, in Markdown."""
     said = {command.name: first_sentence(command.doc) for command in table.commands}
-    parts = [_TOP, overview("Commands", "| command | what it does |", said)]
+    parts = [_TOP, overview("Commands", "| command | effect |", said)]
     parts += [_command(command) for command in table.commands]
     parts += [_RANGE, _options(table.range_terms), "", _VARIABLES, _colors()]
     return "\n".join(parts).rstrip("\n") + "\n"
@@ -96,7 +98,7 @@ def _options(options: Sequence[Option], values: Sequence[Option] = ()) -> str:
             f"`{_pattern(option)}`" if option.kind is not FLAG else "",
             option.unit,
             "required" if option.required else f"`{option.default}`" if option.default else "",
-            option.doc + _also(option) + ("" if option.executed else " (**not carried out yet**)"),
+            option.doc + _also(option) + ("" if option.executed else " (**not supported yet**)"),
             option.source,
         ]
         rows.append("| " + " | ".join(escaped(cell) for cell in cells) + " |")
@@ -116,17 +118,17 @@ def _shortened(row: Row) -> str:
 
 
 def _remarks(row: Row) -> str:
-    state = "" if row.executed else "; **not carried out yet**"
+    state = "" if row.executed else "; **not supported yet**"
     return f"(from: {SOURCES[row.source]}{_also(row)}{state})"
 
 
 def _also(row: Row) -> str:
-    return f"; also read: {', '.join(f'`{word}`' for word in row.also)}" if row.also else ""
+    return f"; also accepted: {', '.join(f'`{word}`' for word in row.also)}" if row.also else ""
 
 
 def _colors() -> str:
     rows = ["## Colours", "", "By number or name:", "", "| number | name |", "|---|---|"]
     rows += [f"| {number} | {name} |" for name, number in COLORS.items()]
-    sources = ["", "## Sources", "", "The last column of the tables says where a keyword is known from:", ""]
+    sources = ["", "## Sources", "", "The last column of the tables gives the source of a keyword:", ""]
     sources += [f"- {tag}: {text}" for tag, text in SOURCES.items()]
     return "\n".join(rows + sources)

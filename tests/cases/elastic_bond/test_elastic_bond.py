@@ -263,5 +263,5 @@ def test_bonds_without_normal_stiffness_are_named_before_the_run(tmp_path, keys,
     properties.prop(sim, density=1000.0, kn=kn, ks=1e9)
     bonds.bond(sim, **keys)
     cycles.cycle(sim, 1)
-    text = "bonds have no normal stiffness, that of particles 0 and 1 among them"
+    text = "bonds have no normal stiffness, for example that of particles 0 and 1"
     assert (f"{number} {text}" in " ".join(said.getvalue().split())) == bool(number)
