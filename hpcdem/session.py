@@ -199,7 +199,7 @@ def prepare(comm: Comm, log: Log, kinds: Sequence[str], *threads: int, ready: Co
 
 
 def needed(kinds: Sequence[str]) -> list[str]:
-    """These kinds, after those that they need and those that all share."""
+    """Return these kinds, after those that they need and those that all share."""
     found = dict.fromkeys(["shared"])
     for kind in kinds:
         found |= dict.fromkeys([*(KINDS[kind].after if kind in KINDS else ()), kind])
@@ -256,9 +256,9 @@ KINDS = {
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
 OF_PARTICLES = ("energy", "clumps", "restitution")
-"""Those that come when a model of particles asks for them."""
+"""Kinds loaded when a model of particles needs them."""
 OF_BLOCKS = tuple(kind for kind in KINDS if kind not in ("shared", "", "blocks", "coupled", *OF_PARTICLES))
-"""Those that come when a model of blocks asks for them."""
+"""Kinds loaded when a model of blocks needs them."""
 
 
 def warm_up(kind: str, *threads: int) -> None:
@@ -272,7 +272,7 @@ def warm_up(kind: str, *threads: int) -> None:
 
 
 def watch_states(sim: Simulation, reproduction: Reproduction) -> None:
-    """Let the log tell of the states of this simulation. It only looks."""
+    """Log the states of this simulation without changing them."""
     from hpcdem.physics.dem import diagnostics
     from hpcdem.physics.dem.simulation import Watcher
 

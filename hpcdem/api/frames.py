@@ -167,21 +167,21 @@ class Frames(Sequence[Frame]):
         return (self[place] for place in range(len(self)))
 
     def pandas(self, object: str | None = None) -> Any:
-        """All frames under each other; the index is step and number, `time` [s] a column."""
+        """Concatenate the tables of all frames; the index is step and number, `time` [s] a column."""
         pandas = _needed("pandas")
         parts = {frame.step: frame.pandas(object).assign(time=frame.time) for frame in self._each()}
         return pandas.concat(parts, names=["step"])
 
     def xarray(self, object: str | None = None) -> Any:
-        """All frames beside each other: dimensions step and number, coordinate `time` [s]; NaN where an object was not
-        there yet, or no more."""
+        """Combine all frames: dimensions step and number, coordinate `time` [s]; NaN where an object does not exist
+        yet, or no more."""
         data = self.pandas(object)
         times = data.pop("time").groupby("step").first()
         found = _with_units(data, self[0]._moment, {})
         return found.assign_coords(time=("step", times.to_numpy()))
 
     def _each(self) -> Iterator[Frame]:
-        """Each step once: of two frames of one step, before and after, the second."""
+        """Iterate over the frames with each step once: of two frames of one step, before and after, the second."""
         return iter({frame.step: frame for frame in self}.values())
 
     def __repr__(self) -> str:

@@ -98,7 +98,7 @@ TAKEN = {
     "num": Taken("int", lambda sim, num: int(num)),
     "list[float]": Taken("Iterable[float]", lambda sim, radii: _radii(radii)),
 }
-"""By the name of the argument, or its type."""
+"""Conversions by the name of the argument, or its type."""
 READ = Taken("File", lambda sim, file: sim._existing(file))
 WRITTEN = Taken("File", lambda sim, file: sim.directory / file)
 
@@ -209,7 +209,7 @@ def _functions(module: str) -> tuple[dict[str, ast.FunctionDef], dict[str, Any]]
 
 
 def _parameters(node: ast.FunctionDef, module: str) -> Iterator[Parameter]:
-    """All but the first, the simulation."""
+    """Yield all parameters but the first, the simulation."""
     given = node.args
     placed = given.args[1:]
     defaults = [None] * (len(placed) - len(given.defaults)) + list(given.defaults)

@@ -25,9 +25,9 @@ from hpcdem.physics.fdem import groups as g
 
 WHERE = "text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all"
 DIMENSIONS: dict[tuple[int, ...], str] = {(2,): "in the plane", (3,): "in three dimensions"}
-"""Where a word is there, if not in both."""
+"""Dimensions in which a word is available, if not in both."""
 WIDTH = 109
-"""Of docstrings."""
+"""Width of docstrings."""
 Kind = TypeVar("Kind", bound=type)
 Chosen = str | Callable[[Mapping[str, Any]], str]
 
@@ -145,7 +145,7 @@ class Row:
         return [*found, *there.values()]
 
     def _all(self) -> Iterator[Argument]:
-        """All that the command takes, as keywords."""
+        """Yield all arguments of the command as keywords."""
         named = self.model_row or self.row
         options = (*named.leading, *named.options)
         for name, option in {option.name: option for option in options}.items():

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
 
 OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{k: k for k in (*g.SUPPORTS, *g.FLOW)}}
-"""What histories call them."""
+"""Names of objects in histories."""
 HOW = ("sum", "mean", "minimum", "maximum")
-"""What a history makes of several numbers."""
+"""Reductions of several numbers to one value of a history."""
 
 
 class Orders:
@@ -236,8 +236,8 @@ class Tabled(Words):
         self._do("table", {"name": name, "data": numbers, "type": {"value": True, word: True}})
 
     def over(self, name: str, axis: str) -> Over:
-        """For a property: the table over "x", "y" or in space "z" in the mesh, over "plastic-strain" (what softens or
-        hardens), or over "temperature" (moduli and strengths)."""
+        """Make the value of a property from a table over "x", "y" or in space "z" in the mesh, over "plastic-strain"
+        (what softens or hardens), or over "temperature" (moduli and strengths)."""
         if axis not in AXES:
             raise ValueError(f"axis: expected {', '.join(map(repr, AXES))}, got {axis!r}")
         return Over(name, AXES.index(axis))
@@ -250,7 +250,7 @@ class Random(Words):
     _word = "fields"
 
     def drawn(self, name: str) -> Drawn:
-        """For a property: drawn from this field."""
+        """Make the value of a property drawn from this field."""
         return Drawn(name)
 
 

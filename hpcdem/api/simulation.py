@@ -636,7 +636,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @property
     def _asleep(self) -> bool:
-        """These particles come out of the checkpoint to which the script is on its way back."""
+        """Return whether these particles come from a checkpoint whose script is still being replayed."""
         running = self._session.interpreter
         return running is not None and running.replays and running.project.asleep == self.engine.number
 
@@ -667,7 +667,7 @@ class Simulation(ParticleCommands, BlockCommands):
         return value
 
     def _warn_of_answers(self) -> None:
-        """Once: this script requested what --resume may not be able to answer."""
+        """Warn once that --resume may not reproduce values that this script requested."""
         running, log = self._session.interpreter, self.engine.log
         if self._seen_alone and self.ranks > 1 and log is not None and running.keeps and not running.replays:
             log.warn_once(
@@ -735,7 +735,7 @@ class Simulation(ParticleCommands, BlockCommands):
         return f"<Simulation: step {clock.step}, {clock.time:.6g} s, {', '.join(bodies)}>"
 
     def _repr_html_(self) -> str:
-        """For notebooks: the line of `repr` and a picture of the model."""
+        """Return the line of `repr` and a picture of the model, for notebooks."""
         try:
             picture = self.frame().picture()
         except HpcdemError:  # nothing there yet, or several ranks

@@ -17,9 +17,10 @@ Point = tuple[float, ...]
 """Two numbers, three in a model of three dimensions."""
 File = str | Path
 Number = float | str | FunctionName
-"""Of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
+"""Value of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
 Value = float | Over | Drawn | np.ndarray
-"""Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
+"""Value of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen
+(n,)."""
 Where = str | g.Term | tuple[g.Term, ...] | None
 """The text of a RANGE, or terms of `hpcdem.physics.fdem.groups`, all of which must hold; None: everything."""
 Selected = str | Selection | None

@@ -45,7 +45,7 @@ def unit_of(field: FieldInfo) -> str:
 
 
 def chooses(field: FieldInfo) -> bool:
-    """Does it choose between pieces of text?"""
+    """Return whether the field chooses between pieces of text."""
     extra = field.json_schema_extra
     return isinstance(extra, dict) and bool(extra.get("chooses"))
 

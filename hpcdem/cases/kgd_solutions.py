@@ -19,7 +19,8 @@ import scipy
 
 @dataclass(frozen=True)
 class Fracture:
-    """Half length [m], opening in the middle [m], net pressure in the middle [Pa]."""
+    """Fracture of a closed-form solution: half length [m], opening in the middle [m], net pressure in the middle
+    [Pa]."""
 
     length: float
     opening: float
@@ -88,7 +89,8 @@ def _slopes() -> tuple[float, float, float]:
 
 
 def viscous(young: float, viscosity: float, rate: float, time: float) -> Fracture:
-    """No toughness and no lag between fluid and tip; constants of the self-similar solution (0.6152, 1.127, 0.5466)."""
+    """Compute the fracture without toughness and without lag between fluid and tip; constants of the self-similar
+    solution (0.6152, 1.127, 0.5466)."""
     mu = 12.0 * viscosity
     return Fracture(
         0.6152 * (young * rate**3 * time**4 / mu) ** (1.0 / 6.0),

@@ -19,7 +19,7 @@ import numpy as np
 from hpcdem.cases.kgd_solutions import Fracture, toughness
 
 A1, B, OMEGA = 0.3581, 0.09269, 2.479
-"""Of the pressure in the first-order solution without toughness (Savitski & Detournay, 81)."""
+"""Constants of the pressure in the first-order solution without toughness (Savitski & Detournay, 81)."""
 
 
 def number(young: float, energy: float, viscosity: float, rate: float, time: float) -> float:

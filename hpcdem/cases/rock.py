@@ -19,7 +19,7 @@ def _whole(given: Any) -> Any:
 
 
 Dimensions = Annotated[Literal[2, 3], BeforeValidator(_whole)]
-"""Of space."""
+"""Dimensions of space."""
 
 
 class Rock(Case):

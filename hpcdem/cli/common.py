@@ -69,7 +69,7 @@ def read_command_line(command: click.Command, program: str, words: list[str]) ->
 
 @contextmanager
 def messages_only() -> Iterator[None]:
-    """Before the ranks are together: a failure a user can act on is printed as its message, and the process leaves."""
+    """Report errors that the user can correct by their message only, and exit; used before MPI starts."""
     try:
         yield
     except HpcdemError as error:

@@ -123,8 +123,8 @@ def _zdem(session: Session, piped: bool) -> None:
 
 
 def serve(talk: Talk, begin: Any, requests: IO[str], answers: IO[str]) -> None:
-    """For a program at the other end of a pipe (page/console.py): each line of requests is {"text": ..., "name": ...}.
-    Output is text; lines that begin with MARK report readiness and how a request ended."""
+    """Serve a program at the other end of a pipe (page/console.py): each line of requests is {"text": ..., "name":
+    ...}. Output is text; lines that begin with MARK report readiness and how a request ended."""
 
     def mark(**content: Any) -> None:
         answers.write(f"\n{MARK}{json.dumps(content)}\n")

@@ -55,7 +55,8 @@ def start(words: list[str], cores_before: int) -> NoReturn:
 
 
 def communicator() -> tuple[Comm, str]:
-    """All ranks, or this process alone with the reason why MPI cannot begin; other processes leave then."""
+    """Return the communicator of all ranks, or of this process with the reason why MPI cannot start; other processes
+    exit then."""
     try:
         return launch.start_mpi(), ""
     except HpcdemError as error:

@@ -18,7 +18,7 @@ from hpcdem.core.nearest import hint
 
 SUFFIXES = (".py", ".sc")
 PLACES = (Path(__file__).resolve().parents[2] / "examples", Path(sys.prefix) / "share" / "hpcdem" / "examples")
-"""Of a source tree, and of a package that was installed."""
+"""Folders of the examples in a source tree, and in an installed package."""
 
 
 @click.command(context_settings=HELP, epilog="Then: hpcdem NAME.py. The first lines of each example describe it.")

@@ -23,7 +23,7 @@ FLUID = ("pressure", "saturation", "aperture", "velocity", "concentration")
 PANELS_SHOWN = {name: (name,) for name in ("cracks", "stress", "plastic", "temperature", *FLUID)} | {
     "both": ("cracks", "stress")
 }
-"""By words of --show."""
+"""Panels by words of --show."""
 PAGE = 17.0
 """Width [cm] of a page on which fonts and lines have their sizes; a film shows the page with --size pixels."""
 

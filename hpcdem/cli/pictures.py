@@ -123,7 +123,7 @@ OPTIONS = (
         help="Show the step, or this text, in the corner [false].",
     ),
 )  # fmt: skip
-"""What a picture may look like."""
+"""Options for the appearance of pictures."""
 
 
 def looks(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -63,7 +63,7 @@ hpcdem: discrete elements for rock and sand. Usage: hpcdem SCRIPT, or hpcdem COM
   hpcdem doctor               report problems of this machine and the commands that fix them
 
 hpcdem --help lists all commands and options."""
-"""What `hpcdem` without a word says: a page that fits on a screen."""
+"""Text of `hpcdem` without arguments: a page that fits on a screen."""
 
 
 def suggestion(word: str) -> str:

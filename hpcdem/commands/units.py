@@ -46,7 +46,7 @@ def look(name: str, log: Any, given: Iterable[Given]) -> None:
 
 
 def _numbers(value: Any) -> Iterator[float]:
-    """All numbers in a value: a number, an array, or several of them."""
+    """Yield all numbers in a value: a number, an array, or several of them."""
     if isinstance(value, (bool, np.bool_, str)):
         return
     if isinstance(value, (int, float, np.integer, np.floating)):

@@ -17,6 +17,6 @@ class Clock:
     dt: float = 0.0
 
     def tick(self) -> None:
-        """One step of length dt has been done."""
+        """Count one step of length dt."""
         self.step += 1
         self.time += self.dt

@@ -100,7 +100,7 @@ class Selection:
     list of names that "group" points into."""
 
     def mask(self, p: Particles) -> np.ndarray:
-        """One bool per particle, shape (n,)."""
+        """Return one bool per particle, shape (n,)."""
         raise NotImplementedError
 
     def resolve(self, extents: Mapping[str, float]) -> Selection:
@@ -237,8 +237,8 @@ def _sides(first: Selection, second: Selection) -> bool:
 
 
 def chain(terms: Sequence[Selection], joins: Sequence[str]) -> Selection:
-    """One selection from RANGE terms as written: ``len(joins) == len(terms) - 1``, each "and", "or", or "" where two
-    terms follow each other without a word.
+    """Combine RANGE terms into one selection, as written: ``len(joins) == len(terms) - 1``, each "and", "or", or ""
+    where two terms follow each other without a word.
 
     ``x (a b) y (c d)`` is one shape, the rectangle of the manual, before "and" and "or" are evaluated from left to
     right; other terms without a word between them are joined by "and".

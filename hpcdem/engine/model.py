@@ -31,7 +31,7 @@ from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
 
 FRESH, LISTS, STORAGE = 0, 1, 2
-"""What a check finds outdated: nothing; the lists; storage, order and ghosts with them."""
+"""Parts that a check finds outdated: nothing; the lists; storage, order and ghosts with them."""
 
 
 class Histories(Protocol):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 LONGEST_WAIT = 64
-"""Most steps between two checks of how far anyone has gone."""
+"""Largest number of steps between two checks of the displacements."""
 GLANCE = 10
 """Steps between two glances: looks that change nothing unless somebody has sped up since the last check."""
 UNSEEN, AT_A_GLANCE, CHECK = 0, 1, 2

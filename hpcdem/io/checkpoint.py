@@ -43,7 +43,7 @@ VERSION = 9
 BLOCKS, BOTH = "blocks", "coupled"
 """`kind` in the state: a model of blocks, one of particles and blocks; particles alone have none."""
 OF_PARTICLES, LINKS = "discs_", "disc_contacts"
-"""In a file of both: what stands before the names of the particles' tables; the table of their contacts."""
+"""Prefix of the names of the particles' tables in a file of both models; table of the contacts between them."""
 
 _PART = 1 << 18
 """Words that are mixed at a time."""

@@ -26,7 +26,7 @@ from hpcdem.io.disk import explain
 
 HEADER = "hpcdem clumps 1"
 MOST_DISCS = 10**6
-"""More discs than this in one body are a slip."""
+"""Largest number of discs in one body; more are refused as a mistake."""
 FARTHEST = 100.0
 """Farthest point of a disc from the centroid in radii of gyration: a rod has 1.7, a disc 1.4."""
 BODY = "clump x y angle area inertia n"

@@ -11,7 +11,7 @@ from typing import Any
 def completion(
     words: Callable[[str], list[str] | None], names: dict[str, Any] | None = None
 ) -> Iterator[None]:  # fmt: skip
-    """Let Tab complete, where there is a terminal that can. words: those that a begun line may continue with, None if
+    """Enable completion by Tab if the terminal supports it. words: those that a begun line may continue with, None if
     it is Python, of which names are known."""
     try:
         import readline

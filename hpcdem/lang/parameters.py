@@ -164,7 +164,7 @@ def _of_python(tree: ast.Module, file: str) -> tuple[dict[str, Parameter], dict[
 
 
 def _at_top(node: ast.AST) -> Iterator[ast.AST]:
-    """All nodes whose names are those of the module."""
+    """Yield all nodes whose names belong to the module."""
     for child in ast.iter_child_nodes(node):
         if not isinstance(child, _OWN_NAMES):
             yield child

@@ -124,7 +124,7 @@ class Console:
 
     @property
     def alive(self) -> bool:
-        """There is a process, at work or not."""
+        """Return whether the process is running, busy or idle."""
         return self.process is not None and self.process.poll() is None
 
     def _listen(self, process: subprocess.Popen[str]) -> None:

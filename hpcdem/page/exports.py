@@ -29,14 +29,14 @@ FORMATS = {
     "png": "image/png", "svg": "image/svg+xml", "pdf": "application/pdf", "dxf": "image/vnd.dxf", "csv": "text/csv",
     "html": "text/html", "gif": "image/gif", "mp4": "video/mp4",
 }  # fmt: skip
-"""Their media types."""
+"""Media types of the formats."""
 PAPER = Paper(dpi=200.0)
 MOST_VECTORS = 20_000
 """Objects of a page with vectors; with more it holds a picture of pixels."""
 _drawing = threading.Lock()
 """Settings of matplotlib are those of the process."""
 _filming = threading.Lock()
-"""One film at a time; pictures are drawn between its own."""
+"""Lock that admits one film at a time; pictures are drawn between its frames."""
 
 
 def kinds() -> list[str]:
@@ -108,7 +108,7 @@ def _dxf_colours() -> np.ndarray:
 
 
 def _dxf_layer(painted: Painted, near: np.ndarray) -> list[str]:
-    """Its entities, as lines of codes and values."""
+    """Write the entities of a layer as lines of codes and values."""
     name = "".join(c if c.isascii() and c.isalnum() else "_" for c in painted.layer.label).upper() or "LAYER"
     lines: list[str] = []
 
@@ -139,7 +139,7 @@ def _dxf_layer(painted: Painted, near: np.ndarray) -> list[str]:
 
 
 def page(moment: Moment, view: ModelView) -> bytes:
-    """One page that needs nothing else: the figure, which the wheel makes larger and the mouse moves."""
+    """Write a self-contained page: the figure, which the wheel enlarges and the mouse moves."""
     count = sum(len(layer.rows) for layer in scene(moment, view).layers)
     if count <= MOST_VECTORS:
         text = _drawn(moment, view, "svg").decode()
@@ -167,7 +167,7 @@ addEventListener("dblclick", () => { s = 1; x = y = 0; put(); });
 
 
 def film(files: Sequence[FrameFile], view: ModelView, kind: str, wanted: dict[str, Any]) -> bytes:
-    """All frames at one place and with one range of colours. Raises HpcdemError."""
+    """Make a film of all frames with a fixed view and one range of colours. Raises HpcdemError."""
     fps = wanted.get("fps", 10)
     if not isinstance(fps, (int, float)) or not 0.1 <= fps <= 60.0:
         raise HpcdemError(f"fps: expected a number from 0.1 to 60, read {fps}")

@@ -25,7 +25,7 @@ KINDS: dict[str, tuple[type, ...]] = {
 MOST_PIXELS = 3840 * 2160
 """Pixels of a picture of `hpcdem view`; the window shows fewer, made larger, where it has more."""
 LONGEST_SIDE = 4096
-"""Of them along a side."""
+"""Largest number of pixels along a side."""
 PICTURES = 16
 """Pictures, clicks and lists of fields requested at a time: the rest of the CONVERSATIONS is for what needs no
 picture, such as to interrupt a run."""

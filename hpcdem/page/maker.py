@@ -58,7 +58,7 @@ def main() -> None:
 
 
 def warm_up() -> None:
-    """Have every kernel compiled, or loaded, and every module imported that a specimen of the page needs."""
+    """Compile or load every kernel, and import every module, that a specimen of the page needs."""
     from hpcdem.pre.specimen import PLACEMENTS, SHAPES, Request, make_specimen
 
     for shape in SHAPES:
@@ -233,7 +233,7 @@ def written(made: Specimen, style: dict[str, Any]) -> dict[str, Callable[[Path],
 
 
 def file(wanted: dict[str, Any]) -> bytes:
-    """One file of a specimen, or all of them in a ZIP archive."""
+    """Make one file of a specimen, or all of them in a ZIP archive."""
     from hpcdem.pre.specimen import make_specimen
 
     files = written(make_specimen(request_of(wanted)), wanted.get("style", {}))

@@ -45,9 +45,9 @@ CONVERSATIONS = 32
 DOOR = 64
 """Connections that have not shown the key yet."""
 HEAD_SECONDS = 10.0
-"""From the connection to the end of the headers."""
+"""Time from the connection to the end of the headers [s]."""
 BODY_SECONDS = 20.0
-"""From there to the end of the body."""
+"""Time from there to the end of the body [s]."""
 SLOWEST = 50e3
 """Bytes per second at which an answer must be taken, after the first seconds (as many as a body has)."""
 HEADERS = {
@@ -128,7 +128,8 @@ class PageServer(ThreadingHTTPServer):
         return f"http://{LOOPBACK}:{self.server_port}/open/{ticket}"
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """In a thread, at the door; who came first leaves where too many stand there."""
+        """Process a request in a thread. If too many clients wait for admission, the one that has waited longest is
+        dropped."""
         with self.turn:
             self.door[request] = None
             eldest = next(iter(self.door)) if len(self.door) > DOOR else None
@@ -140,8 +141,8 @@ class PageServer(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def admitted(self, request: socket.socket) -> bool:
-        """Let in who has shown the key; False if as many conversations as can be are under way. `free` is released at
-        the end."""
+        """Admit a client that has shown the key; False if the maximum number of conversations is active. `free` is
+        released at the end."""
         with self.turn:
             self.door.pop(request, None)
         return self.free.acquire(blocking=False)
@@ -207,7 +208,7 @@ class Conversation(BaseHTTPRequestHandler):
         self.rfile = io.BufferedReader(self.incoming)
 
     def handle(self) -> None:
-        """One request."""
+        """Handle one request."""
         try:
             super().handle()
         finally:
@@ -326,7 +327,7 @@ class Conversation(BaseHTTPRequestHandler):
         self.wfile.write(answer.body)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing: requests hold the key."""
+        """Log nothing: requests contain the key."""
 
 
 def _read(text: bytes) -> dict[str, Any]:

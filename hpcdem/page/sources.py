@@ -23,7 +23,7 @@ from hpcdem.runtime import kernels, run_folder
 MOMENTS = 3
 """Frames that are kept in memory: one on show, and its neighbours."""
 OBJECTS = 500_000
-"""One is read besides others if these have no more objects together."""
+"""Largest number of objects in memory at which another frame is kept beside them."""
 SIGNALS = {"stop": signal.SIGUSR1, "save": signal.SIGUSR2}
 
 
@@ -37,7 +37,8 @@ class Source:
 
 
 class Sources:
-    """All that was named on the command line. HpcdemError where there is nothing to show, unless it may come (empty).
+    """Everything named on the command line. Raises HpcdemError if there is nothing to show, unless that is allowed
+    (empty).
 
     The first folder is that of the run; below it may lie what a console shows of its model (commands/present.py).
     """
@@ -97,7 +98,7 @@ class Sources:
         self.found = found
 
     def source(self, number: Any) -> Source:
-        """One of them, by its index. HpcdemError for an unknown one."""
+        """Return a source by its index. Raises HpcdemError for an unknown one."""
         if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(self.found):
             raise HpcdemError("unknown frames")
         return self.found[number]
@@ -139,7 +140,7 @@ class Sources:
     # ---- the run ---------------------------------------------------------------------------------------------------
 
     def folders(self) -> list[Path]:
-        """Each folder once."""
+        """List each folder once."""
         return [path for path in self.paths if path.is_dir()]
 
     def state(self) -> dict[str, Any]:

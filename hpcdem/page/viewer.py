@@ -64,11 +64,11 @@ KINDS = {
 KEPT = 24
 """Layers that are kept put together."""
 BYTES = 20e6
-"""Of layers of other frames that are kept."""
+"""Largest size of stored layers of other frames [bytes]."""
 MOVED = ("elements", "joints")
-"""What is drawn deformed; joints in space lie on faces of elements."""
+"""Objects drawn deformed; joints in space lie on faces of elements."""
 FINE = 2
-"""Each pixel of a picture at rest is the mean of this number squared."""
+"""Square root of the number of samples of which each pixel of a picture at rest is the mean."""
 FINEST = 2560 * 1600
 """Larger pictures, of screens with small pixels, are as fine as these: nobody waits ten seconds for one."""
 
@@ -121,7 +121,7 @@ class Viewer:
         }
 
     def _one_of_few(self, answer: Call) -> Call:
-        """With places left for what needs no picture. BusyError where too many wait."""
+        """Limit the pictures made at once, to leave threads for other requests. Raises BusyError if too many wait."""
 
         def call(wanted: dict[str, Any]) -> Answer:
             if not self.places.acquire(blocking=False):
@@ -134,7 +134,7 @@ class Viewer:
         return call
 
     def _in_turn(self, answer: Callable[[dict[str, Any]], dict[str, Any]]) -> Call:
-        """One after the other: what is kept of a frame is for one at a time."""
+        """Serialize requests: the stored data of a frame serve one request at a time."""
 
         def call(wanted: dict[str, Any]) -> Answer:
             with self.turn:
@@ -143,7 +143,7 @@ class Viewer:
         return self._one_of_few(call)
 
     def warm_up(self) -> None:
-        """Have the kernels compiled, or loaded, before the first picture is requested."""
+        """Compile or load the kernels before the first picture is requested."""
         from hpcdem.post.view import warm_up
 
         with self.turn:
@@ -413,7 +413,7 @@ def _legend(shown: Scene) -> list[dict[str, Any]]:
 
 
 def _stops(name: str) -> list[str]:
-    """Some colours of a field, for the bar on the page."""
+    """Return some colours of a field for the bar on the page."""
     shades = np.rint(255.0 * shades_of(name)[:: 256 // 16]).astype(int)
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in [*shades, np.rint(255.0 * shades_of(name)[-1]).astype(int)]]
 

@@ -26,20 +26,20 @@ LONGEST = 120.0
 WAITING = 4
 """Requests that may wait where each of them counts."""
 FRAME = struct.Struct("<BQ")
-"""Before each message: one of the codes below, and its length."""
+"""Header of each message: one of the codes below, and its length."""
 READY, ASKED, MADE, REFUSED, BROKEN = range(5)
 """The maker's kernels are compiled; a request; its answer; a sentence for the user; an error of ours."""
 
 
 class SupersededError(HpcdemError):
-    """There is a newer request; nobody waits for this answer."""
+    """Superseded by a newer request: nobody waits for this answer."""
 
     status = 409
-    """Of HTTP: conflict."""
+    """HTTP status: conflict."""
 
 
 class Maker:
-    """One process."""
+    """One process that makes specimens."""
 
     def __init__(self) -> None:
         root = str(Path(__file__).resolve().parents[2])
@@ -108,7 +108,7 @@ class Worker:
         self.busy = 0
         """Number of the request that is worked on, or 0."""
         self.began: float | None = None
-        """When the work on it began; None while the maker gets ready, and is not to be ended."""
+        """Start of the present work; None while the maker gets ready, and must not be ended."""
         self.ended = 0
         """The last request whose maker was ended."""
         self.maker: Maker | None = None

@@ -22,4 +22,4 @@ def _diffusion() -> type[ParticlePhysics]:
 
 
 PHYSICS: Mapping[str, Callable[[], type[ParticlePhysics]]] = {"diffusion": _diffusion}
-"""How to get each class: its import brings numba and kernels, which takes a second."""
+"""Loaders of each class: its import loads numba and kernels, which takes a second."""

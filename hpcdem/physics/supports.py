@@ -14,7 +14,7 @@ ALL: tuple[type[Structure], ...] = (Bolts, Liners)
 QUANTITIES: Mapping[str, Mapping[str, tuple[str, str]]] = {
     kind: of for support in ALL for kind, of in support.quantities.items()
 }
-"""What can be asked of each kind of object: unit and meaning."""
+"""Quantities of each kind of object that can be queried: unit and meaning."""
 
 
 def class_of(kind: str) -> type[Structure]:

@@ -14,7 +14,7 @@ from hpcdem.io.vtkhdf_mesh import MeshState
 from hpcdem.post.saved import save
 
 SIZE = 5.5, 3.9
-"""Of the diagram, in inches."""
+"""Size of the diagram [inches]."""
 FONT = 9.0
 """Points, beside a model."""
 BAR = 0.85
@@ -25,9 +25,9 @@ IN_SPACE = {
     "aperture": ("joints", "aperture"), "velocity": ("joints", "fluid_velocity"),
     "concentration": ("joints", "proppant_concentration"), "cracks": ("joints", ""),
 }  # fmt: skip
-"""What colours a body beside a diagram, by the panel: objects and a field of theirs."""
+"""Field that colours a body beside a diagram, by the panel: objects and one of their fields."""
 COLOURS = ("#202020", "#2a8c5a", "#8c5aa8", "#9a6b2f")
-"""Of curves beside a model: none that a crack has."""
+"""Colours of curves beside a model: none that a crack has."""
 Points = Sequence[tuple[float, float]]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError
 
 MOST_NODES = 20_000_000
-"""More nodes than this are a particle gone astray or a spacing in the wrong unit."""
+"""Largest number of nodes; more indicate a stray particle or a spacing in the wrong unit."""
 _AROUND = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1))
 
 

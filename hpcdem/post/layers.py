@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hpcdem.post.view.scene import Painted
 
 MOST_LABELS = 5000
-"""More ids than this in one picture are a grey mush, and take minutes."""
+"""Largest number of ids in one picture; more are illegible, and take minutes."""
 TENSION, COMPRESSION, INK = "#c81e1e", "#1e3cb4", "#202020"
 BALL = 3.0
 """Radius of the ball that is rolled over the particles to find their surface, in median radii."""
@@ -114,7 +114,7 @@ def bonds(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def bond_states(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """All contacts from centre to centre: black not bonded, red bonded in tension, blue bonded in compression."""
+    """Draw all contacts from centre to centre: black not bonded, red bonded in tension, blue bonded in compression."""
     bonded = frame.tables["bonds"].columns
     places, (first, second) = _ends(frame, "contacts")
     pairs = np.stack([first, second], axis=1)

@@ -205,7 +205,7 @@ def _indexed(image: Any, palette: np.ndarray) -> Any:
 
 
 def _codes(pixels: np.ndarray) -> np.ndarray:
-    """One number per colour: (n, 3) bytes to (n,)."""
+    """Convert colours to one number each: (n, 3) bytes to (n,)."""
     return pixels.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)
 
 

@@ -40,8 +40,8 @@ PARTICLE_FIELDS = (
 since the first section in which the particle was (identity there), strains of F; whether it is fixed along x and y."""
 VERSION = 1
 MEAN, NEAREST, PAGE = VOLUMES = ("mean", "nearest", "page")
-"""How the volumetric strain of the nodes is made: mean of what lies around a node; that of the nearest particle; as
-the manual's pages draw it (`strain.page_volume`)."""
+"""Volumetric strain of the nodes: mean of what lies around a node; that of the nearest particle; as the manual's pages
+draw it (`strain.page_volume`)."""
 
 
 @dataclass

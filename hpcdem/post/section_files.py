@@ -20,7 +20,7 @@ _TEXT = {
 
 
 def write_out(path: str | os.PathLike, section: Section, since: str) -> None:
-    """One row per particle; two header lines that begin with #. since: name of the frame at which F is 1."""
+    """Write one row per particle; two header lines that begin with #. since: name of the frame at which F is 1."""
     p = section.particles
     width = max(11, len(str(int(np.max(p["gid"], initial=0)))) + 2)
     columns = [(Column("id", INT, width), p["gid"])]

@@ -135,7 +135,7 @@ def _in_processes(tasks: Sequence[Task], workers: int) -> Iterator[tuple[int, st
 
 
 def _alone() -> None:
-    """In a new process: it is no rank, so an HDF5 with MPI must not take it for one."""
+    """Prepare a new process: it is not a rank, so an HDF5 with MPI must not mistake it for one."""
     for name in [name for name in os.environ if name.startswith(_LAUNCHER)]:
         del os.environ[name]
 
@@ -178,7 +178,7 @@ class Progress:
             self._bar.stop()
 
     def done(self, name: str) -> None:
-        """One more task of this rank is done."""
+        """Count a completed task of this rank."""
         self._done += 1
         now = time.monotonic()
         if self._bar is not None:

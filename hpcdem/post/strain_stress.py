@@ -32,9 +32,9 @@ from hpcdem.post.section import MEAN, PAGE, Section, write_section
 from hpcdem.post.surface import bed, held_fast, surface
 
 QUIET_SECONDS = 2.0
-"""At most one line on the progress in this time."""
+"""Shortest time between two lines of progress [s]."""
 INSIDE, AROUND = 2, 3
-"""Of `solid_fraction`, in spacings."""
+"""Radii of `solid_fraction`, in spacings."""
 STRESS_REACH = 1.5
 """Particles nearer to a node than this many SIZE count in its stress: as smooth as the manual's figures."""
 SPREAD = 0.8
@@ -437,7 +437,7 @@ def solid_fraction(
 
 
 def _each_way(combine: np.ufunc, values: np.ndarray, reach: int) -> np.ndarray:
-    """Each value combined with those up to `reach` places away in both directions; zero outside."""
+    """Combine each value with those up to `reach` places away in both directions; zero outside."""
     for axis in (0, 1):
         padded = np.pad(values, [(reach, reach) if a == axis else (0, 0) for a in (0, 1)])
         result = np.take(padded, range(values.shape[axis]), axis)

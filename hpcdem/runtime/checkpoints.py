@@ -39,7 +39,7 @@ def go_back_to(path: Path, folders: list[Path], comm: Comm) -> None:
 
 
 def none_before(before: float, folders: list[Path]) -> UsageError:
-    """There is no checkpoint to go back to."""
+    """Return the error if no complete checkpoint is early enough."""
     return UsageError(
         f"no complete checkpoint in {' or '.join(map(str, folders))} at or before {before:g} s of model time (hpcdem "
         "info FILE.sav shows the time of each)"

@@ -88,5 +88,5 @@ class Pace:
 
 
 def threads(count: int) -> str:
-    """In words."""
+    """Format a number of threads."""
     return "1 thread" if count == 1 else f"{count} threads"

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 QUIET_SECONDS = 10.0
 """A log file gets at most one progress line in this time, unless the script sets the interval itself."""
 FOLDED_AFTER = 3
-"""So many warnings that differ in numbers alone are written one by one."""
+"""Number of warnings differing only in numbers that are written individually."""
 _NUMBERS = re.compile(r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 NOTE_SECONDS = 1.0
 """Time between two notes in the folder of the results, and before the first one."""
@@ -153,7 +153,7 @@ class Log:
         self._warned: set[str] = set()
         self._warnings: dict[str, int] = {}
         self.folds = True
-        """Whether warnings that come again and again are counted; not where somebody types commands."""
+        """Whether repeated warnings are counted instead of written; off while a user types commands."""
         self._script_steps = 0
         self._script_done = self._script_first = 0
         self._script_began = now()
@@ -224,7 +224,7 @@ class Log:
         self._script_began = self._now()
 
     def set_interval(self, explicit: bool) -> None:
-        """After SET stepbar: the user wants a line per interval, however short."""
+        """Set after SET stepbar: the user wants a line per interval, however short."""
         self.every_interval = explicit
 
     def command_started(

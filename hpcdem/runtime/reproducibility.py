@@ -17,7 +17,7 @@ from hpcdem.core.errors import HpcdemError, UsageError
 LINE = re.compile(r"state (\d+)(?: of model (\d+))?: ((?:\w+=[0-9a-f]{32} ?)+)\s*$")
 
 States = dict[tuple[int, int], dict[str, str]]
-"""By model and step: what each part of the state came to."""
+"""Digests of the parts of the state, by model and step."""
 
 
 def line(step: int, model: int, parts: Mapping[str, str]) -> str:

@@ -36,7 +36,7 @@ PRESENT = "now"
 _NUMBERED = re.compile(r"(auto_)?(\d{10,})\.sav")
 
 ROUNDING = 1e-9
-"""Of times, which are sums of steps, relative to them."""
+"""Relative tolerance of times, which are sums of steps."""
 
 _held: dict[Path, FolderLock] = {}
 """Locks of this process. One program may make several simulations that write into one folder."""
@@ -167,7 +167,7 @@ class Retention:
 
 
 def retire(folder: Path, comm: Comm, step: int, keep: Retention) -> None:
-    """After the checkpoint of `step`: remove those of this run that are too many, numbered ones before the last
+    """Remove, after the checkpoint of `step`, those of this run that are too many, numbered ones before the last
     `keep.last`, automatic ones before the last two and from before the last numbered one, but for those that `keep`
     spares. Not collective.
 

@@ -136,7 +136,7 @@ class StopRequests:
         self._watchdog.close()
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        """Only sets a flag: the state may be in the middle of a step."""
+        """Set a flag only: the state may be in the middle of a step."""
         name = signal.Signals(number).name
         if name == "SIGUSR2":
             self._save = self._save or time.monotonic() - self._last_saved > SAME_REQUEST

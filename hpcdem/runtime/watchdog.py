@@ -59,7 +59,7 @@ class Watchdog:
         threading.Thread(target=self._watch, args=handles, name="watchdog", daemon=True).start()
 
     def answered(self) -> None:
-        """All ranks have agreed to stop: the last checkpoint may take as long as it needs."""
+        """Note that all ranks have agreed to stop: the last checkpoint may take as long as it needs."""
         self._answered.set()
 
     def close(self) -> None:

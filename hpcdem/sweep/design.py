@@ -1,4 +1,4 @@
-"""From `friction=0.2,0.3` and `1:10` to the values of each member: grids, Latin hypercubes, Sobol sequences."""
+"""Convert `friction=0.2,0.3` and `1:10` to the values of each member: grids, Latin hypercubes, Sobol sequences."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def choice(script: Adjustable, name: str, words: str | Sequence[object], sampled
 
 
 def _whole_numbers(given: str, words: str, low: float, high: float) -> list[Value]:
-    """From low to high."""
+    """List the whole numbers from low to high."""
     if not (low.is_integer() and high.is_integer()):
         raise UsageError(
             f"{given}: without sampling, a range consists of whole numbers. Give the number of values, such as "

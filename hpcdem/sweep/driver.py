@@ -76,7 +76,7 @@ class _Driver:
         self.done = len(plan.members) - len(unfinished)
 
     def run(self) -> dict[str, str]:
-        """Until all are done, have failed, or somebody asks to stop."""
+        """Run members until all are done, have failed, or somebody asks to stop."""
         found = [member.name for member in self.open if member.state == RUNNING]
         already = f", {self.done} already done" if self.done else ""
         self.log.info(f"{self.plan.folder}: {len(self.plan.members)} members{already}, {self.at_once} at once")

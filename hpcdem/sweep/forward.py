@@ -19,7 +19,7 @@ from hpcdem.sweep.calibration import Target
 from hpcdem.sweep.design import Range
 
 OF = ("max", "min", "end", "mean", "slope")
-"""What is taken of a history: a number of y, or the slope of y over x while y is within part of its maximum."""
+"""Values taken from a history: a number of y, or the slope of y over x while y is within part of its maximum."""
 _NUMBER = "a number", lambda v: isinstance(v, int | float) and not isinstance(v, bool)
 _WHOLE = "a whole number above 0", lambda v: _whole(v) and v > 0
 _NATURAL = "a whole number from 0 on", lambda v: _whole(v) and v >= 0

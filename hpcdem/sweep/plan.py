@@ -67,7 +67,7 @@ class Plan:
 
     @property
     def members(self) -> list[Member]:
-        """All of them, in order."""
+        """List all members in order."""
         return [Member(self.folder / f"{k:04d}", values) for k, values in enumerate(self.values)]
 
     def member(self, number: int) -> Member:

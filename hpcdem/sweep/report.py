@@ -31,7 +31,7 @@ class _Quiet:
         """Said of each member alike."""
 
     def warn(self, text: str) -> None:
-        """With the name of the member."""
+        """Log a warning with the name of the member."""
         self.log.warn(f"{self.name}: {text}")
 
 

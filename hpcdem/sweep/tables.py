@@ -28,7 +28,7 @@ SERIES: dict[str, tuple[str, ...]] = {
 TIMES = ("step", "ini", "time[s]", "shortening[m]", "from", "to")
 OF_FAULTS = ("born_shortening[m]", "born_time[s]", "x[m]", "dip_at_birth[deg]", "dip[deg]", "length[m]", "slip[m]",
              "throw[m]", "heave[m]", "largest_slip_rate[m/s]", "share_of_shortening")  # fmt: skip
-"""What is compared of the n-th fault of each member."""
+"""Columns of the n-th fault of each member that are compared."""
 APART = ("tracks",)
 """Measures of single particles, which are others in each member."""
 

@@ -177,7 +177,7 @@ HISTORIES = {
     "bonds": ("1", lambda sim: float(sim.bonds_left())),
     "energy": ("J", budget.stored_energy),
 }
-"""What HIST can follow: unit and function of the simulation."""
+"""Quantities that HIST can record: unit and function of the simulation."""
 
 
 def followed(sim: Simulation) -> dict[str, tuple[str, Callable[[Simulation], float]]]:
@@ -311,7 +311,7 @@ ENERGY_WORDS = {
     "work_blocks": ACROSS,
     "closing": "closing error",
 }
-"""What the table at the end calls the columns of energy.csv."""
+"""Names of the columns of energy.csv in the final table."""
 
 
 def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus:
@@ -361,7 +361,7 @@ def close_histories(sim: Simulation) -> None:
 
 
 def finish(sim: Simulation) -> None:
-    """At STOP, write the last line of histories, and the curves requested by PLOT, `hist_<y>_vs_<x>.txt` and `.png`."""
+    """Write at STOP the last line of histories, and the curves requested by PLOT, `hist_<y>_vs_<x>.txt` and `.png`."""
     close_histories(sim)
     for y, x in sim.plots:
         missing = [i for i in (y, x) if i not in sim.history_requests]

@@ -24,7 +24,7 @@ NUMBERS: dict[str, tuple[type, Callable[[Any], bool], str]] = {
     "restitution": (float, lambda value: 0.0 < value <= 1.0, "restitution must be above 0 and not above 1"),
     "seed": (int, lambda value: not value < 0, "seed must not be negative"),
 }
-"""Their kind, what they must fulfil, and how that is reported."""
+"""Type of each number, its condition, and the text of the message if it is not fulfilled."""
 STEPS = {"dt": "frac", "frac": "dt"}
 """Two ways to say the time step."""
 CHOICES = {"disk": tuple(SPHERES), "wallside": ("left", "both"), "rolling": ("a", "c")}

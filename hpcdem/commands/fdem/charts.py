@@ -44,9 +44,8 @@ def add(
     profile: str = "",
     where: Range | None = None,
 ) -> None:
-    """One more curve: history y against history x (or time), or points, or what fluid has at this moment along the line
-    of channels that a range chooses, over the distance from its left end (profile: a quantity of channels). Collective.
-    """
+    """Add a curve: history y against history x (or time), or points, or what fluid has at this moment along the line of
+    channels that a range chooses, over the distance from its left end (profile: a quantity of channels). Collective."""
     chart = _chart(project, name)
     if profile:
         found, label = _profile(project, profile.replace("-", "_"), where), label or profile.replace("-", " ")

@@ -23,7 +23,7 @@ from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.runtime import run_folder
 
 FORMAT = 1
-"""Of what is saved beside the simulation."""
+"""Version of the data saved beside the simulation."""
 
 
 SUFFIX = ".sav"

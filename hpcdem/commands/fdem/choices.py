@@ -93,7 +93,7 @@ _NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
 _NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer, g.Along, g.Near, g.Crossed, g.Sized)
 _BY_PLACE = (g.Span, g.OnLayer, g.InCircle, g.Near, g.Crossed, g.Along)
 ASIDE = 1e-4
-"""Over the size of a face: how far aside a surface is searched for, and so how well the cosine of its angle is
+"""Distance over the size of a face: how far aside a surface is searched for, and so how well the cosine of its angle is
 known."""
 STRAIGHT = 1e-6
 """Degrees by which an angle that is 0 may be off: coordinates of meshes are rounded."""
@@ -344,7 +344,8 @@ class _Objects:
         return np.min(found, axis=0).reshape(places.shape[:2])
 
     def _along(self, layer: str, distance: float, angle: float) -> np.ndarray:
-        """Near a line of the layer, and, what has a direction, at a small angle to it there."""
+        """Flag objects near a line of the layer; objects with a direction must be at a small angle to the line
+        there."""
         if self.mesh.dim == 3:
             return self._along_surfaces(layer, distance, angle)
         places, found = self.places(), np.zeros(len(self.numbers), bool)
@@ -361,8 +362,8 @@ class _Objects:
         return found
 
     def _along_surfaces(self, layer: str, distance: float, angle: float) -> np.ndarray:
-        """Near the surfaces of a layer in space, at a small angle to them: a face that leans from one by an angle comes
-        away from it along its normal by the cosine of that."""
+        """Flag objects near the surfaces of a layer in space, at a small angle to them: a face that leans from one by
+        an angle comes away from it along its normal by the cosine of that."""
         places, found = self.places(), np.zeros(len(self.numbers), bool)
         slack = self._slack(TOLERANCE)
         middle, along = places.mean(axis=1), places.shape[1] > 1 and self.kind not in g.SUPPORTS and angle < 90.0
@@ -438,7 +439,7 @@ class _Objects:
         return self.project.layers[layer]
 
     def _boundary(self) -> np.ndarray:
-        """Beside nothing, or beside an element that was removed."""
+        """Flag objects without a neighbour, or next to a removed element."""
         alive, edges = self.project.alive, self.project.edges()
         there = np.append(alive, False)[np.where(edges.faces >= 0, edges.faces // 4, len(alive))]
         rim = there[:, 0] != there[:, 1]
@@ -477,7 +478,7 @@ _MASKS: dict[type, Callable[..., np.ndarray]] = {
     g.Crossed: _Objects._crossed,
     g.OnCrack: _Objects._on_crack,
 }
-"""Which objects a term holds for, from what it says."""
+"""Functions that flag the objects selected by a term, by its type."""
 
 
 def _bare(term: g.Term) -> g.Term:

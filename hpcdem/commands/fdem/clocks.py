@@ -17,7 +17,7 @@ from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import Proppant
 
 MECHANICAL, THERMAL, HYDRAULIC, PROPPANT = PARTS = "mechanical", "thermal", "hydraulic", "proppant_transport"
-"""What has a clock; that of proppant is the one of the fluid."""
+"""Parts with a clock; proppant shares the one of the fluid."""
 
 
 def run_time(project: Project, time: float) -> None:
@@ -86,7 +86,7 @@ def _set_clock(project: Project, part: str, time: float) -> None:
 
 
 def _physics(project: Project, part: str) -> Any:
-    """Whose clock it is; CommandError if it is not there."""
+    """Return the physics whose clock is meant. Raises CommandError if the model lacks it."""
     if part == PROPPANT:
         needed(project, Proppant, use=False)
     return needed(project, Heat if part == THERMAL else Flow, use=False)

@@ -83,7 +83,7 @@ def _by_frac(both: Coupled) -> float:
 
 
 def _warn(both: Coupled) -> None:
-    """Once each: what is given for one of the two and may be meant for both."""
+    """Warn once about each setting that is made for one of the two models and may be meant for both."""
     sim, options = both.particles, both.blocks.options
     if sim.log is None:
         return
@@ -102,7 +102,7 @@ def _warn(both: Coupled) -> None:
 
 
 def _warn_of_walls(both: Coupled) -> None:
-    """Once per wall: a block that is in or behind a wall, which holds particles only. Collective."""
+    """Warn once per wall about a block that is in or behind a wall, which holds particles only. Collective."""
     from hpcdem.physics.coupling.beyond import beyond
 
     log = both.particles.log
@@ -172,9 +172,8 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
 
 
 def advance(project: Project, steps: int) -> int:
-    """Up to `steps` steps of the blocks, and of the particles with them; what the outside requested. What is due of the
-    particles on the way is written; if one of their functions wants the command to end, project.progress["done"] says
-    so. Collective."""
+    """Take up to `steps` steps of the blocks and their particles; returns the external request. Due output of the
+    particles is written; if one of their functions ends the command, project.progress["done"] is set. Collective."""
     both, due = project.coupled, project.due
     if both is None or due is None:
         return convergence.advance(project.blocks, steps)

@@ -58,7 +58,7 @@ def face_condition(
 
 
 def remove(project: Project, name: str, kind: str, where: Range | None = None) -> None:
-    """Nothing is prescribed at nodes or faces any more; without the field there is nothing to do."""
+    """Remove the conditions of nodes or faces; does nothing without the field."""
     found = kinds()[name].load_type().there(project.ready())
     if found is not None and kind == FACE:
         found.remove_face_conditions(chosen(project, FACE, where))

@@ -117,7 +117,7 @@ def _level(project: Project, point: Sequence[float]) -> float:
 
 
 def remove_conditions(project: Project, where: Range | None = None, fluid: bool = True, grains: bool = True) -> None:
-    """Nothing is prescribed at flow nodes any more; without fluid there is nothing to do."""
+    """Remove the conditions of flow nodes; does nothing without fluid."""
     for wanted, found in ((fluid, Flow.there(project.ready())), (grains, Proppant.there(project.ready()))):
         if wanted and found is not None:
             found.remove_conditions(points(project, where))

@@ -136,7 +136,7 @@ def _names(blocks: Blocks, kind: str) -> list[str]:
 
 
 def _corners(blocks: Blocks) -> dict[str, np.ndarray]:
-    """Every corner of this rank's elements by itself, with its node: those of broken joints part."""
+    """Return the columns of every corner of this rank's elements, with its node: corners at broken joints differ."""
     axes = "xyz"[: blocks.dim]
     vectors = [f"{name}_{axis}" for name in ("position", "displacement", "velocity") for axis in axes]
     fields = [name for name in diagnostics.DIFFUSING if name in blocks.cold]

@@ -97,7 +97,7 @@ def face_condition(
 
 
 def remove_conditions(project: Project, where: Range | None = None, rock: bool = True, fluid: bool = True) -> None:
-    """No temperature of nodes and their fluid is prescribed any more; without heat there is nothing to do."""
+    """Remove prescribed temperatures of nodes and their fluid; does nothing without heat."""
     found = Heat.there(project.ready())
     if found is not None:
         found.remove_conditions(points(project, where), rock, fluid)

@@ -26,7 +26,7 @@ from hpcdem.physics.fdem.sides import SIDE
 from hpcdem.physics.flow.model import Flow
 
 IN_SPACE = tuple(name for name in UNITS[MODEL] if name != "disc_work")
-"""What a history of a model in three dimensions can follow."""
+"""Quantities of the model that a history can record in three dimensions."""
 ON_IT = 1e-6
 """A place that is no farther from a node, over the size of the model, is that of the node: of all its sides."""
 FLUSH = 500
@@ -93,7 +93,7 @@ def _check_value(project: Project, kind: str, value: str) -> None:
 
 
 def _warn_of_nothing(project: Project, name: str, value: str, joints: Sequence[int]) -> None:
-    """None of these joints has this quantity so far."""
+    """Warn if none of these joints has this quantity so far."""
     blocks, at = project.blocks, np.array(joints, np.int64)
     there = (blocks.joint_row[at] > 0) | (blocks.open[at] & (value in ("opening", "slip")))
     if len(at) and not there.any() and project.log is not None:

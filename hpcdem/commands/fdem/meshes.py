@@ -374,7 +374,7 @@ def densify(
 
 
 def six_nodes(project: Project) -> None:
-    """Each triangle becomes a six-node triangle: four elements with quadratic displacements together. A node between
+    """Turn each triangle into a six-node triangle: four elements with quadratic displacements together. A node between
     two of a group of nodes is in the group. Collective."""
     project.refuse_in_use("elements get more nodes")
     mesh = project.whole_mesh()
@@ -390,7 +390,7 @@ def six_nodes(project: Project) -> None:
 
 
 def add_nodes(project: Project, points: Sequence[tuple[float, ...]]) -> None:
-    """More nodes [m], for elements that are added next; their numbers follow those of the mesh."""
+    """Add nodes [m] for elements that are added next; their numbers follow those of the mesh."""
     project.refuse_in_use("nodes are added")
     if any(len(at) != project.dim for at in points):
         raise CommandError(f"a node needs {project.dim} coordinates")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from hpcdem.pre.mesh import optional
 
 EXTRA = optional.EXTRA
-"""What brings all of them."""
+"""Extra of the package that installs all of them."""
 NEEDED: Mapping[str, Callable[[str], tuple[optional.Load, ...]]] = {
     "mesh create": lambda file: (optional.gmsh, optional.shapely),
     **{
@@ -18,4 +18,5 @@ NEEDED: Mapping[str, Callable[[str], tuple[optional.Load, ...]]] = {
     "geometry import": optional.of_drawing,
     "geometry export": optional.of_drawing,
 }
-"""What loads them, for a file of this name; each raises HpcdemError, with the way to get it, where it is missing."""
+"""Loaders of the packages for a file of this name; each raises HpcdemError with the install command if one is
+missing."""

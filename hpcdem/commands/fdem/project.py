@@ -340,7 +340,7 @@ class Project:
 
 
 def joined(one: Mesh, other: Mesh) -> Mesh:
-    """Two bodies in one mesh: numbers of the second follow those of the first, equal names are united, nothing is
+    """Join two bodies in one mesh: numbers of the second follow those of the first, equal names are united, nothing is
     merged."""
     n_points, n_cells = len(one.points), len(one.cells)
     groups = {s: dict(of) for s, of in one.groups.items()}

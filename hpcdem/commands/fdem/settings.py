@@ -133,7 +133,7 @@ def creep(
 
 
 def reset_velocity(project: Project) -> None:
-    """All velocities become zero."""
+    """Set all velocities to zero."""
     changes.reset_velocity(project.ready())
 
 

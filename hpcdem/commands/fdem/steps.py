@@ -38,7 +38,7 @@ CYCLES = 10_000
 STRIDE = 100
 """Steps at most between two looks at the model time, as the time step may change."""
 CONTINUE = "continue"
-"""What a script may do when a run towards a ratio has failed; else it stops."""
+"""Choice of a script after a failed run towards a ratio; otherwise the script stops."""
 FAILED = ("no progress", "limit")
 """Reasons of `blocks.Watch`; "runaway": a body moved too fast to continue."""
 STEADY_STEP = 1.0

@@ -41,7 +41,7 @@ ENERGY_WORDS = {
     "commands": "supplied by commands",
     "closing": "closing error",
 }
-"""What the table at the end calls the entries of the energy budget."""
+"""Names of the entries of the energy budget in the final table."""
 SUPPORT_WORDS = {
     "stored": "stored, with kinetic energy",
     "at_start": "part of it at the beginning",

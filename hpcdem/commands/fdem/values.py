@@ -23,7 +23,7 @@ from hpcdem.pre.mesh.sizes import skew_grid, spaced
 
 FIGURES = (".png", ".pdf", ".svg")
 DEFAULT_LAYER = "default"
-"""Of shapes that name none."""
+"""Layer of shapes that name none."""
 
 
 def grid_lines(

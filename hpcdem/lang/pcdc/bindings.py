@@ -188,7 +188,7 @@ _TERMS: dict[str, Callable[[Any], g.Term]] = {
 # ---- what more there is to convert -----------------------------------------------------------------------------------
 
 CONVERTERS: dict[str, Callable[[Call], None]] = {}
-"""By the names that rows of the table give them."""
+"""Converters by their names in the rows of the table."""
 
 
 def converter(function: Callable[[Call], None]) -> Callable[[Call], None]:
@@ -351,7 +351,7 @@ def random_field(call: Call) -> None:
 
 @converter
 def history(call: Call) -> None:
-    """One of several words says what is made of several numbers."""
+    """Create a history; one of several words reduces several numbers to one value."""
     given = call.given("object")
     how = next((word for word in ("sum", "mean", "minimum", "maximum") if given.pop(word, False)), "")
     kind = {"joint": g.JOINT}.get(call["object"], call["object"])
@@ -430,4 +430,4 @@ PASSED_OVER: dict[str, Callable[[Any, str], Any]] = {
     "history export": lambda project, file: project.to_write(project.result(file)),
     "chart export": lambda project, file: project.to_write(project.result(file)),
 }
-"""What is still to be known of a command that was carried out before the checkpoint: which file it read or made."""
+"""Facts still needed of a command that was executed before the checkpoint: the file that it read or wrote."""

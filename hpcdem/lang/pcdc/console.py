@@ -35,7 +35,8 @@ class Console:
         self.count = 0
 
     def run(self) -> None:
-        """Until the end of input or exit(). What goes wrong is reported, and the conversation continues."""
+        """Read and execute commands until the end of input or exit(). Errors are reported, and the console
+        continues."""
         self.say(WELCOME)
         with completion(_words, self.interpreter.namespace):
             while True:

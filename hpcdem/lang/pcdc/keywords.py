@@ -48,7 +48,7 @@ class Keyword:
         return typed.lower() in self.fulls
 
     def spellings(self) -> list[str]:
-        """All spellings: in full, then with each part in full or abbreviated as far as allowed."""
+        """Return all spellings: in full, then with each part in full or abbreviated as far as allowed."""
         short = (itertools.product(*(dict.fromkeys(reversed(part)) for part in parts)) for parts in self._parts)
         return list(dict.fromkeys([*self.fulls, *("-".join(one) for one in itertools.chain(*short))]))
 

@@ -64,9 +64,9 @@ class Kind:
     softens: bool = False
     """``table 'name' over plastic-strain`` may, too."""
     temperature_dependent: bool = False
-    """So may ``table 'name' over temperature``, or over another field of elements."""
+    """Also accepts ``table 'name' over temperature``, or over another field of elements."""
     python: str = "float"
-    """Its type in a Python program, in the words of `hpcdem.api.types`."""
+    """Type in a Python program, in the words of `hpcdem.api.types`."""
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -253,17 +253,17 @@ PAIRS = Kind("<f> <f>, <f> <f> ...", "pairs of numbers, time and value", number(
 VECTOR = Kind("<v>", "a vector (x,y)", _vector(2), python="Point")
 OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True, python="Point")
 VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True, python="Point")
-"""In any model, as of tables and charts."""
+"""Vectors of the plane in models of any dimension, as in tables and charts."""
 PLACES = Kind("<v> <v> [...]", "vectors (x,y)", _vector(2), many=True, python="Point")
 CORNER = Kind("(<f>,<f>)", "a vector (x,y)", _vector(2), python="Point")
-"""Of a picture, in space too."""
+"""Corner of a picture; two components in space, too."""
 EYE = Kind(
     "<s>", f"one of {', '.join(EYES)}, or a direction towards the eye as '1,-2,0.5'", _read_by(eye_of), python="str"
 )
 SECTION = Kind("<s>", "a plane, 'x=1.5', 'x<1.5', 'x>1.5', or a point and a normal as '0,0,2,0,1,1'",
                _read_by(section_of), python="str")  # fmt: skip
 THIRD_COUNT, THIRD_POSITIVE = (replace(kind, dims=(3,)) for kind in (COUNT, POSITIVE))
-"""One more in three dimensions."""
+"""Additional value in three dimensions."""
 _FREEDOM = replace(FREEDOM, meaning="0 free, 1 fixed, 2 along a vector or 3 across it", check=whole(0, 3))
 LEVEL = Kind(
     "<f>|<v>|table <s>",

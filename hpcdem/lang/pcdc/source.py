@@ -20,7 +20,7 @@ from hpcdem.lang.pcdc.statement import Statement, shown
 from hpcdem.lang.pcdc.table import PCDC, Table
 
 CALL = "__pcdc__"
-"""What a command is called in the Python text."""
+"""Name of the call of a command in the Python text."""
 
 _COMMAND = re.compile(r"([ \t\f]*)pcdc(?![\w.([])(.*)", re.DOTALL)
 _TRIPLE = ('"""', "'''")

@@ -224,7 +224,7 @@ class Table:
 
     @cached_property
     def ways(self) -> tuple[Way, ...]:
-        """All words that name commands."""
+        """Return all words that name commands."""
         return tuple(way for command in self.commands for way in command.ways)
 
     @cached_property
@@ -253,7 +253,7 @@ SET = Option("s{et}", (STRING,), "the set of the group", default="'default'")
 def declared(
     model: properties.Model, *notations: str, also: Mapping[str, tuple[str, ...]] | None = None, uniform: bool = False
 ) -> tuple[Option, ...]:
-    """One option for each property of a model, with its limits, unit, text and default.
+    """Make one option for each property of a model, with its limits, unit, text and default.
 
     notations: of those that may be shortened, in the order of the page, others follow by their names; also: see
     `Option`; uniform: neither a table nor a field can stand for a number.
@@ -352,7 +352,7 @@ FIELD_MODELS = {
             does="fields.model", of_field=one.name)
     for one in kinds().values()
 }  # fmt: skip
-"""Of fields that diffuse in elements (physics/fields.py), by their names, as the next ones."""
+"""Models of fields that diffuse in elements (physics/fields.py), by their names, as the next ones."""
 FIELDS_AT_NODES = {
     one.name: Model(one.on_nodes, "", f"The {one.name} of nodes; times of tables are those of the field.",
                     (Option(one.name, (TABLED,), one.doc, one.unit, required=True),), dims=BOTH,
@@ -696,7 +696,7 @@ RECORDED = {
     {JOINT: "joint"}.get(kind, kind): {name.replace("_", "-"): unit for name, unit in of.items()}
     for kind, of in UNITS_OF.items()
 }
-"""What a history can follow, and its unit."""
+"""Quantities that a history can record, with units."""
 _RECORDED = choice(*dict.fromkeys(name for of in RECORDED.values() for name in of))
 _EVERY = Option("ev{ery}", (COUNT,), "steps between two records", "", "1")
 
@@ -1740,7 +1740,7 @@ INSTEAD = {
     "temperature": "output image of the field temperature",
     "free-field": "quiet on at the sides, with the stress of the static stage",
 }  # fmt: skip
-"""What there is in three dimensions in place of words for two."""
+"""Words in three dimensions that replace words in two."""
 
 COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_ELEMENT_CREATE, *_OBJECTS, *_RECORDS, *_ONLINE)
 PCDC = Table(COMMANDS, RANGE_TERMS)

@@ -64,7 +64,7 @@ def check(command: t.Command, arguments: Mapping[str, Any], terms: Sequence[tupl
 
 
 def known(value: Any) -> bool:
-    """Nothing in a value waits for an expression."""
+    """Return whether a value is known without evaluating an expression."""
     if isinstance(value, Mapping):
         value = list(value.values())
     if isinstance(value, (list, tuple)):
@@ -202,7 +202,7 @@ def pieces(arguments: Mapping[str, Any]) -> list[Piece]:
 
 
 def _piece(word: str, one: Mapping[str, Any], arguments: Mapping[str, Any]) -> Piece:
-    """One of them. arguments: of the whole command."""
+    """Make one piece. arguments: of the whole command."""
     role = OUTLINE if one.get("is-boundary") else _ROLES[word]
     if word == "inner-boundary" and not one.get("filled", False):
         role = HOLE

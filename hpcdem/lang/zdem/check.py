@@ -245,7 +245,7 @@ def _time(report: Report) -> str:
 
 
 def _spoken(seconds: float) -> str:
-    """Two digits at most: ``under 1 s``, ``46 s``, ``2.5 min``, ``14 h``, ``3 days``."""
+    """Format a time with two digits at most: ``under 1 s``, ``46 s``, ``2.5 min``, ``14 h``, ``3 days``."""
     for unit, size, upto in (("s", 1.0, 100.0), ("min", 60.0, 100.0), ("h", 3600.0, 48.0), ("days", 86400.0, 1e5)):
         if seconds < upto * size:
             number = seconds / size

@@ -227,7 +227,7 @@ class _Follower:
     # ---- what falls, what is taken away
 
     def _settle(self) -> None:
-        """All that falls comes to rest on the bed."""
+        """Add all falling particles to the bed."""
         if not self.falling:
             return
         if self.bed is None:

@@ -211,7 +211,7 @@ def check_same_beginning(script: Script, saved_text: str, position: int) -> None
 
 
 class _Call:
-    """One statement for its command: arguments with expressions resolved and complete file names."""
+    """Arguments of one statement for its command: arguments with expressions resolved and complete file names."""
 
     def __init__(self, interpreter: Interpreter, sim: Any, statement: Statement) -> None:
         self.sim, self.statement = sim, statement

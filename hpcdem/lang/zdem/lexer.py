@@ -1,4 +1,4 @@
-"""From the bytes of a script to words with their line and column, and from words to numbers and expressions.
+"""Split the bytes of a script into words with line and column, and convert words to numbers and expressions.
 
 The rules (manual, preface): upper and lower case are the same; ``( ) = ,`` and blanks only separate; ``# ! ;`` start
 a comment that runs to the end of the line, in any text encoding. One command per line.
@@ -20,7 +20,7 @@ COMMENT = re.compile(rb"[#!;]")
 LINE_END = re.compile(rb"\r\n|\n|\r")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 LINE_BREAK_MARKS = "↵→↪↩⏎➔⮐"
-"""What stands at the end and the beginning of lines that were too long for a page of the manual."""
+"""Marks at the ends and beginnings of lines that were too long for a page of the manual."""
 JOIN = "a command is one line, so join the two parts"
 LARGEST_WHOLE = 2**53
 """Whole numbers beyond this are no longer exact in a C double, which is how ZDEM reads them."""

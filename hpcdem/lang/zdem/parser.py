@@ -1,4 +1,4 @@
-"""From lines to statements. The whole script is read and checked before anything runs.
+"""Parse lines into statements. The whole script is read and checked before anything runs.
 
 What may be written comes from `table`; this module knows only how the kinds of values are read. Rules that tie
 several words or several lines together are in `rules` and `plan`.

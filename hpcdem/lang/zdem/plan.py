@@ -75,7 +75,7 @@ class _Known:
 def follow(
     statements: Iterable[Statement], dt: float | None = None, walls: Mapping[int, Velocity] | None = None
 ) -> list[Run]:
-    """All runs of a script in order. ScriptError at a line that refers to something that is not there.
+    """List all runs of a script in order. Raises ScriptError at a line that refers to a missing object.
 
     dt [s] and walls (id -> velocity [m/s]): what a restored state is known to hold, if the script begins with RESTORE.
     """

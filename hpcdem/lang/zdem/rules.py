@@ -20,7 +20,7 @@ BOND_KEYS = (*BOND_MODEL_1, *BOND_MODEL_2, "tolerate", "rext", "rubber", "conser
 
 _HIST = next(command for command in t.COMMANDS if command.name == "HIST")
 RECORDED = tuple(option.name for option in _HIST.options if option.name not in ("id", "interval", "wall"))
-"""What HIST follows."""
+"""Quantities that HIST records."""
 
 
 def check_statement(statement: Statement) -> None:

@@ -209,8 +209,8 @@ class Row:
     source: str = "R"
 
     def accepts(self, word: str) -> bool:
-        """Does this (lower-case) word stand for the row? Names of up to three letters only match exactly, longer ones
-        by any beginning of at least three letters."""
+        """Return whether this (lower-case) word stands for the row. Names of up to three letters only match exactly,
+        longer ones by any beginning of at least three letters."""
         full = self.full
         return word == full or word in self.also or (len(full) > 3 and len(word) >= 3 and full.startswith(word))
 
@@ -241,7 +241,7 @@ class Option(Row):
 
     @property
     def key(self) -> str:
-        """Its name among the arguments of a statement."""
+        """Name among the arguments of a statement."""
         return self.name.lower()
 
 

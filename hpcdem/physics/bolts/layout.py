@@ -13,7 +13,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 
 MOST = 100_000
-"""Most segments of one bolt."""
+"""Largest number of segments of one bolt."""
 SHORTEST = 0.1
 """Crossings of edges that are nearer to each other than this part of the mean edge count once."""
 INSIDE = 1e-9
@@ -133,7 +133,7 @@ def _crossed_faces(a: np.ndarray, b: np.ndarray, corners: np.ndarray, cells: np.
 def hosts(
     points: np.ndarray, corners: np.ndarray, cells: np.ndarray, alive: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """For points (n, d) [m] the lowest element in which each is, -1: none, and the weights of its corners (n, 4);
+    """Find for points (n, d) [m] the lowest element in which each is, -1: none, and the weights of its corners (n, 4);
     corners (ne, 4, d) [m] of cells (ne, 4), of which some are there."""
     host, weight = np.full(len(points), -1, np.int64), np.zeros((len(points), 4))
     real = (cells >= 0)[:, :, None]

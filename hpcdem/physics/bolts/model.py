@@ -54,7 +54,7 @@ ELEMENT_QUANTITIES: dict[str, tuple[str, str]] = {
     "bolt_state": ("1", "yielding in tension 1, in compression 2; has yielded before 4, 8; broken 16; deleted 32"),
 }
 QUANTITIES = {BOLT_NODE: NODE_QUANTITIES, BOLT_ELEMENT: ELEMENT_QUANTITIES}
-"""What can be asked of nodes and elements of bolts: unit and meaning."""
+"""Quantities of nodes and elements of bolts that can be queried: unit and meaning."""
 
 _NODES: Columns = {
     "bar": (np.int64, 0), "host": (np.int64, 0), "plate": (np.int64, 0), "condition": (np.int64, 0),
@@ -274,7 +274,7 @@ class Bolts(Structure):
     # ---- tables of the kernels -------------------------------------------------------------------------------------
 
     def _arrange(self) -> None:
-        """All that follows from columns, properties and hosts."""
+        """Compute everything that depends on columns, properties and hosts."""
         nodes, bars = self.nodes, self.elements
         n, m, dim = len(nodes["bar"]), len(bars["row"]), self.blocks.dim
         self.first = kernels.first_nodes(nodes["bar"])
@@ -421,7 +421,8 @@ class Bolts(Structure):
         nodes["bond"][lost], nodes["bond_state"][lost] = 0.0, nodes["bond_state"][lost] & ~kernels.SLIPS
 
     def _let_go(self, elements: np.ndarray) -> None:
-        """Half of the grout of a node goes with each of its elements, and with it its part of the force."""
+        """Release elements: half of the grout of each node is lost with each of its elements, and with it its part of
+        the force."""
         nodes, bars, first = self.nodes, self.elements, self.first[elements]
         before = nodes["grout"].sum(axis=1)
         nodes["grout"][first, 1] = nodes["grout"][first + 1, 0] = 0.0

@@ -40,7 +40,7 @@ class Touching:
 
     @staticmethod
     def nothing() -> Touching:
-        """No contact."""
+        """Return an empty set of contacts."""
         return Touching(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
 
 

@@ -34,7 +34,7 @@ from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 __all__ = ["Coupled"]
 
 ROOM = 0.5
-"""How far discs and faces may go towards each other between two searches, over the largest radius."""
+"""Largest displacement of discs and faces towards each other between two searches, over the largest radius."""
 SAFETY = 0.8
 """Part of the stability limit that is used."""
 ON_DISCS, ON_FACES = 0, 1
@@ -78,7 +78,7 @@ class Coupled(SurfaceLoad):
     # ---- one step ----------------------------------------------------------------------------------------------------
 
     def advance(self, steps: int) -> int:
-        """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""
+        """Take up to `steps` steps, fewer if there is an external request. Returns the request (0: none)."""
         request = done = 0
         self.prepare()
         while done < steps and not request:
@@ -117,7 +117,8 @@ class Coupled(SurfaceLoad):
         return request
 
     def prepare(self) -> None:
-        """Both models closed, one time step, contacts found, with the laws of the present materials: ready to step."""
+        """Close both models, choose one time step, and find contacts with the laws of the present materials: ready to
+        step."""
         self._close()
         if self._renew_laws():
             self._replay()
@@ -414,7 +415,7 @@ class Coupled(SurfaceLoad):
         return {"friction": friction, **self._work.state(), "late": self.late}
 
     def begin_restore(self) -> None:
-        """Both models are about to be replaced."""
+        """Prepare for the replacement of both models."""
         self._asleep = True
         self.mesh_replaced()
 

@@ -1,4 +1,4 @@
-"""Both models in one file, bit for bit, on any number of ranks and threads.
+"""Saved state of both models in one file, bit for bit, on any number of ranks and threads.
 
 The file is a checkpoint of blocks to which the tables of the particles were added, under their names with `PREFIX`
 before them, and what the contacts between the two remember. One file: the two cannot be of different steps.

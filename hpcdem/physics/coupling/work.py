@@ -45,7 +45,8 @@ class Work:
             self.empty()
 
     def book_discs(self, kick: bool) -> None:
-        """Half a step's work of the present forces on the discs; kick: with the velocities of the coming half step."""
+        """Book half a step's work of the present forces on the discs; kick: with the velocities of the coming half
+        step."""
         particles, link, s = self.both.particles, self.both.links(), self.both.particles.settings
         p = particles.particles
         forces = particles.lists.owned_forces() if kick else np.empty((0, 3))
@@ -56,8 +57,8 @@ class Work:
             )  # fmt: skip
 
     def book_faces(self) -> None:
-        """Half a step's work of the present forces on the blocks, whose velocities are those after the kick once they
-        stepped."""
+        """Book half a step's work of the present forces on the blocks, whose velocities are those after the kick once
+        they stepped."""
         blocks, link = self.both.blocks, self.both.links()
         e = link.face_number // 4
         if link.made_for[1] == blocks.rebuilds and blocks.closed:

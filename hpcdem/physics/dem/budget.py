@@ -180,7 +180,7 @@ class Budget(engine.Budget[Simulation, int]):
 
     @staticmethod
     def restored(state: dict[str, Any], first: bool) -> Budget:
-        """From `state`; first: this rank takes the whole of it, the others nothing."""
+        """Restore the budget from `state`; first: this rank takes all of it, the others nothing."""
         budget = Budget()
 
         def share(names: tuple[str, ...], numbers: list[str]) -> dict[str, int]:

@@ -280,7 +280,7 @@ def stiffest_bond(sim: Simulation) -> float:
 
 
 MOST_LANCZOS, EVERY_LANCZOS = 60, 5
-"""Most products with the stiffness, and after how many to ask whether the frequency still changes."""
+"""Largest number of products with the stiffness, and number between checks of convergence of the frequency."""
 
 
 def highest_frequency(sim: Simulation, within: float = 1e-3) -> float:
@@ -441,7 +441,7 @@ def _wall_laws(sim: Simulation, out: np.ndarray, iout: np.ndarray) -> dict[str, 
 
 
 def frame(sim: Simulation) -> Frame:
-    """Everything that is written at an output time. The model must be closed. Collective."""
+    """Gather all columns that are written at an output time."""
     p, s, comm = sim.particles, sim.settings, sim.comm
     columns: dict[str, np.ndarray] = {
         name: p[name] for name in ("gid", "x", "y", "radius", "vx", "vy", "spin", "angle", "birth")

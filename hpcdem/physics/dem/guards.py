@@ -16,7 +16,7 @@ from hpcdem.physics.dem.particles import Particles
 LARGEST_STRIDE = 0.5
 """A particle that moves more than this fraction of its radius in one step stops the run."""
 NAMED = 10
-"""Most particles named in a message."""
+"""Largest number of particles named in a message."""
 
 
 def outside(x: np.ndarray, y: np.ndarray, box: tuple[float, float, float, float]) -> np.ndarray:
@@ -129,7 +129,7 @@ def _refuse_runaways(sim: Any, which: np.ndarray) -> None:
 
 
 def refuse_lost_bonds(sim: Any, hist: Any) -> None:
-    """Every bond must have found its place in the new lists (a bond is remembered by both its ends)."""
+    """Stop the run unless every bond has found its place in the new lists (a bond is remembered by both its ends)."""
     if sim.bonds == 0:
         return
     found = np.array([hist.bonded(), sim.lists.bonds_placed], np.int64)

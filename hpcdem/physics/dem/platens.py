@@ -165,4 +165,4 @@ OF_PARTS = {
     "xstrain": _WALL_STRAIN,
     "ystrain": _WALL_STRAIN,
 }
-"""What HIST can follow of groups and walls, by the first word."""
+"""Quantities of groups and walls that HIST can record, by the first word."""

@@ -58,7 +58,7 @@ def save(sim: Simulation, path: Path | str) -> None:
 
 
 def state_of(sim: Simulation) -> dict[str, Any]:
-    """Everything that is not a per-particle table, as JSON values (floats survive JSON bit for bit)."""
+    """Return everything that is not a per-particle table, as JSON values (floats survive JSON bit for bit)."""
     closed = sim.closed
     longest2 = np.array([sim.lists.longest_bond2() if closed else sim._longest2])
     breaks = sim.breaks.copy()
@@ -155,7 +155,7 @@ CLUMP_STATE = {
 
 
 def _clump_tables(sim: Simulation) -> dict[str, Table]:
-    """Each clump once, and the places of their members in them."""
+    """Return the table of clumps, each once, and the positions of their members in them."""
     rows = sim.clumps.rows(sim.particles)
     if rows is None:
         return {}

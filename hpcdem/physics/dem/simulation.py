@@ -37,7 +37,7 @@ from hpcdem.runtime.run_folder import Retention
 
 @dataclass
 class Watcher:
-    """Somebody who wants to look at the model, and perhaps to act on it, at the steps that are multiples of `every`.
+    """Observer of the model, which may also act on it, at the steps that are multiples of `every`.
 
     call: returns True to end the running CYC or IMPLE.
     """
@@ -69,7 +69,8 @@ class ParticlePhysics(Protocol):
         """The largest time step [s] it can bear with the present contacts. The model is closed. Collective."""
 
     def advance(self, sim: Simulation) -> None:
-        """One step, after the forces at the new positions; ghosts have the values of its beginning. Not collective."""
+        """Advance one step, after the forces at the new positions; ghosts have the values at its beginning. Not
+        collective."""
 
     @staticmethod
     def warm_up(threads: int) -> None:

@@ -97,8 +97,8 @@ class Walls:
         return ids
 
     def take_columns(self, columns: dict[str, list]) -> None:
-        """All walls from lists by name. In those of earlier versions BOX has the ids -1 to -4: it gets its present ones
-        unless another wall has them."""
+        """Replace all walls by those in lists by name. In those of earlier versions BOX has the ids -1 to -4: it gets
+        its present ones unless another wall has them."""
         n = len(columns["id"])
         for name in self.COLUMNS:
             like = getattr(self, name)

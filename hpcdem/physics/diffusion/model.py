@@ -64,7 +64,7 @@ class Diffusion:
             raise CommandError(f"diffusion: {light} particles have no mass, so they can hold no heat (PROP density)")
 
     def _inflow(self, sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
-        """Into the owned particles: heat from neighbours (n,) [W], and from how many."""
+        """Compute the inflow of the owned particles: heat from neighbours (n,) [W], and number of neighbours."""
         p = sim.particles
         flow, links = np.zeros(len(p.hot)), np.zeros(len(p.hot), np.int64)
         temperature = p.more[:, p.extra["temperature"].column].copy()
@@ -89,7 +89,7 @@ class Diffusion:
 
     @staticmethod
     def warm_up(threads: int) -> None:
-        """Two discs that touch."""
+        """Call the kernels with two touching discs."""
         from hpcdem.core.comm import SerialComm
         from hpcdem.physics.dem.simulation import Simulation
 

@@ -35,7 +35,7 @@ from hpcdem.physics.fdem.topology import Numbers, finite
 from hpcdem.physics.fdem.user_functions import FUNCTIONS
 
 COMPONENTS = {2: ("xx", "yy", "xy", "zz"), 3: ("xx", "yy", "xy", "zz", "xz", "yz")}
-"""Of stress, in the order of all tables, by dimensions of space."""
+"""Components of stress, in the order of all tables, by dimensions of space."""
 ACROSS = 3
 """Place of zz there."""
 Column = tuple[Any, ...]
@@ -52,7 +52,7 @@ class Assignments(Settings):
     fields: dict[str, RandomField]
 
     def clear_assignments(self) -> None:
-        """Nothing has a model."""
+        """Remove all models."""
         self.tables, self.fields = {}, {}
         self.varied: list[list[str]] = []
         """Kinds of objects and properties of theirs that differ from object to object by a table or a field."""

@@ -71,7 +71,7 @@ def depth(one: np.ndarray, other: np.ndarray) -> float:
 
 
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
-"""Of a tetrahedron."""
+"""Edges of a tetrahedron."""
 
 
 def _outwards(shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from hpcdem.physics.fdem.state import Crack
 from hpcdem.physics.fdem.topology import AGAIN
 
 MANY = 2000
-"""Where one in so many faces has opened, half of the pages that tell of faces are a rank's own."""
+"""Share of opened faces, one in so many, from which half of the memory pages with states of faces are a rank's own."""
 
 
 def waiting(sim: Any) -> list[Crack]:

@@ -20,8 +20,8 @@ from hpcdem.physics.fdem.user_laws import MARK
 
 VECTORS = "position", "displacement", "velocity"
 TORN = 0.1
-"""Where the corners that meet in a point are farther apart than this much of the mean edge, the body is torn there:
-elements that come back are not connected with it. Others may reach into them by as much."""
+"""Limit of tearing: where the corners that meet in a point are farther apart than this much of the mean edge, the body
+is torn there: elements that come back are not connected with it. Others may reach into them by as much."""
 
 
 def crack(sim: Blocks, joints: Numbers) -> None:

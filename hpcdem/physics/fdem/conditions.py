@@ -63,7 +63,7 @@ class Conditions(InitialStress):
     nothing."""
 
     def clear_conditions(self) -> None:
-        """Nothing is prescribed."""
+        """Remove all conditions."""
         self.conditions: list[NodeCondition] = [NodeCondition()]
         self.loads: list[Traction] = [Traction()]
         self.relaxations: list[Relaxation] = []
@@ -74,7 +74,7 @@ class Conditions(InitialStress):
 
     def _make_conditions(self, elements: int) -> None:
         self.corner_row = sparse_zeros(4 * elements, np.int32)
-        """Of conditions of nodes; corners that are one node have what theirs come to (`rows_of_nodes`)."""
+        """Rows of conditions of corners; corners that are one node have the combination of theirs (`rows_of_nodes`)."""
         self.load_row = sparse_zeros(4 * elements, np.int32)
 
     def remove_table(self, name: str) -> None:
@@ -474,7 +474,7 @@ def _row_of(rows: list, wanted: Any) -> int:
 
 
 def _takes_back(changes: Mapping[str, Any]) -> bool:
-    """Nothing is prescribed any more by such a condition: that is so of the whole node."""
+    """Return whether a change removes a condition, which then applies to the whole node."""
     return changes.get("constraint") == moving.UNBOUND or any(
         name.startswith("force") and value == 0.0 for name, value in changes.items()
     )

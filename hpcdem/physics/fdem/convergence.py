@@ -24,7 +24,7 @@ CROSSINGS = 10.0
 BETTER = 0.9
 """Part of the least ratio so far that counts as progress."""
 SLIDES = 0.2
-"""Every corner of a body that slides has this part of its mean velocity at least; held ones do not move."""
+"""Share of the mean velocity of a body that all its corners must have to count as sliding; held corners do not move."""
 LIMIT_STATIC, LIMIT_DYNAMIC = 1_000_000, 10_000_000
 """Steps after which a run towards a ratio has failed, if nothing else is given."""
 
@@ -92,7 +92,7 @@ class Moving:
 
 
 def advance(sim: Blocks, steps: int) -> int:
-    """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""
+    """Take up to `steps` steps, fewer if there is an external request. Returns the request (0: none)."""
     if steps < 0:
         raise CommandError(f"the number of steps must not be negative, got {steps}")
     return sim.advance(steps)
@@ -159,7 +159,7 @@ def watch(sim: Blocks, window: int | None = None, limit: int | None = None, ends
 
 
 def _crossing(sim: Blocks) -> float:
-    """About how many static steps a wave takes through the model and back, twice: 4 n sqrt(1 + P / E), n: edges
+    """Estimate how many static steps a wave takes through the model and back, twice: 4 n sqrt(1 + P / E), n: edges
     along it; masses are those of the stiffest part, joints with the penalty P."""
     size = float(np.ptp(sim.the_mesh().points, axis=0).max())
     tied = sim.joint_row[sim.closed_faces()]

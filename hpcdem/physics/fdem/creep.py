@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 RANGE = 100.0
 """Creep steps that adapt stay within the given one over and times this, unless other bounds are given."""
 FASTEST = 2.0
-"""Most by which one creep step differs from the one before."""
+"""Largest ratio of one creep step to the one before."""
 FULL = 1.0 - 1e-9
 """A creep step this near to the end goes there."""
 PER_STEP = ", which in static runs acts per step and not in creep time: use a dynamic run"

@@ -32,7 +32,7 @@ class ModelDefinition(Conditions):
         self.clear_definition()
 
     def clear_definition(self) -> None:
-        """Nothing is there."""
+        """Remove the mesh and all assignments."""
         self.options = Options()
         self.clear_topology()
         self.clear_assignments()
@@ -59,7 +59,7 @@ class ModelDefinition(Conditions):
             self.open_faces(self.per_node(lambda: mesh.edges().faces[meshes.crack_rows(mesh, mesh.edges()), 0]))
 
     def definition_state(self) -> dict[str, Any]:
-        """All but the arrays, as JSON values."""
+        """Return everything but the arrays, as JSON values."""
         return {
             "options": asdict(self.options),
             "slid": [[face, *values] for face, values in sorted(self.slid.items())],

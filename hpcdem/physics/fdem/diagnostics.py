@@ -292,8 +292,8 @@ def leads_of(sim: Blocks, numbers: np.ndarray) -> np.ndarray:
 
 
 def one_each(sim: Blocks, numbers: np.ndarray) -> np.ndarray:
-    """One number for each point of these nodes, ascending by point; of several sides, the lowest that is present. Not
-    collective."""
+    """Select one number for each point of these nodes, ascending by point; of several sides, the lowest that is
+    present. Not collective."""
     if not sides.are_there(numbers):
         return numbers
     cells = sim.the_mesh().cells.reshape(-1)

@@ -65,9 +65,9 @@ TOUCH = 1e-9
 WORST = 1e-3
 """Worst balance that is put down to rounding."""
 HALVINGS = 8
-"""Of an iteration's way before it is given up."""
+"""Largest number of halvings of the increment of an iteration before it is given up."""
 CUTS, FINE = 6, 10
-"""How often an increment of the loads is halved that finds no balance; where joints soften."""
+"""Largest number of halvings of a load increment without equilibrium; the same where joints soften."""
 TRIES = 3
 """Elastic ways in an increment that need not bring forces nearer to balance."""
 STILL = 1e-6
@@ -79,7 +79,7 @@ they flow at the whole load only, however many increments lead there."""
 BEFORE, AFTER = "temperature before", "temperature after"
 """Columns of elements during a solve: temperatures of the last balance, and those of this one."""
 PASSES = 100
-"""Most balances at one load, each after the flow of the one before."""
+"""Largest number of equilibria at one load, each after the flow of the one before."""
 TANGENT = {2: "tangent", 3: "tangent-space"}
 SOLVERS = ("auto", "direct", "petsc")
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 EMPTY = 140e6
-"""Of a rank without a model, with its kernels and libraries [B]."""
+"""Memory of a rank without a model, with its kernels and libraries [B]."""
 OWN = {2: 650.0, 3: 1200.0}
-"""Of all ranks together per element, by dimensions [B], with joints before their peak or without."""
+"""Memory of all ranks together per element, by dimensions [B], with joints before their peak or without."""
 NODE = {2: 205.0, 3: 230.0}
-"""Of a node of the machine per element [B]: mesh, connectivity, the definition of the model."""
+"""Memory of a node of the machine per element [B]: mesh, connectivity, the definition of the model."""
 REBUILDING = 2.3
 """A rank takes so many times its own memory while storage is made again: old and new tables are there at once."""
 MAKING = 800.0
-"""Of the first rank of a node per element, while the mesh and its connectivity are made [B]."""
+"""Memory of the first rank of a node per element, while the mesh and its connectivity are made [B]."""
 
 
 class Footprint(NamedTuple):

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.topology import Numbers
 
 UPRIGHT = 1e-6
-"""How far a face may lean in the mesh, over its height."""
+"""Largest deviation of a face from the vertical in the mesh, over its height."""
 _FACES: dict[str, tuple[type, int]] = {
     "face": (np.int64, 1), "low": (np.int64, 1), "lower": (np.int64, 1), "upper": (np.int64, 1),
     "height": (np.float64, 1), "sign": (np.float64, 1), "hold": (np.float64, 4),
@@ -60,8 +60,8 @@ class FreeField(SurfaceLoad):
 
     @staticmethod
     def create(blocks: Blocks, chosen: Numbers) -> None:
-        """These faces are free-field sides from now on. Their nodes are held by the forces that they have at this
-        moment, of stress, weight and loads: a model in equilibrium stays in it when the conditions of its sides go.
+        """Make these faces free-field sides. Their nodes are held by the forces that they have at this moment, of
+        stress, weight and loads: a model in equilibrium stays in it when the conditions of its sides go.
 
         CommandError if they are not upright faces of the surface, or in static mode.
         """
@@ -338,12 +338,12 @@ class FreeField(SurfaceLoad):
         return False
 
     def mesh_replaced(self) -> None:
-        """There is another mesh: `of_mesh` says that these are gone with the one before."""
+        """Do nothing: `of_mesh` reports that these are removed with the mesh."""
 
     # ---- state on disk -------------------------------------------------------------------------------------------
 
     def saved_state(self) -> dict[str, Any]:
-        """Nothing but the columns."""
+        """Return no state: the columns contain all of it."""
         return {}
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:

@@ -20,7 +20,7 @@ LINER_ELEMENT, LINER_NODE = "liner-element", "liner-node"
 SUPPORTS = (BOLT_ELEMENT, BOLT_NODE, LINER_ELEMENT, LINER_NODE)
 FLOW_NODE, CHANNEL = "flow-node", "flow-channel"
 FLOW = {FLOW_NODE: NODE, CHANNEL: JOINT}
-"""They have the numbers, groups and places of nodes and joints."""
+"""Kinds of objects whose numbers, groups and positions are those of nodes and joints."""
 KINDS = (ELEMENT, NODE, FACE, JOINT, *SUPPORTS)
 SHOWN = {"elements": ELEMENT, "joints": JOINT, "channels": CHANNEL}
 """Objects of a picture that a range chooses among."""
@@ -134,7 +134,7 @@ class Span:
 
 @dataclass(frozen=True)
 class OnLayer:
-    """On the lines of a geometry layer; elements: inside of it."""
+    """Objects on the lines of a geometry layer; elements: inside of it."""
 
     layer: str
 
@@ -193,7 +193,7 @@ class Not:
 
 @dataclass(frozen=True)
 class OnBoundary:
-    """On a surface of the model."""
+    """Objects on a surface of the model."""
 
 
 @dataclass(frozen=True)
@@ -267,4 +267,4 @@ Term = (
     | Not
 )
 Range = tuple[Term, ...]
-"""All terms must hold."""
+"""Terms of a range, all of which must hold."""

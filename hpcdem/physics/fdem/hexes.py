@@ -100,12 +100,13 @@ class Hexes:
         self.modulus = models[model, space.LAME] + models[model, space.MU2]
 
     def stiffen(self, ratio: np.ndarray) -> None:
-        """For the time step they are so many times (count,) as stiff."""
+        """Multiply the stiffness that determines the time step by `ratio` (count,)."""
         self.omega2 *= ratio
         self.modulus *= ratio
 
     def forces(self, force: np.ndarray, v: np.ndarray, gravity: tuple[float, float, float], s0: np.ndarray) -> None:
-        """Into the rows (n, 16) [N] of these tetrahedra, with the velocities v (n, 16); s0: see `hexes.forces`."""
+        """Add forces to the rows (n, 16) [N] of these tetrahedra, with the velocities v (n, 16); s0: see
+        `hexes.forces`."""
         sim, o = self.sim, self.sim.options
         hexes.forces(
             sim.threads, self.count, self.place, sim.x, v, self.parts, self.h, self.remember, s0,

@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 LAWS = {COULOMB_JOINT.name: joint_law.COULOMB, BARTON_BANDIS.name: joint_law.BARTON_BANDIS}
 _BY_TEMPERATURE = tuple(one.name for one in COHESIVE.properties if one.temperature_dependent)
 NOW: dict[int, tuple[Any, int]] = {2: (build.edges_now, 14), 3: (joints_space.faces_now, 22)}
-"""By dimension: what a joint is at this moment, and into how many columns: means of opening, slip [m], normal and shear
-stress [Pa]; these stresses at its three points; forces on the corners of this side [N/m], in space [N]."""
+"""Kernel of the present state of a joint by dimension, and into how many columns: means of opening, slip [m], normal
+and shear stress [Pa]; these stresses at its three points; forces on the corners of this side [N/m], in space [N]."""
 MEANS, POINTS, FORCES = 0, 4, 10
 CORNERS = {2: 2 * (np.arange(4)[:, None] + np.arange(2)), 3: STRIDE * FACES}
-"""By dimension: where the corners of the faces of an element begin in its row of x; in the plane the first ones stand
-once more behind the last."""
+"""By dimension, the offsets where the corners of the faces of an element begin in its row of x; in the plane the first
+ones stand once more behind the last."""
 
 
 def tables(rows: Rows, warm: Mapping[str, np.ndarray] | None = None, row: Any = slice(None)) -> tuple[
@@ -185,7 +185,7 @@ class JointTables:
 
     @cached_property
     def lower_slots(self) -> np.ndarray:
-        """Their slots."""
+        """Return the slots of the lower faces."""
         return self.slot_of(self.lower_faces)
 
     def slot_of(self, faces: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from hpcdem.physics.fdem.kernels.joints import NONE
 from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
 
 OPPOSITE = np.array([0, 2, 1])
-"""Which of the corners p, q, r of the other side are opposite a, b, c."""
+"""Corners of p, q, r of the other side that are opposite a, b, c."""
 
 
 class HexJoints:
@@ -66,7 +66,8 @@ class HexJoints:
         )  # fmt: skip
 
     def moved(self, which: np.ndarray) -> Joints:
-        """Some of them (n,) as joints of triangles, with corners shifted as the bilinear opening has it."""
+        """Return the joints `which` (n,) as joints of triangles, with corners shifted according to the bilinear
+        opening."""
         local, n = self.local, len(which)
         at = local.sim.x.reshape(-1)[self.at[which][:, :, None] + np.arange(3)]
         near, far = at[:, :4], at[:, 4:]

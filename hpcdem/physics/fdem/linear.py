@@ -21,7 +21,7 @@ MANY = 400_000
 MANY_IN_SPACE = 20_000
 """Unknowns from which PETSc is used in space, where factors fill up sooner."""
 CONDENSED = 2000
-"""Most unknowns of joints and fluid for dense matrices."""
+"""Largest number of unknowns of joints and fluid for dense matrices."""
 SINGULAR = (
     "the stiffness matrix is singular: part of the model can move without resistance (an open joint without tensile "
     "strength, or properties that differ by more than 1e15)"
@@ -39,7 +39,7 @@ class Pieces:
 
     @staticmethod
     def joined(parts: list[Pieces]) -> Pieces:
-        """All of one kind, in the order of their numbers."""
+        """Join all pieces of one kind, in the order of their numbers."""
         key = np.concatenate([part.key for part in parts])
         order = np.argsort(key, kind="stable")
         node = np.concatenate([part.node for part in parts])[order]
@@ -186,7 +186,7 @@ class Direct:
         return self.comm.bcast(moved)
 
     def close(self) -> None:
-        """Nothing is held outside of Python."""
+        """Do nothing: no resources outside of Python."""
 
 
 class Condensed:
@@ -279,7 +279,7 @@ class Condensed:
         return self.comm.bcast(moved)
 
     def close(self) -> None:
-        """Nothing is held outside of Python."""
+        """Do nothing: no resources outside of Python."""
 
 
 class Petsc:
@@ -386,7 +386,8 @@ class Petsc:
             raise CommandError(SINGULAR)
 
     def _rigid(self) -> Any:
-        """Near null space: the translations, in space rotations, too. (Multigrid for elasticity needs to know them.)"""
+        """Make the near null space: the translations, in space rotations, too. (Multigrid for elasticity needs to know
+        them.)"""
         if self._x is None:
             movements = rigid_movements(np.zeros(self.unknowns.given.shape))[:, :, : self.unknowns.given.shape[1]]
         else:

@@ -64,7 +64,7 @@ class Loads:
         self.applied = np.zeros((len(sim.number) if self.some else 1, width))
 
     def _acting(self, quiet: np.ndarray) -> np.ndarray:
-        """These faces, none in static runs, where that is reported."""
+        """Return the quiet faces that act: all, or none in static runs, which is reported."""
         sim = self.sim
         if sim.options.dynamic:
             return quiet
@@ -101,7 +101,7 @@ class Loads:
         return len(at) > 0
 
     def find(self) -> None:
-        """All of them now, into `applied`; those of other ranks' corners are missing."""
+        """Evaluate all loads at present, into `applied`; those at corners of other ranks are missing."""
         if not self.some:
             return
         sim, applied = self.sim, self.applied

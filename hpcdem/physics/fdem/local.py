@@ -136,7 +136,7 @@ class Local(JointTables):
         self._hold(blocks)
 
     def _hold(self, blocks: Sequence[ElementBlock]) -> None:
-        """These are the elements."""
+        """Set up the solids of these blocks of elements."""
         self.temperature_dependent = any(bool(one.any()) for one in self.sim.temperature_dependent())
         self.solids = Solids(self.sim, blocks, self.temperature_dependent, self.whole)
         self.yielding, self.creeping, self.laws = self.solids.yielding, self.solids.creeping, self.solids.laws
@@ -315,7 +315,7 @@ class Local(JointTables):
         return found
 
     def _fill(self, force: np.ndarray, of_joints: np.ndarray, keep: bool) -> None:
-        """All forces into the rows of all corners."""
+        """Compute all forces in the rows of all corners."""
         self._elements(np.ones(self.count, bool), np.ones(len(self.head), bool), force, of_joints, keep)
 
     @cached_property

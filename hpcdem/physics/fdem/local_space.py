@@ -126,7 +126,8 @@ class LocalSpace(Local):
         return out
 
     def _make_nodes(self) -> None:
-        """All forces are stored. Of hexahedra only one corner at each of their points has some."""
+        """Make the set of nodes; all forces are stored. For hexahedra only one corner at each of their points has
+        forces."""
         sim = self.sim
         self.loads = LoadsSpace(sim, self.force_width, self.stride, self.hexes)
         self.nodes = nodes = NodeSetSpace(sim, self.loads.special, self.force_width, self.stride)

@@ -67,7 +67,7 @@ class NodeCondition:
 
 
 KINDS = "motion", "force", "constraint"
-"""What may be taken back by itself."""
+"""Parts of a condition that can be removed separately."""
 
 
 def without(one: NodeCondition, kinds: Sequence[str]) -> NodeCondition:

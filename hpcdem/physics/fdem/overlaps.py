@@ -26,7 +26,7 @@ ROUNDING = 1e-5
 DEEP = 0.1
 """Overlap over an altitude that is too much: at a third contact lets go of what comes further in."""
 AGAIN = 1.5
-"""It is reported again when it has grown by this."""
+"""Factor of growth after which an overlap is reported again."""
 NAMED = 5
 """Places that a message names."""
 

@@ -42,8 +42,8 @@ def opposite(sim: Blocks, x: np.ndarray) -> np.ndarray:
 
 
 def join(sim: Blocks, nodes: Nodes) -> np.ndarray:
-    """Such joints press and slide with friction from now on, see `opposite`; the model is closed, before and after.
-    Returns their lower faces. Collective."""
+    """Let such joints press and slide with friction, see `opposite`; the model is closed, before and after. Returns
+    their lower faces. Collective."""
     lower = opposite(sim, nodes.x)
     if not len(lower):
         return lower

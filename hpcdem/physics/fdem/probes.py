@@ -27,7 +27,7 @@ class Probe(ABC):
     """A quantity at numbers (n,) of elements, nodes or joints. Every method is collective."""
 
     def __init__(self, sim: Blocks, numbers: np.ndarray) -> None:
-        """Not collective."""
+        """Set up the probe. Not collective."""
         self.sim, self.numbers = sim, numbers
         self.local: Local | None = None
         self._at, self._n = np.empty(0, np.int64), 0
@@ -95,7 +95,7 @@ class ForceProbe(Probe):
     """A component of reaction or unbalanced force [N/m] of nodes: a sum over corners that several ranks may have."""
 
     def __init__(self, sim: Blocks, name: str, nodes: np.ndarray) -> None:
-        """Not collective."""
+        """Set up the probe. Not collective."""
         super().__init__(sim, nodes)
         self.name = name
         self._place = np.empty(0, np.int64)

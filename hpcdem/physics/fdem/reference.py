@@ -41,8 +41,8 @@ class Deformation(NamedTuple):
 
 
 def deformation(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, small: bool) -> Deformation:
-    """From the corners (3, 2) of a triangle, (4, 3) of a tetrahedron, in the mesh and now [m] and their velocities
-    [m/s]: F = R U."""
+    """Compute the deformation from the corners (3, 2) of a triangle, (4, 3) of a tetrahedron, in the mesh and now [m]
+    and their velocities [m/s]: F = R U."""
     one = np.eye(mesh.shape[1])
     per_mesh = np.linalg.inv((mesh[1:] - mesh[0]).T)
     f, df = (x[1:] - x[0]).T @ per_mesh, (v[1:] - v[0]).T @ per_mesh

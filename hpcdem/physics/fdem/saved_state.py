@@ -43,7 +43,7 @@ def save(sim: Blocks, path: Path | str, extra: Mapping[str, Any] | None = None) 
 
 
 def state_of(sim: Blocks, extra: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything that is not a table, as JSON values. Collective."""
+    """Return everything that is not a table, as JSON values. Collective."""
     mesh = sim.mesh
     tally = sim.comm.sum_into(sim.local.tally.sum(axis=0)) if sim.closed else np.zeros(1, np.int64)
     return {

@@ -14,12 +14,12 @@ from hpcdem.physics.fdem.topology import Topology, finite
 SAFETY = 0.8
 """Part of the stability limit that is used as time step."""
 OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
-"""What becomes of bodies that overlap before the first step."""
+"""Treatment of bodies that overlap before the first step."""
 DEEP_OVERLAP = WARN, STOP = "warn", "stop"
-"""What becomes of a run in which they come to overlap too deep."""
+"""Treatment of a run in which bodies come to overlap too deep."""
 POTENTIAL = DISTANCE, MUNJIZA = "distance", "munjiza"
-"""What contact in space presses with: the distance to the nearest side of an element, over a length of its body, or
-four times the smallest of its barycentric coordinates (Munjiza 2004)."""
+"""Potential of contact in space: the distance to the nearest side of an element, over a length of its body, or four
+times the smallest of its barycentric coordinates (Munjiza 2004)."""
 RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
 """Parts of Rayleigh damping, and the factors of both that make its ratio what was set at its frequency."""
 

@@ -47,7 +47,7 @@ from hpcdem.physics.fdem.pairs import cut_corner
 from hpcdem.physics.fdem.state import NARROW, WIDE, ListState
 
 ROOM = 0.6
-"""How far elements may go, both together, before storage and ghosts are made again; over the mean edge."""
+"""Largest sum of displacements of two elements before storage and ghosts are renewed; over the mean edge."""
 SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
 OLDEST = 2000

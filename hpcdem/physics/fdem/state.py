@@ -85,15 +85,15 @@ class State(ModelDefinition, Model):
 
     rebuild_state: ListState
     number: np.ndarray
-    """Of each element held here; when the model is closed [ghosts of the left | owned | ghosts of the right]."""
+    """Number of each element held here; when the model is closed [ghosts of the left | owned | ghosts of the right]."""
     x: np.ndarray
     """Corners [m], see elements.py."""
     v: np.ndarray
-    """Their velocities at the last half step [m/s]."""
+    """Velocities of the corners at the last half step [m/s]."""
     cold: dict[str, np.ndarray]
-    """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work",
-    "plastic" (what is remembered of yielding, see plasticity.py), "creep" (of creep, see kernels/creep.py),
-    "law" (state variables, see user_laws.py)."""
+    """Further columns of the owned elements, which migrate with them: "home" (where displacement is zero), "work",
+    "plastic" (what is remembered of yielding, see plasticity.py), "creep" (of creep, see kernels/creep.py), "law"
+    (state variables, see user_laws.py)."""
     histories: Histories
     surface_loads: SurfaceLoads
     n_left: int
@@ -101,15 +101,15 @@ class State(ModelDefinition, Model):
     where: np.ndarray
     """(ne,) storage row of each element of the model, -1: not held here."""
     areas: np.ndarray
-    """Of the elements of the model [m2]."""
+    """Areas of the elements of the model [m2]."""
     cut: np.ndarray
     """Along which diagonal quads are cut for contact, see `pairs.cut_corner`."""
     node: np.ndarray
     """(4 ne,) which corners move as one node; -1: none."""
     shared_nodes: np.ndarray
-    """Which nodes have several corners, bool."""
+    """Flags of nodes with several corners, bool."""
     member_begin: np.ndarray
-    """Where the corners of each node of several begin in `member`."""
+    """Offsets of the corners of each node with several in `member`."""
     member: np.ndarray
     point_corners: np.ndarray
     """(np,) corners of elements that are there at each point of the mesh."""
@@ -147,9 +147,9 @@ class State(ModelDefinition, Model):
         self._longest = 0.0
         self.mean_edge = 0.0
         self.surface: Any = None
-        """In space: what contact knows of the surface, see `pairs_space.Surface`."""
+        """Tables of the surface for contact, in space, see `pairs_space.Surface`."""
         self.untouched = True
-        """Nothing has moved since there is this mesh."""
+        """Whether nothing has moved since the mesh was made."""
         self._told_step = 0.0
         self._hex_rows: tuple[np.ndarray, hexahedra.Rows] | None = None
         self._empty()

@@ -57,9 +57,9 @@ class Table:
 
 
 AXES = ("x", "y", "z", "plastic-strain", "temperature", *FIELDS)
-"""What a property can follow a table over: from place to place, or with what an object goes through."""
+"""Arguments of tables of properties: a coordinate, or a quantity that changes in the object."""
 PLASTIC_STRAIN, TEMPERATURE = 3, 4
-"""From TEMPERATURE on they are fields of elements."""
+"""Indices in AXES; from TEMPERATURE on they are fields of elements."""
 
 
 @dataclass(frozen=True)
@@ -78,4 +78,4 @@ class Drawn:
 
 
 Value = float | Over | Drawn | np.ndarray
-"""Of a property: one number for all objects, or a rule, or one for each of the objects that are given (n,)."""
+"""Value of a property: one number for all objects, or a rule, or one for each of the objects that are given (n,)."""

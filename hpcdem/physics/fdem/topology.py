@@ -18,7 +18,8 @@ T = TypeVar("T")
 Numbers = np.ndarray | Sequence[int] | None
 """Numbers of elements, nodes, faces or joints; None: all."""
 AGAIN, CRACK = 2, 3
-"""In `broken`: a joint that broke before, or never was whole, and is a joint again for so long (pressed.py)."""
+"""Values of `broken`: a joint that broke before, or was never intact, and is a joint again temporarily (pressed.py); a
+crack."""
 
 
 class Topology:
@@ -38,11 +39,11 @@ class Topology:
     broken: np.ndarray
     """(4 ne,) by the lower face: 1 if the joint broke; more, while it is a joint again, see pressed.py."""
     slid: dict[int, tuple[float, ...]]
-    """By face what broken joints remember of their slip at three points [m], see pressed.py."""
+    """History of the slip of broken joints by face, at three points [m], see pressed.py."""
     born: np.ndarray
     """Elements that came back after they were removed, ascending."""
     birthplace: np.ndarray
-    """Where their corners were then (n, 4, dim) [m]."""
+    """Positions of their corners at that time (n, 4, dim) [m]."""
 
     def clear_topology(self) -> None:
         """Remove the mesh."""

@@ -99,7 +99,7 @@ _CORNERS = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), 
 
 
 def two(dim: int) -> Mesh:
-    """Two triangles, or two tetrahedra, with a joint between them."""
+    """Make a mesh of two triangles, or two tetrahedra, with a joint between them."""
     if dim == 2:
         return Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)])
     return Mesh.of(_CORNERS, [(0, 1, 2, 3), (1, 4, 2, 3)])
@@ -173,7 +173,7 @@ def _creep_at_rest(sim: Blocks) -> None:
 
 
 def _in_space(threads: int, law: str = "mech_iso_elastic", **properties: Value) -> Blocks:
-    """Two tetrahedra, and one that touches them."""
+    """Make a model of two tetrahedra, and one that touches them."""
     below = [(x, y, z - 1.001) for x, y, z in _CORNERS[:4]]
     mesh = Mesh.of(_CORNERS + below, [(0, 1, 2, 3), (1, 4, 2, 3), (5, 6, 7, 8)])
     return rock(mesh, threads, law, **properties)
@@ -296,7 +296,7 @@ def in_space(threads: int = 1) -> None:
 
 
 def _rest(mesh: Mesh, threads: int) -> None:
-    """One body at rest, of which an element is removed gradually."""
+    """Call the kernels of one body at rest, of which an element is removed gradually."""
     sim = rock(mesh, threads)
     sim.initial_stress(None, yy=-1.0)
     sim.option(dynamic=False, overlap="keep")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.topology import Numbers
 
 SLACK = 1e-9
-"""Of the size of the model: so far beyond the end of a line points count as below it."""
+"""Tolerance over the size of the model: up to this distance beyond the end of a line, points count as below it."""
 Level = tuple[tuple[float, ...], ...]
 """A water line: its points (x, y), from left to right; in space a point and normal of its plane, and then the corners
 (x, y) of a polygon about it, if it ends somewhere [m]."""
@@ -153,7 +153,7 @@ class Water(SurfaceLoad):
                 np.add.at(out, self._to[:, corner] + c, -push[:, corner] * normal[:, c])
 
     def mesh_replaced(self) -> None:
-        """There is another mesh: `of_mesh` says that this is gone with the one before."""
+        """Do nothing: `of_mesh` reports that this is removed with the mesh."""
 
     # ---- state on disk -------------------------------------------------------------------------------------------
 

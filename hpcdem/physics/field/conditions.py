@@ -33,13 +33,13 @@ class Conditions(Assigned, Field):
     exposed: conditions of faces."""
 
     quantity: ClassVar[str]
-    """What it is a field of, and the column of elements with its values at their corners."""
+    """Quantity of the field, and name of the column of elements with its values at their corners."""
     unstressed: ClassVar[str]
     """Column of elements: the mean value at which one is free of the stress that the field brings."""
     several: ClassVar[str] = "values"
     low_to_high: ClassVar[str] = "lower to the higher"
     otherwise: ClassVar[str] = ""
-    """What else helps where a time step is too long."""
+    """Further advice of messages about a time step that is too long."""
     expansion: ClassVar[str] = ""
     """Property: linear expansion with it; none: it brings no stress."""
 
@@ -51,7 +51,8 @@ class Conditions(Assigned, Field):
         self.prescribed: list[Number] = [0.0]
         self.exposed = Exposed(blocks, lambda: self._transfers)
         self.accounts = dict.fromkeys(("given", "commands", "removed"), 0.0)
-        """What conditions gave to elements that are gone, what commands brought, and what is gone with elements."""
+        """Amounts that conditions gave to removed elements, that commands brought, and that removed elements
+        contained."""
         self._expands: bool | None = None
 
     @property
@@ -110,8 +111,8 @@ class Conditions(Assigned, Field):
             cold[self.unstressed] = np.zeros((n, 1))
 
     def _take_unstressed(self, elements: np.ndarray) -> None:
-        """These elements, and hexahedra that they are parts of, are free of thermal stress as they are; the model is
-        open. Collective."""
+        """Make the present temperature of these elements, and of hexahedra that they are parts of, free of thermal
+        stress; the model is open. Collective."""
         blocks, mesh = self.blocks, self.blocks.the_mesh()
         number, t = blocks.number, blocks.cold[self.quantity]
         found = by_temperature.of_corners(mesh, number, t)
@@ -204,7 +205,7 @@ class Conditions(Assigned, Field):
             change_rows(exposed.conditions, exposed.row, at, changes)
 
     def remove_face_conditions(self, faces: np.ndarray | None) -> None:
-        """Nothing passes through faces (None: all)."""
+        """Remove the conditions of faces (None: all)."""
         self._unset(self.exposed.row, faces)
 
     def _need_model(self) -> None:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 SAFETY = 0.9
 """Part of the stability limit that an estimated sub-step may be."""
 SPREAD = 0.1
-"""By how much of the mean edge corners of one node may be apart, in joints that open."""
+"""Largest distance of corners of one node in opening joints, over the mean edge."""
 
 
 class Diffusing(Conditions):
@@ -112,7 +112,7 @@ class Diffusing(Conditions):
         return np.zeros((blocks.n_own, 4), bool)
 
     def add_to(self, applied: np.ndarray) -> None:
-        """Its stress is in the elements."""
+        """Do nothing: the stress of the field is in the elements."""
 
     def reach(self, blocks: Any, middle: np.ndarray) -> float:
         """Elements around a node of the field."""
@@ -165,7 +165,7 @@ class Diffusing(Conditions):
         """Conductances are known, nodes not yet."""
 
     def _bound(self) -> None:
-        """All tables of this rank are there but the length of sub-steps."""
+        """Complete the tables of this rank; called when only the length of sub-steps is missing."""
 
     def _sets_pace(self) -> bool:
         """The clock of the model is that of this field where blocks are at rest."""
@@ -242,7 +242,7 @@ class Diffusing(Conditions):
         return 1
 
     def _given(self) -> tuple[float, ...]:
-        """Everything except the limit that determines the length of a sub-step."""
+        """Return everything except the limit that determines the length of a sub-step."""
         return (*map(float, self._given_clock()), self._cycle_time(), self._limit)
 
     def _find_step(self) -> None:
@@ -313,7 +313,7 @@ class Diffusing(Conditions):
         self._stale = True
 
     def mesh_replaced(self) -> None:
-        """There is another mesh: `of_mesh` says that this is gone with the one before."""
+        """Do nothing: `of_mesh` reports that this is removed with the mesh."""
 
     def follow(self) -> None:
         """Advance the field by the step that the elements have moved."""
@@ -347,7 +347,7 @@ class Diffusing(Conditions):
         """The blocks have moved by a step."""
 
     def _waits(self) -> bool:
-        """More steps of the blocks come before the next cycle."""
+        """Return whether more steps of the blocks come before the next cycle."""
         return self.blocks.options.mechanical and self.waited < self._every()
 
     def _begin_cycle(self) -> None:
@@ -405,7 +405,7 @@ class Diffusing(Conditions):
     # ---- state on disk -------------------------------------------------------------------------------------------
 
     def saved_state(self) -> dict[str, Any]:
-        """All but the columns, as JSON values; those of elements are saved with these."""
+        """Return everything but the columns, as JSON values; those of elements are saved with these."""
         own = {name: getattr(self, name) for name in ("prescribed", "accounts", *self.kept)}
         faces = [asdict(one) for one in self.exposed.conditions]
         return {"rows": self._saved_properties(), "faces": faces, "time": self.time, "cycles": self.cycles,

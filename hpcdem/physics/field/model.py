@@ -37,12 +37,12 @@ class Assigned:
     of_objects: ClassVar[str] = ELEMENT
     model: ClassVar[Model]
     kind_of_model: ClassVar[str]
-    """As messages call it."""
+    """Name of the model in messages."""
     alike: ClassVar[tuple[str, ...]] = ()
     why_alike: ClassVar[str] = "all channels have the same fluid"
     """Properties that all objects have alike."""
     stiffens: ClassVar[bool] = False
-    """What is assigned changes masses or time steps of the blocks."""
+    """Whether assignments change masses or time steps of the blocks."""
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
@@ -66,7 +66,7 @@ class Assigned:
         return np.flatnonzero(self.row)
 
     def assign(self, numbers: np.ndarray | None, given: Mapping[str, Value]) -> None:
-        """These objects (None: all) have the model with these properties."""
+        """Assign the model with these properties to objects (None: all)."""
         at = self._numbers(numbers)
         self._put(at, self.blocks.complete(self.of_objects, at, self.model, {}, given))
 
@@ -207,9 +207,9 @@ class Field(SurfaceLoad):
     of_mesh: ClassVar[bool] = True
     own_clock: ClassVar[bool] = True
     told: ClassVar[str] = ""
-    """What messages call it, if not by its name."""
+    """Name in messages, if it differs from the name of the field."""
     word: ClassVar[str]
-    """What commands call its part of the calculation."""
+    """Word of commands for its part of the calculation."""
     blocks: Blocks
 
     def _start_clock(self, time: float) -> None:

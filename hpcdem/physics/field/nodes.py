@@ -84,5 +84,5 @@ class Nodes:
         return self.corner[self.begin[:-1]]
 
     def put(self, values: np.ndarray, t: np.ndarray) -> None:
-        """All corners of nodes have their values (n,), in t (rows, w)."""
+        """Set all corners of nodes to their values (n,), in t (rows, w)."""
         t.reshape(-1)[self.corner] = np.repeat(values, np.diff(self.begin))

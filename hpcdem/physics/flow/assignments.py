@@ -162,7 +162,7 @@ class FlowAssignments(Assigned, Field):
         self.blocks.changed(stiffness=False)
 
     def _dry(self, points: np.ndarray) -> None:
-        """No condition says any more that water stands before faces with a corner among these points."""
+        """Unset the bit of wet faces by conditions at faces with a corner among these points."""
         self.wet_bits[around(self.blocks.the_mesh(), points)[1]] &= ~BY_CONDITION
 
     def remove_conditions(self, nodes: np.ndarray | None) -> None:
@@ -234,7 +234,7 @@ class FlowAssignments(Assigned, Field):
         return found
 
     def stage(self, name: str, does: str, value: Number, duration: float, limit: float) -> None:
-        """One more stage of a well, see `Stage`; duration [s] of flow time."""
+        """Add a stage of a well, see `Stage`; duration [s] of flow time."""
         well = self.well(name)
         values = assigned.checked(self.blocks.tables, value, f"the {does} of a well")
         if does == HELD and values.min() < 0.0:

@@ -44,8 +44,8 @@ class Slurry(Protocol):
         rank."""
 
     def packs(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray] | None:
-        """None if no pack bears; else what all packs push with in rooms of nodes (n,) [m2], and its derivative: rows
-        (2, n)."""
+        """Return the function of volumes of nodes (n,) [m2] that gives the pressure of all packs, and its derivative:
+        rows (2, n); None if no pack carries load."""
 
     def show(self, pushes: np.ndarray) -> None:
         """Packs of the nodes held here push with so much [Pa]. Not collective."""
@@ -191,7 +191,7 @@ class Channels(Travelling, FlowAssignments):
         return self.blocks.where[corner // 4] * self.blocks.x.shape[1] + self.blocks.local.stride * (corner % 4)
 
     def _book_gone(self, gone: np.ndarray) -> None:
-        """Their accounts are kept."""
+        """Add the removed nodes to the account of removed fluid."""
         self.nodes[gone, kernels.REMOVED] += self.nodes[gone, kernels.W]
         for name, column in _ACCOUNT.items():
             self.removed[name] = self._sum(self.nodes[gone, column], self.removed[name])

@@ -16,9 +16,10 @@ STEP, ELEMENT = 20e-6, 70e-9
 ITERATION, UNKNOWN = 5e-3, 14e-6
 """Seconds of an iteration of Newton's method, and per unknown of it: forces, matrix, factors."""
 FORCES, DENSE = 4e-6, 3.3e-11
-"""With condensed elements: seconds per unknown for forces and elimination, and per cube of what is left of them."""
+"""Cost with condensed elements: seconds per unknown for forces and elimination, and per cube of what is left of
+them."""
 ITERATIONS = 5
-"""Of an implicit step."""
+"""Iterations of an implicit step."""
 LONG = 1800.0
 """Seconds of an explicit run above which a warning precedes it."""
 

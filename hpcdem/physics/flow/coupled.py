@@ -26,7 +26,7 @@ CUTS = 1e-9
 EASY, HARD = 6, 12
 """Iterations of a step after which the next one may be longer, must be shorter."""
 GROWTH, MOST_GROWTH = 1.4, 4.0
-"""Of the time step from one to the next where that is due, and the largest power of it."""
+"""Growth factor of the time step from one to the next where that is due, and the largest power of it."""
 FEW, PLENTY = 6, 10
 """Time steps between the peak of a joint and that of the next: fewer make time steps shorter, more make them longer."""
 TOGETHER = 1e-3

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.flow.implicit import Balance, Fluid, Step
 
 POINTS = 5
-"""At which the forces of joints are evaluated along a step."""
+"""Number of points along a step at which the forces of joints are evaluated."""
 
 
 def stored(sim: Blocks) -> tuple[float, float]:

@@ -46,7 +46,7 @@ class Faces(Channels):
         self._wet, self._wet_rows = np.empty(0, np.int64), np.empty((0, blocks.dim), np.int64)
         """Wet free faces of this rank, and rows of the state at their corners."""
         self._loads: list[list[tuple[np.ndarray, ...]]] = []
-        """What kernels take of sides of channels, and of those."""
+        """Arguments of kernels for sides of channels, and for the other faces."""
 
     @property
     def implicit(self) -> bool:

@@ -162,7 +162,7 @@ class Fluid:
         return 1 if self.packs is None else 2
 
     def _variables(self, u: np.ndarray) -> np.ndarray:
-        """From those of each node by itself: of a well that of its lowest node."""
+        """Return the variables from those of each node alone: a well has that of its lowest node."""
         for _, rows in self.wells:
             u[rows[0]] = u[rows].max()
         return u

@@ -47,7 +47,7 @@ class Flow(Values):
     def __init__(self, blocks: Blocks) -> None:
         super().__init__(blocks)
         self.energy: dict[str, float] | None = dict.fromkeys(account.ENTRIES, 0.0)
-        """Of implicit steps [J/m], in space [J], see `energies`; None: not known any more."""
+        """Energies of implicit steps [J/m], in space [J], see `energies`; None: not known any more."""
         self.implicit_dt = 0.0
         self.since_peak = self.passed = 0
         self.condensed: np.ndarray | None = None
@@ -117,7 +117,7 @@ class Flow(Values):
             self.note_leaks()
 
     def mesh_replaced(self) -> None:
-        """There is another mesh: `of_mesh` says that this is gone with the one before."""
+        """Release the flow of the replaced mesh; `of_mesh` reports that it is removed with it."""
         self.close()
 
     def balanced(self) -> None:
@@ -128,7 +128,7 @@ class Flow(Values):
     # ---- the clock ---------------------------------------------------------------------------------------------------
 
     def _given(self) -> list[float]:
-        """Everything except the channels that determines the length of a sub-step."""
+        """Return everything except the channels that determines the length of a sub-step."""
         o = self.blocks.options
         switches = [float(o.mechanical), float(o.dynamic), float(o.flow_every), float(o.flow_steps), o.flow_dt]
         return [*switches, *self._gravity(), self.blocks.clock.dt if o.mechanical else 0.0]
@@ -293,7 +293,7 @@ class Flow(Values):
     # ---- state on disk -----------------------------------------------------------------------------------------------
 
     def saved_state(self) -> dict[str, Any]:
-        """All but the columns, as JSON values."""
+        """Return everything but the columns, as JSON values."""
         return {
             **self._saved_clock(), "rows": self._saved_properties(),
             "conditions": [asdict(one) for one in self.conditions], "removed": self.removed,

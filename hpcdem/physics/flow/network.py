@@ -28,9 +28,9 @@ class Shape:
 EDGE = Shape(((0, 1),), (1, 0))
 TRIANGLE = Shape(((1, 2), (2, 0), (0, 1)), (0, 2, 1))
 SHAPES = {2: EDGE, 3: TRIANGLE}
-"""By the number of their corners, which is that of the dimensions of space."""
+"""Shapes of channels by the number of their corners, which is that of the dimensions of space."""
 LINKS = {corners: len(shape.links) for corners, shape in SHAPES.items()}
-"""Of a channel."""
+"""Number of links of a channel."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def path(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def faces_of(mesh: Mesh, elements: np.ndarray) -> np.ndarray:
-    """All faces of these elements (n,), in their order."""
+    """Return all faces of these elements (n,), in their order."""
     faces = 4 * elements[:, None] + np.arange(4)
     return faces[np.arange(4) < corner_counts(mesh.cells[elements])[:, None]]
 

@@ -13,10 +13,10 @@ from hpcdem.physics.fdem.properties import JOINT, Model, Property
 FLUID = ("fluid_density", "fluid_bulk", "viscosity", "turbulence")
 """Properties of the fluid: the same in all channels."""
 MATRIX = ("matrix_permeability", "matrix_porosity_compressibility", "matrix_porosity")
-"""What leak-off needs."""
+"""Properties needed for leak-off."""
 COMPRESSED = "matrix_porosity_compressibility"
 NEEDED = ("matrix_permeability", "matrix_porosity")
-"""Of these, what must not be zero: nothing would leak."""
+"""Properties of leak-off that must not be zero: nothing would leak."""
 
 
 def _apertures(values: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.tangent import Tangent
 
 AIM, ENOUGH = 1e-10, 1e-7
-"""What is lacking of forces and fluid over what contributes: aimed at, and enough where rounding allows no more."""
+"""Residual of forces and fluid over their contributions: target, and limit if rounding allows no less."""
 MOST, HALVINGS = 25, 6
 """Iterations of a step, and halvings of the way of one."""
 

@@ -40,9 +40,9 @@ CHANNEL_QUANTITIES: dict[str, tuple[str, str]] = {
     "pack_pressure": ("Pa", "mean pressure of packs at its ends; NaN without proppant"),
 }
 _OF_OTHERS = ("temperature", "concentration", "proppant", "pack_pressure")
-"""Of these, what other physics keep."""
+"""Quantities stored by other physics."""
 QUANTITIES = {FLOW_NODE: NODE_QUANTITIES, CHANNEL: CHANNEL_QUANTITIES}
-"""What can be asked of flow nodes and channels: unit and meaning."""
+"""Quantities of flow nodes and channels that can be queried: unit and meaning."""
 
 
 class Values(Faces):

@@ -24,7 +24,7 @@ QUANTITIES = {
     "injected": ("m2", "accumulated inflow, at the density at zero pressure"),
     "stage": ("1", "number of the active stage, from 1; 0: none yet, or all are over"),
 }
-"""What can be asked of a well: unit and meaning."""
+"""Quantities of a well that can be queried: unit and meaning."""
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ class FluidHeat(Assigned, Travelling):
 
     @property
     def on(self) -> bool:
-        """There are channels with it. Not collective."""
+        """Return whether there are channels with heat."""
         return bool(self.rows) and len(self.flow.network.channels) > 0
 
     def content(self) -> float:

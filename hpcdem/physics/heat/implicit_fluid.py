@@ -64,7 +64,7 @@ class Fluid:
         )  # fmt: skip
 
     def made_for(self) -> tuple[bytes, ...]:
-        """Everything that determines the matrix."""
+        """Return everything that determines the matrix."""
         parts = (self.ends, self.q, self.conduct, self.exchange, self.walls, self.held, self.capacity)
         return tuple(one.tobytes() for one in parts)
 
@@ -87,7 +87,8 @@ class Fluid:
         return t[np.where(self.q > 0.0, *self.ends.T)]
 
     def beyond(self, t: np.ndarray) -> np.ndarray:
-        """By how much temperatures (m,) of what flows in channels are, in second order, beyond those upstream."""
+        """Return the difference (m,) between temperatures of the fluid in channels, in second order, and those
+        upstream."""
         state, out = np.zeros((len(t), kernels.FLUID_STATE)), np.empty(len(self.q))
         state[:, kernels.T], state[:, kernels.FULL] = t, self.capacity
         kernels.upstream(*at_nodes(self.ends, len(t)), self.ends, self.q, self.length, self.held, state, state)

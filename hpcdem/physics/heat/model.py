@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 RARELY, MOST = 1e-2, 10
 """Part of the stability limit for which heat by itself waits while blocks move, and steps of these, at most."""
 NEAR, DEEP = 1e-3, 0.2
-"""How far apart, and how deep in each other, faces may be that touch for heat, over the mean edge."""
+"""Largest gap, and largest overlap, of faces in thermal contact, over the mean edge."""
 HEAT_OF_FRICTION = "heat_of_friction"
 """Column of elements: of corners heat of friction that waits for the next cycle [J/m]."""
 

@@ -46,7 +46,7 @@ def _heated(dim: int, threads: int) -> Blocks:
 
 
 def _fluid() -> None:
-    """One channel between two nodes: its kernels, without those of the flow."""
+    """Call the kernels of one channel between two nodes, without those of the flow."""
     begin, channel, side = np.array([0, 1, 2]), np.zeros(2, np.int64), np.array([-1.0, 1.0])
     ends, walls, held = np.array([[0, 1]]), np.zeros((1, 4), np.int64), np.full(2, -1)
     one, two, state = np.ones(1), np.ones(2), np.ones((2, kernels.FLUID_STATE))

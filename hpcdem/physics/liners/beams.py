@@ -62,8 +62,8 @@ class Beams(Elements):
         return Laid(order, self._numbered(goes_on, old, layout.closing(points[order], goes_on)), parted, goes_on)
 
     def _open_ends(self) -> dict[int, tuple[list[int], list[int]]]:
-        """By point of the mesh, the nodes at which a liner ends and those at which one begins, that have no neighbour
-        on the other side."""
+        """Return by point of the mesh the nodes at which a liner ends and those at which one begins, that have no
+        neighbour on the other side."""
         liners, beams = self.liners, self.liners.elements
         there = np.flatnonzero(self.there() & (beams["host"] >= 0))
         points, ends = face_points(liners.blocks.the_mesh().cells, beams["face"][there]), beams["ends"]

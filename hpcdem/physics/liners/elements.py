@@ -34,7 +34,7 @@ class Elements(ABC):
     of_elements: ClassVar[Columns]
     quantities: ClassVar[Mapping[str, Mapping[str, tuple[str, str]]]]
     parted_at: ClassVar[str]
-    """What of the mesh is between two elements that are joined."""
+    """Part of the mesh between two joined elements."""
 
     def __init__(self, liners: Any) -> None:
         self.liners = liners  # physics.liners.model.Liners, which imports this

@@ -20,7 +20,7 @@ from hpcdem.physics.liners.properties import LINER
 from hpcdem.physics.liners.shells import Shells
 
 KINDS: dict[int, type[Elements]] = {2: Beams, 3: Shells}
-"""What liners are made of, by dimensions of space."""
+"""Elements of liners, by dimensions of space."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,8 @@ for _kind, _known in QUANTITIES.items():
             _known[_name] = _unit, f"in space: {_doc}"
         elif _name not in Shells.quantities[_kind]:
             _known[_name] = _unit, f"in the plane: {_doc}"
-"""What can be asked of nodes and elements of liners, in the plane or in space: unit in the plane, and meaning."""
+"""Quantities of nodes and elements of liners that can be queried, in the plane or in space: unit in the plane, and
+meaning."""
 
 
 class Liners(Structure):

@@ -23,7 +23,7 @@ CONCENTRATION, RATE = "concentration", "rate"
 
 
 def checked(given: Mapping[str, Any]) -> dict[str, float]:
-    """These properties, with defaults for others."""
+    """Check the given properties and complete them by defaults."""
     for name, value in given.items():
         if not isinstance(value, (int, float)):
             raise CommandError(f"all channels have the same proppant: {name} must be a number")
@@ -45,7 +45,7 @@ class ProppantAssignments(Travelling, Field):
 
     @property
     def stays(self) -> bool:
-        """Not if a pack pushes on walls, the less the farther they go."""
+        """Return whether the load stays constant during a static solve: a pack pushes less the farther the walls go."""
         return not self.values.get("proppant_modulus", 0.0) > 0.0
 
     def assign(self, joints: np.ndarray | None, given: Mapping[str, Any]) -> None:

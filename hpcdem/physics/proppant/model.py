@@ -34,7 +34,7 @@ COURANT = 0.1
 STALE = 10.0
 """Times, as long as a node needs to lose its slurry, that a step of flow may be without a word."""
 SWEEPS = 4
-"""Over the nodes, for the factors of what they take."""
+"""Number of sweeps over the nodes for the factors of their inflow."""
 NO_STOKES = 1.0
 """Reynolds number of a single grain beyond which Stokes' law is far off."""
 
@@ -62,7 +62,7 @@ class Proppant(ProppantAssignments):
     def __init__(self, blocks: Blocks, flow: Flow) -> None:
         super().__init__(blocks, flow)
         self.accounts = dict.fromkeys(("came", "left", "removed"), 0.0)
-        """Of nodes that are gone, and what went with room that is gone [m2]."""
+        """Amounts of removed nodes, and lost with removed volume [m2]."""
         self._start_clock(flow.time)
         self.sub_steps = 1
         self._held: np.ndarray | None = None
@@ -131,8 +131,8 @@ class Proppant(ProppantAssignments):
         return lambda ends, table: self._thicken(ends, state, table)
 
     def packs(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray] | None:
-        """None if no pack bears; else, of rooms (n,) [m2] of all flow nodes, what packs push with (137) [Pa] and its
-        derivative, rows (2, n). Grains stay where they are."""
+        """Return the function of volumes (n,) [m2] of all flow nodes that gives the pressure of packs (137) [Pa] and
+        its derivative, rows (2, n); None if no pack carries load. Grains stay at their positions."""
         modulus = self.values["proppant_modulus"]
         if not modulus > 0.0 or not self.on or self.blocks.options.one_way:
             return None

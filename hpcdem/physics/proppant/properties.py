@@ -47,7 +47,7 @@ def _both(values: dict[str, Any]) -> None:
 MEDIUM = Model(
     PROPPANT.name, JOINT, "channel of a fluid with grains in it", (*POROUS.properties, *PROPPANT.properties), _both
 )
-"""Both, as the language says them."""
+"""Both models, with the words of the language."""
 NAMES = tuple(one.name for one in PROPPANT.properties)
 
 

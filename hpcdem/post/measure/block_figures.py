@@ -18,7 +18,7 @@ from hpcdem.post.measure.figures import BOTTOM, GAP, INK, LEFT, LINES, RIGHT, TO
 MODE_COLOURS = blocks.TENSION, blocks.MIXED, blocks.SHEAR
 GREY, PALE = "#808080", "#e4e1d8"
 MAP_HEIGHT = 9.5
-"""Of maps at most [cm]."""
+"""Largest height of maps [cm]."""
 LOWER_GAP = 1.45
 """Above panels that have another axis than those over them [cm]."""
 LEGEND = 0.6
@@ -107,7 +107,7 @@ class _Maps:
 
 
 def _elements(axes: Any, state: MeshState, colour: Any = PALE, edges: Any = "face") -> None:
-    """All elements, in one colour or (ne,) colours."""
+    """Draw all elements, in one colour or (ne,) colours."""
     from matplotlib.collections import PolyCollection
 
     for n in (3, 4):

@@ -342,11 +342,11 @@ OF_CRACKS = {"mode": "mode", "aperture[m]": "aperture", "time[s]": "break_time"}
 
 
 SIZES = {2: ("length[m]", "p21"), 3: ("area[m2]", "p32")}
-"""By dimensions of space: what is measured of joints, and their density."""
+"""Names of the size of joints and of their density, by dimensions of space."""
 
 
 def cracks_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) -> list[Sheet]:
-    """Over time; in space also each broken joint of a frame, the last one."""
+    """Make the tables of cracks: over time; in space also each broken joint of a frame, the last one."""
     dim = state.points.shape[1]
     size, density = SIZES[dim]
     head = (
@@ -410,7 +410,7 @@ OF_CHANNELS = {
 
 
 def fluid_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) -> list[Sheet]:
-    """Over time, and each channel of a frame, the last one."""
+    """Make the tables of fluid: over time, and each channel of a frame, the last one."""
     dim = state.points.shape[1]
     size, volume = SIZES[dim][0], {2: "volume[m3/m]", 3: "volume[m3]"}[dim]
     most = "pressure[Pa]", "aperture[m]", "velocity[m/s]"
@@ -446,7 +446,7 @@ class Emission:
 
 
 def events_of(request: Request, files: Sequence[FrameFile]) -> Events:
-    """All joints that broke: of the table that the run wrote; else those that are broken in the last frame."""
+    """Gather all joints that broke: of the table that the run wrote; else those that are broken in the last frame."""
     path = request.folder / emission.TABLE
     if path.is_file():
         found = emission.read_events(path)

@@ -56,7 +56,8 @@ def strains(state: MeshState) -> np.ndarray:
 
 
 def regions(state: MeshState, request: Request, wanted: np.ndarray) -> list[Region]:
-    """All elements that are wanted (ne,); each group among them; and those whose middle in the mesh lies in the box."""
+    """Measure regions: all elements that are wanted (ne,); each group among them; and those whose middle in the mesh
+    lies in the box."""
     stress = np.column_stack([state.of_elements[f"stress_{c}"] for c in COMPONENTS])
     strain = strains(state)
     mesh = tetrahedra.volumes(homes(state), state.cells)
@@ -134,7 +135,7 @@ def regions_sheets(parts: Sequence[Any]) -> list[Sheet]:
 
 
 def displacement_sheets(parts: Sequence[Any]) -> list[Sheet]:
-    """Over time, and each point of the surface in the last frame."""
+    """Make the tables of displacement: over time, and each point of the surface in the last frame."""
     places = tuple(f"{axis}[m]" for axis in "xyz")
     ends = tuple(f"{axis}_{end}[m]" for axis in ("ux", "uy", "uz") for end in ("least", "most"))
 

@@ -48,7 +48,7 @@ def change(before: Grains, after: Grains) -> Change:
 
 
 def _keys(*tables: np.ndarray) -> list[np.ndarray]:
-    """One number per pair of ids, in whichever order, equal over the tables (m, 2)."""
+    """Make one number per pair of ids, in whichever order, equal over the tables (m, 2)."""
     ids, place = np.unique(np.concatenate([t.ravel() for t in tables]), return_inverse=True)
     ends = np.sort(place.reshape(-1, 2), axis=1)
     numbers = ends[:, 0] * max(len(ids), 1) + ends[:, 1]

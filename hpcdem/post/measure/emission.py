@@ -42,7 +42,7 @@ COLUMNS = {
     3: {**_COLUMNS, "z [m]": "z", "joint_area [m2]": "size", "kinetic_energy [J]": "kinetic",
         "peak_kinetic_energy [J]": "peak_kinetic"},
 }  # fmt: skip
-"""Of `cracks.csv` by dimensions of space, and what they are called here."""
+"""Columns of `cracks.csv` by dimensions of space, and what they are called here."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Events:
 
     @property
     def places(self) -> dict[str, np.ndarray]:
-        """Their coordinates (n,) [m] by axis."""
+        """Return the coordinates (n,) [m] by axis."""
         return {"x": self.x, "y": self.y} | ({"z": self.z} if len(self.z) else {})
 
     def kinds(self) -> np.ndarray:

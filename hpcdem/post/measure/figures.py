@@ -25,7 +25,7 @@ from hpcdem.post.saved import write
 LEFT, RIGHT, TOP, BOTTOM, GAP = 1.75, 0.45, 0.55, 1.1, 0.45
 """Margins of a page and space between panels with a common x axis [cm]."""
 PALE = 0.45
-"""How much of its colour a particle keeps under lines."""
+"""Share of its colour that a particle keeps under lines."""
 RIGHTWARD, LEFTWARD, INK = "#b2182b", "#2166ac", "#202020"
 LINES = ("#1b6ca8", "#c8511b", "#3a8a4d", "#7a4fa3", "#8a6d1f", "#c2378a", "#4d4d4d", "#16a0a0")
 MOST_PROFILES = 14
@@ -64,7 +64,7 @@ def length_unit(extent: float) -> tuple[float, str]:
 
 
 def section_view(g: Grains, air: float = 0.1) -> View:
-    """All particles, the room around them as in other pictures, without the height of the walls above the bed."""
+    """Return a view of all particles with the usual margin, without the height of the walls above the bed."""
     seen = view(g.drawn())
     high = float(np.max(g.y + g.r))
     low = float(np.min(g.y - g.r))
@@ -159,7 +159,7 @@ def surface(done: Done, plan: Plan, final: Grains) -> Any:
 
 
 def _spread(stamps: Sequence[Stamp]) -> list[int]:
-    """At most MOST_PROFILES frames, evenly over shortening where a wall pushes, else over the frames."""
+    """Choose at most MOST_PROFILES frames, evenly over shortening where a wall pushes, else over the frames."""
     at, _ = when(stamps)
     if np.isnan(at).any() or np.ptp(at) == 0.0:
         at = np.arange(len(stamps), dtype=float)

@@ -58,7 +58,7 @@ class Grains:
         return replace(self, **{name: getattr(self, name)[keep] for name in _COLUMNS})
 
     def moved(self, x: float, y: float) -> Grains:
-        """Everything moved by (x, y) [m]."""
+        """Return everything moved by (x, y) [m]."""
         walls = {i: ((a[0] + x, a[1] + y), (b[0] + x, b[1] + y)) for i, (a, b) in self.walls.items()}
         return replace(self, x=self.x + x, y=self.y + y, walls=walls)
 

@@ -1,5 +1,5 @@
-"""Each measurement in two halves: what is taken from a frame (on the rank that reads it), and the table that the parts
-of all frames make (on rank 0)."""
+"""Measurements, each in two halves: what is taken from a frame (on the rank that reads it), and the table that the
+parts of all frames make (on rank 0)."""
 
 from __future__ import annotations
 
@@ -201,13 +201,14 @@ def layer_names(g: Grains, plan: Plan) -> np.ndarray:
 
 
 def _words(slip: float, dip: float) -> tuple[str, str, str]:
-    """To which side a fault dips, which way the hanging wall went, sense."""
+    """Return the side to which a fault dips, the direction of the hanging wall, and the sense of slip."""
     ways = ("left", "right")
     return ways[dip <= 0.0], ways[slip * dip > 0.0], "reverse" if slip > 0.0 else "normal"
 
 
 def history_sheets(stamps: Sequence[Stamp], found: fault_history.History) -> list[Sheet]:
-    """All faults together in each frame; each fault in each frame, each fault, slip along them, offset of horizons."""
+    """Make the tables of faults: all faults together in each frame; each fault in each frame, each fault, slip along
+    them, offset of horizons."""
     steps = [stamp.step for stamp in stamps]
     rows, summary, along, offsets = [], [], [], []
     for f in found.faults:

@@ -171,7 +171,7 @@ def _read(file: FrameFile, plan: Plan, tables: tuple[str, ...]) -> Grains:
 
 
 def _one_field(parts: list[dict[str, Any]]) -> None:
-    """Only one frame is drawn: the other fields are let go."""
+    """Discard the fields of all frames but the one that is drawn."""
     drawn = kinds.drawn([part["faults"] for part in parts])
     for part in parts:
         if part["faults"] is not None and part["faults"] is not drawn:

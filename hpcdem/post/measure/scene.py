@@ -28,11 +28,11 @@ from hpcdem.post.measure.grains import (
 from hpcdem.post.surface import bed
 
 KINDS = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks")
-"""What can be measured of particles, by its word on the command line."""
+"""Measurements of particles, by words of the command line."""
 BLOCK_KINDS = ("cracks", "fragments", "emission", "fluid")
-"""What can be measured of blocks."""
+"""Measurements of blocks."""
 SOLID_KINDS = ("regions", "displacement", "cracks", "fragments", "emission", "fluid")
-"""What can be measured of blocks in space."""
+"""Measurements of blocks in space."""
 
 
 @dataclass(frozen=True)

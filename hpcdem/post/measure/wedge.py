@@ -16,9 +16,9 @@ from hpcdem.post.measure.grains import Walls
 from hpcdem.post.measure.surface import surface
 
 ROUGH = 3.0
-"""How much higher the bed stands behind the toe than in front of it, on average and at least, over the standard
-deviation of the surface in front. The highest and the farthest point of a rough level surface lie anywhere, but part
-nothing."""
+"""Limit of the toe: how much higher the bed stands behind the toe than in front of it, on average and at least, over
+the standard deviation of the surface in front. The highest and the farthest point of a rough level surface lie
+anywhere, but part nothing."""
 LEAST_FRONT = 5
 """Surface points from the toe on; where there are fewer, the fall from crest to toe is compared with the roughness
 there."""

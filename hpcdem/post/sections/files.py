@@ -13,7 +13,7 @@ DRAWN = {
     "invariant": ("distortional", "1", lambda v: v * abs(v)),
     "difference": ("shear", "Pa", lambda v: 2.0 * v),
 }
-"""What pages draw of a field: signed J2, whose root is the distortional strain, and s1 - s2."""
+"""Fields as pages draw them: signed J2, whose root is the distortional strain, and s1 - s2."""
 GRIDS = ("volumetric", "distortional", "mean", "shear", *DRAWN)
 
 

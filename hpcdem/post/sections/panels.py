@@ -25,15 +25,16 @@ INK = "#000000"
 LINE = 0.5
 """Width of surface, walls and bars [points]."""
 BAND, SMOOTH_BAND, SHADE = 2.0, 1.0, 0.45
-"""Where |distortional strain| is larger (SMOOTH_BAND: where it is a mean over the grid), a stress is painted in this
-part of its brightness: strained bands show as dark ones. 2 is the second invariant 4 of the manual's pages."""
+"""Shading of strained bands: where |distortional strain| is larger (SMOOTH_BAND: where it is a mean over the grid), a
+stress is painted in this part of its brightness: strained bands show as dark ones. 2 is the second invariant 4 of the
+manual's pages."""
 FIELD_PIXELS = 1000
-"""About as many pixels of a field side by side in a panel; at most FINEST to a cell."""
+"""Approximate number of pixels of a field across a panel; at most FINEST per cell."""
 FINEST = 8
 BALL = 3.0
 """Material is where a ball of this many median radii cannot get to between the particles, as under the surface line."""
 VECTOR_DISCS, DISC_PIXELS = 30000, 2400
-"""More particles than this are a bitmap also in a vector picture; width of the bitmap in pixels."""
+"""Number of particles above which they become a bitmap in a vector picture; width of the bitmap in pixels."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Kind:
 DEFORMATION = Kind("deformation", "Deformation")
 VOLUMETRIC = Kind("volumetric", "Volumetric strain", "%", strain=True)
 PAGE_VOLUME = Kind("volumetric", "det(1 + ∂u/∂x) − 1", "", 100.0, strain=True)
-"""What the manual's pages draw as volumetric strain, with their colours."""
+"""Volumetric strain as drawn on the manual's pages, with their colours."""
 DISTORTIONAL = Kind("distortional", "Distortional strain J\N{SUBSCRIPT TWO}", strain=True, squared=True)
 """The second invariant of the deviator, as the manual's pages draw it; the field is its root."""
 ROOT = Kind("distortional", "Distortional strain \N{SQUARE ROOT}J\N{SUBSCRIPT TWO}", strain=True)
@@ -70,10 +71,10 @@ _DIFFERENCE = (
     "\N{GREEK SMALL LETTER SIGMA}\N{SUBSCRIPT ONE} \N{MINUS SIGN} \N{GREEK SMALL LETTER SIGMA}\N{SUBSCRIPT THREE}"
 )
 SHEAR = Kind("shear", f"Shear stress {_DIFFERENCE}", "MPa", 0.5e6)
-"""What the manual's pages draw as maximum shear stress; the field is half of it."""
+"""Maximum shear stress as drawn on the manual's pages; the field is half of it."""
 HALF_SHEAR = Kind("shear", f"Maximum shear stress ({_DIFFERENCE})/2", "MPa", 1e6)
 KINDS = (DEFORMATION, VOLUMETRIC, DISTORTIONAL, MEAN, SHEAR)
-"""From top to bottom."""
+"""Kinds of panels from top to bottom."""
 
 
 def draw(section: Section, kind: Kind, ax: Any, table: ColourTable | None) -> None:
@@ -156,7 +157,7 @@ class Pixels:
 
     @classmethod
     def over(cls, section: Section, width: float) -> Pixels | None:
-        """For a panel that is `width` [m] wide; None without particles."""
+        """Paint for a panel that is `width` [m] wide; None without particles."""
         p = {name: section.particles[name][section.bed] for name in ("x", "y", "radius")}
         if not len(p["x"]):
             return None

@@ -61,7 +61,7 @@ def outline(section: Section, before: Section | None = None) -> Outline:
 
 
 Limits = tuple[float | None, float | None]
-"""Where an axis begins and ends [m], None: where the model does."""
+"""Limits of an axis [m], None: those of the model."""
 
 
 def common_view(outlines: Sequence[Outline], x: Limits = (None, None), y: Limits = (None, None)) -> View:

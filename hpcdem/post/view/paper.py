@@ -26,7 +26,7 @@ TALLEST = 1.3
 """Largest height of the model over its width on paper; taller ones are narrower."""
 EDGE = "#5a5a5a"
 FINE = 2
-"""Each pixel of bodies in three dimensions is the mean of this number squared."""
+"""Square root of the number of samples of which each pixel of bodies in three dimensions is the mean."""
 EDGES = 0.5
 """Width of their edges [points]."""
 LARGEST = 8192

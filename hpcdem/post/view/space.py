@@ -9,7 +9,7 @@ import numpy as np
 from hpcdem.core.picture_words import Section
 
 SIDES = 6
-"""Of a bar."""
+"""Number of sides of a bar."""
 
 
 class Skin(NamedTuple):
@@ -80,7 +80,7 @@ def skin(
 
 
 def _bare(points: np.ndarray, cells: np.ndarray, of: np.ndarray, cut: np.ndarray) -> Skin:
-    """With those points only that are corners."""
+    """Make a skin with only those points that are corners."""
     used, corner = np.unique(np.where(cells < 0, cells[:, :1], cells), return_inverse=True)
     corner = corner.reshape(cells.shape)
     return Skin(points[used], np.where(cells < 0, -1, corner), of, cut)

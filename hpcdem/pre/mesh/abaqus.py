@@ -58,15 +58,15 @@ class Line(NamedTuple):
 
     @property
     def where(self) -> str:
-        """For messages."""
+        """Return file and line for messages."""
         return f"{self.file}:{self.number}"
 
     def row(self) -> list[str]:
-        """Its values, as text."""
+        """Return the values as text."""
         return [text.strip() for text in self.text.split(",")]
 
     def floats(self) -> list[float]:
-        """Its values."""
+        """Return the values."""
         return [_number(text, self) for text in self.row() if text]
 
 
@@ -130,7 +130,7 @@ class Scope:
         )
 
     def add(self, kind: str, name: str, word: Keyword, entries: list[Entry]) -> None:
-        """To a set."""
+        """Add entries to a set."""
         key = kind, name.upper()
         self.spelled.setdefault(key, name)
         self.sets.setdefault(key, []).extend(entries)
@@ -389,7 +389,8 @@ class _Reader:
         return np.unique(np.concatenate(out))
 
     def _target(self, scope: Scope, entry: Entry) -> tuple[Scope, np.ndarray | range | str]:
-        """Whose numbers, or whose set (in capitals), an entry names: `7`, `SET`, `INSTANCE.7`, `INSTANCE.SET`."""
+        """Resolve an entry: whose numbers, or whose set (in capitals), an entry names: `7`, `SET`, `INSTANCE.7`,
+        `INSTANCE.SET`."""
         value = entry.value
         of = self._instance_named(entry.instance, entry) if entry.instance else scope
         if isinstance(value, str):

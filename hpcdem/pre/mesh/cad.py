@@ -23,7 +23,7 @@ from hpcdem.pre.mesh import occ as shapes
 from hpcdem.pre.mesh.solids import Brep, Shell
 
 MOST_TRIANGLES = 20_000
-"""Of a shell: each becomes a surface of OpenCASCADE."""
+"""Largest number of triangles of a shell: each becomes a surface of OpenCASCADE."""
 MOST_TEXT = 50_000_000
 """Characters of a solid: checkpoints hold them."""
 SAME = 1e-7

@@ -22,7 +22,8 @@ from hpcdem.pre.mesh.solids import Disc, on_surface
 TOLERANCE = 1e-6
 """An edge lies on a line if it keeps to it within this part of its own length."""
 STRAYING = 4.0
-"""How the cost of a path along edges grows with the square of its distance from the trace, in edge lengths."""
+"""Factor by which the cost of a path along edges grows with the square of its distance from the trace, in edge
+lengths."""
 
 
 def _sides(mesh: Mesh) -> Edges:

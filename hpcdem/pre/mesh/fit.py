@@ -16,7 +16,7 @@ TOLERANCE = 1e-3
 OPPOSITE = 0.999
 """Faces that lie on each other look away from each other: the cosine of their normals is below minus this."""
 LEVEL = 0.5
-"""Two triangles are a quad if the cosine of their normals is above this."""
+"""Least cosine between the normals of two triangles that form a quad."""
 PLACES = 3
 """Places that a message names."""
 
@@ -34,7 +34,7 @@ class Free:
     bodies: int
 
     def of(self, rows: np.ndarray) -> Free:
-        """Some of them."""
+        """Select some of the faces."""
         return Free(
             self.mesh,
             self.faces[rows],
@@ -52,7 +52,7 @@ class Free:
 
 
 def free_faces(mesh: Mesh) -> Free:
-    """All faces on a surface."""
+    """Return all faces on a surface."""
     partner = mesh.face_partners()
     body = bodies(partner)
     real = np.ones(len(partner), bool)

@@ -51,7 +51,7 @@ class Fractures:
 
 
 def joined(*parts: Fractures) -> Fractures:
-    """All traces, in the order given."""
+    """Join all traces, in the order given."""
     return Fractures(np.concatenate([p.ends for p in parts]), np.concatenate([p.sets for p in parts]))
 
 

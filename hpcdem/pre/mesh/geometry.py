@@ -19,7 +19,7 @@ from hpcdem.core.errors import CommandError
 Vector = Sequence[float]
 
 MOST_SIDES = 100_000
-"""Of a circle of straight sides."""
+"""Largest number of straight sides of a circle."""
 STEPS_PER_CIRCLE = 8
 """A circle has at least so many edges, however coarse the mesh."""
 
@@ -204,7 +204,7 @@ class Layers:
         return layer
 
     def tables(self) -> dict[str, np.ndarray]:
-        """Everything but solids as arrays, for a checkpoint: names, and curves one after the other."""
+        """Return everything but solids as arrays for a checkpoint: names, and curves in sequence."""
         rows = [(k, c) for k, name in enumerate(self.curves) for c in self.curves[name] if isinstance(c, Curve)]
         return {
             "layer_names": np.array(list(self.curves), dtype=object),

@@ -24,7 +24,7 @@ SET = "physical"
 INSTANCES = "instance"
 """Set of the instances of an assembly."""
 FLATNESS = 1e-9
-"""How far points may lie from a plane z = constant, in parts of the model's size."""
+"""Largest distance of points from a plane z = constant, over the size of the model."""
 OWN = dict(zip(optional.OWN_READERS, (gmsh_file.read, abaqus.read), strict=True))
 FROM_0 = frozenset((".vtk", ".vtu", ".vtp", ".xdmf", ".xmf", ".off", ".ply", ".h5m"))
 """Files whose points and elements are counted from 0."""

@@ -17,7 +17,7 @@ from hpcdem.pre.mesh import solids as s
 Tags = list[tuple[int, int]]
 
 OPTIONS = (("General.Terminal", 0), ("General.NumThreads", 1), ("Mesh.MaxNumThreads3D", 1))
-"""One thread: the same input makes the same mesh."""
+"""Options of Gmsh; one thread, since then equal input gives equal meshes."""
 
 
 def begun() -> Any:

@@ -15,7 +15,7 @@ from hpcdem.pre.mesh.sizes import not_too_many, positive
 
 Quad = tuple[int, int, int, int]
 SHARP = 1e-9
-"""Of the length of a side: points nearer than this to a line are on it."""
+"""Tolerance over the length of a side: points nearer to a line are on it."""
 
 
 def densified(mesh: Mesh, elements: np.ndarray, pattern: Sequence[int], most: Sequence[float]) -> Remade:
@@ -77,7 +77,7 @@ class _Tree:
         return first, 1 - first
 
     def _halved(self, quad: Quad, first: bool, second: bool) -> list[Quad]:
-        """Its pieces: the first side halved (and the one across), the second, or both."""
+        """Return the pieces of a quad: the first side halved (and the one across), the second, or both."""
         a, b, c, d = quad
         if first and second:
             ab, bc, cd, da = (self._middle(*pair) for pair in ((a, b), (b, c), (c, d), (d, a)))

@@ -36,7 +36,7 @@ class Refined:
     cut: int = 0
 
     def with_pieces(self, elements: np.ndarray) -> np.ndarray:
-        """These elements and what was cut off from them."""
+        """Return these elements and the pieces that were cut off from them."""
         return np.flatnonzero(np.isin(self.parent, elements))
 
     def flags(self, before: np.ndarray) -> np.ndarray:
@@ -387,6 +387,6 @@ def _shape(a: Plane, b: Plane, c: Plane, tolerance: float) -> float:
 
 
 def _within(p: Plane, corners: tuple[Plane, Plane, Plane], tolerance: float) -> bool:
-    """In the triangle or on its sides."""
+    """Return whether a point is in the triangle or on its sides."""
     a, b, c = corners
     return all(_turn(u, v, p) >= -tolerance * math.sqrt(_squared(u, v)) for u, v in ((a, b), (b, c), (c, a)))

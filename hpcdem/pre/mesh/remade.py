@@ -30,7 +30,7 @@ class Moved:
     quads: dict[tuple[int, ...], list[tuple[int, ...]]] = field(default_factory=dict)
     """Halves of sides of hexahedra that are cut otherwise now."""
     pieces: dict[tuple[int, ...], list[tuple[int, ...]]] = field(default_factory=dict)
-    """Of faces that were cut."""
+    """Pieces of faces that were cut."""
 
     def faces(self, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (m, dim) of the pieces of these faces (n, dim), and the row of the face each comes from; none of faces

@@ -17,7 +17,7 @@ from hpcdem.pre.mesh.geometry import Curve, sampled
 GROWTH = 0.2
 """Edges grow by this much of the distance from a refined layer, by default: neighbours by a fifth."""
 MOST_ELEMENTS = 20_000_000
-"""More are refused before they are made."""
+"""Largest number of elements; more are refused before they are made."""
 FLAT = 1e-9
 """Edges that span less than this part of the square, or cube, of the longest are flat."""
 MOST_SAMPLES = 500_000

@@ -20,7 +20,7 @@ from hpcdem.pre.mesh.solids import Disc, _frame
 LEAST_ANGLE = 15.0
 """Degrees."""
 NEAR = 0.25
-"""Of an edge."""
+"""Distance over the length of an edge."""
 AROUND = 64
 """Points of a rim that are checked."""
 

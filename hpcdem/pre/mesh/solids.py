@@ -73,7 +73,7 @@ class Box(Body):
 
 @dataclass(frozen=True)
 class Sphere(Body):
-    """About a centre [m]."""
+    """Sphere about a centre [m]."""
 
     centre: Point
     radius: float
@@ -334,7 +334,7 @@ class Shell(Body):
         return np.where(inside, -far, far)
 
     def parts(self, points: np.ndarray) -> list[np.ndarray]:
-        """Its planes: triangles in one plane are one part."""
+        """Return the distances to each plane: triangles in one plane are one part."""
         planes: dict[tuple[float, ...], tuple[np.ndarray, np.ndarray]] = {}
         size = float(np.ptp(np.array(self.corners), axis=0).max())
         for a, b, c in self.triangles():
@@ -354,14 +354,14 @@ class Brep(Body):
     faces: tuple[float, ...]
     """Number of the face of each triangle."""
     name: str = ""
-    """As the file calls it."""
+    """Name in the file."""
 
     def check(self) -> None:
         if not self.text or not self.corners:
             raise CommandError("a solid of a CAD file needs its text and triangles")
 
     def shell(self) -> Shell:
-        """Its triangles."""
+        """Return the shell of its triangles."""
         return Shell(self.corners)
 
     def bounds(self) -> np.ndarray:
@@ -372,7 +372,7 @@ class Brep(Body):
         return self.shell().distance(points)
 
     def parts(self, points: np.ndarray) -> list[np.ndarray]:
-        """Its faces."""
+        """Return the distances to each face."""
         triangles, of = self.shell().triangles(), np.array(self.faces)
         return [
             np.min([_from_triangle(one, points) for one in triangles[of == face]], axis=0) for face in np.unique(of)
@@ -458,7 +458,7 @@ class Disc(Surface):
 
 @dataclass(frozen=True)
 class Plane(Surface):
-    """One without end: a point [m] and a normal of any length."""
+    """Infinite plane: a point [m] and a normal of any length."""
 
     point: Point
     normal: Point

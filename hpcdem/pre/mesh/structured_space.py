@@ -96,7 +96,7 @@ def _step(at: tuple[int, int, int], axis: int) -> tuple[int, ...]:
 
 
 def _faces() -> list[list[tuple[int, ...]]]:
-    """Two triangles of each side of a box, cut alike on opposite sides, by their corners."""
+    """List the two triangles of each side of a box, cut alike on opposite sides, by their corners."""
     found = []
     for axis in range(3):
         for end in (0, 1):

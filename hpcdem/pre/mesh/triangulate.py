@@ -28,7 +28,7 @@ from hpcdem.pre.mesh.sizes import GROWTH, Refinement, SizeField, not_too_many
 from hpcdem.pre.mesh.smooth import smoothed
 
 MOST_EDGES = 1_000_000
-"""More elements, or edges on lines, are refused at once: the size is a slip of units."""
+"""Largest number of elements, or of edges on lines; more are refused at once, as the size is a mistake of units."""
 DELAUNAY, FRONTAL_DELAUNAY, FRONTAL_QUADS = 5, 6, 8
 """Numbers of gmsh's algorithms: triangles in no pattern; near equilateral; those that pair up to quads."""
 BLOSSOM = 1

@@ -20,7 +20,7 @@ NARROW = 1e-3
 NEARLY = 0.05
 """A line whose ends are nearer than this part of its length may be meant as a ring."""
 MOST = 5
-"""Of each kind that are named one by one."""
+"""Number of faults of each kind that are named individually."""
 
 
 def polygons(section: Section, file: str) -> np.ndarray:

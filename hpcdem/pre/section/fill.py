@@ -15,7 +15,8 @@ from hpcdem.pre.section import check
 from hpcdem.pre.section.shapes import Section
 
 POROSITY = 0.2
-"""That of a dense packing of discs of similar radii is 0.16 to 0.18; layers a few discs thick are looser."""
+"""Porosity of the filling. That of a dense packing of discs of similar radii is 0.16 to 0.18; layers a few discs thick
+are looser."""
 ROUNDS, RENEW = 300, 10
 """Rounds of relaxation at most; rounds between two searches for neighbours."""
 DONE = 0.02

@@ -95,7 +95,7 @@ class Placement:
         return float(np.abs((points[:, :2] - first) @ np.array([-along[1], along[0]])).max(initial=0.0))
 
     def model(self, curve: Curve) -> Curve:
-        """In the model [m], from the plane of the section."""
+        """Convert a curve from the plane of the section to the model [m]."""
         return replace(curve, points=(curve.points - np.array(self.origin)) * (self.unit or 1.0) + np.array(self.to))
 
     def file(self, points: np.ndarray) -> np.ndarray:
@@ -119,12 +119,12 @@ class Section:
 
     @property
     def polygons(self) -> list[Shape]:
-        """Its areas."""
+        """Return the polygons."""
         return [shape for shape in self.shapes if shape.polygon]
 
     @property
     def lines(self) -> list[Shape]:
-        """Its lines."""
+        """Return the lines."""
         return [shape for shape in self.shapes if not shape.polygon]
 
     @property

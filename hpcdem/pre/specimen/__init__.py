@@ -1,4 +1,4 @@
-"""From a grading curve to a specimen: how many grains of which size, their outlines, their places.
+"""Make specimens from a grading curve: numbers of grains of each size, their outlines and positions.
 
     specimen = make_specimen(Request(sizes=(10, 5, 1, 0.5), percents=(100, 95, 75, 60), shape="triangle"))
 
@@ -29,7 +29,7 @@ __all__ = [
 
 PLACEMENTS = ("cells", "dense")
 MOST = 1_000_000
-"""Most grains of a specimen."""
+"""Largest number of grains of a specimen."""
 MM = 1e-3
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError, HpcdemError, ScriptError
 
 MOST_SIZES = 1000
-"""Most rows of a grading; a laboratory has a few dozen sieves."""
+"""Largest number of rows of a grading; a laboratory has a few dozen sieves."""
 SMALLEST, LARGEST = 1e-6, 1e9
 """Sizes [mm] that are taken for grains: from a nanometre to a thousand kilometres."""
 

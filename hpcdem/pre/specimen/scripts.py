@@ -225,6 +225,6 @@ def _smallest(specimen: Specimen) -> tuple[float, float]:
 
 
 def _rounded(value: float) -> float:
-    """Two digits, downwards for time steps and rates, which is all the same for the others."""
+    """Round to two digits, downwards for time steps and rates, which is all the same for the others."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return math.floor(value / unit + 1e-9) * unit

@@ -61,7 +61,8 @@ CHECKS = (
 )
 
 Found = list[tuple[int, bool, Finding]]
-"""What one rank found: the number of the check, which orders them, whether it is made on each host, and the finding."""
+"""Findings of one rank: the number of the check, which orders them, whether it is made on each host, and the
+finding."""
 
 
 def look(machine: Machine, at_start: bool = False) -> Found:

@@ -105,7 +105,7 @@ def srun_cores(machine: Machine) -> Findings:
 
 
 def sbatch_cores(machine: Machine) -> Findings:
-    """In a batch script: what srun will not take from sbatch."""
+    """Warn, in a batch script, about options that srun does not take over from sbatch."""
     asked = machine.slurm("CPUS_PER_TASK")
     if asked >= 2 and not machine.in_step and "SRUN_CPUS_PER_TASK" not in machine.environ:
         text = f"the job requested {asked} cores per task; srun (since Slurm 22.05) does not inherit -c from sbatch"

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PATIENT = 15.0
 """Seconds for all imports from which on the file system is to blame."""
 MODULES = ("numpy", "scipy", "numba", "h5py", "matplotlib", "rich")
-"""What a run loads, and its last picture."""
+"""Packages loaded by a run, and by its last picture."""
 TRIAL = "from mpi4py import MPI; print('hpcdem sees', MPI.COMM_WORLD.Get_size())"
 PETSC = "import mpi4py; mpi4py.rc.initialize = False; import petsc4py.lib; petsc4py.lib.ImportPETSc()"
 
@@ -65,7 +65,7 @@ def _needs(package: str) -> Iterator[Requirement]:
 
 
 def _version(name: str) -> str | None:
-    """By the package's description, or, as for Debian's h5py, which has two under other names, as it says itself."""
+    """Return a version from the package's metadata, or, if that has another name (Debian's h5py), from the module."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:

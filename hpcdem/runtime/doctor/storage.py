@@ -72,7 +72,7 @@ def results(machine: Machine) -> Findings:
 
 
 def temporary(machine: Machine) -> Findings:
-    """Both in the folder for temporary files."""
+    """Check space and file operations in the folder for temporary files."""
     yield from _room("temporary", Path(tempfile.gettempdir()), TEMPORARY)
     yield from _trial(machine, "temporary", Path(tempfile.gettempdir()), TEMPORARY)
 

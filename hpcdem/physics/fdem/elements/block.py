@@ -51,7 +51,7 @@ class ElementBlock:
 
     @property
     def tables(self) -> Tables:
-        """For kernels."""
+        """Return the tables for kernels."""
         sim = self.sim
         return self.kind.tables(self.rows, sim.n_left, sim.x.reshape(-1), sim.x.shape[1], self.c, *self._tables)
 
@@ -109,7 +109,7 @@ class ElementBlock:
     # ---- state variables of elements, and tables of owned elements ---------------------------------------------------
 
     def remember(self) -> None:
-        """Some elements of the model yield or creep."""
+        """Allocate the histories of elements; called if some elements of the model yield or creep."""
         self.elastic, self.uncrept, self.initial = (np.zeros_like(self.s0) for _ in range(3))
 
     def histories(self, memory: np.ndarray, width: int) -> np.ndarray:

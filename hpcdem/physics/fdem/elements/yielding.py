@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.tables import Table
 
 Flow = tuple[np.ndarray, list[np.ndarray], np.ndarray, np.ndarray]
-"""What flow changes: what elements remember of yielding (n_own, 9 or more), stresses without strain of the blocks [Pa],
+"""Arrays changed by plastic flow: histories of yielding (n_own, 9 or more), stresses without strain of the blocks [Pa],
 yield surfaces (rows, 4), strains that strength follows."""
 
 
