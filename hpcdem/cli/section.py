@@ -143,8 +143,8 @@ def _faults(folder: Path, step: int) -> tuple[list[Shape], list[str]]:
     path = folder / "measure" / "faults.csv"
     if not path.is_file():
         return [], []
-    found: list[Shape] = []
-    short: list[str] = []
+    found: dict[str, Shape] = {}  # of two frames of one step the later one counts
+    short: dict[str, None] = {}
     with path.open(newline="", encoding="utf-8") as file:
         for row in csv.DictReader(line for line in file if not line.startswith("#")):
             try:
@@ -155,13 +155,12 @@ def _faults(folder: Path, step: int) -> tuple[list[Shape], list[str]]:
                 raise HpcdemError(f"{path}: not a table of faults; repeat hpcdem measure {folder} faults") from None
             name = f"fault {row.get('fault', len(found) + 1)}"
             if (ends[0] == ends[1]).all():
-                short.append(name)
+                short[name] = None
                 continue
-            about = {k: row[k] for k in ("sense", "dip[deg]", "mean_strain") if row.get(k)}
-            found.append(
-                Shape(name, (made_curve(ends, False, name),), False, {"kind": "fault", "step": step, **about}, name)
-            )
-    return found, short
+            about: dict[str, Any] = {k: row[k] for k in ("sense", "dip[deg]", "mean_strain") if row.get(k)}
+            about |= {"kind": "fault", "step": step}
+            found[name] = Shape(name, (made_curve(ends, False, name),), False, about, name)
+    return [*found.values()], [*short]
 
 
 def draw(found: Section, path: Path) -> None:

@@ -366,7 +366,7 @@ def test_a_closed_line_is_no_ring_that_lacks_a_side(tmp_path):
 def test_a_fault_of_one_point_is_named_and_no_line(tmp_path):
     (tmp_path / "measure").mkdir()
     (tmp_path / "measure" / "faults.csv").write_text(
-        "step,fault,x1[m],y1[m],x2[m],y2[m]\n9,1,0,0,30,40\n9,2,5,5,5,5\n8,3,0,0,1,1\n"
+        "step,fault,x1[m],y1[m],x2[m],y2[m]\n9,1,0,0,30,39\n9,1,0,0,30,40\n9,2,5,5,5,5\n8,3,0,0,1,1\n"
     )
     shapes, short = program._faults(tmp_path, 9)
     assert [shape.name for shape in shapes] == ["fault 1"] and shapes[0].length() == 50.0 and short == ["fault 2"]

@@ -14,6 +14,7 @@ from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame
 from hpcdem.post.measure import fault_history, faults
 from hpcdem.post.measure.fault_history import Seen, track
 from hpcdem.post.measure.grains import Grains
+from hpcdem.post.measure.scene import Request, make_plan
 from hpcdem.sweep import tables
 from tests.unit.measured import R, frame, lattice, ramp, write
 from tests.unit.test_measure_folder import PROGRAM, column, run, table
@@ -105,6 +106,12 @@ def test_horizons_are_offset_by_the_slip(folder: Path) -> None:
         assert float(row["heave[m]"]) == pytest.approx(slip * np.cos(np.radians(dip)), abs=1e-6)
     middle = {row["horizon"]: float(row["y[m]"]) for row in rows if row["fault"] == "2"}
     assert sorted(middle.values()) == pytest.approx([1000.0, 2000.0], abs=R)
+
+
+def test_the_frames_of_blocks_end_at_the_last_step_asked_for(folder: Path) -> None:
+    for last, steps in ((0, [0]), (2000, [0, 1000, 2000])):
+        plan, _ = make_plan(Request(folder.parent / "blocks", ("faults",), last=last), ["faults"])
+        assert [file.step for file in plan.frames] == steps
 
 
 def test_blocks_give_the_same_numbers(folder: Path) -> None:

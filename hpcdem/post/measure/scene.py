@@ -129,8 +129,8 @@ def make_plan(request: Request, what: Sequence[str]) -> tuple[Plan, Grains]:
     """The plan, and the last frame that has particles. Raises HpcdemError."""
     frames = in_time(request.folder, request.first or 0, request.last)
     if not frames and set(what) == {"faults"}:  # the estimator needs no more than points that keep their numbers
-        frames = list_mesh_frames(request.folder)
-        frames = [f for f in frames if (request.first or 0) <= f.step <= (request.last or f.step)]
+        low, high = request.first or 0, np.inf if request.last is None else request.last
+        frames = [f for f in list_mesh_frames(request.folder) if low <= f.step <= high]
     if not frames:
         between = (f" from step {request.first}" if request.first else "") + (
             f" to step {request.last}" if request.last is not None else ""
