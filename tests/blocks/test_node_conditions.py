@@ -85,7 +85,7 @@ def test_a_component_of_a_plane_that_stays_leaves_a_line():
         (moves(at_x=3.0, at_y=4.0, does_y=A, constraint=ALONG, way=(0.6, 0.8)), "acceleration-y 4"),
         (moves(at_z=1.0, constraint=ACROSS, way=(0.0, 0.0, 1.0)), r"across \(0, 0, 1\) \(type 3\) and velocity-z 1"),
         (moves(at_y=1.0, at_z=1.0, constraint=ACROSS, way=(0.0, 0.8, 0.6)), "velocity-y 1 and velocity-z 1"),
-        (moves(at_x=1.0, constraint=ACROSS, way=(0.6, 0.64, 0.48)), "a component is 0, or two"),
+        (moves(at_x=1.0, constraint=ACROSS, way=(0.6, 0.64, 0.48)), "prescribe the value 0 or a second component"),
     ],
 )
 def test_what_contradicts(one, told):

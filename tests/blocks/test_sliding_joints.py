@@ -403,7 +403,7 @@ def test_sides_that_have_left_each_other(kind):
     assert re.search(
         rf"face-joint \d+ \(joint-mohr-coulomb\) at {place} has slipped or opened by 0.011 m, 0.11 of its size", said[0]
     )
-    with pytest.raises(CommandError, match=r"0\.111 m, 1\.1 of its size.*the run ends where"):
+    with pytest.raises(CommandError, match=r"0\.111 m, 1\.1 of its size.*the run stops"):
         move_top(sim, 0.1, 0.0)
     assert of_joints(sim, "slip") == pytest.approx(np.copysign(0.011, of_joints(sim, "slip")), rel=1e-3)
     other = stack(kind, COULOMB_JOINT.name, COULOMB, young=1e9, dynamic=True)

@@ -119,7 +119,7 @@ def test_a_checkpoint_needs_the_function_with_the_same_text(tmp_path, monkeypatc
     saved_state.save(sim, tmp_path / "a.sav")
     found = user_functions.FUNCTIONS.pop(name)
     empty = Blocks()
-    with pytest.raises(CommandError, match=r"the function rock\.py:lift, which this script has not named"):
+    with pytest.raises(CommandError, match=r"the function rock\.py:lift, which this script does not use"):
         saved_state.restore(empty, tmp_path / "a.sav")
     assert empty.mesh is None
     monkeypatch.setitem(user_functions.FUNCTIONS, name, found)

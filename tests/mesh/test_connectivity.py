@@ -181,9 +181,9 @@ WRONG = {
         [*SQUARE, (1.0, 1e-12), (2.0, 0.0), (2.0, 1.0)],
         [(0, 1, 2, 3), (4, 5, 6, 2)],
         {},
-        "points 1 and 4 lie in the same place .* merge",
+        "points 1 and 4 coincide at .* merge",
     ),
-    "element twice": (SQUARE, [(0, 1, 2, 3), (2, 3, 0, 1)], {}, "element 0 .* is there again as element 1"),
+    "element twice": (SQUARE, [(0, 1, 2, 3), (2, 3, 0, 1)], {}, "element 0 .* is a duplicate of element 1"),
     "three on an edge": (
         [(0, 0), (1, 0), (0, 1), (1, 1), (0.5, -1), (0.5, -2)],
         [(0, 1, 2), (0, 1, 3), (0, 4, 1), (5, 4, 0)],

@@ -106,7 +106,7 @@ def test_merging_points(read):
     # Halves with points of their own are two bodies; a slit within a body is refused.
     assert read(msh([*apart[:6], (1 + 1e-12, 0, 0), (1, 1 - 1e-12, 0)], elements)).edges().inner.sum() == 0
     slit = [*apart[:6], (1 + 1e-12, 0, 0), (0, 2, 0), (1, 2, 0), (2, 2, 0)]
-    with pytest.raises(HpcdemError, match=r"m\.msh: points 2 and 7 lie in the same place \(1, 0\) of one body"):
+    with pytest.raises(HpcdemError, match=r"m\.msh: points 2 and 7 coincide at \(1, 0\) of one body"):
         read(msh(slit, [(3, 1, 1, 2, 5, 4), (3, 2, 7, 3, 6, 5), (3, 1, 4, 5, 9, 8), (3, 1, 5, 6, 10, 9)]), merge=0.0)
     assert read(msh(apart, elements)).edges().inner.sum() == 0
     merged = read(msh(apart, elements), merge=1e-6)
@@ -124,7 +124,7 @@ BAD = {
     "volume": (SQUARES, [TWO[1], (4, 1, 1, 2, 3, 4)], r"m\.msh: 1 tetrahedra .* element 2: .*model new dim 3"),
     "pyramid": (SQUARES, [TWO[1], (7, 1, 1, 2, 3, 4, 5)], r"m\.msh: 1 pyramids .* element 2: only triangles"),
     "lines only": (SQUARES, [TWO[0]], r"m\.msh: there are no triangles and no quads \(elements: 1 of line"),
-    "twice": (SQUARES, [TWO[1], (2, 1, 5, 1, 2)], r"element 1 .* is there again as element 2"),
+    "twice": (SQUARES, [TWO[1], (2, 1, 5, 1, 2)], r"element 1 .* is a duplicate of element 2"),
     "three": (SQUARES, [*TWO, (2, 1, 2, 5, 7)], "used by more than two elements"),
     "line off": (SQUARES, [(1, 7, 1, 6), *TWO[1:]], r"m\.msh: lines of the group 'fault' are not edges"),
     "line in the void": (SQUARES, [(1, 7, 1, 7), *TWO[1:]], r"m\.msh: lines of the group 'fault' are not edges"),

@@ -117,7 +117,9 @@ def test_another_text_does_not_go_on(alone, launch, tmp_path):
         f"RES {sorted((folder / 'data').glob('*.sav'))[0]}\nPROP law pairs.py:sticky parameter pull 2e3\nCYC 10\nSTOP\n"
     )
     done = launch(1, "again.py", "--no-figure", "--outdir", "other", cwd=folder)
-    assert done.returncode != 0 and "of another text of pairs.py: a run cannot resume with a changed law" in done.stderr
+    assert (
+        done.returncode != 0 and "but pairs.py has changed since: a run cannot resume with a changed law" in done.stderr
+    )
     shutil.copy(LAWS, folder)
     done = launch(1, "again.py", "--no-figure", "--outdir", "other", cwd=folder)
     assert done.returncode == 0, done.stderr

@@ -170,7 +170,7 @@ class PairLaw:
             if not slope <= bounds[q, 0] * (1.0 + 1e-6) + 1e-12 * abs(found[0][0]) / OVERLAP:
                 raise CommandError(
                     f"{self.place}: dFn/du is {slope:g} N/m where discs begin to touch, with {told}, above its "
-                    f"stiffness {bounds[q, 0]:g} N/m, by which the time step is found: stiffness= of pair_law says more"
+                    f"stiffness {bounds[q, 0]:g} N/m, which sets the time step: give pair_law a larger stiffness="
                 )
 
 
@@ -449,9 +449,9 @@ def _known(name: str) -> PairLaw:
     raise UnknownLaw(
         f"the checkpoint has discs with the law {title}, "
         + (
-            f"of another text of {title.rpartition(':')[0]}: a run cannot resume with a changed law"
+            f"but {title.rpartition(':')[0]} has changed since: a run cannot resume with a changed law"
             if other
-            else f"which this script has not named: PROP law {title} in any line of it does"
+            else f"which this script does not use: add a line PROP law {title}"
         )
     )
 

@@ -41,11 +41,13 @@ def check(sim: State, local: Local, error: type[Exception]) -> None:
         f"face-joint {face} ({name}) at ({at}) has slipped or opened by {way:.3g} m, {share:.2g} of its size. Its "
         "sides still interact over the whole joint"
     )
-    advice = "longer edges along the joint, or classic-intrinsic-cohesive-interface, whose broken faces meet as contact"
+    advice = (
+        "use longer edges along the joint, or classic-intrinsic-cohesive-interface, whose broken faces are contacts"
+    )
     if share > GONE:
-        raise error(f"{text}; the run ends where that is more than its size. What follows: {advice}")
+        raise error(f"{text}; the run stops, because this is more than its size. For larger slip {advice}")
     if sim.log is not None:
-        sim.log.warn_once("joints slide far", f"{text}. Right for larger slip: {advice}")
+        sim.log.warn_once("joints slide far", f"{text}. For larger slip {advice}")
 
 
 def _rows(sim: State, local: Local) -> np.ndarray:

@@ -69,7 +69,7 @@ class FreeField(SurfaceLoad):
             raise CommandError("free-field boundaries need a dynamic run: use model option dynamic on first")
         faces = blocks.numbers_of_faces(chosen)
         if not len(faces):
-            raise CommandError("a free-field side needs faces: the range holds none")
+            raise CommandError("a free-field side needs faces, but the range contains none")
         known = FreeField.there(blocks)
         if known is not None and np.isin(faces, known.faces["face"]).any():
             raise CommandError("some of these faces are on a free-field side already")

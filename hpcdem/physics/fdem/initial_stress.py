@@ -64,7 +64,7 @@ class InitialStress(Assignments):
         if self.options.plane_stress and (values[:, ACROSS] != 0.0).any():
             raise CommandError(
                 f"an initial stress zz of {values[values[:, ACROSS] != 0.0, ACROSS][0]:g} Pa cannot be in plane "
-                "stress, where the stress across the plane is 0: leave stress-zz out, or say model plane-strain"
+                "stress, where the stress across the plane is 0: omit stress-zz, or use model plane-strain"
             )
         if mesh.dim == 2 and zz is None and "zz" not in (gradient or {}):
             values[:, ACROSS] = math.nan  # until there are moduli

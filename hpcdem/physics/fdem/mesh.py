@@ -452,7 +452,7 @@ def _bad_points(mesh: Mesh, names: Names) -> str | None:
     if len(twins):
         p, q = min((int(min(t)), int(max(t))) for t in twins)
         return (
-            f"points {names.point(p)} and {names.point(q)} lie in the same place {_at(mesh, p)} of one body: elements "
+            f"points {names.point(p)} and {names.point(q)} coincide at {_at(mesh, p)} of one body: elements "
             "on both sides would not be connected; merge the points (a crack between them is an edge flagged as crack)"
         )
     return None
@@ -501,7 +501,7 @@ def _bad_edges(mesh: Mesh, names: Names) -> str | None:
 def _given_twice(mesh: Mesh, e: int, names: Names) -> str | None:
     twins = np.flatnonzero((np.sort(mesh.cells, axis=1) == np.sort(mesh.cells[e])).all(axis=1))
     return (
-        f"{_element(mesh, int(twins[0]), names)} is there again as element {names.element(int(twins[1]))}"
+        f"{_element(mesh, int(twins[0]), names)} is a duplicate of element {names.element(int(twins[1]))}"
         if len(twins) > 1
         else None
     )

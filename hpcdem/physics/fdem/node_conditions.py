@@ -171,8 +171,8 @@ def _on_a_line(one: NodeCondition, given: list[str]) -> NodeCondition:
         if all(value == 0.0 for _, value in assigned.values()):
             return _moved(one, {axis: (moving.VELOCITY, 0.0) for axis in way})
         raise Contradiction(
-            f"{_constraint(one)} and {' and '.join(map(one.motion, leading))}: along an oblique line numbers of one "
-            "kind are prescribed"
+            f"{_constraint(one)} and {' and '.join(map(one.motion, leading))}: along an oblique line all "
+            "prescribed components must be numbers of one kind (velocity or acceleration)"
         )
     first = max(leading, key=lambda axis: abs(way[axis]))
     speed = float(assigned[first][1]) / way[first]
@@ -199,8 +199,8 @@ def _in_a_plane(one: NodeCondition, given: list[str]) -> NodeCondition:
     kinds = {assigned[axis][0] for axis in known}
     if not still and (len(kinds) > 1 or any(isinstance(assigned[axis][1], str) for axis in known)):
         raise Contradiction(
-            f"{_constraint(one)} and {' and '.join(map(one.motion, known))}: across an oblique vector numbers of one "
-            "kind are prescribed"
+            f"{_constraint(one)} and {' and '.join(map(one.motion, known))}: across an oblique vector all "
+            "prescribed components must be numbers of one kind (velocity or acceleration)"
         )
     kind = assigned[known[0]][0]
     out = 0.0 if still else sum(normal[axis] * float(assigned[axis][1]) for axis in known)
@@ -214,8 +214,8 @@ def _in_a_plane(one: NodeCondition, given: list[str]) -> NodeCondition:
         return _moved(one, {**assigned, left[0]: (kind, -out / normal[left[0]] if out else 0.0)})
     if not still:
         raise Contradiction(
-            f"{_constraint(one)} and {one.motion(known[0])}: beside a plane that is oblique to it a component is 0, or "
-            "two are prescribed"
+            f"{_constraint(one)} and {one.motion(known[0])}: in a plane oblique to that axis, "
+            "prescribe the value 0 or a second component"
         )
     # One component is zero and the others lie in a plane: a line.
     along = _cross(np.array([float(axis == known[0]) for axis in "xyz"]), np.array(one.way))

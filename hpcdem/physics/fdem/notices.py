@@ -80,7 +80,7 @@ def _tell_beyond(sim: Any, least: float, of: np.ndarray, what: str) -> None:
     place = ", ".join(f"{c:.4g}" for c in sim.the_mesh().centroids(np.array([element]))[0])
     sim.log.warn_once(
         f"beyond strength {count} {element} {far}",
-        f"{count} elements {what}; farthest beyond is element {element} at ({place}), by {-far:.4g} Pa: "
+        f"{count} elements {what}; the largest excess is {-far:.4g} Pa, of element {element} at ({place}): "
         f"{pascals(stress)}",
     )
 

@@ -128,8 +128,8 @@ def check_restored(state: Mapping[str, Any]) -> None:
             if isinstance(value, str) and MARK in value and value not in state["tables"] and value not in FUNCTIONS:
                 title = value.partition(MARK)[0]
                 raise UnknownLaw(
-                    f"the checkpoint has conditions that follow the function {title}, which this script has not named "
-                    "with the same text: node function 'FILE:FUNCTION' before model restore does"
+                    f"the checkpoint has conditions that follow the function {title}, which this script does not use "
+                    "with the same text: add node function 'FILE:FUNCTION' before model restore"
                 )
 
 

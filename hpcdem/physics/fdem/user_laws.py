@@ -243,7 +243,7 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
                 i = int(np.flatnonzero(steep)[0])
                 raise CommandError(
                     f"{law}: d{what[k]}/d{strain[k]} is {slope[i]:g} Pa at zero strain, above its stiffness "
-                    f"{bound[i]:g} Pa, by which the time step is found: stiffness= of element_law says more"
+                    f"{bound[i]:g} Pa, which sets the time step: give element_law a larger stiffness="
                 )
     values[BOUND] = bound.reshape(shape) if shape else float(bound[0])
 
@@ -401,8 +401,8 @@ def check_restored(state: Mapping[str, Any]) -> None:
         raise UnknownLaw(
             f"the checkpoint has elements with the law {title}, "
             + (
-                f"of another text of {title.rpartition(':')[0]}: a run cannot resume with a changed law"
+                f"but {title.rpartition(':')[0]} has changed since: a run cannot resume with a changed law"
                 if other
-                else "which this script has not named: element law 'FILE:FUNCTION' before model restore does"
+                else "which this script does not use: add element law 'FILE:FUNCTION' before model restore"
             )
         )

@@ -29,17 +29,17 @@ _ZDEM = """
 - 每行一个命令;除文件名外不分大小写。`( ) = ,` 和空格只作分隔。
 - `# ! ;` 之后是注释,注释可用任何编码,其余为 UTF-8。
 - 命令可缩写到三个字母,关键字可缩写到两个字母(不与本命令其他关键字混淆时)。
-- 第一条命令是 START、RESTORE 或 LOAD;STOP 之后不读。
+- 第一条命令是 START、RESTORE 或 LOAD;STOP 之后的内容被忽略。
 - 单独一行 `friction = 0.3` 定义参数,以后在需要数的地方写 `{friction}`([参数扫描](sweep.zh.md))。
-- 先读完整个脚本再运行;第一处错误报出行号,什么也不做。单位为 SI。
+- 运行前先检查整个脚本;有错误时给出第一处错误的行号,不做任何计算。单位为 SI。
 """
 
 _PCDC = """
 ## 脚本的读法
 
 - 脚本是 Python,首词为 `pcdc` 的行是命令,循环和函数中也可以;命令续行用反斜杠,`#` 之后是注释。
-- 先读完全部命令和 Python 再运行;第一处错误报出文件、行号和内容。`hpcdem --check script.sc` 到此为止。
-- 花括号内的部分可以省略:`a{s}-l{ayer}` 可写成 `as-layer`、`a-l`;不分大小写。有歧义的缩写会列出候选并拒绝。
+- 运行前先检查全部命令和 Python;有错误时给出第一处错误的文件、行号和内容。`hpcdem --check script.sc` 只做这项检查。
+- 花括号内的部分可以省略:`a{s}-l{ayer}` 可写成 `as-layer`、`a-l`;不分大小写。缩写有歧义时报错并列出候选。
 - 值是数、引号内的文本、`on` 和 `off`、向量 `(x,y)`;方括号内是 Python 表达式:`[m_R/12]`、`'layer [i]'`。
 - `<f>` 数,`<i>` 整数,`<s>` 文本,`<v>` 向量;可写 `table <s>` 处,值是时间的函数。
 - 拉为正;对象编号从 0 开始;单位可用任何一致的单位制,表中为 SI。
@@ -50,7 +50,7 @@ _IN_ROWS = {
     "| required |": "| 必需 |",
     "; also accepted: ": ";也可写作 ",
     "; may be repeated": ";可重复",
-    " (**not supported yet**)": "(**尚不执行**)",
+    " (**not supported yet**)": "(**尚不支持**)",
     "| all |": "| 全部 |",
     "| that of the law |": "| 由本构而定 |",
     "; joined particles keep theirs": ";所连颗粒保持各自的值",
@@ -111,7 +111,7 @@ def pcdc_page() -> str:
             lines += ["模型:" + "、".join(f"[{m.keyword.name}](#{m.keyword.name})" for m in command.models) + "。", ""]
         lines += ["例:", "", "```", *command.example, "```", ""]
         parts.append("\n".join(lines))
-    parts += ["## range\n\n写在行末,只对部分对象起作用;不写时对全部。各项必须同时满足;什么也没选中是错误。\n"]
+    parts += ["## range\n\n写在行末,只对部分对象起作用;不写时对全部。各项必须同时满足;没有选中任何对象时报错。\n"]
     parts += [_chinese(pcdc._options(_meant_pcdc(PCDC.range_terms))), "\n## 模型和条件\n"]
     for command in PCDC.commands:
         for model in command.models:
@@ -124,8 +124,8 @@ def pcdc_page() -> str:
             parts.append("\n".join(lines))
     parts += ["## 监测记录的量\n", _chinese(_last(pcdc._recorded()))]
     parts += [
-        "\n## 三维\n\n`pcdc model new dim 3` 之后向量有三个分量,可用以下命令,除列出者外关键字都可用;其余在运行前被拒绝。\n",
-        f"没有的命令:{'、'.join(f'`{name}`' for name in pcdc.missing_in_space(PCDC))};也没有:"
+        "\n## 三维\n\n`pcdc model new dim 3` 之后向量有三个分量,可用以下命令;除表中列出的以外,其关键字都可用;其余命令在运行前报错。\n",
+        f"不可用的命令:{'、'.join(f'`{name}`' for name in pcdc.missing_in_space(PCDC))};此外不支持:"
         f"{'、'.join(pcdc.IN_THE_PLANE.values())}。\n",
     ]
     parts += [_chinese(_last(pcdc._dimensions(PCDC)))]
@@ -177,8 +177,8 @@ def _chinese(table: str) -> str:
         "object": "对象",
         "command": "命令",
         "models": "模型",
-        "not available": "没有的关键字",
-        "in three dimensions only": "仅三维有的",
+        "not available": "不可用的关键字",
+        "in three dimensions only": "仅三维可用",
     }
     cells = [names[cell.strip()] for cell in head.strip("|").split("|")]
     for english, meant in _IN_ROWS.items():

@@ -308,7 +308,7 @@ ADDED = [
     ("model add node (5,5)\npcdc element group 'a'", "point 45 at \\(5, 5\\) belongs to no element"),
     ("model add element 0 1 99", "there is no node 99"),
     ("model add element 0 1 2", "flat"),
-    ("model add element 0 1 10 9", "more than two elements|is there again|same side"),
+    ("model add element 0 1 10 9", "more than two elements|is a duplicate|same side"),
     ("model add element 0 1", "the line ends where"),
     ("element from", "is rejected: a mesh of another program"),
 ]
