@@ -13,7 +13,8 @@ def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: fl
     """Append rows to the file. Collective.
 
     since: None to append; at the first call of a run, the step at which it starts: later rows of the file are removed
-    (0: the file starts again). Raises HpcdemError on all ranks if the file cannot be written.
+    (0: the file starts again), earlier ones are 0 in columns that they do not have. Raises HpcdemError on all ranks if
+    the file cannot be written.
     """
     error = None
     if comm.rank == 0:
@@ -36,7 +37,8 @@ def _cut(path: str | os.PathLike, header: str, since: float) -> None:
             for line in file.read().splitlines(keepends=True)[1:]:
                 step = re.match(r"(\d+)[ ,]", line)
                 if step is not None and int(step[1]) <= since and line.endswith("\n"):
-                    kept.append(line.rstrip("\n"))
+                    new = header.count(",") - line.count(",") if step[0].endswith(",") else 0
+                    kept.append(line.rstrip("\n") + ",0.0" * new)
     temporary = f"{os.fspath(path)}.tmp"
     try:
         with open(temporary, "w", encoding="utf-8") as file:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -78,6 +78,7 @@ def bond(
     if largest == 0.0:
         return 0
 
+    _refuse_soft(kind, given)
     if moment:
         sim.bond_types.row(kind=kind, **given)  # contacts begin to remember with the next lists
     # Lists that are sure to hold every pair within the search distance, made at the present positions.
@@ -87,8 +88,6 @@ def bond(
     which = _flags_with_ghosts(sim, where)
     renewed = _renewed(sim, kind, given).astype(np.int32)
     fresh = sim.bond_types.row(kind=kind, **given)
-    made_of = sim.bond_types.rows[[fresh, *renewed]]
-    _refuse_soft(made_of)
     made, longest2 = 0, 0.0
     for t in range(lists.n_blocks):
         n, d2 = contacts.make_bonds(
@@ -131,11 +130,12 @@ def _marks(sim: Simulation, given: dict[str, float], rubber: bool, conserving: b
     return {name: 1.0 for name, said in words.items() if said}
 
 
-def _refuse_soft(types: np.ndarray) -> None:
-    """CommandError for types of bonds that lack the modulus which their words need."""
-    elastic = types["kind"] == laws.ELASTIC_BOND
-    if ((types["conserving"] != 0.0) & (types["gbmod"] == 0.0) & elastic).any():
+def _refuse_soft(kind: int, values: Mapping[str, float]) -> None:
+    """CommandError for a type of bonds that lacks the modulus which its words need."""
+    if kind == laws.ELASTIC_BOND and values.get("conserving") and not values.get("gbmod"):
         raise CommandError("conserving bonds have their own shear stiffness, touching or open: gbmod above 0 is needed")
+    if values.get("moment") and not values.get("ebmod"):
+        raise CommandError("bonds with a moment have their bending stiffness from ebmod: ebmod above 0 is needed")
 
 
 def _reach(sim: Simulation, gap: float, scale: float) -> tuple[float, float]:
@@ -309,7 +309,9 @@ def _renewed(sim: Simulation, kind: int, given: dict[str, float]) -> np.ndarray:
     mapping = np.arange(len(table))
     for m in np.flatnonzero(used):
         values = {name: float(table.rows[name][m]) for name in KEPT} if table.rows["kind"][m] == kind else {}
-        mapping[m] = table.row(kind=kind, **{**values, **given})
+        values |= given
+        _refuse_soft(kind, values)
+        mapping[m] = table.row(kind=kind, **values)
     return mapping
 
 

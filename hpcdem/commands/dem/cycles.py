@@ -274,9 +274,11 @@ def _is_surely_small(sim: Simulation) -> bool:
     """Return whether the time step is far below its limit in any state of contact: springs are linear, and much stiffer
     ones would still be stable. Collective."""
     rows = _laws_in_use(sim)
-    if (rows[:, 0] != LINEAR).any():
+    if (rows[:, 0] != LINEAR).any() or (sim.rolling is not None and sim.rolling.damped):
         return False
     largest = max(float(np.max(rows[:, 1:3], initial=0.0)), diagnostics.stiffest_bond(sim))
+    if sim.rolling is not None:
+        largest *= sim.rolling.most()
     return sim.clock.dt**2 * TOUCHING * largest <= (0.8 * NEAR) ** 2 * diagnostics.lightest(sim)
 
 
@@ -290,6 +292,17 @@ def _watch_the_time_step(sim: Simulation) -> None:
             sim.next_watch = step + WATCH * int(min(RELAXED, (NEAR * critical / sim.clock.dt) ** 2))
         if sim.clock.dt > NEAR * critical and critical < 0.8 * sim.step_limit:
             _tell_limits(sim, critical, f"step {step}: ")
+        _warn_of_rolling_dashpots(sim)
+
+
+def _warn_of_rolling_dashpots(sim: Simulation) -> None:
+    """A warning if they reverse a rotation in a step. Collective."""
+    turning = 0.0 if sim.rolling is None else 2.0 * sim.clock.dt * sim.rolling.fastest(sim)
+    if turning > 1.0 and sim.log is not None:
+        sim.log.warn_once(
+            "rolling dashpots", f"PROP rdamp: dashpots would reverse relative rotations within {1.0 / turning:.3g} "
+            "steps, so rolling discs will not come to rest. Reduce the time step or rdamp"
+        )  # fmt: skip
 
 
 def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
@@ -333,6 +346,7 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
     or if lattice-solid damping reverses a velocity."""
     dt, sim.next_watch = sim.clock.dt, 0
     _tell_limits(sim, diagnostics.critical_dt(sim))
+    _warn_of_rolling_dashpots(sim)
     damping = sim.settings.lsm * dt / diagnostics.lightest(sim)
     braking = 0.0 if sim.dashpots is None else 2.0 * dt * sim.dashpots.fastest(sim)
     if sim.log is None:

@@ -331,13 +331,15 @@ def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus
 
 def _append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
     """Add rows to a text file whose rows begin with the step. The first time in a run, a new model starts a new file, a
-    restarted one cuts what lies after its step."""
+    restarted one cuts what lies after its step. If the header has gained columns, earlier rows are 0 there."""
     path = folder(sim) / name
-    since = None
-    if name not in sim.series_open:  # a row of this step, if there is one, was written after the checkpoint
+    since, before = None, sim.series_open.get(name)
+    if before is None:  # a row of this step, if there is one, was written after the checkpoint
         since = min(sim.restart_step, sim.clock.step - 0.5) if sim.restart_step else 0
+    elif before != header and header.startswith(before):
+        since = math.inf
     append_rows(path, header, rows, since, sim.comm)
-    sim.series_open.add(name)
+    sim.series_open[name] = header
 
 
 def secure_series(sim: Simulation) -> None:

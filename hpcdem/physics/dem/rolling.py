@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.core.fields import RADIUS
+from hpcdem.core.fields import MATERIAL, RADIUS
 from hpcdem.physics.dem.kernels import mass, rolling
 from hpcdem.physics.dem.kernels.motion import INERTIA, KICK_SPIN, MASS
 
@@ -55,7 +55,7 @@ class Rolling:
             sim.wall_laws, of, n_mat, inverse, sim.clock.dt, s.rolling == CONSTANT, spheres, float(sim.stamp),
             lists.force, self.lost, self.lost_at_walls, self.lost_of_bonds, lists.tally,
         )  # fmt: skip
-        self._of, self._of_pairs = of, of_pairs
+        self._of, self._of_pairs, self._inverse = of, of_pairs, inverse
 
     def push(self) -> None:
         """Add the torques at the present places and spins."""
@@ -97,15 +97,50 @@ class Rolling:
 
     def rates(self, sim: Any) -> np.ndarray:
         """Sum of kr / I of the contacts of the owned particles (n_own,) [1/s2]."""
-        lists, b, n_left = sim.lists, sim.lists.blocks, sim.particles.n_left
+        return self._over_inertia(sim, *self.stiffnesses(sim))
+
+    def most(self) -> float:
+        """Bound of kr/I over kn/m of any contact, at least 1: of linear springs with a wall 6 mu_r^2, of bonds 8/3."""
+        return max(1.0, 6.0 * float(self._of[:, rolling.FRICTION].max()) ** 2, 8.0 / 3.0 if self._bends.any() else 1.0)
+
+    @property
+    def damped(self) -> bool:
+        """Whether there are dashpots."""
+        return bool((self._of[:, rolling.DAMPING] > 0.0).any())
+
+    def fastest(self, sim: Any) -> float:
+        """Largest sum of C/I of the dashpots of a disc as they are [1/s]. Collective."""
+        if not self.damped:
+            return 0.0
+        p, lists, n_mat = sim.particles, sim.lists, len(sim.materials)
         pairs, walls = self.stiffnesses(sim)
+
+        def dashpots(kr: np.ndarray, damping: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+            return 2.0 * damping * np.sqrt(np.divide(kr, inverse, out=np.zeros(len(kr)), where=inverse > 0.0))
+
+        material, of = p.ihot[:, MATERIAL], rolling.DAMPING
+        for k, row, partner, _, _ in self._pieces(sim):
+            damping = np.where(lists.bond[k] == 0, self._of_pairs[material[row] * n_mat + material[partner], of], 0.0)
+            pairs[k] = dashpots(pairs[k], damping, self._inverse[row] + self._inverse[partner])
+        walls = dashpots(walls, self._of[material[lists.slot_row], of], self._inverse[lists.slot_row])
+        return float(sim.comm.max_into(np.array([self._over_inertia(sim, pairs, walls).max(initial=0.0)]))[0])
+
+    def _pieces(self, sim: Any) -> Iterator[tuple[slice, np.ndarray, np.ndarray, int, int]]:
+        """Of each block: its slots, their rows and partners, first and last owned row."""
+        lists = sim.lists
+        for t, (row, partner, first, last) in enumerate(lists.pieces()):
+            begin = lists.ptr[lists.blocks.poff[t]]
+            yield slice(begin, begin + len(row)), row, partner, first, last
+
+    def _over_inertia(self, sim: Any, pairs: np.ndarray, walls: np.ndarray) -> np.ndarray:
+        """Sum over the contacts of the owned particles (n_own,), by numbers of the slots, over I."""
+        lists, n_left = sim.lists, sim.particles.n_left
         total = np.zeros(len(sim.body))
         np.add.at(total, lists.slot_row - n_left, walls)
-        for t, (row, partner, first, last) in enumerate(lists.pieces()):
-            kr = pairs[lists.ptr[b.poff[t]] :][: len(row)]
+        for k, row, partner, first, last in self._pieces(sim):
             for of in (row, partner):
                 mine = (of >= first) & (of < last)
-                np.add.at(total, of[mine] - n_left, kr[mine])
+                np.add.at(total, of[mine] - n_left, pairs[k][mine])
         return np.divide(total, sim.body[:, INERTIA], out=np.zeros(len(total)), where=sim.body[:, KICK_SPIN] != 0.0)
 
 

@@ -165,7 +165,7 @@ class Simulation(Model):
         self.progress: dict | None = None
         self.last_frame: tuple[int, bool] | None = None
         self.edited = True  # by a command, since the last `_ini` frame of a coupled run
-        self.series_open: set[str] = set()
+        self.series_open: dict[str, str] = {}  # header of each
         self.series_closed: set[str] = set()
         self.restart_step = 0
         self.rebuild_state = ListState()
@@ -437,8 +437,7 @@ class Simulation(Model):
         return self.bonds - broken
 
     def used(self, column: np.ndarray, table: PropertyTable) -> np.ndarray:
-        """Flag the rows of a property table that occur among these owned row numbers, on any rank; (rows,) bool.
-        Collective."""
+        """Flag the rows of a property table that occur among row numbers, on any rank; (rows,) bool. Collective."""
         flags = np.zeros(len(table), np.int64)
         flags[column] = 1
         return self.comm.max_into(flags).astype(bool)

@@ -116,11 +116,35 @@ def test_a_cantilever_breaks_at_its_root(tmp_path, share):
     assert left == {(0, 1), (1, 2), (2, 3)} - ({(0, 1)} if share > 1.0 else set())
 
 
+@pytest.mark.parametrize("bond", [True, False])
+def test_a_half_turn_of_the_whole_keeps_the_torques(tmp_path, bond):
+    """The later one in storage is then the earlier one."""
+    sim = bonded(tmp_path)
+    if not bond:
+        bonds.break_bonds(sim)
+        properties.prop(sim, rfric=0.5)
+        sim.particles["x"][:] *= 0.99
+    turn(sim, 1e-3)
+    before = force(sim, 0)[2], force(sim, 1)[2]
+    assert before[0] < 0.0 < before[1]
+    order = sim.particles["gid"].tolist()
+    properties.prop(sim, spin=0.0)
+    sim.open_model()
+    sim.particles["x"][:] = R - sim.particles["x"]
+    cycles.cycle(sim, 1)
+    assert sim.particles["gid"].tolist() == order[::-1]
+    assert (force(sim, 0)[2], force(sim, 1)[2]) == pytest.approx(before)
+    assert abs(sim.energy.look(sim).relative) < 1e-9
+
+
 def test_refusals(tmp_path):
     sim = bonded(tmp_path)
     for keys in ({"n_bond": 1.0, "moment": True}, {"tstrength": T, "moment": True}):
         with pytest.raises(CommandError, match="bending stiffness follows from ebmod"):
             bonds.bond(sim, **keys)
+    for change in (bonds.bond, lambda sim, **keys: bonds.renew(sim, None, [], **keys)):
+        with pytest.raises(CommandError, match="bonds with a moment have their bending stiffness from ebmod"):
+            change(sim, ebmod=0.0)
     particles.ball(sim, 2, 50.0, 0.0, R)
     particles.ball(sim, 3, 51.0, 0.0, R)
     properties.prop(sim, Ids(2, 3), density=1000.0, kn=1e9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -179,6 +180,31 @@ def test_the_stability_limit_counts_rolling(tmp_path):
     assert diagnostics.critical_dt(sim) == pytest.approx(0.8 * math.sqrt(inertia / (3.0 * KN * R**2)), rel=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["c", "a"])
+def test_dashpots_that_reverse_a_rotation_are_reported(tmp_path, kind):
+    """C/I dt of a disc in its contact with a wall: 2 eta sqrt(kr Ir)/I dt, Ir = I + m R^2 = 3 I."""
+    sim = on_plane(tmp_path, eta=1.0, kind=kind)
+    steps(sim, 1)
+    rate = 2.0 * math.sqrt(3.0 * 3.0 * KN * (MU * R) ** 2 / body(sim)[1]) * (kind == "c")
+    assert sim.rolling.fastest(sim) == pytest.approx(rate)
+    sim.log = Mock()
+    sim.settings.dt = 2e-3
+    properties.prop(sim, rdamp=20.0)
+    cycles.cycle(sim, 1)
+    keys = [call.args[0] for call in sim.log.warn_once.call_args_list]
+    assert ("rolling dashpots" in keys) == (kind == "c")
+
+
+def test_a_stiff_rolling_spring_is_not_taken_for_harmless(tmp_path):
+    """mu_r 10: kr/I is 600 kn/m, so the step is looked at while contacts form."""
+    sim = on_plane(tmp_path, mu=10.0, dt=3e-4)
+    cycles.prepare(sim)
+    assert not cycles._is_surely_small(sim)
+    sim = on_plane(tmp_path, mu=0.0, dt=3e-4)
+    cycles.prepare(sim)
+    assert cycles._is_surely_small(sim)
+
+
 @pytest.mark.parametrize("threads", [2, 4])
 def test_threads_do_not_change_a_bit(tmp_path, threads):
     states = []
@@ -187,6 +213,19 @@ def test_threads_do_not_change_a_bit(tmp_path, threads):
         steps(sim, 600)
         states.append(diagnostics.fingerprint(sim))
     assert states[0] == states[1]
+
+
+def test_energy_gains_columns_when_rolling_begins(tmp_path):
+    sim = model(tmp_path, 1e-4, energy=2)
+    particles.ball(sim, 0, 0.0, 0.0, 1.0)
+    properties.prop(sim, density=1000.0, kn=1e6, xv=1.0)
+    cycles.cycle(sim, 4)
+    properties.prop(sim, rfric=0.1)
+    cycles.cycle(sim, 4)
+    head, *rows = (tmp_path / "energy.csv").read_text().splitlines()
+    assert head.endswith(",elastic_rolling,loss_rolling") and len(rows) >= 4
+    assert {row.count(",") for row in rows} == {head.count(",")}
+    assert rows[0].endswith(",0.0,0.0")
 
 
 def test_what_it_cannot_act_with_is_refused(tmp_path):

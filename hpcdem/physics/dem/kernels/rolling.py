@@ -23,15 +23,15 @@ import math
 
 from numba import njit, prange
 
-from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, X, Y
+from hpcdem.core.fields import GID, MATERIAL, RADIUS, SPIN, X, Y
 from hpcdem.numerics.exact_sum import add_to_bins
 from hpcdem.numerics.lanes import as_bits
 from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.dem.kernels.contacts import E_MOD, MODEL, TENSILE, TENSION_BREAKS, A, B, pair_law
 from hpcdem.physics.dem.kernels.walls import NONE, end_of_slots, heir, meeting
 
-# What a contact remembers: the stamp of live memory (histories.py), Mk [N m], torque with the dashpot [N m], and what
-# its spring stores [J].
+# What a contact remembers: the stamp of live memory (histories.py), Mk [N m] and torque with the dashpot [N m], both
+# for the relative rotation of the lower id, and what its spring stores [J].
 STAMP, SPRING, TORQUE, STORED = range(4)
 WIDTH = 4
 OF_BOND = 0.5
@@ -128,7 +128,8 @@ def _of_pairs(
         for k in range(ptr[p + i], ptr[p + i + 1]):
             j = partner[k]
             dx, dy, ri, rj = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y], hot[i, RADIUS], hot[j, RADIUS]
-            rate = hot[i, SPIN] - hot[j, SPIN]
+            side = 1.0 if ihot[i, GID] < ihot[j, GID] else -1.0  # their order in storage changes
+            rate = side * (hot[i, SPIN] - hot[j, SPIN])
             q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
             lost[k] = lost_of_bonds[k] = 0.0
             if memory[k, STAMP] == stamp + OF_BOND and bond[k] == 0:  # broken by its forces, or by a command
@@ -152,9 +153,9 @@ def _of_pairs(
                     stamp, tally, i >= cut[t],
                 )  # fmt: skip
             if i >= cut[t]:
-                force[shift + i, 2] -= total
+                force[shift + i, 2] -= side * total
             if cut[t] <= j < cut[t + 1]:
-                force[shift + j, 2] += total
+                force[shift + j, 2] += side * total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
