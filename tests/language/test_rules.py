@@ -525,7 +525,7 @@ def test_ymove_and_the_sense_of_the_way(play):
     """The distance is what counts; that the wall goes the other way is told."""
     wall = ["WALL id 1 nodes (0 0) (9 0) yv -0.5", "BALL id 0 x 50 y 9 rad 1", "PROP density 1"]
     sim, log = play(*wall, "IMPLE wall id 1 ymove 0.05")
-    assert sim.clock.step == 100 and "against 0.05" in log
+    assert sim.clock.step == 100 and "opposite to the distance 0.05" in log
 
 
 @pytest.mark.parametrize(

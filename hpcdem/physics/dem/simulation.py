@@ -453,8 +453,7 @@ class Simulation(Model):
         self.comm.max_into(ends)
         if not np.isfinite(ends).all():
             raise CommandError("{left}, {right}, {bottom}, {top} need at least one free particle")
-        left, right, bottom, top = (float(v) for v in ends * (-1.0, 1.0, -1.0, 1.0))
-        return {"left": left, "right": right, "bottom": bottom, "top": top}
+        return dict(zip(("left", "right", "bottom", "top"), (ends * (-1.0, 1.0, -1.0, 1.0)).tolist(), strict=True))
 
     def note_maker(self, first_gid: int) -> None:
         """The present line of the script makes the particles from this id on."""
