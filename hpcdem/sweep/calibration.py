@@ -11,10 +11,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.sweep.design import Range
+from hpcdem.sweep.design import Range, Sampling
 from hpcdem.sweep.emulator import Emulator, fit
 
 Forward = Callable[[np.ndarray], np.ndarray]
@@ -133,7 +132,7 @@ def calibrate(
     if first < d + MORE:
         raise UsageError(f"first = {first}: {d} parameters need at least {d + MORE} points before the first round")
     random = np.random.default_rng(seed)
-    points = _hypercube(d, first, seed)
+    points = Sampling("latin", first, seed).points(d)
     values = forward(points)
     for turn in range(rounds + 1):
         emulators = _fitted(points, values, targets)
@@ -145,13 +144,6 @@ def calibrate(
         more = _chosen(samples, emulators, targets, batch, points)
         points, values = np.concatenate([points, more]), np.concatenate([values, forward(more)])
     raise AssertionError
-
-
-def _hypercube(d: int, n: int, seed: int) -> np.ndarray:
-    import inspect
-
-    word = "rng" if "rng" in inspect.signature(qmc.LatinHypercube).parameters else "seed"
-    return np.asarray(qmc.LatinHypercube(d, **{word: np.random.default_rng(seed)}).random(n))
 
 
 def _fitted(points: np.ndarray, values: np.ndarray, targets: Sequence[Target]) -> list[Emulator]:

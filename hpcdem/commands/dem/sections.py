@@ -147,8 +147,8 @@ def _group(sim: Simulation, found: Section, where: Selection | None) -> int:
     total = sum(counts.values())
     outside = sim.count(int((wanted & (which < 0)).sum()))
     if sim.log is not None:
-        said = ", ".join(f"{name} {count}" for name, count in counts.items())
-        sim.log.info(f"SECTION: particles by group: {said}; {outside} in no polygon keep theirs")
+        by_group = ", ".join(f"{name} {count}" for name, count in counts.items())
+        sim.log.info(f"SECTION: particles by group: {by_group}; {outside} in no polygon keep theirs")
         words = {word for one in given for word in one}
         if words:
             sim.log.info(f"SECTION: assigned from attributes: {', '.join(sorted(words))}")

@@ -47,7 +47,6 @@ class Rolling:
         self.lost, self.lost_at_walls = np.zeros(len(lists.row)), np.zeros(len(lists.slot_row))
         self.lost_of_bonds = np.zeros(len(lists.row))
         self._bends = sim.bond_types.rows["moment"] != 0.0
-        self._torques: Any = rolling.torques if lists.n_blocks == 1 else rolling.torques_threaded
         self._args = (
             lists.n_blocks, p.hot, p.ihot, b.cut, b.lo, b.poff, b.foff, lists.ptr, lists.partner, lists.bond,
             lists.u_made, lists.fs, lists.memory, sim.pair_laws, sim.bond_laws, self._bends, of_pairs,
@@ -59,7 +58,7 @@ class Rolling:
 
     def push(self) -> None:
         """Add the torques at the present places and spins."""
-        self._torques(*self._args)
+        rolling.torques(*self._args)
 
     def book_lost(self, sim: Any, bins: np.ndarray, of_bonds: np.ndarray) -> None:
         """Add what was lost in the last step to exact bins: by rolling, and by bonds that broke."""

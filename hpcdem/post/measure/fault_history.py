@@ -305,8 +305,8 @@ class History:
 
 
 def history(faults: Sequence[Fault], profiles: dict[int, dict[int, Profile]], brief: int, least: float) -> History:
-    """The faults whose sides have slid by `least` [m] in any frame, and those into which one of them merged, numbered
-    anew."""
+    """The faults whose sides have slid by `least` [m] in any frame, and those into which one of them merged, with new
+    numbers."""
     kept = {f.number for f in faults if any(p.slid(f.vergence) >= least for p in profiles.get(f.number, {}).values())}
     for f in faults:  # into an older or a younger one
         target = f

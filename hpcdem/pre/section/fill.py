@@ -24,6 +24,8 @@ DONE = 0.02
 SKIN = 0.6
 """Margin of the search for neighbours, over the largest radius."""
 MOST_DISCS = 20_000_000
+MOST_POINTS = 4 * MOST_DISCS
+"""Points of a lattice over the box of a polygon: an inclined layer as wide as a disc would need any number of them."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,11 @@ def _scattered(area: Any, n: int, seed: int, stream: int) -> np.ndarray:
     side = float(np.sqrt(area.area / n / np.sqrt(0.75)))
     while True:
         columns, rows = int((x1 - x0) / side) + 2, int((y1 - y0) / (side * np.sqrt(0.75))) + 2
+        if columns * rows > MOST_POINTS:
+            raise CommandError(
+                f"the polygon at ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m is hardly wider than its discs; take smaller "
+                "radii, or leave it out with only"
+            )
         row, column = np.divmod(np.arange(columns * rows), columns)
         at = np.column_stack([x0 + side * (column + 0.5 * (row % 2) - 0.25), y0 + side * np.sqrt(0.75) * row])
         at += 0.5 * side * (uniforms(seed, stream, np.arange(2 * len(at))).reshape(-1, 2) - 0.5)

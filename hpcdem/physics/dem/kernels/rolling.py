@@ -26,6 +26,7 @@ from numba import njit, prange
 from hpcdem.core.fields import GID, MATERIAL, RADIUS, SPIN, X, Y
 from hpcdem.numerics.exact_sum import add_to_bins
 from hpcdem.numerics.lanes import as_bits
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.dem.kernels.contacts import E_MOD, MODEL, TENSILE, TENSION_BREAKS, A, B, pair_law
 from hpcdem.physics.dem.kernels.walls import NONE, end_of_slots, heir, meeting
@@ -194,7 +195,7 @@ def _of_walls(
         first = last
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def torques(
     n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, u_made, fs, memory, pairs, bonds, bends, of_pairs,
     wptr, walls, slot_row, slot_wall, slot_side, slot_memory, table, of_walls, n_mat, inverse_inertia, dt, constant,
@@ -206,24 +207,6 @@ def torques(
     where a disc keeps its spin; memory (slots, 4), slot_memory (wall slots, 4): see above; bonds: contacts.bond_laws;
     bends (types,) bool: those with a moment; lost, lost_at_walls, lost_of_bonds: what each lost in the step [J].
     """
-    for t in range(n_blocks):
-        _of_pairs(
-            t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, u_made, fs, memory, pairs, bonds, bends, of_pairs,
-            n_mat, inverse_inertia, dt, constant, spheres, stamp, force, lost, lost_of_bonds, tally,
-        )  # fmt: skip
-        _of_walls(
-            t, hot, ihot, lo, foff, wptr, walls, slot_row, slot_wall, slot_side, slot_memory, table, of_walls, n_mat,
-            inverse_inertia, dt, constant, spheres, stamp, force, lost_at_walls,
-        )  # fmt: skip
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def torques_threaded(
-    n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, u_made, fs, memory, pairs, bonds, bends, of_pairs,
-    wptr, walls, slot_row, slot_wall, slot_side, slot_memory, table, of_walls, n_mat, inverse_inertia, dt, constant,
-    spheres, stamp, force, lost, lost_at_walls, lost_of_bonds, tally,
-):  # fmt: skip
-    """The same, a thread for each block."""
     for t in prange(n_blocks):
         _of_pairs(
             t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, u_made, fs, memory, pairs, bonds, bends, of_pairs,
