@@ -348,6 +348,18 @@ def test_discs_keep_inside_their_polygons(tmp_path):
         fill.filled(section, radii, 0.01, 5, 0, "s")
 
 
+def test_an_inclined_layer_as_wide_as_a_disc_is_refused(tmp_path):
+    """What is left for the centres of discs is a line; a lattice that meets it would have any number of points."""
+    width = 2.0 + 1e-6
+    half = width / np.sqrt(2.0)
+    ring = [[0.0, 0.0], [1000.0, 1000.0], [1000.0 - half, 1000.0 + half], [-half, half], [0.0, 0.0]]
+    text = {"type": "Feature", "properties": {"name": "thin"}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    (tmp_path / "thin.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [text]}))
+    section = read(tmp_path / "thin.geojson")
+    with pytest.raises(CommandError, match="hardly wider than its discs; take smaller radii"):
+        fill.filled(section, np.array([1.0]), 0.2, 5, 0, "thin")
+
+
 def test_an_area_hardly_larger_than_a_disc_gets_one(tmp_path):
     side = 2.2
     section = read(polygons(tmp_path, [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side], [0.0, 0.0]]))

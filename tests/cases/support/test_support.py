@@ -13,46 +13,44 @@ import pytest
 from hpcdem.cases import Support
 from tests.cases.ready import results
 
-COARSE = {"size": 0.6, "coarse": 5.0, "reach": 7.0, "stages": 2000}
+COARSE = {"size": 0.5, "coarse": 5.0, "reach": 7.0, "stages": 2000}
 
 
 @pytest.mark.slow  # quick: bolts by themselves, tests/bolts
 def test_bolts_hold(resident, tmp_path):
-    """With them the rock comes in less, and no more of it yields."""
+    """With them less of the rock yields, and it comes in less."""
     usual = results(resident, tmp_path / "usual", Support(**COARSE))
     assert 0.0 < usual.at_support < usual.convergence and usual.plastic_radius > 3.5
     assert 0.0 < usual.axial_force <= 250e3 and usual.yielded > 0 and usual.broken == 0
     none = results(resident, tmp_path / "none", Support(bolts=0, **COARSE))
     assert none.axial_force == none.yielded == none.slipped == 0
     assert none.at_support == usual.at_support and none.convergence > 1.05 * usual.convergence
-    assert none.plastic_radius >= usual.plastic_radius
+    assert none.plastic_radius > usual.plastic_radius
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("yields", [False, True])
 def test_a_slice_in_space_is_plane_strain(resident, tmp_path, yields):
     """One ring of bolts in a slice as wide as their spacing, beside bolts that are spread along the tunnel: closure,
-    crown and zone that yields within 5 %; the largest force of a bolt, which scatters with the mesh, within 6 %."""
-    rock = {"size": 0.6, "coarse": 5.0, "reach": 7.0, "stages": 2000 if yields else 500}
+    crown and zone that yields within 4 %; the largest force of a bolt, which scatters with the mesh, within 6 %."""
+    rock = {"size": 0.5, "coarse": 5.0, "reach": 7.0, "stages": 2000 if yields else 500}
     if not yields:
         rock |= {"cohesion": 20e6, "tensile_strength": 20e6}
     plane = results(resident, tmp_path / "plane", Support(elements="tri", **rock))
     space = results(resident, tmp_path / "space", Support(dim=3, **rock))
     for name in ("convergence", "at_support", "crown", "plastic_radius"):
-        assert getattr(space, name) == pytest.approx(getattr(plane, name), rel=0.05)
+        assert getattr(space, name) == pytest.approx(getattr(plane, name), rel=0.04)
     assert space.axial_force == pytest.approx(plane.axial_force, rel=0.06)
     assert (space.yielded > 10) == (plane.yielded > 10) == yields
 
 
 @pytest.mark.slow  # bolts by themselves: tests/bolts
 def test_every_option_of_the_bolts(resident, tmp_path):
-    """Each of these alone changes what the tunnel does, in the way that it should; closures of runs that yield on
-    different ways scatter by a percent in this mesh."""
+    """Each of these alone changes what the tunnel does, in the way that it should."""
     usual = results(resident, tmp_path / "usual", Support(**COARSE))
     none = results(resident, tmp_path / "none", Support(bolts=0, **COARSE))
     late = results(resident, tmp_path / "late", Support(release=0.95, **COARSE))
-    assert late.at_support > 1.5 * usual.at_support
-    assert 0.99 * usual.convergence < late.convergence <= none.convergence
+    assert late.at_support > 1.5 * usual.at_support and usual.convergence < late.convergence <= none.convergence
     weak = results(resident, tmp_path / "weak", Support(bond_cohesion=2e5, **COARSE))
     assert weak.slipped > usual.slipped and weak.axial_force < usual.axial_force
     strong = results(resident, tmp_path / "strong", Support(bolt_yield=1e9, plates=False, **COARSE))
