@@ -619,8 +619,8 @@ class Simulation(ParticleCommands, BlockCommands):
 
     # ---- ours ------------------------------------------------------------------------------------------------------
 
-    def _asked(self, told: tuple[Any, ...], make: Callable[[], Any], again: bool = False) -> Any:
-        """Return the result of `make`. In a PCDC script the journal stores it, with a checksum of what was `told`, so
+    def _asked(self, key: tuple[Any, ...], make: Callable[[], Any], again: bool = False) -> Any:
+        """Return the result of `make`. In a PCDC script the journal stores it, with a checksum of `key`, so
         that a run that resumes from a checkpoint finds the way back: particles that come out of the checkpoint do
         nothing until then, and receive the same values as before. again: done in any case."""
         running = self._session.interpreter
@@ -629,9 +629,9 @@ class Simulation(ParticleCommands, BlockCommands):
         if not running.keeps_calls:
             return running.look(make) if self.engine.coupled and not again else make()
         asleep = self._asleep and not again
-        value = running.ask((self.engine.number, *told), make, None if asleep else make)
-        if asleep and told[0] == "set" and "outdir" in told[2]:
-            self._write_into(told[2]["outdir"])  # not part of the checkpoint
+        value = running.ask((self.engine.number, *key), make, None if asleep else make)
+        if asleep and key[0] == "set" and "outdir" in key[2]:
+            self._write_into(key[2]["outdir"])  # not part of the checkpoint
         return value
 
     @property
@@ -926,11 +926,11 @@ class Coupling:
         except CommandError as error:
             raise ScriptError(*_place(), f"end: {error}") from error
 
-    def _asked(self, told: str, make: Callable[[], Any]) -> Any:
+    def _asked(self, key: str, make: Callable[[], Any]) -> Any:
         running = session.current().interpreter
         if running is None:
             return make()
-        return running.ask(("coupling", told), make) if running.keeps_calls else running.look(make)
+        return running.ask(("coupling", key), make) if running.keeps_calls else running.look(make)
 
 
 def _parted(what: str) -> UsageError:
@@ -969,8 +969,8 @@ def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0
                 raise _parted("couple")
             made.append(both())
 
-        told = "couple", particles.engine.number, friction, dt
-        running.ask(told, lambda: made.append(both()), again, fails_again=True)
+        key = "couple", particles.engine.number, friction, dt
+        running.ask(key, lambda: made.append(both()), again, fails_again=True)
         particles._warn_of_answers()
         return made[0]
     except CommandError as error:

@@ -440,13 +440,13 @@ class RunCommand(click.Command):
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         from hpcdem.cli.strain_stress import strain_stress
 
-        told: Callable[[str], str] = str
+        translate: Callable[[str], str] = str
         if chinese.wanted(encoding=getattr(sys.stdout, "encoding", None)):
             translated(strain_stress)
-            told = in_chinese
+            translate = in_chinese
         for group, programs in GROUPS.items():
-            with formatter.section(told(group)):
-                formatter.write_dl([(f"hpcdem {one.name} {one.use}".rstrip(), told(one.line)) for one in programs])
+            with formatter.section(translate(group)):
+                formatter.write_dl([(f"hpcdem {one.name} {one.use}".rstrip(), translate(one.line)) for one in programs])
         super().format_options(ctx, formatter)
         hidden = [parameter for parameter in self.get_params(ctx) if getattr(parameter, "hidden", False)]
         shown = {option for parameter in self.get_params(ctx) if parameter not in hidden for option in parameter.opts}

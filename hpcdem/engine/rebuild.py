@@ -23,9 +23,9 @@ class CheckInterval:
         self.countdown = left = self.countdown - 1
         return CHECK if left <= 0 else UNSEEN if left % GLANCE else AT_A_GLANCE
 
-    def is_too_late(self, room: float, stride: float) -> bool:
+    def is_too_late(self, margin: float, stride: float) -> bool:
         """Return whether a margin [m] is used up before the next glance or check at this stride [m] per step."""
-        return stride * min(GLANCE, self.countdown) > room
+        return stride * min(GLANCE, self.countdown) > margin
 
     def wait(self, *limits: float) -> None:
         """Schedule the next check after at most so many steps, at least one, and at most twice the last interval."""

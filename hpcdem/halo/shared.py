@@ -58,9 +58,9 @@ class Nodes:
                 parcel, error = self._made(make)
             if once and self.leads.size > 1:
                 parcel = _sent(self.leads, *parcel)
-        made, told = self._handed_out(*parcel)
-        if told is not None:
-            raise error or told
+        made, failure = self._handed_out(*parcel)
+        if failure is not None:
+            raise error or failure
         return made
 
     def _made(self, make: Callable[[], Any]) -> tuple[tuple[bytes, list[Any]], Exception | None]:

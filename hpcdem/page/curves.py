@@ -140,7 +140,7 @@ class Curves:
                 raise HpcdemError(f"{one or 'y'}: expected a history, such as {_some(records)}")
             steps, along = self._values(x_text, used)
             curves.append((title, unit, steps, along, self._values(text, used)[1]))
-        return _told((x_title, x_unit), curves, whole)
+        return _answer((x_title, x_unit), curves, whole)
 
     def chart(self, name: Any, whole: bool = False) -> dict[str, Any]:
         """A chart of the script, as it was written last. HpcdemError."""
@@ -159,8 +159,8 @@ class Curves:
         for label, points in rows.items():
             values = np.array(points).T
             curves.append((label if len(rows) > 1 else y_title, y_unit, np.full(values.shape[1], -1), *values))
-        told = _told((x_title, x_unit), curves, whole)
-        return told | {"y_title": y_title}
+        answer = _answer((x_title, x_unit), curves, whole)
+        return answer | {"y_title": y_title}
 
     # ---- columns ---------------------------------------------------------------------------------------------------
 
@@ -232,7 +232,7 @@ class Curves:
         return self._heads[path][1]
 
 
-def as_csv(told: dict[str, Any]) -> str:
+def as_csv(answer: dict[str, Any]) -> str:
     """Write the drawn curves as CSV with columns curve, x, y, like the charts of scripts."""
 
     def cell(text: str) -> str:
@@ -241,8 +241,8 @@ def as_csv(told: dict[str, Any]) -> str:
     def titled(part: dict[str, Any]) -> str:
         return f"{part['title']} [{part['unit']}]" if part["unit"] else part["title"]
 
-    lines = [f"curve,{cell(titled(told['x']))},{cell(told.get('y_title') or 'y')}"]
-    for curve in told["curves"]:
+    lines = [f"curve,{cell(titled(answer['x']))},{cell(answer.get('y_title') or 'y')}"]
+    for curve in answer["curves"]:
         label = cell(titled(curve))
         lines += [f"{label},{_word(x)},{_word(y)}" for x, y in zip(curve["x"], curve["y"], strict=True)]
     return "\n".join(lines) + "\n"
@@ -279,7 +279,7 @@ def _parted(title: str, brackets: str = "[") -> tuple[str, str]:
     return (found[1], "" if found[2] == "1" else found[2]) if found else (title, "")
 
 
-def _told(x: tuple[str, str], curves: list[tuple], whole: bool) -> dict[str, Any]:
+def _answer(x: tuple[str, str], curves: list[tuple], whole: bool) -> dict[str, Any]:
     """Assemble the answer for the page. size, shown: divisor of the displayed values, and their unit."""
 
     def part(title: str, unit: str, columns: list[np.ndarray]) -> dict[str, Any]:
@@ -290,13 +290,13 @@ def _told(x: tuple[str, str], curves: list[tuple], whole: bool) -> dict[str, Any
     by_unit: dict[str, list[np.ndarray]] = {}
     for _, unit, _, _, values in curves:
         by_unit.setdefault(unit, []).append(values)
-    told = []
+    described = []
     for title, unit, steps, along, values in curves:
         rows = np.arange(len(steps)) if whole else _some_of(values)
-        told.append(part(title, unit, by_unit[unit]) | {
+        described.append(part(title, unit, by_unit[unit]) | {
             "x": _list(along[rows]), "y": _list(values[rows]), "step": steps[rows].tolist(),
         })  # fmt: skip
-    return {"x": part(*x, [curve[3] for curve in curves]), "curves": told}
+    return {"x": part(*x, [curve[3] for curve in curves]), "curves": described}
 
 
 def _list(values: np.ndarray) -> list[float | None]:

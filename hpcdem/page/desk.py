@@ -310,23 +310,23 @@ def check(text: Any, name: str) -> dict[str, Any]:
     """Check a script like `hpcdem --check`. Returns its language and a summary, or the wrong line and its problem."""
     if not isinstance(text, str):
         raise HpcdemError("text: expected a script")
-    told: dict[str, Any] = {"language": None, "summary": "", "line": None, "problem": ""}
+    result: dict[str, Any] = {"language": None, "summary": "", "line": None, "problem": ""}
     try:
-        told["language"] = detect.kind(text, name)
-        if told["language"] == "zdem":
+        result["language"] = detect.kind(text, name)
+        if result["language"] == "zdem":
             from hpcdem.lang.zdem import check as of_zdem
             from hpcdem.lang.zdem.execute import refuse_unexecuted
             from hpcdem.lang.zdem.parser import parse_text
 
             script = parse_text(text, name)
             refuse_unexecuted(script.statements)
-            told["summary"] = of_zdem.summary(script, None)
-        elif told["language"] == "pcdc":
+            result["summary"] = of_zdem.summary(script, None)
+        elif result["language"] == "pcdc":
             from hpcdem.lang.pcdc import check as of_pcdc
 
-            told["summary"] = of_pcdc.summary(text, name)
+            result["summary"] = of_pcdc.summary(text, name)
     except ScriptError as error:
-        told["line"], told["problem"] = error.line, error.message
+        result["line"], result["problem"] = error.line, error.message
     except HpcdemError as error:
-        told["problem"] = str(error)
-    return told
+        result["problem"] = str(error)
+    return result

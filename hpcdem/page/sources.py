@@ -147,7 +147,7 @@ class Sources:
         """Frames by source, with what tells whether the last one was written again; of the first folder whether a run
         writes there, its progress, and its histories."""
         self.look()
-        told: dict[str, Any] = {
+        answer: dict[str, Any] = {
             "sources": [
                 {
                     "name": source.name,
@@ -160,8 +160,8 @@ class Sources:
             "histories": self.curves().state(),
         }
         for folder in self.folders()[:1]:
-            told["run"] = _run(folder)
-        return told
+            answer["run"] = _run(folder)
+        return answer
 
     def waiting(self) -> dict[str, Any]:
         """Explain why there is no frame yet: kernels are being compiled, a run is active, or the folder is empty."""
@@ -209,10 +209,10 @@ def _stamp(path: Path) -> str:
 def _progress(folder: Path) -> dict[str, Any] | None:
     """Read the progress that the run has noted in its folder; None if there is no valid note."""
     try:
-        told = json.loads((folder / PROGRESS).read_text(encoding="utf-8"))
+        progress = json.loads((folder / PROGRESS).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return told if isinstance(told, dict) else None
+    return progress if isinstance(progress, dict) else None
 
 
 def _run(folder: Path) -> dict[str, Any] | None:

@@ -174,22 +174,22 @@ class Viewer:
 
     def state(self) -> dict[str, Any]:
         """Frames, the run, histories; where there is no picture yet, why."""
-        told = self.sources.state()
+        answer = self.sources.state()
         waiting: dict[str, Any] = {"drawing": not self.warm}
-        if not told["sources"]:
+        if not answer["sources"]:
             waiting |= self.sources.waiting()
             if self.desk is not None and (waiting["kind"] == "empty" or self.desk.console.alive):
                 waiting["kind"] = "first" if self.desk.console.busy else "desk"
-        return told | {"waiting": waiting}
+        return answer | {"waiting": waiting}
 
     def curves(self, wanted: dict[str, Any]) -> Answer:
         """Histories over each other, or a chart of the script; as CSV all of their points."""
         curves, whole = self.sources.curves(), wanted.get("format") == "csv"
         if wanted.get("chart") is not None:
-            told = curves.chart(wanted["chart"], whole)
+            answer = curves.chart(wanted["chart"], whole)
         else:
-            told = curves.drawn(wanted.get("x"), wanted.get("y"), whole)
-        return Answer(as_csv(told).encode(), "text/csv") if whole else as_json(told)
+            answer = curves.drawn(wanted.get("x"), wanted.get("y"), whole)
+        return Answer(as_csv(answer).encode(), "text/csv") if whole else as_json(answer)
 
     def fields(self, wanted: dict[str, Any]) -> dict[str, Any]:
         """Fields and vectors of a kind of object, with their units."""
@@ -250,13 +250,13 @@ class Viewer:
             value = objects.value(name, which)
             names = objects.names.get(name)
             if names:
-                told: Any = names[int(value)] if 0 <= int(value) < len(names) else None
+                entry: Any = names[int(value)] if 0 <= int(value) < len(names) else None
             elif np.ndim(value):
-                told = f"({', '.join(f'{part:.6g}' for part in value)})"
+                entry = f"({', '.join(f'{part:.6g}' for part in value)})"
             else:
-                told = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
+                entry = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
             unit = shown.moment.unit_of(name)
-            values.append([name, told, unit, _printed(told if names else value, unit)])
+            values.append([name, entry, unit, _printed(entry if names else value, unit)])
         told_of = {"point": None if picture.near is None else self._hit(shown, picture, int(column), int(row))}
         number = objects.value(objects.number, which) if objects.number in objects.fields else which
         place_of = {axis: float(v) for axis, v in zip("xyz", objects.centre(which))}
@@ -393,10 +393,10 @@ def _size(layers: OrderedDict[tuple, Painted]) -> int:
 
 
 def _legend(shown: Scene) -> list[dict[str, Any]]:
-    told: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = []
     for layer in shown.layers:
         if layer.scale is not None:
-            told.append({
+            entries.append({
                 "label": layer.layer.label, "field": layer.layer.field, "title": layer.scale.title,
                 "low": layer.scale.low,
                 "high": layer.scale.high, "log": layer.scale.log, "colours": layer.scale.colours,
@@ -404,12 +404,12 @@ def _legend(shown: Scene) -> list[dict[str, Any]]:
                 "above": layer.scale.above,
             })  # fmt: skip
         elif layer.legend:
-            told.append({"label": layer.layer.label, "classes": layer.legend})
+            entries.append({"label": layer.layer.label, "classes": layer.legend})
         if layer.reference is not None:
             part = layer.reference.length / shown.seen.width
-            told.append({"label": layer.layer.label, "arrow": layer.reference.text, "part": part,
+            entries.append({"label": layer.layer.label, "arrow": layer.reference.text, "part": part,
                          "vectors": layer.layer.vectors})  # fmt: skip
-    return told
+    return entries
 
 
 def _stops(name: str) -> list[str]:

@@ -455,14 +455,14 @@ def _rounds(
 ) -> None:
     """Collective over `comm`: one frame per rank and round."""
     last = _Last()
-    began = told = time.monotonic()
+    began = reported = time.monotonic()
     for first in range(0, len(frames), comm.size):
         last = _round(comm, frames, first, last, options, output, sums)
         done, now = min(first + comm.size, len(frames)), time.monotonic()
-        if now - told >= QUIET_SECONDS or done == len(frames):
+        if now - reported >= QUIET_SECONDS or done == len(frames):
             name, speed = frames[done - 1].path.name, done / max(now - began, 1e-9)
             log.info(f"{done} of {len(frames)} frames, to {name}, {speed:.3g} frames/s")
-            told = now
+            reported = now
 
 
 class _Last(NamedTuple):

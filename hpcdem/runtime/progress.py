@@ -277,17 +277,17 @@ class Log:
         self._note_due = now + NOTE_SECONDS
         *_, since, began = self._noted
         speed, known = (step - since) / max(now - began, 1e-9), math.isfinite(last) and last > first
-        told = {
+        record = {
             "step": step, "command": name, "line": self._text.strip().rpartition("\n")[2], "speed": speed,
             "part": (step - first) / (last - first) if known else None,
             "left": (last - step) / speed if known and speed > 0.0 else None,
         }  # fmt: skip
         if self._script_steps:
             done = self._script_done + step - first - before
-            told |= {"script_part": done / self._script_steps, "script_left": max(self._script_left(done), 0.0)}
+            record |= {"script_part": done / self._script_steps, "script_left": max(self._script_left(done), 0.0)}
         try:
             beside = self.place / f"{PROGRESS}.tmp"
-            beside.write_text(json.dumps(told), encoding="utf-8")
+            beside.write_text(json.dumps(record), encoding="utf-8")
             beside.replace(self.place / PROGRESS)
         except OSError:
             pass

@@ -28,7 +28,7 @@ STEPBAR = 1000
 NEAR = 0.5
 """Time step over the estimate of the critical one from which the true limit is computed."""
 TOLD = 1.2
-"""The log tells of the part of the stability limit again where it is so much larger than the last that it told."""
+"""Factor by which the part of the stability limit must grow before it is logged again."""
 MOST_STEPS = 2**53
 """Steps are counted exactly up to here, in frames and histories too."""
 WATCH = 100

@@ -351,15 +351,15 @@ def _tell_of_thin(project: Project, steps: int | None, time: float | None) -> No
 def _flow_on(project: Project, run: Coupled, flow: Flow, end: float) -> None:
     """Implicit steps to this flow time [s]. Checkpoints that are requested are written between two of them, inside of
     the run: nothing is different after one."""
-    told, last = clocks.monotonic(), end * (1.0 - 1e-12)
+    reported, last = clocks.monotonic(), end * (1.0 - 1e-12)
     if flow.time >= last:
         return
     with run:
         while flow.time < last:
             run.advance(end)
             _write_due(project)
-            if project.log is not None and clocks.monotonic() - told > QUIET_SECONDS:
-                told = clocks.monotonic()
+            if project.log is not None and clocks.monotonic() - reported > QUIET_SECONDS:
+                reported = clocks.monotonic()
                 shown = partial(with_prefix, unit="s")
                 now, whole = shown(flow.time, digits=6), shown(end, digits=6)
                 project.log.info(f"flow time {now} of {whole}, time step {shown(flow.implicit_dt)}")

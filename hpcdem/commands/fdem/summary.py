@@ -98,20 +98,20 @@ def close(project: Project, figure: bool = True) -> None:
     joule, volume = unit_in("J/m", blocks.dim), unit_in("m2", blocks.dim, content=True)
     if blocks.budget is not None:
         energies = diagnostics.energies(blocks)
-        told = {
+        entries = {
             text: energies[name]
             for name, text in ENERGY_WORDS.items()
             if name not in ("work_discs", "work_bolts", "work_liners", "work_heat", "plastic_lost", "creep_lost")
             or energies[name]
         }
-        log.account("energy budget", "energy", joule, told, project.units)
+        log.account("energy budget", "energy", joule, entries, project.units)
         log.info(f"energy: closing error {energies['relative']:.2g} of the largest flow")
         for support in supports.ALL:
             there = support.there(blocks)
             if there is not None:
                 found = there.energies()
-                told = {SUPPORT_WORDS[name]: found[name] for name in SUPPORT_WORDS if name in found}
-                log.account(f"energy of {support.name}", "energy", joule, told, project.units)
+                entries = {SUPPORT_WORDS[name]: found[name] for name in SUPPORT_WORDS if name in found}
+                log.account(f"energy of {support.name}", "energy", joule, entries, project.units)
     flow = Flow.there(blocks)
     if flow is not None:
         found = flow.account()
@@ -144,8 +144,8 @@ def _tell_fields(project: Project) -> None:
         if log is not None and kind.name in blocks.surface_loads:
             found = kind.load_type().there(blocks).account()
             unit = kind.amount if blocks.dim == 2 else kind.amount.removesuffix("/m")
-            told = {word: found[name] for name, word in HEAT_WORDS.items() if name in found}
-            log.account(kind.name, kind.name, unit, told, project.units)
+            entries = {word: found[name] for name, word in HEAT_WORDS.items() if name in found}
+            log.account(kind.name, kind.name, unit, entries, project.units)
 
 
 def _tell_both(project: Project) -> None:

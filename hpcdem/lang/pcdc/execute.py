@@ -207,10 +207,10 @@ class Interpreter:
         except ScriptError as error:
             self._agree(index, repr(error))
             raise self._on_the_way(error) from None
-        told = repr((arguments, terms))
-        asked = self._agree(index, told)
+        text = repr((arguments, terms))
+        asked = self._agree(index, text)
         self.project.line = statement.line if self._included_at is None else self._included_at
-        if self._passed_over(statement, arguments, told):
+        if self._passed_over(statement, arguments, text):
             return
         if asked and self.journal is not None:
             fdem.steps.stop_here(self.project, asked)
@@ -237,12 +237,12 @@ class Interpreter:
 
     # ---- continuing from a checkpoint ------------------------------------------------------------------------------
 
-    def _passed_over(self, statement: Statement, arguments: Mapping[str, Any], told: str) -> bool:
+    def _passed_over(self, statement: Statement, arguments: Mapping[str, Any], text: str) -> bool:
         """Note a command, or, on the way back to a checkpoint, pass over it if it was done before that was written."""
         journal = self.journal
         if journal is None:
             return False
-        checksum = zlib.crc32(f"{statement.command.name} {told}".encode("utf-8", "backslashreplace"))
+        checksum = zlib.crc32(f"{statement.command.name} {text}".encode("utf-8", "backslashreplace"))
         if not journal.replays:
             journal.note(COMMAND, checksum)
             return False
@@ -291,21 +291,21 @@ class Interpreter:
         return ask() if journal is None else self._placed(lambda: journal.look(ask))
 
     def ask(
-        self, told: tuple[Any, ...], make: Callable[[], Any], again: Callable[[], Any] | None = None,
+        self, key: tuple[Any, ...], make: Callable[[], Any], again: Callable[[], Any] | None = None,
         fails_again: bool = False,
     ) -> Any:  # fmt: skip
         """A method of particles with these arguments, see Journal.ask."""
         journal = self.journal
         if journal is None:
             return make()
-        return self._placed(lambda: journal.ask(_checksum(told), make, again, fails_again))
+        return self._placed(lambda: journal.ask(_checksum(key), make, again, fails_again))
 
-    def ask_alone(self, told: tuple[Any, ...], make: Callable[[], Any], again: bool) -> Any:
+    def ask_alone(self, key: tuple[Any, ...], make: Callable[[], Any], again: bool) -> Any:
         """Query particles of this rank only, see Journal.ask_alone."""
         journal, alone = self.journal, self.project.comm.size == 1
         if journal is None:
             return make()
-        return self._placed(lambda: journal.ask_alone(_checksum(told), make, again, alone))
+        return self._placed(lambda: journal.ask_alone(_checksum(key), make, again, alone))
 
     def function(self, call: Callable[[], object]) -> Callable[[], object]:
         """Wrap a function so that the journal records what it does during a command."""
@@ -350,18 +350,18 @@ class Interpreter:
             "at": f"line {line}: {source.line(line)}",
         }  # fmt: skip
 
-    def _agree(self, index: int, told: str) -> int:
+    def _agree(self, index: int, words: str) -> int:
         """Collective: all ranks are at this command, or LOOK, with these values, or all raise ScriptError. Returns what
         was requested from outside a while ago (runtime.stop_requests), the same on all ranks."""
         comm, stop = self.project.comm, self.project.blocks.stop
         asked = stop.overdue_request() if stop is not None else 0
         if comm.size == 1:
             return asked
-        mark = (index << 32) | zlib.crc32(told.encode("utf-8", "backslashreplace"))
+        mark = (index << 32) | zlib.crc32(words.encode("utf-8", "backslashreplace"))
         found = comm.max_into(np.array([mark, -mark, asked], np.int64))
         if found[0] == -found[1]:
             return int(found[2])
-        everyone = comm.allgather((index, told))
+        everyone = comm.allgather((index, words))
         other = next(rank for rank, one in enumerate(everyone) if one != everyone[0])
         if everyone[other][0] != everyone[0][0]:
             places = " and ".join(self._place(*everyone[rank]) for rank in (0, other))
@@ -376,9 +376,9 @@ class Interpreter:
                 raise ScriptError(place.rpartition(":")[0], int(place.rpartition(":")[2]), f"{question}: {why}")
         raise self.statements[min(i for i, _ in everyone)].error(why)
 
-    def _place(self, index: int, told: str) -> str:
+    def _place(self, index: int, text: str) -> str:
         if index == LOOK:
-            return told.partition(": ")[0]
+            return text.partition(": ")[0]
         if index >= len(self.statements):
             return "the end of the script"
         return f"{self.statements[index].file}:{self.statements[index].line}"
@@ -440,8 +440,8 @@ class Interpreter:
             write(sys.stdout, text.getvalue())
 
 
-def _checksum(told: tuple[Any, ...]) -> int:
-    return zlib.crc32(described(told).encode("utf-8", "backslashreplace"))
+def _checksum(key: tuple[Any, ...]) -> int:
+    return zlib.crc32(described(key).encode("utf-8", "backslashreplace"))
 
 
 def _way(places: list[tuple[str, int]]) -> str:

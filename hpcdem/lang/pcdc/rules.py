@@ -106,7 +106,7 @@ def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | 
     if "update-frequency" in arguments and auto is not True and not isinstance(auto, Pending):
         raise ValueError("update-frequency needs auto on")
     given = [
-        told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)
+        phrase for word, phrase in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)
     ]
     if len(given) > 1:
         raise ValueError(f"{given[0]} and {given[1]} cannot be combined: both set the time step")

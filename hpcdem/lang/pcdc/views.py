@@ -129,18 +129,18 @@ class Model(Accounts):
         flow-channels that are there: of a group (group=, set=), of a layer (geometry=), or x=(from, to), y=, z= in the
         mesh, with present=True by where they are now; of a group of elements (face_of=), of elements by number
         (element=), or as RANGE has it between=, boundary=True, crack=True."""
-        told = f"numbers {kind} {where}"
-        return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)), told)
+        query = f"numbers {kind} {where}"
+        return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)), query)
 
     def values(self, kind: str, name: str, **where: Any) -> np.ndarray:
         """A quantity by name, in the order of numbers; of nodes with face_of= or element= on their side."""
-        told = f"values {kind} {name} {where}"
-        return self._look(lambda: fdem.queries.values(self._project, _kind(kind), _name(name), _range(where)), told)
+        query = f"values {kind} {name} {where}"
+        return self._look(lambda: fdem.queries.values(self._project, _kind(kind), _name(name), _range(where)), query)
 
     def total(self, kind: str, name: str, **where: Any) -> float:
         """Exact sum of a quantity."""
-        told = f"total {kind} {name} {where}"
-        return self._look(lambda: fdem.queries.total(self._project, _kind(kind), _name(name), _range(where)), told)
+        query = f"total {kind} {name} {where}"
+        return self._look(lambda: fdem.queries.total(self._project, _kind(kind), _name(name), _range(where)), query)
 
     def history(self, name: str) -> np.ndarray:
         """(n, 3) step, time and value of what a history has recorded."""

@@ -202,12 +202,12 @@ class Coupled(SurfaceLoad):
         if found[4] >= 0.0:
             link.stop_on_breakthrough(int(found[4]))
         path_d, speed_d, path_b, speed_b = np.sqrt(found[:4]).tolist()
-        room, stride = link.room - path_d - path_b, (speed_d + speed_b) * dt
-        if glance and not self._check_interval.is_too_late(room - 2.0 * stride, stride):
+        margin, stride = link.room - path_d - path_b, (speed_d + speed_b) * dt
+        if glance and not self._check_interval.is_too_late(margin - 2.0 * stride, stride):
             return False
-        self.late += room < 0.0
-        self._check_interval.wait(0.5 * max(room, 0.0) / stride if stride > 0.0 else math.inf)
-        return room < 2.0 * stride
+        self.late += margin < 0.0
+        self._check_interval.wait(0.5 * max(margin, 0.0) / stride if stride > 0.0 else math.inf)
+        return margin < 2.0 * stride
 
     # ---- forces ------------------------------------------------------------------------------------------------------
 

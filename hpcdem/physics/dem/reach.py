@@ -114,10 +114,10 @@ def _choose_fast(sim: Any, first_class: int | None, limit: float) -> None:
     widest = float(reach[~alone].max(initial=half))
     rebuild_state.columns = max(1, math.ceil(2.0 * (sim.largest_radius + widest) / rebuild_state.side))
     sim.fast = Fast(gid, np.where(alone, free, reach), alone)
-    room = np.append(sim.fast.reach, half)
+    margin = np.append(sim.fast.reach, half)
     pace = np.append(rows[:, 3], limit * 2.0**first_class)
     fall = 2.0 * gravity * dt * dt
-    wait = min(fast.wait(float(r), float(s), fall) for r, s in zip(room, pace, strict=True))
+    wait = min(fast.wait(float(r), float(s), fall) for r, s in zip(margin, pace, strict=True))
     rebuild_state.pace = rebuild_state.countdown = max(1, min(rebuild_state.countdown, int(min(wait, LONGEST_WAIT))))
 
 

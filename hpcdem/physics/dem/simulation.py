@@ -145,9 +145,9 @@ class Simulation(Model):
         self.streams = 0
         self.breaks = np.zeros(2, np.int64)
         self.bonds = 0
-        self.bonds_looked_at: tuple[float, ...] = ()  # state of the last look for bonds of two shear stiffnesses
+        self.bonds_looked_at: tuple[float, ...] = ()  # state of the last search for bonds of two shear stiffnesses
         self.step_limit = math.inf  # the lowest estimate of the critical time step that was reported
-        self.told_share = 0.0  # the largest part of the stability limit that the log told of
+        self.told_share = 0.0  # the largest part of the stability limit that was logged
         self.next_watch = 0  # the step from which on it is checked again
         self.lost = 0
         self.rows: list[tuple[int, int]] = []
@@ -237,7 +237,7 @@ class Simulation(Model):
     def _check_rebuild(self, glance: bool = False) -> tuple[int, int]:
         rebuild_state, p, dt = self.rebuild_state, self.particles, self.clock.dt
         found = np.zeros(9)
-        # Half of the room, in case things speed up; gravity counted twice; and never more than twice the last wait.
+        # Half of the margin, in case things speed up; gravity counted twice; and never more than twice the last wait.
         fall = 2.0 * math.hypot(self.settings.gx, self.settings.gy) * dt * dt
         motion.survey(p.hot, p.n_left, p.n_own, self.origin, dt, self._fast_rows, found[:4])
         found[4] = self.stop.local_request() if self.stop is not None else 0
@@ -249,19 +249,19 @@ class Simulation(Model):
             guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, mixed, self.comm, alone)
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
         stride = max(math.sqrt(found[motion.SPEED2]), self.walls.fastest()) * dt
-        room = 0.5 * rebuild_state.skin - path
-        if glance and not rebuild_state.is_too_late(room, stride) and found[5 + fast.DUE] == 0.0:
-            hurry = found[5 + fast.HURRY]  # half the room over the stride, of the fast ones
+        margin = 0.5 * rebuild_state.skin - path
+        if glance and not rebuild_state.is_too_late(margin, stride) and found[5 + fast.DUE] == 0.0:
+            hurry = found[5 + fast.HURRY]  # half the margin over the stride, of the fast ones
             if hurry == 0.0 or not rebuild_state.is_too_late(2.0 / hurry, 1.0):
                 return FRESH, 0
-        if (room < 0.0 and self.largest_radius > 0.0) or found[5 + fast.DUE] == fast.LATE:
+        if (margin < 0.0 and self.largest_radius > 0.0) or found[5 + fast.DUE] == fast.LATE:
             with self.timers("neighbour"):
                 missed.stop_on_missed(self)
-        stale = room < stride or found[5 + fast.DUE] > 0.0
+        stale = margin < stride or found[5 + fast.DUE] > 0.0
         if stale:
-            room = 0.5 * rebuild_state.skin
+            margin = 0.5 * rebuild_state.skin
         hurry = 0.0 if stale else found[5 + fast.HURRY]
-        rebuild_state.wait(fast.wait(room, stride, fall), 1.0 / hurry if hurry > 0.0 else math.inf)
+        rebuild_state.wait(fast.wait(margin, stride, fall), 1.0 / hurry if hurry > 0.0 else math.inf)
         return STORAGE if stale else FRESH, int(found[4])
 
     def check_soon(self) -> None:

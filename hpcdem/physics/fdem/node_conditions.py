@@ -247,8 +247,8 @@ def together(rows: Sequence[NodeCondition], dim: int) -> NodeCondition:
             values = [{f"{name}_{axis}": getattr(one, f"{name}_{axis}") for name in names} for one in several]
             compared = names if names[0] == "does" else names[:1]  # sides may share one force
             if len({tuple(one[f"{name}_{axis}"] for name in compared) for one in values}) > 1:
-                told = dict.fromkeys(one.motion(axis) if names[0] == "does" else one.push(axis) for one in several)
-                raise Contradiction(" and ".join(told))
+                conflicts = dict.fromkeys(one.motion(axis) if names[0] == "does" else one.push(axis) for one in several)
+                raise Contradiction(" and ".join(conflicts))
             found = replace(found, **values[0] if values else {})
     for one in rows:
         kind, way = bound(kind, way, one.constraint, one.way, dim)  # type: ignore[assignment]

@@ -203,8 +203,8 @@ class Blocks(Edited):
         found = np.zeros(4)
         self._survey(self.listed, found)
         self.comm.max_into(found)
-        room = 0.5 * self.rebuild_state.skin - math.sqrt(found[0])
-        return self.rebuild_state.is_too_late(room, math.sqrt(found[1]) * self.clock.dt)
+        margin = 0.5 * self.rebuild_state.skin - math.sqrt(found[0])
+        return self.rebuild_state.is_too_late(margin, math.sqrt(found[1]) * self.clock.dt)
 
     def _check_rebuild(self, glance: bool = False) -> tuple[int, int]:
         if glance and not (self.options.collision and self._has_sped_up()):
@@ -236,15 +236,15 @@ class Blocks(Edited):
         stale, outdated = breaks > 0.0, rebuild_state.stored >= OLDEST
         wait = float(LONGEST_WAIT // 4 if yields > 0.0 else LONGEST_WAIT)  # a joint may be about to break
         if self.options.collision:
-            room = 0.5 * rebuild_state.skin - math.sqrt(path2)
-            rebuild_state.late += room < 0.0
+            margin = 0.5 * rebuild_state.skin - math.sqrt(path2)
+            rebuild_state.late += margin < 0.0
             # Lists end where the ghosts do, so some of their room is left for the next ones.
             outdated |= 0.5 * (ROOM - WIDE) * self.mean_edge < math.sqrt(way2) + stride
-            stale |= room < stride
+            stale |= margin < stride
             if stale or outdated:
-                room = 0.5 * rebuild_state.skin
+                margin = 0.5 * rebuild_state.skin
             if stride > 0.0:
-                wait = min(wait, 0.5 * room / stride)
+                wait = min(wait, 0.5 * margin / stride)
         rebuild_state.wait(wait)
         return STORAGE if outdated else LISTS if stale else FRESH, int(request)
 
@@ -384,9 +384,9 @@ class Blocks(Edited):
         self._apart = rebuild_state.side
         if not frozen:
             rebuild_state.skin = self._skin()
-            room = ROOM * self.mean_edge if self.options.collision else 0.0
-            self._apart = max(room, self._longest, of_loads) * (1.0 + 1e-9)
-            needed = max(2.0 * radius, self._longest, of_loads) * (1.0 + 1e-9) + room
+            margin = ROOM * self.mean_edge if self.options.collision else 0.0
+            self._apart = max(margin, self._longest, of_loads) * (1.0 + 1e-9)
+            needed = max(2.0 * radius, self._longest, of_loads) * (1.0 + 1e-9) + margin
             if not needed <= rebuild_state.side <= 1.2 * needed:
                 rebuild_state.side = 1.05 * needed
         return self.ownership.cells(middle, rebuild_state.side)
@@ -408,9 +408,9 @@ class Blocks(Edited):
         self.n_left, self.n_own = halo.n_left, len(order)
         n = len(self.x)
         self.number = np.empty(n, np.int64)
-        room = aligned((n * v.shape[1] + 8,))  # kernels read four columns at a time
-        room[-8:] = 0.0
-        self.v = room[:-8].reshape(n, v.shape[1])
+        storage = aligned((n * v.shape[1] + 8,))  # kernels read four columns at a time
+        storage[-8:] = 0.0
+        self.v = storage[:-8].reshape(n, v.shape[1])
         self.closed = True
         self.number[self.owned], self.v[self.owned] = number, v
         halo.fill(self.number)

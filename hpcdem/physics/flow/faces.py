@@ -100,18 +100,18 @@ class Faces(Channels):
         between = self.network.there[mesh.face_points(free)].all(axis=1)
         kinds = wet_bits & ~stressed, wet_bits & stressed, between & ~wet_bits & ~stressed
         wet, total, dry = blocks.comm.sum_into(np.array([kind.sum() for kind in kinds], np.int64)).tolist()
-        told = []
+        notes = []
         if wet:
-            told.append(f"water of conditions and wells loads {wet} free faces")
+            notes.append(f"water of conditions and wells loads {wet} free faces")
         if total:
-            told.append(f"{total} with water have a prescribed stress, which replaces the water pressure")
+            notes.append(f"{total} with water have a prescribed stress, which replaces the water pressure")
         if dry:
-            told.append(
+            notes.append(
                 f"{dry} free faces between flow nodes are dry: no condition applies water pressure to them (node "
                 "boundary hydraulic-constant-flow-boundary pressure, flow-surface, or well create, with a range that "
                 "holds their nodes)"
             )
-        text = "; ".join(told)
+        text = "; ".join(notes)
         if blocks.log is not None and text != self._reported_wet:
             blocks.log.info(f"flow: {text or 'no free face is wet any more'}")
         self._reported_wet = text

@@ -240,17 +240,17 @@ class Flow(Values):
     def _sub_step(self, condition: np.ndarray) -> None:
         """condition (n,): rows of the conditions of the owned nodes."""
         blocks, before, after = self.blocks, self.time, self.time + self.dt
-        told = self.dt, condition, self.conditions_at(after), self.fluid("fluid_bulk"), self.nodes, self.state
+        arguments = self.dt, condition, self.conditions_at(after), self.fluid("fluid_bulk"), self.nodes, self.state
         if blocks.threads == 1:
             into, gone = self._sums
             kernels.sub_step(
                 self._ends, self._law, self._law_table, self._since, self._leaks, before, after, self._flowing_table(),
-                self._q, self._lost_fluid, into, gone, *told,
+                self._q, self._lost_fluid, into, gone, *arguments,
             )  # fmt: skip
         else:
             self._find_flows(self.dt)
             links = self._begin, self._channel, self._side, self._q, self._leaks, self._lost_fluid
-            kernels.fill(blocks.threads, *links, *told)
+            kernels.fill(blocks.threads, *links, *arguments)
         self.time = after
         if self.carried is not None:
             self.carried += self.dt * self._q

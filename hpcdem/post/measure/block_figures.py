@@ -520,8 +520,8 @@ def emitted(found: Emission) -> Any:
         base += found.rates[:, 2 + k]
     part = float(found.rates[0, 1] - found.rates[0, 0])
     wide, unit = times(np.array([part]), True)
-    told = f"{wide[0]:.2g} {unit[unit.find('(') + 1 : -1]}" if found.timed else f"{part:.3g} steps"
-    label(b, None, f"events per {told}")
+    interval = f"{wide[0]:.2g} {unit[unit.find('(') + 1 : -1]}" if found.timed else f"{part:.3g} steps"
+    label(b, None, f"events per {interval}")
     key(b, loc="upper left")
     for k, shade in enumerate(MODE_COLOURS):
         c.plot(at[kinds == k], found.magnitude[kinds == k], "o", ms=2.6, mfc="none", mec=shade, mew=0.6)

@@ -142,7 +142,7 @@ def _measure(comm: Comm, log: Any, plan: Plan, what: Sequence[str]) -> dict[str,
     tables = ("bonds", "contacts") if "cracks" in what else ()
     mine: list[tuple[Any, dict[str, Any]]] = []
     error = None
-    told = time.monotonic()
+    reported = time.monotonic()
     try:
         before = _read(plan.frames[first - 1], plan, tables) if pairs and 0 < first < last else None
         for k in range(first, last):
@@ -153,8 +153,8 @@ def _measure(comm: Comm, log: Any, plan: Plan, what: Sequence[str]) -> dict[str,
             if "faults" in what:
                 _one_field([row[1] for row in mine])
             before = now if pairs else None
-            if time.monotonic() - told > 5.0:
-                told = time.monotonic()
+            if time.monotonic() - reported > 5.0:
+                reported = time.monotonic()
                 log.info(f"{plan.frames[k].path.name}: {k - first + 1} of {last - first} frames read")
     except HpcdemError as failure:
         error = str(failure)

@@ -26,8 +26,8 @@ def run(module: str, *words: str, sent: str = "", failed: str) -> None:
         start_new_session=True,
     )  # fmt: skip
     if done.returncode:
-        told = [line for line in done.stderr.splitlines() if line.strip()]
-        why = told[-1].removeprefix("Exception: ") if told else f"it ended with {done.returncode}"
+        messages = [line for line in done.stderr.splitlines() if line.strip()]
+        why = messages[-1].removeprefix("Exception: ") if messages else f"it ended with {done.returncode}"
         raise HpcdemError(f"{failed}: {why}")
 
 

@@ -116,10 +116,10 @@ def _points(rows: Any) -> np.ndarray:
 def read_shapefile(found: Found) -> None:
     """Polygons and lines of a shapefile, read by pyshp; names and attributes from its .dbf, the unit from its .prj."""
     shapefile = optional.pyshp()
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         _records(found, shapefile)
-    found.warnings += dict.fromkeys(str(one.message) for one in told)
+    found.warnings += dict.fromkeys(str(one.message) for one in caught)
 
 
 def _records(found: Found, shapefile: Any) -> None:
