@@ -24,6 +24,7 @@ class ParticleCommands:
     clump = Function("clumps.clump")
     join = Function("clumps.join", "where! group color")
     delete = Function("particles.delete")
+    twin = Function("particles.twin", "number")
     export = Function("particles.export", file=WRITTEN, looks=True)
     prop = Function("properties.prop")
     bond = Function("bonds.bond")

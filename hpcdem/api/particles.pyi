@@ -255,6 +255,22 @@ class ParticleCommands:
         """
     def delete(self, where: Selected = None) -> int:
         """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
+    def twin(self, number: int, *, where: Selected = None) -> int:
+        """TWIN: move one free particle by 1e-5 of its radius, for runs that differ by no more than that.
+
+        Parameters
+        ----------
+        number : of the twin; it draws the particle and the direction. 0 is the model itself: nothing moves.
+        where : the particles of which one is drawn; members of clumps and particles fixed in x or y are not.
+
+        Returns
+        -------
+        int : id of the particle, -1 for twin 0.
+
+        Raises
+        ------
+        CommandError : if no such particle is free.
+        """
     def export(self, file: File, group: bool = False, where: Selected = None) -> None:
         """EXP: rows "x y r [group]" in the order of ids, 13 significant digits.
 

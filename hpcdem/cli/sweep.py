@@ -61,6 +61,8 @@ class Setting(click.ParamType):
 @click.option("--set", "values", type=Setting(), multiple=True, metavar="NAME=VALUES", help="Values of a parameter of "
               "the script; repeatable: all values are combined.")  # fmt: skip
 @click.option("--seed", metavar="VALUES", help="Short for --set seed=VALUES; in ZDEM, values of SET seed.")
+@click.option("--twins", type=click.IntRange(1), metavar="N", help="N runs that differ in the position of one "
+              "particle, by 1e-5 of its radius; the first is the script unchanged.")  # fmt: skip
 @click.option("--latin", type=click.IntRange(1), metavar="N", help="N samples of the ranges: a Latin hypercube.")
 @click.option("--sobol", type=click.IntRange(1), metavar="N", help="N samples of the ranges: a Sobol sequence.")
 @click.option("--sampling-seed", type=click.IntRange(0), metavar="S", help="Seed of the sampling itself [0].")
@@ -165,7 +167,7 @@ def _opened(options: Mapping[str, Any]) -> Sweep:
     from hpcdem.sweep import Sweep
 
     path: Path = options["script"]
-    of_members = ("values", "seed", "latin", "sobol", "sampling_seed", "ranks", "threads", "links", "output")
+    of_members = ("values", "seed", "twins", "latin", "sobol", "sampling_seed", "ranks", "threads", "links", "output")
     if path.is_dir():
         for name in of_members:
             if options[name]:
@@ -183,16 +185,16 @@ def _opened(options: Mapping[str, Any]) -> Sweep:
     if options["sampling_seed"] is not None and not (options["latin"] or options["sobol"]):
         raise UsageError("--sampling-seed requires --latin or --sobol")
     return Sweep(
-        path, values, seed=options["seed"], latin=options["latin"], sobol=options["sobol"],
+        path, values, seed=options["seed"], twins=options["twins"], latin=options["latin"], sobol=options["sobol"],
         sampling_seed=options["sampling_seed"] or 0, ranks=options["ranks"] or 1, threads=options["threads"] or 1,
         folder=options["output"], links=options["links"],
     )  # fmt: skip
 
 
 _FILE = {
-    "script": "script", "seed": "seed", "latin": "latin", "sobol": "sobol", "sampling-seed": "sampling_seed",
-    "ranks": "ranks", "threads": "threads", "jobs": "jobs", "tries": "tries", "with": "links", "output": "output",
-    "sbatch": "sbatch",
+    "script": "script", "seed": "seed", "twins": "twins", "latin": "latin", "sobol": "sobol",
+    "sampling-seed": "sampling_seed", "ranks": "ranks", "threads": "threads", "jobs": "jobs", "tries": "tries",
+    "with": "links", "output": "output", "sbatch": "sbatch",
 }  # fmt: skip
 """Keys of a file of settings, besides [set]."""
 

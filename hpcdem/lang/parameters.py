@@ -1,7 +1,8 @@
 """The parameters of a script of any kind: numbers, words and truth values that its own text sets by name.
 
 In Python, and in PCDC scripts, a parameter is an assignment at the top level of a literal: ``friction = 0.3``. In a
-ZDEM script it is ``friction = 0.3`` on a line of its own (`zdem.parameters`), and ``SET seed 20`` sets ``seed``.
+ZDEM script it is ``friction = 0.3`` on a line of its own (`zdem.parameters`), and ``SET seed 20`` sets ``seed``. Every
+ZDEM script with steps has the parameter ``twin``: of its line ``TWIN 3``, or of one inserted before the first steps.
 A script with other values is another text: the literal is replaced where it stands.
 """
 
@@ -27,13 +28,14 @@ _OWN_NAMES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef, a
 @dataclass(frozen=True)
 class Parameter:
     """A parameter that a script assigns. line: counted from 1; begin, end: of the literal in the bytes of its line
-    (UTF-8)."""
+    (UTF-8); form: what a value is written as."""
 
     name: str
     value: Value
     line: int
     begin: int
     end: int
+    form: str = "{}"
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ class Adjustable:
         for name in sorted(values, key=lambda name: (self.parameter(name).line, self.parameter(name).begin))[::-1]:
             at = self.parameter(name)
             line = pieces[2 * (at.line - 1)]
-            word = str(values[name]) if self.kind == "zdem" else repr(values[name])
+            word = at.form.format(values[name] if self.kind == "zdem" else repr(values[name]))
             pieces[2 * (at.line - 1)] = line[: at.begin] + word.encode() + line[at.end :]
         text = b"".join(pieces)
         if self.kind == "zdem":
@@ -122,6 +124,20 @@ def _of_zdem(script: parser.Script, text: bytes) -> Iterator[Parameter]:
         found = next((k for k in range(1, len(words)) if len(words[k]) >= 3 and "seed".startswith(words[k])), None)
         if found is not None and lexer.number(line.tokens[found + 1]) is not None:
             yield _at(text, line.tokens[found + 1], "seed", seeds[0].get("seed"))
+    yield from _twin(script, text)
+
+
+def _twin(script: parser.Script, text: bytes) -> Iterator[Parameter]:
+    """The number of the only TWIN; without one, a line for it before the first steps."""
+    twins = [s.line for s in script.statements if s.command == "TWIN"]
+    steps = [s.line for s in script.statements if s.command in ("CYC", "IMPLE")]
+    if len(twins) > 1 or not (twins or steps):
+        return
+    line = next(line for line in lexer.read_lines(text, script.file) if line.number == (twins or steps)[0])
+    if not twins:
+        yield Parameter("twin", 0, line.number, 0, 0, "TWIN {}\n")
+    elif lexer.number(line.tokens[1]) is not None:
+        yield _at(text, line.tokens[1], "twin", int(line.tokens[1].text))
 
 
 def _at(text: bytes, token: lexer.Token, name: str, value: Value) -> Parameter:

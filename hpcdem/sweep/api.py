@@ -55,10 +55,11 @@ class Sweep:
         report = sweep.report()
         print(report.members["wedge.taper[deg] end"])
 
-    values: by parameter, a list, or words as on the command line ("0.2,0.3", "1:10", "0.1:0.5:5"); latin, sobol: so
-    many samples of the ranges LOW:HIGH among them, by the sampling's own seed `sampling_seed`; folder: of the sweep,
-    by default SCRIPT_sweep beside the script; links: files that the script reads. A folder that holds this sweep is
-    taken up, with members that are new. UsageError or ScriptError, before anything is written, for what cannot be.
+    values: by parameter, a list, or words as on the command line ("0.2,0.3", "1:10", "0.1:0.5:5"); twins: number of
+    runs in which one particle is moved by 1e-5 of its radius, the first is the script unchanged; latin, sobol: so many
+    samples of the ranges LOW:HIGH among them, by the sampling's own seed `sampling_seed`; folder: of the sweep, by
+    default SCRIPT_sweep beside the script; links: files that the script reads. A folder that holds this sweep is taken
+    up, with members that are new. UsageError or ScriptError, before anything is written, for what cannot be.
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class Sweep:
         values: Mapping[str, str | Sequence[Any]] | None = None,
         *,
         seed: str | Sequence[int] | None = None,
+        twins: int | None = None,
         latin: int | None = None,
         sobol: int | None = None,
         sampling_seed: int = 0,
@@ -81,6 +83,10 @@ class Sweep:
             if "seed" in wanted:
                 raise UsageError("seed is given twice")
             wanted["seed"] = seed
+        if twins is not None:
+            if "twin" in wanted:
+                raise UsageError("twin is given twice")
+            wanted["twin"] = list(range(twins))
         if latin is not None and sobol is not None:
             raise UsageError("give either latin or sobol")
         number = latin if latin is not None else sobol

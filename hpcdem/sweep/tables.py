@@ -29,6 +29,8 @@ TIMES = ("step", "ini", "time[s]", "shortening[m]", "from", "to")
 OF_FAULTS = ("born_shortening[m]", "born_time[s]", "x[m]", "dip_at_birth[deg]", "dip[deg]", "length[m]", "slip[m]",
              "throw[m]", "heave[m]", "largest_slip_rate[m/s]", "share_of_shortening")  # fmt: skip
 """Columns of the n-th fault of each member that are compared."""
+CHANCE = ("seed", "twin")
+"""Parameters that groups do not distinguish."""
 APART = ("tracks",)
 """Measures of single particles, which are others in each member."""
 
@@ -61,7 +63,7 @@ class Band:
 @dataclass
 class Report:
     """members: by column, a value per member that is done; bands: by measure, then by group (() all of them, else
-    values of the parameters but the seed)."""
+    values of the parameters but `CHANCE`)."""
 
     names: list[str]
     members: dict[str, list[Any]]
@@ -202,7 +204,7 @@ def band(parts: Sequence[Series]) -> Band | None:
 def collect(members: Sequence[Member], found: Sequence[tuple[Any, Any, dict[str, float]]], folder: Path) -> Report:
     """The report of members that are done, from what each measured."""
     names = tuple(members[0].values)
-    varied = tuple(n for n in names if n != "seed" and len({m.values[n] for m in members}) > 1)
+    varied = tuple(n for n in names if n not in CHANCE and len({m.values[n] for m in members}) > 1)
     table: dict[str, list[Any]] = {"member": [m.name for m in members]}
     table |= {name: [m.values[name] for m in members] for name in names}
     columns = list(dict.fromkeys(column for series, _, _ in found for column in series))
@@ -231,7 +233,7 @@ def collect(members: Sequence[Member], found: Sequence[tuple[Any, Any, dict[str,
 
 
 def grouped(members: Sequence[Member], varied: Sequence[str]) -> dict[tuple[Value, ...], list[int]]:
-    """Members by the values of their parameters but the seed; () are all. Groups of one member are none."""
+    """Members by the values of their parameters but `CHANCE`; () are all. Groups of one member are none."""
     groups: dict[tuple[Value, ...], list[int]] = {(): list(range(len(members)))}
     for k, member in enumerate(members):
         if varied:

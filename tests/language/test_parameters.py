@@ -54,7 +54,9 @@ def adjustable(text: str, file: str = "push.py") -> Adjustable:
 
 def test_other_values_change_their_place_and_nothing_else():
     script = adjustable(ZDEM)
-    assert {n: p.value for n, p in script.parameters.items()} == {"friction": 0.3, "depth": -300, "seed": 20}
+    assert {n: p.value for n, p in script.parameters.items()} == {
+        "friction": 0.3, "depth": -300, "seed": 20, "twin": 0,
+    }  # fmt: skip
     text = script.with_values({"friction": 0.25, "seed": 7}).decode()
     assert text == ZDEM.replace("friction = 0.3 ", "friction = 0.25 ").replace("seed 20", "seed 7")
     assert parse_text(text).statements[1].get("seed") == 7

@@ -375,6 +375,8 @@ class Maker:
     def do_ball(self) -> None:
         self.make_ball()
         self.add("PROP", self.material(), f"RANGE id {100_000 + self.balls - 1}")
+        if self.chance(50):
+            self.add(f"TWIN {self.whole(0, 9)} RANGE id {100_000 + self.balls - 1}")
 
     def do_row(self) -> None:
         self.make_row()

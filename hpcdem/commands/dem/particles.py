@@ -13,15 +13,19 @@ from hpcdem.commands.dem.properties import chosen
 from hpcdem.core import limits
 from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.fields import FIX_BITS
 from hpcdem.core.selection import Selection
 from hpcdem.io.dat import is_frame
 from hpcdem.io.files import write_sections
 from hpcdem.io.parts import read_lines, share
+from hpcdem.numerics.rng import uniforms
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.pre import packing
 from hpcdem.pre.rows import row
 
 NO_GROUP = "***"
+STREAM = 2026
+"""First of the two streams of random numbers of TWIN."""
 FAILURES = 1000
 """Attempts without room in a row after which GEN gives up. Found from two published facts: see docs/physics.md."""
 
@@ -262,6 +266,42 @@ def delete(sim: Simulation, where: Selection | None = None) -> int:
         return 0
     sim.open_model()
     return sim.remove(chosen(sim, where))
+
+
+def twin(sim: Simulation, number: int, where: Selection | None = None) -> int:
+    """TWIN: move one free particle by 1e-5 of its radius, for runs that differ by no more than that.
+
+    Parameters
+    ----------
+    number : of the twin; it draws the particle and the direction. 0 is the model itself: nothing moves.
+    where : the particles of which one is drawn; members of clumps and particles fixed in x or y are not.
+
+    Returns
+    -------
+    int : id of the particle, -1 for twin 0.
+
+    Raises
+    ------
+    CommandError : if no such particle is free.
+    """
+    which = chosen(sim, where) & (sim.particles["fix"] & (FIX_BITS["x"] | FIX_BITS["y"]) == 0)
+    if sim.clumps:
+        which &= sim.particles.clump < 0
+    drawn = np.concatenate(sim.comm.allgather(sim.particles["gid"][which]))
+    if not len(drawn):
+        raise CommandError("TWIN: none of the selected particles is free to move")
+    if number == 0:
+        return -1
+    gid = int(drawn[uniforms(number, STREAM, drawn).argmin()])
+    angle = 2.0 * math.pi * float(uniforms(number, STREAM + 1, np.array([gid]))[0])
+    sim.open_model()
+    p = sim.particles
+    one = np.flatnonzero(p["gid"] == gid)
+    for name, part in (("x", math.cos(angle)), ("y", math.sin(angle))):
+        p[name][one] += 1e-5 * p["radius"][one] * part
+    sim.ownership.wanted = True
+    sim.check_soon()
+    return gid
 
 
 def export(sim: Simulation, file: Path | str, group: bool = False, where: Selection | None = None) -> None:

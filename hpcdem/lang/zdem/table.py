@@ -605,6 +605,15 @@ COMMANDS = (
         does="particles.delete",
     ),
     Command(
+        "TWIN",
+        "Moves one free particle, drawn by the number, by 1e-5 of its radius; twin 0 is the model itself. Twins show "
+        "how far results depend on chance (hpcdem sweep --twins).",
+        leading=(Option("number", "number of the twin", kind=INDEX, required=True, source="X"),),
+        ranged=True,
+        example=("TWIN 3", "TWIN 3 RANGE group rock"),
+        does="particles.twin",
+    ),
+    Command(
         "EXP",
         "Writes x y r of particles to a text file that LOAD reads. Its folder must exist before the run begins.",
         longest="export",
