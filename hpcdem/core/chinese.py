@@ -3,7 +3,8 @@
 HPCDEM_LANG (zh, en) decides, else the first of LC_ALL, LC_MESSAGES, LANG that is set. The English message always stays:
 it is what can be looked up; below it stands what it means in general, for the messages that are known here.
 
-Helps and reference pages have their Chinese from the catalogue `hpcdem/locale/zh` (gettext); scripts/catalogue compiles it.
+The log of a run, helps and reference pages have their Chinese from the catalogue `hpcdem/locale/zh` (gettext);
+scripts/catalogue compiles it.
 """
 
 from __future__ import annotations
@@ -104,13 +105,40 @@ def known(context: str, text: str) -> str | None:
     Parameters
     ----------
     context : str
-        Where it stands: "help", "program", "case", "zdem command", "zdem keyword", "pcdc command", "pcdc model",
+        Where it stands: "help", "program", "case", "log", "zdem command", "zdem keyword", "pcdc command", "pcdc model",
         "pcdc keyword", "pcdc default".
     text : str
         Its English; of commands, models and programs their name.
     """
     meant = _catalogue().pgettext(context, text)
     return None if meant == text else meant
+
+
+def logged(text: str, encoding: str | None = None) -> str:
+    """Return a text of the log of a run in Chinese where that is wanted; of warnings the English stays, as of errors."""
+    if not wanted(encoding=encoding):
+        return text
+    meant = in_log(text)
+    return f"{text}\n        {meant}" if text.startswith("warning") and meant != text else meant
+
+
+def in_log(text: str) -> str:
+    """Translate a text of the log, part by part; what is unknown stays."""
+    if " | " in text:
+        return " | ".join(map(in_log, text.split(" | ")))
+    for pattern, meant in _forms():
+        if found := pattern.fullmatch(text):
+            return meant.format(*map(in_log, found.groups()))
+    return text
+
+
+@cache
+def _forms() -> list[tuple[re.Pattern[str], str]]:
+    """The forms of texts of the log in the catalogue (context "log"; {}: a value), those that say most first."""
+    texts: dict[str, str] = getattr(_catalogue(), "_catalog")  # noqa: B009
+    forms = [(key[4:].split("{}"), meant) for key, meant in texts.items() if key.startswith("log\4")]
+    forms.sort(key=lambda one: -sum(map(len, one[0])))
+    return [(re.compile("(.*?)".join(map(re.escape, words)), re.DOTALL), meant) for words, meant in forms]
 
 
 def _filled(text: str, found: re.Match[str]) -> str:

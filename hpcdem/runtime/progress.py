@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from hpcdem.core import chinese
 from hpcdem.core.timers import Summary, Timers
 from hpcdem.core.units import counted, in_one_unit, with_prefix
 from hpcdem.io.run_record import PROGRESS
@@ -208,6 +209,7 @@ class Log:
 
     def _print(self, text: str) -> None:
         self._text = text
+        text = chinese.logged(text, self._stream.encoding)
         if self._terminal:
             text = folded(text, shutil.get_terminal_size().columns)
         if self._bar is not None:
@@ -494,8 +496,9 @@ class Bar:
             transient=True,
         )
         self._command = self._progress.add_task(name, total=steps)
+        whole = chinese.logged("script")
         self._script = (
-            self._progress.add_task("script", total=script_steps, completed=script_done) if script_steps else None
+            self._progress.add_task(whole, total=script_steps, completed=script_done) if script_steps else None
         )
         self._drawn = 0.0
         self._progress.start()

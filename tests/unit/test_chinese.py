@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import gettext
 import inspect
 import os
@@ -22,6 +23,7 @@ from scripts.lib.pages.options import PROGRAMS
 from tests import catalogue
 
 HAN = re.compile("[\u4e00-\u9fff]")
+PACKAGE = Path(chinese.__file__).parents[1]
 
 
 @pytest.mark.parametrize(
@@ -144,3 +146,60 @@ def test_nearly_all_options_have_their_chinese() -> None:
     texts = catalogue.of("help")
     waiting = there - set(texts) - set(texts.values())
     assert len(waiting) < 0.1 * len(there), waiting
+
+
+# --- the log of a run ----------------------------------------------------------------------------------------------
+
+OF_RUNS = ("commands", "engine", "lang", "physics", "runtime", "session.py", "api")
+"""Folders whose texts a run writes into its log. Other programs (cli, post, sweep) print English."""
+NO_WORDS = {
+    "{}: {}", "{}{}", "{}; {}", "  {}", "{}", "{}:{}: {}", "{} {}s: {}", "SECTION {}: {}",
+    "{} | {} in {}, {} element-steps/s", "{} | {} steps/s, {} element-steps/s{}",
+}  # fmt: skip
+"""Forms that consist of values: their parts are translated."""
+
+
+def forms_of_log() -> dict[str, str]:
+    """Texts that runs give to their log, with {} for values, and the file and line of each."""
+    found = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if path.relative_to(PACKAGE).parts[0] not in OF_RUNS:
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and "log" in ast.unparse(node.func):
+                at = {"info": 0, "warn": 0, "warn_once": 1}.get(node.func.attr)
+                form = None if at is None or len(node.args) <= at else form_of(node.args[at])
+                if form is not None:
+                    found[form] = f"{path.relative_to(PACKAGE)}:{node.lineno}"
+    return found
+
+
+def form_of(node: ast.expr) -> str | None:
+    """The text of a literal, None for anything else."""
+    if isinstance(node, ast.Constant):
+        return str(node.value)
+    if isinstance(node, ast.JoinedStr):
+        return "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values)  # type: ignore[misc]
+    return None
+
+
+def test_every_text_of_the_log_has_its_chinese() -> None:
+    """A text that is new or was changed needs an entry of context "log" in locale/zh (then run scripts/catalogue)."""
+    forms = forms_of_log()
+    assert len(forms) > 100
+    waiting = {form: at for form, at in forms.items() if form not in NO_WORDS
+               and not HAN.search(chinese.in_log(form.replace("{}", "7")))}  # fmt: skip
+    assert not waiting
+    assert all(HAN.search(meant) for meant in catalogue.of("log").values())
+
+
+def test_the_log_of_a_run_in_chinese(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(
+        "START\nSET dt 0.01\nBALL id 1 x 5 y 5 rad 1\nPROP density 1000\nPROP fric 0.1 RANGE group nobody\nCYC 3\nSTOP\n"
+    )
+    words = "--no-figure", "--outdir", str(tmp_path / "data"), str(tmp_path / "a.py")
+    shown = program(*words, LANG="zh_CN.UTF-8").stdout
+    assert "1 进程 x 1 线程,主机 " in shown and "第 6 行:CYC,3 步\n" in shown and "颗粒 1,接触 0,胶结 0\n" in shown
+    assert "warning: no particle has ever been in group nobody\n        警告:从来没有颗粒属于组 nobody\n" in shown
+    assert "3 步,用时 " in shown
+    assert not HAN.search(program(*words, LANG="C.UTF-8").stdout)
