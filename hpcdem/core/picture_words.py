@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 OBJECTS = (
     "elements", "particles", "clumps", "walls", "contacts", "bonds", "channels", "joints", "bolts", "liners",
-    "face-conditions", "flow-nodes", "node-conditions",
+    "face-conditions", "flow-nodes", "node-conditions", "faults",
 )  # fmt: skip
 """What can be shown, in the order in which it lies over one another."""
-HIDDEN = ("clumps", "contacts", "bonds", "face-conditions", "flow-nodes", "node-conditions")
+HIDDEN = ("clumps", "contacts", "bonds", "face-conditions", "flow-nodes", "node-conditions", "faults")
 """Of these, what is shown only if somebody asks for it."""
 COLOURS = {
     "viridis": "viridis",

@@ -15,6 +15,8 @@ from hpcdem.post.measure import fault_history, faults
 from hpcdem.post.measure.fault_history import Seen, track
 from hpcdem.post.measure.grains import Grains
 from hpcdem.post.measure.scene import Request, make_plan
+from hpcdem.post.view.moment import read_moment
+from hpcdem.post.view.scene import default_view, scene
 from hpcdem.sweep import tables
 from tests.unit.measured import R, frame, lattice, ramp, write
 from tests.unit.test_measure_folder import PROGRAM, column, run, table
@@ -210,3 +212,28 @@ def test_three_ranks_follow_the_same_faults(folder: Path, tmp_path: Path, needs_
     assert ended.returncode == 0, ended.stdout + ended.stderr
     for path in sorted((tmp_path / "3").iterdir()):
         assert path.read_bytes() == (folder / "measure" / path.name).read_bytes(), path.name
+
+
+def test_views_show_the_faults_of_a_frame(folder: Path, tmp_path: Path) -> None:
+    for path in folder.glob("all_*.vtkhdf"):
+        (tmp_path / path.name).symlink_to(path)
+    frames = sorted(tmp_path.glob("all_*.vtkhdf"))
+    assert "faults" not in read_moment(frames[-1]).objects
+    run(tmp_path, "faults", "--over-time")
+    rows = [row for row in table(tmp_path / "measure", "faults") if row["step"] == "5000"]
+    moment = read_moment(frames[-1])
+    found = moment.of("faults")
+    assert found.count == len(rows) == 2 and found.fields["fault"].tolist() == [1, 2]
+    assert found.fields["slip"].tolist() == [float(row["slip[m]"]) for row in rows] and moment.unit_of("heave") == "m"
+    assert found.fields["active"].tolist() == [0, 1]
+    ends = [[float(row[name]) for name in ("x1[m]", "y1[m]", "x2[m]", "y2[m]")] for row in rows]
+    assert found.read()[0].reshape(2, 4).tolist() == ends
+    view = default_view(moment)
+    assert not view.layer("faults").visible
+    layer = scene(moment, view.with_layer("faults", visible=True)).layers[-1]
+    assert [name for name, _ in layer.legend] == ["fault 1", "fault 2"] and len(set(layer.kind.tolist())) == 2
+    assert "faults" not in read_moment(frames[0]).objects and read_moment(frames[1]).of("faults").count == 1
+    damaged = (tmp_path / "measure/faults.csv").read_text().replace("slip[m]", "slp[m]", 1)
+    (tmp_path / "measure/faults.csv").write_text(damaged)
+    with pytest.raises(HpcdemError, match=r"faults.csv is damaged"):
+        read_moment(frames[-1])

@@ -55,7 +55,7 @@ def test_what_is_no_view_is_refused_with_its_file(tmp_path: Path, text: str, mes
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ('"object": "elephants"', r"layer 1 \(elephants\), object: expected elements, .* or node-cond.*'elephants'"),
+        ('"object": "elephants"', r"layer 1 \(elephants\), object: expected elements, .* or faults.*'elephants'"),
         ('"opacity": 2', r"layer 1 \(joints\), opacity: expected at most 1, read 2"),
         ('"name": "a", "opacity": "2 x"', r"layer 1 \(a\), opacity: expected a number, read '2 x'"),
         ('"opcity": 1', "opcity is not a word of a layer; did you mean 'opacity'"),

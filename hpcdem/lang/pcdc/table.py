@@ -1299,6 +1299,8 @@ _ELEMENT_CREATE = (
                      _GROUP), does="patch"),
 )  # fmt: skip
 
+_DRAWN = tuple(name for name in OBJECTS if name != "faults")
+"""Objects of the present model; faults are measured in frames."""
 _OBJECTS = (
     _group_command("element", "e{lement}"),
     Command("e{lement} delete", "Deletes elements. Before the first model or condition is assigned, they leave the "
@@ -1671,7 +1673,7 @@ _RECORDS = (
             (Option("view", (FILE,), "view file *.mv of hpcdem view or hpcdem draw", "",
                     "everything"),
              Option("field", (STRING,), "field of the colours; hpcdem draw --list lists the fields of a frame"),
-             Option("object", (choice(*OBJECTS),), "objects to which the field and the options below apply", "",
+             Option("object", (choice(*_DRAWN),), "objects to which the field and the options below apply", "",
                     "the first that have the field"),
              Option("limits", (FLOAT, FLOAT), "values of the first and the last colour", "",
                     "the 1 % and 99 % quantiles of the shown values"),

@@ -18,13 +18,15 @@ from hpcdem.io.frame import Columns, Frame, Table, part
 from hpcdem.io.frames import list_frames, read_frame
 from hpcdem.io.vtkhdf_mesh import CONTACTS, CORNERS, FACE_CONDITIONS, MeshState, is_mesh_frame, read_mesh_frame
 from hpcdem.post import fluid, liners
+from hpcdem.post.view import tracks
 
 DISCS, POLYGONS, LINES = "discs", "polygons", "lines"
 SOLIDS, FACES, RODS = "solids", "faces", "rods"
 """In space."""
 SPOTS, BALLS = "spots", "balls"
 """Points, in the plane and in space."""
-INSIDE = ("clumps", "contacts", "bonds", "joints", "channels", "face-conditions", "flow-nodes", "node-conditions")
+INSIDE = ("clumps", "contacts", "bonds", "joints", "channels", "face-conditions", "flow-nodes", "node-conditions",
+          "faults")  # fmt: skip
 """Objects that lie between others."""
 OF_CHANNELS = (
     "aperture", "fluid_pressure", "saturation", "flow_rate", "fluid_velocity", "fluid_temperature",
@@ -34,7 +36,7 @@ OF_CHANNELS = (
 UNITS = {
     "Pa": ("stress", "pressure", "suction", "ebmod", "gbmod", "tstrength", "sstrength"),
     "m": ("x", "y", "radius", "displacement", "opening", "slip", "length", "aperture", "overlap", "position",
-          "distance"),
+          "distance", "throw", "heave"),
     "m/s": ("velocity", "vx", "vy", "incoming"), "m/s2": ("acceleration",),
     "N/m": ("contact_force", "nodal_force", "membrane", "transverse"),
     "N m/m": ("bending",), "1/m": ("curvature",),
@@ -234,14 +236,22 @@ class Moment:
 
 def read_moment(path: str | os.PathLike) -> Moment:
     """The frame in a file of hpcdem, of particles or of blocks. HpcdemError if it is none, or damaged."""
-    path = Path(path)
-    if path.suffix != ".vtkhdf":
-        return _with_origin(of_particles(read_frame(path)), path)
-    if is_mesh_frame(path):
-        return of_blocks(read_mesh_frame(path, lazily=True, solid=True))
     from hpcdem.io.vtkhdf import read_vtkhdf
 
-    return _with_origin(of_particles(read_vtkhdf(path, lazily=True)), path)
+    path = Path(path)
+    if path.suffix == ".vtkhdf" and is_mesh_frame(path):
+        return _with_faults(of_blocks(read_mesh_frame(path, lazily=True, solid=True)), path)
+    frame = read_vtkhdf(path, lazily=True) if path.suffix == ".vtkhdf" else read_frame(path)
+    return _with_faults(_with_origin(of_particles(frame), path), path)
+
+
+def _with_faults(moment: Moment, path: Path) -> Moment:
+    """With the faults that were measured in this frame."""
+    ends, fields = tracks.faults(path, moment.step) if moment.dim == 2 else (np.zeros((0, 2, 2)), {})
+    if len(ends):
+        names = {"fault": [f"fault {k}" for k in range(int(fields["fault"].max()) + 1)]}
+        moment.objects["faults"] = Objects(LINES, len(ends), lambda: (ends,), fields, names=names, number="fault")
+    return moment
 
 
 # ---- particles -------------------------------------------------------------------------------------------------------

@@ -27,11 +27,12 @@ NOTHING = "#b8b8b8"
 INK = {
     "contacts": "#7a7a7a", "bonds": "#1e3cb4", "bolts": "#202020", "liners": "#7a5195", "channels": "#2f7fb5",
     "face-conditions": "#e07b00", "flow-nodes": "#17607f", "node-conditions": "#a3195b",
+    "faults": "#c81e1e",
 }  # fmt: skip
 """Of lines and points without a field."""
 WIDTH = {
     "walls": 1.2, "contacts": 0.4, "bonds": 0.6, "joints": 1.0, "channels": 1.6, "bolts": 1.6, "liners": 2.2,
-    "face-conditions": 2.6, "flow-nodes": 3.0, "node-conditions": 4.0,
+    "face-conditions": 2.6, "flow-nodes": 3.0, "node-conditions": 4.0, "faults": 2.4,
 }  # fmt: skip
 """Of lines, and of points as discs [points], at size 1."""
 POINT = 1.0 / 480.0
@@ -159,7 +160,7 @@ def default_view(moment: Moment) -> ModelView:
     them."""
     shells = moment.dim == 3 and "liners" in moment.objects
     inside = shells or any(objects.kind == RODS and name not in HIDDEN for name, objects in moment.objects.items())
-    looks: dict[str, dict[str, Any]] = {}
+    looks: dict[str, dict[str, Any]] = {"faults": {"field": "fault"}}
     if "elements" in moment.objects:
         field = telling(moment)
         small = moment.of("elements").count <= blocks.MOST_EDGES
