@@ -69,6 +69,12 @@ def prepare_environment(threads: int) -> tuple[int, list[str]]:
     os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
     set_thread_variables(threads)
     let_waiting_threads_sleep(threads)
+    started = started_threads()
+    if started is not None and threads > started:
+        return started, [
+            f"{threads} threads per rank requested, but this process has already started numba with {started}: using "
+            "those. Open the first simulation before other code runs in parallel, or set NUMBA_NUM_THREADS"
+        ]
     if "NUMBA_THREADING_LAYER" in os.environ:
         return threads, []
     # Fork and join cost 2 us with OpenMP, 24 with workqueue and up to 3000 with TBB, which numba would take first.
@@ -129,8 +135,16 @@ LOCAL_RANKS = ("OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PE
 
 def set_thread_variables(threads: int) -> None:
     """One number for numba, OpenMP and the BLAS libraries."""
-    for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = str(threads)
+    os.environ["NUMBA_NUM_THREADS"] = str(started_threads() or threads)
+
+
+def started_threads() -> int | None:
+    """The number of threads that numba has started in this process: from then on it compiles nothing while its variable
+    says another number. None before."""
+    pool, config = sys.modules.get("numba.np.ufunc.parallel"), sys.modules.get("numba.core.config")
+    return config.NUMBA_NUM_THREADS if pool is not None and config is not None and pool._is_initialized else None
 
 
 def openmp_runtime_found() -> bool:

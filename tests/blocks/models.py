@@ -28,7 +28,7 @@ FUNCTIONS: dict[str, str] = {}
 def load_laws(sim: Blocks) -> None:
     """Before the model is made or comes back from a checkpoint."""
     file = Path(__file__).with_name("laws") / "rock.py"
-    LAWS.update({name: user_laws.load(sim, file, f"rock.py:{name}") for name in ("elastic", "tresca")})
+    LAWS.update({name: user_laws.load(sim, file, f"rock.py:{name}") for name in ("flat", "tresca")})
     FUNCTIONS["beat"] = user_functions.load(sim, file, "rock.py:beat")
 
 
@@ -152,7 +152,7 @@ def obeying(sim: Blocks) -> None:
     changes.element_model(sim, None, LAWS["tresca"].name, {**rock, "limit": 2e6})
     sim.element_property(np.arange(0, len(one.cells), 3), {"limit": 3e6})
     changes.element_model(sim, np.arange(len(one.cells), len(one.cells) + 6), "mech_iso_elastic", ROCK)
-    changes.element_model(sim, np.arange(len(one.cells) + 6, len(one.cells) + 16), LAWS["elastic"].name, rock)
+    changes.element_model(sim, np.arange(len(one.cells) + 6, len(one.cells) + 16), LAWS["flat"].name, rock)
     edges = sim.mesh.edges()
     inner = edges.faces[edges.inner][:, 0]
     sim.joint_model(inner[inner < 4 * len(one.cells)], COHESIVE, WEAK)

@@ -159,7 +159,7 @@ def test_strength_of_a_plate(kind):
         )
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad"])
+@pytest.mark.parametrize("kind", [pytest.param("cross", marks=pytest.mark.slow), "quad"])
 def test_a_footing_at_rest_is_that_of_relaxation(kind):
     """On half of the top of a plate, in small stages: static solve and steps. (A load put on at once swings beyond its
     end in relaxation, and what flows then stays: 5 % of the stress.)"""

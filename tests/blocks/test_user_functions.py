@@ -92,13 +92,13 @@ def test_what_is_wrong_is_told_by_file_and_line(case, tmp_path):
 def test_a_number_that_is_none_later_stops_the_run_and_names_what_is_of_the_user(tmp_path):
     (tmp_path / "f.py").write_text("import math\n\n\ndef late(t):\n    return math.sqrt(1e-5 - t)\n")
     sim = plate()
-    law = user_laws.load(sim, FILE, "rock.py:elastic").name
-    changes.element_model(sim, [3], law, ROCK)
+    law = user_laws.load(sim, FILE, "rock.py:tresca").name
+    changes.element_model(sim, [3], law, {**ROCK, "limit": 1e9})
     sim.time_step(value=1e-6)
     function(sim, "lift")  # named, but nothing follows it
     sim.velocity_condition([0, 1], vx=user_functions.load(sim, tmp_path / "f.py", "f.py:late"))
     with pytest.raises(
-        PhysicsError, match=r"a number is not finite .*; or it comes from f\.py:late, rock\.py:elastic\n"
+        PhysicsError, match=r"a number is not finite .*; or it comes from f\.py:late, rock\.py:tresca\n"
     ):
         convergence.advance(sim, 100)
 

@@ -64,6 +64,7 @@ def compressed(sim: Blocks, strain: float, parts: int = 20, sign: float = -1.0) 
         deform(sim, np.diag([1.0, 1.0 + sign * strain * k / parts]))
 
 
+@pytest.mark.some_of_each
 @pytest.mark.parametrize("pressure", [0.0, 2e6])
 def test_strength_of_a_pressed_plate(kind, pressure):
     """Between two plates without friction, sides under pressure: 2 c sqrt(N) + N p, whatever the mesh (shaken)."""

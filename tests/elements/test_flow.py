@@ -65,7 +65,7 @@ def account(sim: Blocks, small: bool, **stress: float) -> np.ndarray:
 
 @pytest.mark.some_of_each
 @pytest.mark.parametrize("small", [False, True], ids=["large", "small"])
-@pytest.mark.parametrize("what", ["plain", "stressed", "softens"])
+@pytest.mark.parametrize("what", [pytest.param("plain", marks=pytest.mark.slow), "stressed", "softens"])
 def test_one_path_comes_to_the_same_in_all_kinds(what: str, small: bool) -> None:
     soft = {"cohesion": [(0.0, 3.45e6), (4e-3, 1e6)], "tensile": [(0.0, 1e6), (2e-3, 1e5)]} if what == "softens" else {}
     stress = {} if what == "plain" else {"xx": -1e6, "yy": -3e6, "zz": -2e6, "xy": 0.5e6}

@@ -184,6 +184,7 @@ def test_sigusr2_saves_and_goes_on(launch, script, undisturbed, wait_until, rank
     assert (data / LAST_FRAME).read_bytes() == undisturbed
 
 
+@SLOW  # quick, of one process: tests/unit/test_runtime_watchdog.py
 @pytest.mark.mpi
 def test_a_second_sigterm_ends_ranks_that_hang(launch, resident, script, undisturbed, wait_until, rank_process):
     """Rank 1 has stopped for good; rank 0 waits for it inside MPI, where no handler of Python runs."""

@@ -17,6 +17,7 @@ from tests.flow.support import at
 from tests.heat.support import GRANITE, temperatures
 
 E, NU, ALPHA = ROCK["young"], ROCK["poisson_ratio"], 1e-5
+HARD = {**ROCK, "limit": 1e20}
 STRONG = {**{k: v for k, v in ROCK.items() if k in ("density", "young", "poisson_ratio")}, "friction": 30.0,
           "cohesion": 1e12, "tensile": 1e12}  # fmt: skip
 SOFT = {**STRONG, "friction": 0.0, "cohesion": 5e6}
@@ -217,7 +218,7 @@ def test_a_restart_knows_thermal_stress(law: str, tmp_path) -> None:
 def test_laws_of_users_know_no_temperature() -> None:
     sim = Blocks()
     sim.take_mesh(rectangle(2, 2, 1.0, 1.0))
-    changes.element_model(sim, None, user_laws.load(sim, USERS, "rock.py:elastic").name, ROCK)
+    changes.element_model(sim, None, user_laws.load(sim, USERS, "rock.py:tresca").name, HARD)
     heat = Heat.of(sim)
     heat.assign(None, {**GRANITE, "expansion_coeficient": ALPHA})
     with pytest.raises(CommandError, match="does not support the out-of-plane strain of heat"):
@@ -232,7 +233,7 @@ def test_beside_laws_of_users_moduli_may_follow_temperatures() -> None:
     sim.take_mesh(rectangle(2, 2, 1.0, 1.0))
     sim.table("softer", [(0.0, ROCK["young"]), (100.0, 0.5 * ROCK["young"])])
     changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": Over("softer", TEMPERATURE)})
-    changes.element_model(sim, np.arange(4), user_laws.load(sim, USERS, "rock.py:elastic").name, ROCK)
+    changes.element_model(sim, np.arange(4), user_laws.load(sim, USERS, "rock.py:tresca").name, HARD)
     heat = Heat.of(sim)
     heat.assign(None, GRANITE)
     sim.velocity_condition(None, vx=0.0, vy=0.0)

@@ -3,21 +3,14 @@ model, first in relaxation, then in motion. The same bits on any ranks and threa
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from tests.property.workers import Resident
 
-LAW = """\
-from hpcdem import StateVariable, element_law
-
-
-@element_law(state=[StateVariable("most", "1", "largest strain so far")])
-def stiff(e11, e22, e12, most, bulk, shear):
-    p, two_mu = (bulk - 2.0 / 3.0 * shear) * (e11 + e22), 2.0 * shear
-    return p + two_mu * e11, p + two_mu * e22, two_mu * e12, p, max(most, abs(e22))
-"""
+LAWS = Path(__file__).parent.parent / "blocks" / "laws" / "rock.py"
 START = """\
 pcdc model new
 pcdc table create 'c' values (0,2e5) (0.01,5e4)
@@ -29,7 +22,7 @@ pcdc element c-model mech-m-c property density 2000 young 5e7 poisson-r 0.3 fric
     cohesion table 'c' over plastic-strain range group 'soft' set 'layer'
 pcdc element c-model mech-bur property density 2000 young 1e8 poisson-r 0.25 k-s 5e7 k-v 5e11 m-v 5e12 \\
     range group 'slow' set 'layer'
-pcdc element c-model user 'stiff.py:stiff' property density 2000 young 2e8 poisson-r 0.25 \\
+pcdc element c-model user 'rock.py:tresca' property density 2000 young 2e8 poisson-r 0.25 parameter 'limit' 1e9 \\
     range group 'top' set 'layer'
 pcdc node boundary mech-m-b-c type 1 (0,0) range y -0.01 0.01
 pcdc model gravity (0,-9.81)
@@ -72,7 +65,7 @@ if pcdc.rank == 0:
 def ended(resident: Resident, folder: Path, ranks: int, script: str, *options: str) -> str:
     """What the script prints last."""
     folder.mkdir(exist_ok=True)
-    (folder / "stiff.py").write_text(LAW)
+    shutil.copy(LAWS, folder)
     (folder / "all.sc").write_text(script)
     done = resident(ranks, "--no-figure", *options, "all.sc", cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -100,5 +93,5 @@ def test_the_same_on_any_ranks(alone, resident, tmp_path, ranks, threads):
 @pytest.mark.mpi
 def test_from_the_middle(alone, resident, tmp_path):
     """Of the restored law the script must say where it is: a checkpoint names no file that is executed."""
-    begin = f"pcdc element law 'stiff.py:stiff'\npcdc model restore '{alone[1] / 'middle.sav'}'\n"
+    begin = f"pcdc element law 'rock.py:tresca'\npcdc model restore '{alone[1] / 'middle.sav'}'\n"
     assert ended(resident, tmp_path, 2, begin + REST, "-j", "1") == alone[0]

@@ -52,7 +52,7 @@ def test_a_law_like_the_built_in_one(of: Any, part: float, dynamic: bool) -> Non
         sim = body(mesh, dynamic=dynamic, damp_factor=0.1)
         if own:
             some = np.arange(6 * int(part * len(mesh.cells) / 6))
-            changes.element_model(sim, some, law(sim, "elastic"), {**ROCK, "damp_factor": 0.1})
+            changes.element_model(sim, some, law(sim, "mises"), {**ROCK, "damp_factor": 0.1})
         sim.initial_stress(None, xx=-1e5, yz=2e5)
         sim.velocity_condition(nodes_on(mesh, "left"), vx=0.0, vy=0.0, vz=0.0)
         heat = Heat.of(sim)
@@ -87,7 +87,7 @@ def test_others_may_follow_temperatures(of: Any) -> None:
     sim.table("softer", [(0.0, 50e9), (100.0, 20e9)])
     sim.element_property(None, {"young": Over("softer", TEMPERATURE)})
     mine = np.arange(len(mesh.cells) // 2)
-    changes.element_model(sim, mine, law(sim, "elastic"), ROCK)
+    changes.element_model(sim, mine, law(sim, "mises"), ROCK)
     heat = Heat.of(sim)
     heat.assign(None, GRANITE)
     sim.velocity_condition(None, vx=0.0, vy=0.0, vz=0.0)
@@ -229,7 +229,7 @@ def test_a_stiffer_law_has_shorter_steps(of: Any) -> None:
     steps = []
     for times in (1.0, 2.0):
         sim = body(of((2, 2, 2), (1.0, 1.0, 1.0)))
-        changes.element_model(sim, None, law(sim, "elastic"), {**ROCK, "times": times})
+        changes.element_model(sim, None, law(sim, "mises"), {**ROCK, "times": times})
         sim.close_model()
         steps.append(sim.clock.dt)
     assert steps[1] == pytest.approx(steps[0] / np.sqrt(2.0), rel=1e-12)

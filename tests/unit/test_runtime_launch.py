@@ -116,6 +116,7 @@ def clean(monkeypatch):
     for name in ("NUMBA_THREADING_LAYER", "NUMBA_DISABLE_INTEL_SVML", "HDF5_USE_FILE_LOCKING"):
         monkeypatch.setenv(name, "x")
         monkeypatch.delenv(name)
+    monkeypatch.setattr(launching, "started_threads", lambda: None)  # other tests of this process may have
 
 
 def test_threads_that_no_machine_has_are_refused(clean):
@@ -132,6 +133,22 @@ def test_one_knob_sets_all_threads(clean, monkeypatch):
     assert os.environ["NUMBA_THREADING_LAYER"] == "omp"
     assert os.environ["NUMBA_DISABLE_INTEL_SVML"] == "1"
     assert os.environ["HDF5_USE_FILE_LOCKING"] == "FALSE"
+
+
+def test_threads_that_numba_has_started_keep_their_number(monkeypatch):
+    """It compiles nothing any more where its variable says another number: a notebook may have used it before."""
+    from numba import config, get_num_threads, njit
+
+    get_num_threads()
+    started = config.NUMBA_NUM_THREADS
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.setenv(name, "7")
+    if "NUMBA_NUM_THREADS" not in os.environ:
+        monkeypatch.setenv("NUMBA_NUM_THREADS", str(started))
+    threads, warnings = launching.prepare_environment(started + 1)
+    assert threads == started and f"already started numba with {started}" in warnings[0]
+    assert launching.prepare_environment(1)[0] == 1
+    assert njit(lambda x: x + 1)(1) == 2
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def hanging() -> Iterator[Callable[..., subprocess.Popen[str]]]:
         process.communicate()
 
 
-@pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), ("SIGINT", 130)])
+@pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), pytest.param("SIGINT", 130, marks=pytest.mark.slow)])
 def test_the_second_signal_ends_a_process_that_hangs(hanging, name, code):
     process = hanging(grace=0.3, timeout=60.0)
     process.send_signal(getattr(signal, name))

@@ -41,7 +41,7 @@ def run(line: str) -> str:
     return stream.getvalue()
 
 
-def pixels(figure: Any, dpi: int = 200) -> np.ndarray:
+def pixels(figure: Any, dpi: int = 100) -> np.ndarray:
     """The picture, row 0 at the bottom, fractions (rows, columns, 3)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -194,7 +194,7 @@ SOME = "--xmax 40.0 --ymax 10.0 --width 9 --strainvol OFF --stressshear OFF"
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Section], str]:
     """Three small sections and everything drawn of them: folder, sections, log."""
     folder = tmp_path_factory.mktemp("zdemss") / "datass"
-    sections = write_wedges(folder, [wedge(6000, 0.0, True, 200.0), wedge(26000, 4000.0, False, 200.0, missing=3)])
+    sections = write_wedges(folder, [wedge(6000, 0.0, True, 400.0), wedge(26000, 4000.0, False, 400.0, missing=3)])
     return folder, sections, run(f"-d {folder} --format jpg,png,pdf,svg,ps {SOME}")
 
 
@@ -273,6 +273,7 @@ def test_the_same_section_gives_the_same_files(drawn: tuple[Path, list[Section],
             assert path.read_bytes() == (tmp_path / path.relative_to(folder)).read_bytes(), path.name
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_two_ranks_write_the_same_files(
     drawn: tuple[Path, list[Section], str], tmp_path: Path, needs_mpi: None, launch: Any
@@ -318,13 +319,18 @@ def test_options_switch_panels(line: str, keys: list[str], tmp_path: Path, monke
 
 
 def test_a_page_is_as_wide_as_asked_and_all_of_it_is_on_the_paper() -> None:
+    """And no number lies on another."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    for width in (8.0, 14.0, 17.0):
+    for width in (8.0, 14.0):
         figure = section_page(
             wedge(3, 4000.0, radius=300.0), SEEN, panels.KINDS, replace(STYLE, width=width, labels="on")
         )
         FigureCanvasAgg(figure).draw()
+        for ax in figure.axes:
+            boxes = [t.get_window_extent() for t in ax.get_xticklabels() if t.get_text() and t.get_visible()]
+            boxes.sort(key=lambda box: box.x0)
+            assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
         assert figure.get_size_inches()[0] * 2.54 == pytest.approx(width)
         assert figure.get_size_inches()[1] * 2.54 < max(1.8 * width, 24.0)
         for collection in figure.axes[0].collections:  # what is cut off by the axes does not count
@@ -333,18 +339,6 @@ def test_a_page_is_as_wide_as_asked_and_all_of_it_is_on_the_paper() -> None:
         assert everything.x0 >= 0.0 and everything.y0 >= 0.0
         assert everything.x1 <= width / 2.54 and everything.y1 <= figure.get_size_inches()[1]
         assert min(t.get_fontsize() for ax in figure.axes for t in ax.get_xticklabels()) >= 5.0
-
-
-def test_no_number_of_a_page_lies_on_another() -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    for width in (8.0, 14.0):
-        figure = section_page(wedge(3, 4000.0, radius=300.0), SEEN, panels.KINDS, replace(STYLE, width=width))
-        FigureCanvasAgg(figure).draw()
-        for ax in figure.axes:
-            boxes = [t.get_window_extent() for t in ax.get_xticklabels() if t.get_text() and t.get_visible()]
-            boxes.sort(key=lambda box: box.x0)
-            assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
 
 
 def test_high_panels_go_side_by_side() -> None:
@@ -432,7 +426,7 @@ def test_many_particles_are_a_bitmap_in_a_vector_picture(tmp_path: Path, monkeyp
         figure = section_page(section, SEEN, [panels.DEFORMATION], STYLE)
         draw.save(figure, tmp_path, name, ("svg",))
         texts[name] = (tmp_path / "ps" / f"{name}.svg").read_text()
-        pictures[name] = pixels(figure)
+        pictures[name] = pixels(figure, 200)
     assert "<image" in texts["bitmap"] and "<image" not in texts["discs"]
     assert len(texts["bitmap"]) < len(texts["discs"])
     ax, p = figure.axes[0], section.particles
@@ -453,7 +447,7 @@ def test_labels(labels: str, texts: list[str]) -> None:
     assert [" ".join(t.get_text() for t in part.texts) for part in (figure, *figure.axes[:2])] == texts
 
 
-@pytest.mark.parametrize("width", [8.0, 14.0])
+@pytest.mark.parametrize("width", [8.0, pytest.param(14.0, marks=pytest.mark.slow)])
 def test_captions_lie_between_the_panels(width: float) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

@@ -161,7 +161,7 @@ def _added(sim: Simulation, law: str, parameter: Mapping[str, float], folder: Pa
     values = user_laws.given(new, parameter, whole=True)
     if not sim.own_laws.number(new.name):
         sim.open_model()
-    return sim.own_laws.add(new, sim), values
+    return sim.own_laws.add(new), values
 
 
 def _say_between(sim: Simulation, law: str, pair: Sequence[str], parameter: Mapping[str, float], folder: Path) -> None:

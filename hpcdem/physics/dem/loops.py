@@ -13,7 +13,7 @@ from hpcdem.physics.dem.kernels import walls as wall_kernels
 
 
 def refresh(sim: Any) -> None:
-    """Masses, law tables and argument lists of the kernels, from materials, walls and settings."""
+    """Masses, law tables and argument lists of the kernels, from materials, walls and settings. Collective."""
     p, s, lists = sim.particles, sim.settings, sim.lists
     rows, n_mat = sim.materials.rows, len(sim.materials)
     dt, b = sim.clock.dt, lists.blocks
@@ -25,6 +25,7 @@ def refresh(sim: Any) -> None:
     if sim.clumps:
         sim.clumps.fill(p, rows["density"].copy(), rows["damp"].copy(), dt, sim.body)
     sim.own_table, bounds = sim.own_laws.tables(rows) if sim.own_laws else (None, None)
+    sim.own_laws.compile_loops(sim)
     sim.pair_laws = contacts.pair_table(rows, sim.own_laws.which(rows), bounds)
     sim.wall_laws = wall_kernels.wall_table(rows, sim.walls.kn, sim.walls.ks, sim.walls.fric)
     sim.bond_laws = contacts.bond_laws(sim.bond_types.rows)

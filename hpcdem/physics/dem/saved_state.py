@@ -216,7 +216,7 @@ def restore_newest(sim: Simulation, folders: list[Path], before: float = math.in
 def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Tables) -> None:
     """Take a state that was read; tables: this rank's slabs, which are let go of. UnknownLaw if it has a user
     law that was not named. Collective."""
-    laws = user_laws.ModelLaws.restored(state, sim)
+    laws = user_laws.ModelLaws.restored(state)
     sim.clear()
     sim.own_laws, sim.stamp = laws, state.get("stamp", 1)
     sim.clock = Clock(**state["clock"])

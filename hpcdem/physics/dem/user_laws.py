@@ -53,7 +53,6 @@ from hpcdem.physics.user_files import (
     in_turn,
     law_of,
     made_of,
-    numba_message,
     stiffness_of,
 )
 from hpcdem.runtime import kept
@@ -116,15 +115,14 @@ class _Declared(Declared):
 @dataclass(frozen=True)
 class PairLaw:
     """A law of a file. name: FILE:FUNCTION and a digest of its text; place: its file and line, for messages; kept:
-    what names the folder of what is made of it, None if that must not be kept; kernel: compiled, and what it takes;
-    loops: see kernels/user_pairs.py."""
+    what names the folder of what is made of it, None if that must not be kept; kernel: compiled, and what it takes, see
+    kernels/user_pairs.py."""
 
     name: str
     place: str
     declared: _Declared
     kept: tuple[str, ...] | None
     kernel: user_pairs.Kernel
-    loops: user_pairs.Loops
 
     @property
     def title(self) -> str:
@@ -220,17 +218,28 @@ class ModelLaws:
             return self.laws[int(material["law"]) - 1].title
         return HERTZ if material["hertz"] else LINEAR
 
-    def add(self, law: PairLaw, sim: Model) -> int:
-        """Return the number of a law, a new one if necessary. Collective."""
+    def add(self, law: PairLaw) -> int:
+        """Return the number of a law, a new one if necessary."""
         if not self.number(law.name):
             if len(self.laws) == MOST_LAWS:
                 raise CommandError(f"a model can have at most {MOST_LAWS} user laws, and has that many")
-            self.take((*self.laws, law), sim)
+            self.take((*self.laws, law))
         return self.number(law.name)
 
-    def take(self, laws: tuple[PairLaw, ...], sim: Model) -> None:
-        """These laws, whose loops are compiled. Collective."""
-        self.laws, self.loops = laws, _loops_of(laws, sim) if laws else None
+    def take(self, laws: tuple[PairLaw, ...]) -> None:
+        """These laws; their loops are compiled by `compile_loops`."""
+        self.laws, self.loops = laws, _loops_of(laws) if laws else None
+
+    def compile_loops(self, sim: Model) -> None:
+        """Compile the force loop of these laws for the threads of the model, unless compiled already. Collective."""
+        done = (tuple(law.name for law in self.laws), sim.threads)
+        if self.loops is None or not sim.comm.any(done not in _COMPILED):
+            return
+        loops = self.loops
+        spent = in_turn(sim.comm, lambda: _compile(loops, sim.threads))
+        _COMPILED.add(done)
+        if spent and sim.log is not None:
+            sim.log.info(f"force loop of pairs with {self.titles} is compiled: {spent:.1f} s")
 
     @property
     def memory(self) -> int:
@@ -293,11 +302,11 @@ class ModelLaws:
         return {"names": [law.name for law in self.laws], "between": between}
 
     @staticmethod
-    def restored(state: dict[str, Any], sim: Model) -> ModelLaws:
-        """From the state of a checkpoint. UnknownLaw unless its laws were named in this run. Collective."""
+    def restored(state: dict[str, Any]) -> ModelLaws:
+        """From the state of a checkpoint. UnknownLaw unless its laws were named in this run."""
         found = state.get("pair_laws") or {"names": [state["pair_law"]] if state.get("pair_law") else []}
         out = ModelLaws()
-        out.take(tuple(_known(name) for name in found["names"]), sim)
+        out.take(tuple(_known(name) for name in found["names"]))
         for a, b, number, values in found.get("between", ()):
             out.between[a, b] = number, tuple(values)
         return out
@@ -311,7 +320,9 @@ def _mixed(materials: np.ndarray, column: str, mix: str) -> np.ndarray:
 LAWS: dict[str, PairLaw] = {}
 """Those that were named in this process."""
 TOGETHER: dict[tuple[str, ...], user_pairs.Loops] = {}
-"""The loops of several laws, by their names."""
+"""The loops of the laws of a model, by their names."""
+_COMPILED: set[tuple[tuple[str, ...], int]] = set()
+"""Of which laws the force loop is compiled in this process, for so many threads."""
 
 
 def pair_law(
@@ -330,19 +341,13 @@ def pair_law(
 
 
 def load(sim: Model, path: Path, law: str) -> PairLaw:
-    """The law 'file.py:function' of a file, checked and compiled for the threads of this run, on all ranks from the
-    text that rank 0 reads. CommandError with file and line. Collective."""
-
-    from numba.core.errors import NumbaError
+    """The law 'file.py:function' of a file, checked, on all ranks from the text that rank 0 reads. CommandError with
+    file and line. Collective."""
 
     def take(text: str, path: str, name: str, function: str) -> PairLaw:
-        found = LAWS.get(name) or _made(text, path, name, function)
-        try:
-            _compile(found.loops, sim.threads)
-        except NumbaError as error:
-            raise Wrong(found.declared.line, numba_message(error)) from None
-        LAWS[name] = found
-        return found
+        if name not in LAWS:
+            LAWS[name] = _made(text, path, name, function)
+        return LAWS[name]
 
     return agreed(sim, path, law, "law", take)
 
@@ -373,15 +378,13 @@ def _made(text: str, path: str, name: str, function: str) -> PairLaw:
     columns += columns[:1] * (-len(columns) % 4) or ["kn"] * (4 if not columns else 0)
     law = njit(error_model="numpy", nogil=True)(declared.function)
     kernel = user_pairs.Kernel(law, tuple(arguments), states, tuple(columns), energy, tuple(of_energy))
-    loops = user_pairs.loops([kernel])
     values = made_of(law, path)
     stored = made_of(energy, path) if energy is not None else ""
     kept_as = None if values is None or stored is None else (name, values, stored, repr(kernel[1:4]), repr(of_energy))
-    _keep(loops, kept_as)
     check_what_returns(law, len(arguments), (*FORCES, *states), path, line)
     if energy is not None:
         check_what_returns(energy, len(of_energy), STORES, path, _line(declared.energy), "energy")
-    return PairLaw(name, f"{Path(path).name}:{line}: law '{function}'", declared, kept_as, kernel, loops)
+    return PairLaw(name, f"{Path(path).name}:{line}: law '{function}'", declared, kept_as, kernel)
 
 
 def _of_energy(declared: _Declared, columns: Sequence[str], states: Sequence[str]) -> list[str]:
@@ -402,30 +405,18 @@ def _line(function: Any) -> int:
     return int(function.__code__.co_firstlineno)
 
 
-def _keep(loops: user_pairs.Loops, made: tuple[str, ...] | None) -> None:
-    """Loops that are made of these texts are taken from the folder of what is kept, or go into it."""
-    if made is not None:
-        place = kept.folder(*made)
-        for what, kernel in loops._asdict().items():
-            kept.keep(kernel, place, f"pairs_{what}")
-
-
-def _loops_of(laws: tuple[PairLaw, ...], sim: Model) -> user_pairs.Loops:
-    """The loops of laws that stand in one model, compiled. Collective."""
-    if len(laws) == 1:
-        return laws[0].loops
+def _loops_of(laws: tuple[PairLaw, ...]) -> user_pairs.Loops:
+    """The loops of laws that stand in one model; what is compiled of them is taken from the store, or goes into it."""
     from hpcdem.physics.dem.kernels import user_pairs
 
     names = tuple(law.name for law in laws)
-
-    def make() -> None:
-        if names not in TOGETHER:
-            TOGETHER[names] = user_pairs.loops([law.kernel for law in laws])
-            made = [law.kept for law in laws]
-            _keep(TOGETHER[names], None if None in made else sum((m or () for m in made), ()))
-        _compile(TOGETHER[names], sim.threads)
-
-    in_turn(sim.comm, make)
+    if names not in TOGETHER:
+        loops = TOGETHER[names] = user_pairs.loops([law.kernel for law in laws])
+        made = [law.kept for law in laws]
+        if None not in made:
+            place = kept.folder(*sum((m or () for m in made), ()))
+            for what, kernel in loops._asdict().items():
+                kept.keep(kernel, place, f"pairs_{what}")
     return TOGETHER[names]
 
 

@@ -138,17 +138,15 @@ def element_law(
 
 
 def load(sim: State, path: Path, law: str) -> UserLaw:
-    """The law 'file.py:function' of a file, checked and compiled for the threads of this run, on all ranks from the
-    text that rank 0 reads. CommandError with file and line. Collective."""
+    """The law 'file.py:function' of a file, checked, on all ranks from the text that rank 0 reads; its loops are
+    compiled once elements have it, see `compile_loops`. CommandError with file and line. Collective."""
 
     def take(text: str, path: str, name: str, function: str) -> UserLaw:
         found = MODELS.get(name)
         if found is None:
-            found = _made(text, path, name, function)
+            found = MODELS[name] = _made(text, path, name, function)
             _COMPILED.difference_update([one for one in _COMPILED if one[0] == name])
         assert isinstance(found, UserLaw)
-        _compile(found, sim, _kinds(sim, found))
-        MODELS[name] = found
         return found
 
     return agreed(sim, path, law, "law", take)
@@ -325,17 +323,14 @@ def begin(sim: State) -> None:
     sim.cold[COLUMN] = np.column_stack([now, states.reshape(n, -1)])
 
 
-def _kinds(sim: State, law: UserLaw, some: np.ndarray | None = None) -> list[str]:
-    """Kinds of the selected elements (ne,) bool; the simple kind if none is selected."""
+def _kinds(sim: State, law: UserLaw, some: np.ndarray) -> list[str]:
+    """Kinds of the selected elements (ne,) bool."""
     simple, several = ("triangle", "quad") if law.dims == (2,) else ("tetrahedron", "hexahedron")
-    if sim.mesh is None or sim.mesh.dim not in law.dims:
-        return [simple]
-    mesh = sim.mesh
+    mesh = sim.the_mesh()
     whole = mesh.cells[:, 3] >= 0 if mesh.dim == 2 else np.zeros(len(mesh.cells), bool)
     if mesh.dim == 3 and len(mesh.hexes):
         whole = mesh.macro_of() >= 0
-    whole = whole if some is None else whole[some]
-    return [kind for kind, there in ((simple, not len(whole) or not whole.all()), (several, whole.any())) if there]
+    return [kind for kind, there in ((simple, not whole[some].all()), (several, whole[some].any())) if there]
 
 
 def compile_loops(sim: State) -> None:

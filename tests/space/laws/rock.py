@@ -13,7 +13,7 @@ def stiffest(bulk, shear, times):
     return times * (bulk + 4.0 / 3.0 * shear)
 
 
-@element_law(dim=3, properties=[Property("times", "1", "of its stiffness", default=1.0)], stiffness=stiffest)
+@element_law(dim=3)
 def elastic(e11, e22, e12, e33, e13, e23, evol, bulk, shear):
     """That of mech-iso-elastic."""
     lame, two_mu = bulk - 2.0 / 3.0 * shear, 2.0 * shear
@@ -27,12 +27,20 @@ FLOW = [
 ]
 
 
-@element_law(dim=3, properties=[Property("limit", "Pa", "largest sqrt(J2)", low_itself=False)], state=FLOW)
+@element_law(
+    dim=3,
+    properties=[
+        Property("limit", "Pa", "largest sqrt(J2)", low_itself=False, default=1e20),
+        Property("times", "1", "of its stiffness", default=1.0),
+    ],
+    state=FLOW,
+    stiffness=stiffest,
+)
 def mises(
     e11, e22, e12, e33, e13, e23, evol, p11, p22, p12, p33, p13, p23, work, i11, i22, i12, i33, i13, i23, bulk, shear,
     limit,
 ):  # fmt: skip
-    """Shear stress up to a limit; plastic strain without volume."""
+    """Shear stress up to a limit, below it that of mech-iso-elastic; plastic strain without volume."""
     two_mu, mean, third = 2.0 * shear, (i11 + i22 + i33) / 3.0, evol / 3.0
     s11, s22 = two_mu * (e11 - third - p11) + (i11 - mean), two_mu * (e22 - third - p22) + (i22 - mean)
     s33, s12 = two_mu * (e33 - third - p33) + (i33 - mean), two_mu * (e12 - p12) + i12
