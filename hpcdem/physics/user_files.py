@@ -110,9 +110,14 @@ def agreed(sim: Model, path: Path, what: str, kind: str, take: Callable[[str, st
         sim.comm.agree(message)
     except HpcdemError as error:
         raise CommandError(str(error)) from None
-    if spent and sim.log is not None:
-        sim.log.info(f"{kind} {Path(file).name}:{function} is compiled: {spent:.1f} s")
+    report(sim, kind, Path(file).name, function, spent)
     return made[0]
+
+
+def report(sim: Model, kind: str, file: str, function: str, spent: float) -> None:
+    """Report in the log what was compiled, of which file and function, in how many seconds; nothing of 0."""
+    if spent and sim.log is not None:
+        sim.log.info(f"{kind} {file}:{function} is compiled: {spent:.1f} s")
 
 
 def in_turn(comm: Comm, act: Callable[[], None]) -> float:

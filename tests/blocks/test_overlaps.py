@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, overlaps, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
@@ -25,6 +27,12 @@ def two(depth: float, kind: str = "cross", x0: float = 0.213) -> Blocks:
 def deepest(sim: Blocks) -> np.ndarray:
     sim.close_model()
     return overlaps.deepest(sim, sim.local)
+
+
+def test_the_deepest_pair_comes_first_and_of_equal_ones_that_of_the_lower_elements():
+    rows = np.array([[1.0, 0.1, 7, 8], [1.0, 0.9, 5, 6], [2.0, 0.5, 9, 3], [0.5, 0.0, 5, 6], [1.0, 0.2, 5, 9]])
+    found = overlaps._gathered(SimpleNamespace(comm=SerialComm()), rows)
+    assert found[:, [0, 2, 3]].tolist() == [[2.0, 9, 3], [1.0, 5, 6], [1.0, 5, 9], [1.0, 7, 8]]
 
 
 @pytest.mark.some_of_each

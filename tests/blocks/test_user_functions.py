@@ -10,6 +10,7 @@ import pytest
 
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state, user_functions, user_laws
+from hpcdem.physics.fdem.node_conditions import NodeCondition
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import ROCK, model, near, rectangle, shaken
 from tests.pcdc.test_plastic import run
@@ -23,6 +24,18 @@ def function(sim: Blocks, name: str) -> str:
 
 def plate() -> Blocks:
     return model(shaken(rectangle(4, 4, 1.0, 1.0), 0.2))
+
+
+def test_rows_of_functions_stand_behind_those_of_all():
+    """Objects with the conditions 1, 0, 2, 1, of which 1 and 2 follow a function."""
+    name = function(plate(), "lift")
+    ways = [NodeCondition(), NodeCondition(at_y=name), NodeCondition(at_x=name)]
+    places = np.arange(8.0).reshape(4, 2)
+    placed = user_functions.Placed(ways, np.array([1, 0, 2, 1]), places)
+    assert placed.of.tolist() == [3, 0, 4, 5] and placed.rows.tolist() == [1, 2, 1]
+    (one, field, of, mine, at), (other, *_, there) = placed.parts
+    assert (one, field, of, mine.tolist()) == (ways[1], "at_y", user_functions.FUNCTIONS[name], [0, 2])
+    assert at.tolist() == places[[0, 3]].tolist() and other == ways[2] and there.tolist() == [[4.0, 5.0]]
 
 
 def test_velocity_by_place():

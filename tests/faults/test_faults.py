@@ -155,7 +155,7 @@ def test_a_signal_to_one_rank_stops_all(launch, resident, script, undisturbed, w
     assert code == 85, err
     assert err.count("resume with --resume") == 1
     assert len(checkpoints(data)) > len(before) or int(checkpoints(data)[-1][:10]) % 400 == 0
-    finish(resident, 2, script, undisturbed)
+    finish(resident, 1, script, undisturbed)
 
 
 @SLOW

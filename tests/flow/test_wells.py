@@ -184,6 +184,14 @@ def test_flow_from_a_well_is_steady_between_two_pressures() -> None:
 # ---- what makes no sense ---------------------------------------------------------------------------------------------
 
 
+def test_a_stage_without_an_end_that_begins_now_never_acts_if_another_follows() -> None:
+    well = Well("w", np.array([0]), [Stage(RATE, 1.0, 2.0)])
+    with pytest.raises(CommandError, match="stage 1 of well 'w' has no time"):
+        well.add(Stage(SHUT), 2.0)
+    well.add(Stage(SHUT), 3.0)
+    assert [(one.begin, one.end) for one in well.stages] == [(2.0, 3.0), (3.0, math.inf)]
+
+
 def test_a_well_in_nothing() -> None:
     sim, flow = line(4, 1.0)
     away = at(sim, 0.0, 0.25)

@@ -31,6 +31,8 @@ def crowd(folder, depths, dt: float = 1e-6):
 
 def test_deep_overlaps_are_named_once_per_command(tmp_path):
     sim, said = crowd(tmp_path, [0.4, 0.6, 0.9])
+    sim.open_model()
+    assert sim.remove(np.zeros(6, bool)) == 0
     walls.wall(sim, 7, ((-0.3, -9.0), (-0.3, 19.0)), kn=2.0)
     cycles.cycle(sim, 20)
     text = said.getvalue()

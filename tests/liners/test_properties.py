@@ -7,6 +7,7 @@ import pytest
 
 from hpcdem.physics.fdem import convergence
 from hpcdem.physics.fdem.structures import VELOCITY
+from hpcdem.physics.liners.layout import closing
 from hpcdem.physics.liners.model import Liners
 from hpcdem.physics.liners.properties import LINER
 from tests.blocks.support import model, near, rectangle
@@ -22,6 +23,12 @@ OTHER = {
     "shear_stiffness": 4e9, "bond_tensile_strength": 1e5, "bond_cohesion": 2e5, "bond_friction": 10.0,
 }  # fmt: skip
 CONDITIONS = {"does_y": VELOCITY, "at_y": 0.6, "force_x": -2e4, "moment": 500.0}
+
+
+def test_faces_of_a_closed_chain() -> None:
+    """Of an open chain, a ring of three faces, and one of four."""
+    points = np.array([[0, 1], [1, 2], [5, 6], [6, 7], [7, 5], [10, 11], [11, 12], [12, 13], [13, 10]])
+    assert closing(points, np.array([0, 1, 0, 1, 1, 0, 1, 1, 1], bool)) == [(2, 4), (5, 8)]
 
 
 def shaken(properties: dict[str, float], conditions: dict[str, object] | None = None) -> np.ndarray:

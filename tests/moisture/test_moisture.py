@@ -14,6 +14,7 @@ from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import AXES, Over
 from hpcdem.physics.moisture.model import Moisture
+from hpcdem.physics.moisture.properties import _order
 from tests.blocks.support import rectangle, shaken
 from tests.flow.support import at
 from tests.space.support import box, hexes
@@ -22,6 +23,13 @@ DENSITY, D = 1600.0, 1e-8
 SOIL = {"density": DENSITY, "young": 1e7, "poisson_ratio": 0.3}
 CLAY = {"diffusivity": D}
 OVER = AXES.index("moisture")
+
+
+def test_the_residual_moisture_is_below_that_of_saturation() -> None:
+    for residual in (0.3, 0.4):
+        with pytest.raises(CommandError, match="moisture_residual must be below"):
+            _order({"moisture_residual": residual, "moisture_saturated": 0.3})
+    _order({"moisture_residual": np.array([0.1, 0.2]), "moisture_saturated": 0.3})
 
 
 def bar(kind: str) -> Mesh:

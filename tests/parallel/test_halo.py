@@ -11,6 +11,7 @@ from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import UsageError
 from hpcdem.decomp import balance, strips
 from hpcdem.halo.copies import Copies, moved
+from hpcdem.halo.migrate import Trail
 from hpcdem.halo.ownership import Ownership
 from tests.parallel.test_many_ranks import flow, state
 from tests.pretended import Pretended, Ranks
@@ -45,6 +46,22 @@ def test_copies_are_the_present_rows_of_their_owners() -> None:
     for wanted, once, twice in Ranks(3).run(copy):
         assert once == [[float(k), float(k * k)] for k in wanted]
         assert twice == [[2.0 * k, 2.0 * k * k] for k in wanted]
+
+
+def test_what_is_known_of_particles_follows_them() -> None:
+    """3 went from rank 0 to rank 1 and on to rank 2, and 4 to rank 1; of 9, deleted, the row is dropped."""
+    ways = [{3: 1, 4: 1}, {3: 2}, {}]
+
+    def follow(comm: Pretended) -> list[list[float]]:
+        trail = Trail()
+        trail.begin()
+        for gid, owner in ways[comm.rank].items():
+            trail.note(np.array([gid]), np.array([owner]))
+        mine = np.array([[1], [4], [3]][comm.rank])
+        gid = np.array([1, 3, 4, 9] if comm.rank == 0 else [], np.int64)
+        return np.column_stack(trail.follow(comm, mine, gid, 0.5 * gid)).tolist()
+
+    assert Ranks(3).run(follow) == [[[1.0, 0.5]], [[4.0, 2.0]], [[3.0, 1.5]]]
 
 
 def test_rows_go_over_to_new_owners() -> None:

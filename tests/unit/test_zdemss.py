@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import itertools
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -271,29 +270,6 @@ def test_the_same_section_gives_the_same_files(drawn: tuple[Path, list[Section],
     for path in (folder / "ss").rglob("*"):
         if path.is_file() and path.parent.name != "data":
             assert path.read_bytes() == (tmp_path / path.relative_to(folder)).read_bytes(), path.name
-
-
-@pytest.mark.slow
-@pytest.mark.mpi
-def test_two_ranks_write_the_same_files(
-    drawn: tuple[Path, list[Section], str], tmp_path: Path, needs_mpi: None, launch: Any
-) -> None:
-    folder, sections, _ = drawn
-    write_wedges(tmp_path / "two", sections)
-    program = tmp_path / "zdemss.py"
-    program.write_text(
-        "import sys\nfrom hpcdem.cli import common\n"
-        "from hpcdem.cli.zdemss import work, zdemss\n"
-        "common.run_program(zdemss, 'zdemss', sys.argv[1:], work)\n"
-    )
-    words = f"--dir {tmp_path / 'two'} --format jpg,ps {SOME}".split()
-    ended: subprocess.CompletedProcess[str] = launch.python(2, program, *words)
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    found = [p for p in (tmp_path / "two").rglob("*") if p.is_file()]
-    assert len(found) == 2 + 4 + 12 + 2 * 5
-    for path in found:
-        assert path.read_bytes() == (folder / path.relative_to(tmp_path / "two")).read_bytes(), path.name
-    assert "not a section" not in ended.stdout
 
 
 # -- pages --------------------------------------------------------------------------------------------------------

@@ -53,6 +53,7 @@ from hpcdem.physics.user_files import (
     in_turn,
     law_of,
     made_of,
+    report,
     stiffness_of,
 )
 from hpcdem.runtime import kept
@@ -236,10 +237,9 @@ class ModelLaws:
         if self.loops is None or not sim.comm.any(done not in _COMPILED):
             return
         loops = self.loops
-        spent = in_turn(sim.comm, lambda: _compile(loops, sim.threads))
+        file, _, functions = self.titles.partition(":")
+        report(sim, "loop of law", file, functions, in_turn(sim.comm, lambda: _compile(loops, sim.threads)))
         _COMPILED.add(done)
-        if spent and sim.log is not None:
-            sim.log.info(f"force loop of pairs with {self.titles} is compiled: {spent:.1f} s")
 
     @property
     def memory(self) -> int:
