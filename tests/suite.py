@@ -185,6 +185,47 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(Suite(config), "hpcdem-suite")
 
 
+# --- which worker runs which files -------------------------------------------------------------------------------
+
+FAMILIES = {
+    "blocks": "blocks bolts elements flow heat liners moisture pcdc proppant section",
+    "space": "space coupled",
+    "discs": "cases language laws parallel property published python specimen sweep",
+}
+"""Folders of tests that share kernels."""
+_FAMILY = {folder: family for family, folders in FAMILIES.items() for folder in folders.split()}
+
+
+def next_file(files: Iterable[str], families: dict[Any, str], node: Any) -> str:
+    """The file that a worker runs next: the longest one of its family, as it has loaded the kernels; if that is done,
+    of the family with most seconds left for each of its workers. families: of the workers; becomes that of now."""
+    left: defaultdict[str, dict[str, float]] = defaultdict(dict)
+    for file in files:
+        left[_FAMILY.get(file.split("/")[1], "rest")][file] = seconds_of(_file(file))
+    if families.get(node) not in left:
+        at = Counter(families.values())
+        families[node] = max(left, key=lambda family: sum(left[family].values()) / (1 + at[family]))
+    mine = left[families[node]]
+    return max(mine, key=lambda file: mine[file])
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Whole files, by `next_file`; what else --dist asks for is left to xdist."""
+    if config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class ByFamily(LoadFileScheduling):
+        families: dict[Any, str] = {}
+
+        def _assign_work_unit(self, node: Any) -> None:
+            self.workqueue.move_to_end(next_file(self.workqueue, self.families, node), last=False)
+            super()._assign_work_unit(node)
+
+    return ByFamily(config, log)
+
+
 def clock(seconds: float) -> str:
     """Minutes and seconds as m:ss."""
     return f"{int(seconds) // 60}:{int(seconds) % 60:02d} min"

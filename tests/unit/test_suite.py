@@ -60,6 +60,17 @@ def test_the_time_of_a_change_is_bounded(monkeypatch: pytest.MonkeyPatch) -> Non
     assert suite.within(["a", "b"], 70.0) == (["a"], ["b"]), "one runs however long it takes"
 
 
+def test_a_worker_stays_with_the_kernels_it_has_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two workers in turn: long files first, another family when one's own is done."""
+    seconds = {"blocks/test_a": 9.0, "unit/test_d": 1.0, "heat/test_b": 8.0, "space/test_c": 5.0, "laws/test_e": 4.0}
+    monkeypatch.setattr(suite, "seconds_of", lambda file: seconds[file.removeprefix("tests/")])
+    left, families, order = [f"tests/{name}" for name in seconds], {}, ""
+    for node in "ababa":
+        left.remove(file := suite.next_file(left, families, node))
+        order += file[-1]
+    assert order == "acbed"
+
+
 def test_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(suite, "seconds_of", lambda file: {"a": 30.0, "b": 10.0}[file])
     own = suite.Suite(SimpleNamespace(workerinput={}))  # type: ignore[arg-type]
