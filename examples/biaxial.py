@@ -82,7 +82,7 @@ class Servo:
         return not self.driven and self.good == 50  # True ends the cycle: at rest under this stress
 
     def run(self, steps):
-        """Let it work for so many steps, or until the stress is reached if no wall is driven."""
+        """Run the servo for a number of steps, or until the stress is reached if no wall is driven."""
         call = sim.every(self.STEPS, self)
         sim.cycle(steps)
         call.cancel()

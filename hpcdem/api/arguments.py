@@ -67,7 +67,7 @@ def model_arguments(command: Command, name: str, given: Mapping[str, Any], dim: 
 
 def _there(word: str, dims: tuple[int, ...], dim: int) -> None:
     if dim not in dims:
-        what = "use sim.start(dim=3) for three dimensions" if dim == 2 else "this version has it in two only"
+        what = "use sim.start(dim=3) for three dimensions" if dim == 2 else "three dimensions are not supported"
         raise ValueError(f"{word} is for {dims[0]} dimensions; {what}")
 
 
@@ -83,7 +83,7 @@ def _model(command: Command, name: str) -> Model:
     found = matching(typed, command.models)
     if len(found) != 1:
         names = [model.keyword.name for model in command.models]
-        raise ValueError(f"there is no model '{name}'; there is {', '.join(names)}{hint(typed, names)}")
+        raise ValueError(f"there is no model '{name}'; available: {', '.join(names)}{hint(typed, names)}")
     return found[0]
 
 
@@ -204,5 +204,5 @@ def _parsed(text: str, kind: str) -> g.Range | None:
     except ScriptError as error:
         raise CommandError(f"where '{short(text)}': {error.message.removeprefix(': ')}") from None
     if statement.expressions:
-        raise CommandError(f"where '{short(text)}': square brackets are for scripts; in Python an f-string does it")
+        raise CommandError(f"where '{short(text)}': square brackets work in scripts only; use an f-string in Python")
     return bindings.where(statement.range)

@@ -263,7 +263,7 @@ class Geometry(Words):
         file : name of the file.
         as_layer : name of the layer; a layer may hold several shapes.
         dxf_layer : only this layer of the file (default: all).
-        scale : metres in a unit of the file [m] (default: the unit given in STEP, DXF and .prj files, else 1).
+        scale : metres per unit of the file [m] (default: the unit given in STEP, DXF and .prj files, else 1).
         named : each name in the section becomes a layer, and as_layer the outline of all its polygons (in the
             plane).
         origin : point of the section, in its units, that is moved to `to` (in the plane; default: (0,0)).
@@ -331,7 +331,7 @@ class Geometry(Words):
         ----------
         layers : names of the layers.
         file : name of the file, in the folder of the results.
-        scale : metres in a unit of the file [m] (default: 1).
+        scale : metres per unit of the file [m] (default: 1).
         origin : point of the section, in its units, that is moved to `to` (default: (0,0)).
         to : position of the origin in the model [m] (default: (0,0)).
         line : two points of a map with heights, in its units: x is the distance along their line, y the height.
@@ -577,7 +577,7 @@ class Mesh(Words):
         group : a group for all elements, in addition to those of the file.
         set : the set of the group.
         merge : points nearer than this are merged [m] (default: 0).
-        scale : metres in a unit of the file [m] (default: 1).
+        scale : metres per unit of the file [m] (default: 1).
         """
     def intersect(self, layer: str, follow: bool = False) -> None:
         """Turns the joints on a layer into cracks: the edges of the mesh that lie on it.
@@ -585,7 +585,8 @@ class Mesh(Words):
         Parameters
         ----------
         layer : its lines are edges of the mesh, its surfaces faces.
-        follow : they are not: uses the edges that follow them best, or the faces between elements on either side.
+        follow : for lines that are not edges: uses the edges that follow them best, or the faces between elements on
+            either side.
         """
     def glue(
         self,
@@ -1248,7 +1249,7 @@ class Elements(Stressed):
     def water(self, surface: str, density: float, *, where: Where | None = None) -> None:
         """Water pressure on the surface of the model: depth below a water line times density and gravity, on all free
         faces of these elements below the line, also on parts of faces, as they move. The line runs from left to
-        right; beyond its ends is no water. The last command replaces earlier ones.
+        right; there is no water beyond its ends. The last command replaces earlier ones.
 
         Parameters
         ----------
@@ -1398,7 +1399,7 @@ class Faces(Fluxed):
 
         Parameters
         ----------
-        heat_flux : heat that comes in [W/m2].
+        heat_flux : heat inflow per area [W/m2].
         transfer_coeficient : heat transfer to the environment [W/(m2 K)] (default: that of the elements).
         environment_temperature : temperature of the environment [K].
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.

@@ -100,7 +100,7 @@ class Frame:
         for name in given:
             if name not in Looks.__annotations__:
                 near = hint(name, Looks.__annotations__)
-                raise UsageError(f"there is no look '{name}'{near}; there is {', '.join(Looks.__annotations__)}")
+                raise UsageError(f"unknown option '{name}'{near}; available: {', '.join(Looks.__annotations__)}")
         import matplotlib
 
         from hpcdem.io.axes import CM
@@ -127,7 +127,7 @@ class Frame:
         for kind in (*MAIN, *self._moment.objects):
             if self._moment.objects.get(kind) is not None:
                 return kind
-        raise HpcdemError("this frame holds nothing")
+        raise HpcdemError("this frame is empty")
 
     def __repr__(self) -> str:
         there = ", ".join(f"{count} {kind}" for kind, count in self.objects.items() if count)
@@ -202,14 +202,16 @@ def frames(path: str | Path = "data", name: str | None = None) -> Frames:
     if path.is_file():
         return Frames([FrameFile(path, read_moment(path).step, False)])
     if not path.is_dir():
-        raise HpcdemError(f"there is no folder or file {path}")
+        raise HpcdemError(f"folder or file not found: {path}")
     kinds = dict(mesh_frames_by_name(path))
     if files := list_frames(path):
         kinds["all"] = files
     if name is None and len(kinds) == 1:
         (name,) = kinds
     if not kinds or name not in kinds:
-        there = f"there are frames of {', '.join(sorted(kinds))}: say which (name=)" if kinds else "there are no frames"
+        there = (
+            f"it contains frames of {', '.join(sorted(kinds))}: select one with name=" if kinds else "no frames found"
+        )
         raise HpcdemError(f"{path}: {there}")
     return Frames(kinds[name])
 
@@ -243,5 +245,7 @@ def _needed(package: str) -> Any:
             import IPython.display as module
     except ImportError:
         name = package.partition(".")[0]
-        raise UsageError(f"no package {name} here: pip install {name.lower()}, or the extra [notebook]") from None
+        raise UsageError(
+            f"package {name} is not installed: pip install {name.lower()}, or the extra [notebook]"
+        ) from None
     return module

@@ -60,7 +60,7 @@ def _radii(rad: Iterable[float] | float) -> list[float]:
 def _degrees(dofs: tuple[str, ...]) -> tuple[str, ...]:
     wrong = [d for d in dofs if d not in FIX_BITS]
     if wrong or not dofs:
-        raise CommandError(f"say which of {', '.join(FIX_BITS)}" + (f", not {wrong[0]!r}" if wrong else ""))
+        raise CommandError(f"expected one or more of {', '.join(FIX_BITS)}" + (f", not {wrong[0]!r}" if wrong else ""))
     return dofs
 
 

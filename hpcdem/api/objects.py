@@ -215,7 +215,7 @@ class Named(Words):
     def __getitem__(self, name: str) -> dict[str, float]:
         found = fdem.queries.wells(self._do.project())
         if name not in found:
-            raise CommandError(f"there is no well '{name}'; there is {quoted(found)}")
+            raise CommandError(f"there is no well '{name}'; available: {quoted(found)}")
         return found[name]
 
 

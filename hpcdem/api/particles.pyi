@@ -201,7 +201,7 @@ class ParticleCommands:
         Parameters
         ----------
         file : the section.
-        scale : metres in a unit of the file; left out, as the file says, else 1.
+        scale : metres per unit of the file; left out, as the file says, else 1.
         origin, to : point of the file, in its units, and where it is in the model [m].
         line : two points of a map, in its units: x is the distance along the line through them, y the height (z).
         legend : of an image: a file with lines colour, name.

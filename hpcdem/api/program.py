@@ -56,7 +56,7 @@ def carried_out(
 def _wrong(text: str, names: Collection[str]) -> str:
     """Shorten Python's message about a call, and suggest the argument that was meant."""
     if (found := _UNKNOWN.search(text)) and names:
-        return f"there is no argument '{found[1]}'{hint(found[1], names)}; there is {', '.join(names)}"
+        return f"there is no argument '{found[1]}'{hint(found[1], names)}; available: {', '.join(names)}"
     return _OWN_NAME.sub("", text)
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     "line and y the height (z). More in docs/sections.md.",
 )  # fmt: skip
 @click.argument("source", type=PATH, metavar="FILE|DIR")
-@click.option("--scale", type=POSITIVE, metavar="M", help="Metres in a unit of the file [as the file says, else 1].")
+@click.option("--scale", type=POSITIVE, metavar="M", help="Metres per unit of the file [as given in the file, else 1].")
 @click.option("--origin", type=pictures.Numbers(2), default="0,0", metavar="X,Y", help="Point of the file, in its "
               "units, that is moved to --to [0,0].")  # fmt: skip
 @click.option("--to", type=pictures.Numbers(2), default="0,0", metavar="X,Y", help="Position of the origin in the "
@@ -119,10 +119,10 @@ def of_run(options: dict[str, Any]) -> Section:
     ]  # fmt: skip
     faults, short = _faults(folder, g.step)
     warnings = () if faults or short else (
-        f"no faults of step {g.step}: `hpcdem measure {folder} faults` finds them first",
+        f"no faults at step {g.step}: run `hpcdem measure {folder} faults` first",
     )  # fmt: skip
     if short:
-        warnings = (f"ignored: {', '.join(short)}, of which one point was measured only",)
+        warnings = (f"ignored: {', '.join(short)} (only one measured point each)",)
     shapes += faults
     if not shapes:
         raise HpcdemError(f"{folder}: the frame of step {g.step} has no particles")

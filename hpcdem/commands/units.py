@@ -19,14 +19,16 @@ def declared(before: str, name: str, log: Any, late: bool) -> str:
     CommandError for an unknown one, or if another one was declared before."""
     new = units.system(name).name
     if before not in ("", new):
-        raise CommandError(f"the units of this model are {units.CHOICES[before]} already; a new model can have others")
+        raise CommandError(
+            f"this model already uses the units {units.CHOICES[before]}; start a new model to change them"
+        )
     if log is not None and not before:
         if late:
             log.warn("units: values given before this line were not checked")
         if new != units.SI.name:
             log.warn_once(
                 f"units {new}",
-                f"units {units.CHOICES[new]}: histories, charts and the energy table have these units. Pictures and "
+                f"units {units.CHOICES[new]}: histories, charts and the energy table use these units. Pictures and "
                 "tables made from frames show SI units; the numbers of default values in the reference are in the "
                 "declared units",
             )

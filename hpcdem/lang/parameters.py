@@ -74,7 +74,7 @@ class Adjustable:
             raise UsageError(f"{name}: {self.refused[name]}")
         known = ", ".join(self.parameters) or "none"
         raise UsageError(
-            f"{name}: {self.file} has no such parameter{hint(name, list(self.parameters))}; there are: {known}. Add a "
+            f"{name}: {self.file} has no such parameter{hint(name, list(self.parameters))}; available: {known}. Add a "
             f"line {name} = NUMBER to create one"
         )
 

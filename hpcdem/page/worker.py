@@ -200,7 +200,7 @@ class Worker:
         how = maker.end()
         with self.turn:
             if self.closed:
-                return HpcdemError("the server is ending")
+                return HpcdemError("the server is shutting down")
             if self.ended != number:
                 return HpcdemError(f"the process that makes specimens has ended: {how}")
             if self._superseded(number):
@@ -217,7 +217,7 @@ class Worker:
     def _maker(self) -> Maker:
         """The process that answers, started if necessary."""
         if self.closed:
-            raise HpcdemError("the server is ending")
+            raise HpcdemError("the server is shutting down")
         if self.maker is None or not self.maker.alive:
             self.maker = Maker()
         return self.maker

@@ -41,7 +41,7 @@ exit "$code"
 """
 
 _ENVIRONMENT = """\
-# As in slurm/one_node.sh: pmi2 for MPICH and its wheel, pmix for Open MPI; srun forgets --cpus-per-task.
+# As in slurm/one_node.sh: pmi2 for MPICH and its wheel, pmix for Open MPI; srun does not inherit --cpus-per-task.
 export SLURM_MPI_TYPE="${SLURM_MPI_TYPE:-MPI}"
 export SRUN_CPUS_PER_TASK="${SLURM_CPUS_PER_TASK:-1}"
 """

@@ -106,7 +106,9 @@ class Result:
         for k, target in enumerate(self.targets):
             off = abs(float(self.predicted[:, k].mean()) - target.value) / target.tolerance
             if off > FAR:
-                found.append(f"target {target.name} is out of reach: {off:.1f} tolerances from it at best")
+                found.append(
+                    f"target {target.name} cannot be reached: the best prediction is {off:.1f} tolerances away"
+                )
         return found
 
 
@@ -156,7 +158,7 @@ def _fitted(points: np.ndarray, values: np.ndarray, targets: Sequence[Target]) -
         if len(np.unique(repeated[known], axis=0)) < points.shape[1] + MORE:
             raise HpcdemError(
                 f"target {target.name}: {int(known.sum())} of {len(y)} runs gave a number, too few for "
-                f"{points.shape[1]} parameters; look at the failed members, or narrow the ranges"
+                f"{points.shape[1]} parameters; check the failed members, or narrow the ranges"
             )
         found.append(fit(repeated[known], y[known]))
     return found

@@ -62,7 +62,7 @@ def page(result: Result, logs: list[bool]) -> str:
     for target, row in zip(result.targets, result.sensitivity()):
         lines.append(f"| {target.name} | " + " | ".join(f"{one:.2f}" for one in row) + " |")
     cautions = result.cautions() or ["the targets determine all parameters"]
-    return "\n".join([*lines, "", "What the targets tell:", "", *(f"- {one}" for one in cautions), ""])
+    return "\n".join([*lines, "", "What the targets determine:", "", *(f"- {one}" for one in cautions), ""])
 
 
 def _table(names: tuple[str, ...], rows: np.ndarray) -> str:

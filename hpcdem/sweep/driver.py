@@ -28,7 +28,7 @@ def jobs_at_once(plan: Plan, jobs: int | None) -> int:
     if (jobs or 1) * each > cores:
         raise UsageError(
             f"{jobs or 1} at once with {plan.ranks} ranks of {plan.threads} threads are {(jobs or 1) * each} processes "
-            f"and threads; there are {cores} cores here"
+            f"and threads; available: {cores} cores here"
         )
     return jobs or cores // each
 

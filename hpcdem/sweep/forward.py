@@ -254,5 +254,5 @@ class Forward:
             found.append([m.read(data_folder(member)) if done else float("nan") for m in test.measured])
         failed = sum(by_values[tuple(sorted(one.items()))].state == plans.FAILED for one in values)
         if failed:
-            self.log.warn(f"{folder}: {failed} of these {len(values)} members failed; they count as no number")
+            self.log.warn(f"{folder}: {failed} of these {len(values)} members failed and are treated as missing values")
         return np.array(found).reshape(len(points), len(seeds), len(test.measured))

@@ -267,7 +267,7 @@ def test_what_cannot_act_is_refused():
         lambda: sim.stress_condition(base, quiet=False, **nothing), lambda: sim.stress_condition(base, quiet=True),
     )  # fmt: skip
     refused("fixed in x", lambda: sim.velocity_condition([middle], vx=0.0), lambda: sim.remove_conditions([middle]))
-    refused("not along x or y", lambda: sim.move_constraint([lowest], 2, (1.0, 1.0)),
+    refused("but must move along x or y", lambda: sim.move_constraint([lowest], 2, (1.0, 1.0)),
             lambda: sim.remove_conditions([lowest]))  # fmt: skip
     refused("is quiet too", lambda: sim.stress_condition(left[:1], quiet=True),
             lambda: sim.remove_stress_conditions(left[:1]))  # fmt: skip

@@ -112,7 +112,10 @@ def test_errors_name_file_and_line(bench: Bench, line: str, message: str) -> Non
     ("line", "message"),
     [
         ("model step 1", r"bolt-element 0 has no model \(7 in all\): assign bolt c-model first"),
-        (f"bolt c-model mech-e-p property {STEEL} range id 99", "there is no bolt-element 99; numbers go from 0 to 6"),
+        (
+            f"bolt c-model mech-e-p property {STEEL} range id 99",
+            "there is no bolt-element 99; numbers range from 0 to 6",
+        ),
         ("bolt-node boundary b-n-f-b-c force-x 1 range group 'q'", "there is no set 'default' of bolt-nodes"),
         ("bolt-node boundary b-n-f-b-c force-x table 'q'", "there is no table 'q'"),
         ("model solve elastic", "the static solve does not support bolts"),

@@ -169,7 +169,7 @@ def test_what_is_said_of_one_only_is_named(tmp_path):
     assert (
         told.count("gravity differs: SET gravity 0 -9.81 acts on the particles, model gravity (0,0) on the blocks") == 1
     )
-    assert told.count("there is no contact between blocks, but contact with particles") == 1
+    assert told.count("blocks do not interact with each other, only with particles") == 1
     assert told.count("is in or beyond wall 7, and walls and BOX stop particles only") == 1
     assert told.count("is in or beyond the bottom side of the BOX") == 1 and "wall 8" not in told
     stepping.step(project, 1500)

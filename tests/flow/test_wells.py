@@ -209,7 +209,7 @@ def test_a_well_in_nothing() -> None:
 def test_what_a_well_refuses() -> None:
     sim, flow = pumping()
     node = at(sim, 0.0, 0.0)
-    with pytest.raises(CommandError, match="there is a well 'w' already"):
+    with pytest.raises(CommandError, match="well 'w' exists already"):
         flow.drill("w", at(sim, 1.0, 0.0))
     with pytest.raises(CommandError, match=rf"node {node[0]} belongs to well 'w' already"):
         flow.drill("v", node)
@@ -225,7 +225,7 @@ def test_what_a_well_refuses() -> None:
     ):  # fmt: skip
         with pytest.raises(CommandError, match=said):
             flow.stage("w", does, value, duration, limit)
-    with pytest.raises(CommandError, match="there is no well 'x'; there is 'w'"):
+    with pytest.raises(CommandError, match="there is no well 'x'; available: 'w'"):
         flow.stage("x", SHUT, 0.0, 1.0, math.inf)
     with pytest.raises(CommandError, match="there is no quantity depth of a well"):
         flow.well_value("w", "depth")
@@ -275,7 +275,7 @@ def test_a_script_with_wells(tmp_path: Path) -> None:
         ("well stage 'w'", "one of rate, pressure and shut-in, not none"),
         ("well stage 'w' pressure 2 limit 3", "limit, a pressure, needs rate"),
         ("well stage 'w' rate 2 time 0", "time"),
-        ("well stage 'x' rate 2", "there is no well 'x'; there is 'w'"),
+        ("well stage 'x' rate 2", "there is no well 'x'; available: 'w'"),
         ("well stage 'w' rate table 'q'", "there is no table 'q'"),
         ("well create 'v' range y 0.25 0.25", "well 'v' has no flow node: no channel ends at node"),
         ("history create 'h' well value pressure", "object well and well, its name, are both required"),

@@ -424,7 +424,7 @@ SAND = "GEN num 5 rad discrete 0.5 x (0 10) y (0 10)"
     ("lines", "message"),
     [
         ([SAND, "PROP density 1 kn 1e4 ks 1e4", f"{SAND} group sed", "PROP density 1 range group sed", "CYC 500"],
-         r"script.py:7: CYC: 5 particles have no contact law, while others have .*: 5 of group sed, made in line 5$"),
+         r"script.py:7: CYC: 5 particles have no contact law, .*: 5 of group sed, created in line 5$"),
         ([SAND, "PROP density 1 shear 1e9 poiss 0.2 hertz", f"{SAND} group sed", "BALL id 99 x 50 y 50 rad 1 group b",
           "PROP density 1 range group sed", "PROP density 1 range group b", "CYC 500"],
          r":9: CYC: 6 particles have no contact .*: 5 of group sed, made in line 5; 1 of group b, made in line 6"),

@@ -236,10 +236,10 @@ def test_blocks_that_are_mirrored_or_repeated(drawing):
 @pytest.mark.parametrize(
     ("code", "scale", "factor", "said"),
     [
-        (4, None, 1e-3, r"in millimetres \(\$INSUNITS 4\): a unit is 0.001 m, scale says otherwise"),
-        (4, 1.0, 1.0, "in millimetres .*: a unit is 1 m, as scale says"),
+        (4, None, 1e-3, r"in millimetres \(\$INSUNITS 4\): 1 unit = 0.001 m, replaced by scale"),
+        (4, 1.0, 1.0, "in millimetres .*: 1 unit = 1 m, set by scale"),
         (2, None, 0.3048, "in feet"),
-        (0, None, 1.0, "names no unit .*: a unit is 1 m, taken as metres"),
+        (0, None, 1.0, "defines no unit .*: 1 unit = 1 m, interpreted as metres"),
         (6, None, 1.0, "in metres"),
     ],
 )

@@ -158,7 +158,7 @@ def test_binary_shells_with_bytes_at_their_end_in_millimetres(tmp_path: Path) ->
         path.write_bytes(binary(CUBE, more=more))
         (body,) = cad.read(path, scale=1e-3, notes=notes)
         np.testing.assert_allclose(body.bounds(), [[0, 0, 0], [1e-3] * 3], atol=1e-12)
-    assert notes[1] == notes[0] == "files *.stl name no unit: a unit is 0.001 m, as scale says"
+    assert notes[1] == notes[0] == "files *.stl define no unit: 1 unit = 0.001 m, set by scale"
     assert notes[2] == "ignored 50 bytes after the last triangle" and notes[4].startswith("ignored 5 bytes")
     path.write_bytes(binary(CUBE)[:-60])
     with pytest.raises(HpcdemError, match=r"cube\.stl: .*its header declares 12 triangles, it has 10"):

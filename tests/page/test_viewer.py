@@ -112,7 +112,7 @@ def test_a_query_tells_the_element_and_its_values(page: Tab, folder: Path):
     assert rows["displacement"] == "948.683 mm (900, 300)"
     page.tab.mouse.click(*page.place(0.02, 0.98))
     page.tab.wait_for_selector("#answer[hidden]", state="attached")
-    assert page.text("#message") == "Nothing there"
+    assert page.text("#message") == "No object here"
 
 
 def page_box(page: Tab) -> list[float]:

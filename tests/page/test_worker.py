@@ -155,7 +155,7 @@ def test_after_the_end_requests_are_refused_and_no_process_is_left(workers, want
     until(lambda: worker.began is not None)
     process = worker.maker.process
     worker.close()
-    assert "the server is ending" in str(slow.end().error)
+    assert "the server is shutting down" in str(slow.end().error)
     assert process.returncode == -signal.SIGKILL
-    with pytest.raises(HpcdemError, match="the server is ending"):
+    with pytest.raises(HpcdemError, match="the server is shutting down"):
         worker.ask("specimen", wanted(**QUICK))

@@ -108,7 +108,7 @@ def test_what_was_chosen_is_what_is_there(desk):
      ("element property young 1e9 range id 18", r"element 18 was removed \(element c-model null\)"),
      ("node boundary mech-m-b-c type 1 range x 3 3 y 2 2", r"selects no node: all that it selects \(1\) was removed"),
      ("face-joint property gf1 3 range face-of 'void' set 'stage'", "selects no face-joint: all that it selects"),
-     ("element property young 1e9 range id 480", "there is no element 480; numbers go from 0 to 47"),
+     ("element property young 1e9 range id 480", "there is no element 480; numbers range from 0 to 47"),
      ("history create 'one' element id 18 value stress-xx", "element 18 was removed"),
      ("element c-model null range group 'void' set 'stage'", "selects no element: all that it selects")],
 )  # fmt: skip

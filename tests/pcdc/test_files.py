@@ -89,7 +89,7 @@ CURVES = "pcdc mesh structured (0,0) (1,1) cells 1 1\npcdc history create 'a' mo
 @pytest.mark.parametrize("name", ["../x", "../../x", "a/../../x", "./../x"])
 def test_results_stay_in_their_folder(bench, command, name):
     """Refused as the line is read, or carried out, where the name comes from Python; a whole path says where."""
-    message = "leads out of the folder of the results; for another folder give an absolute path"
+    message = "lies outside the folder of the results; give an absolute path for another folder"
     with pytest.raises(ScriptError, match=message):
         check.read(f"pcdc {command.format(name)}\n", "script.sc")
     with pytest.raises(ScriptError, match=message):

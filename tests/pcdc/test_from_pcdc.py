@@ -216,12 +216,12 @@ def test_a_look_at_the_scripts_finds_their_names():
     for name, text in SCRIPTS.items():
         assert "warning" not in check.summary(text, "a.sc"), name
     for text, what in (
-        ("pcdc n g 'a' range geometry-distance 'bed' within 1\n", "line 1: no line makes the geometry layer 'bed'"),
-        ("pcdc f-j g 'a' range not geom-a 'bed'\n", "line 1: no line makes the geometry layer 'bed'"),
-        ("pcdc table 'a' data 0 1\npcdc n apply mech-f-b-c f-x table 'b'\n", "line 2: no line makes the table 'b'"),
-        ("pcdc element create geometry layer 'out' m-s 1\n", "line 1: no line makes the geometry layer 'out'"),
+        ("pcdc n g 'a' range geometry-distance 'bed' within 1\n", "line 1: no line creates the geometry layer 'bed'"),
+        ("pcdc f-j g 'a' range not geom-a 'bed'\n", "line 1: no line creates the geometry layer 'bed'"),
+        ("pcdc table 'a' data 0 1\npcdc n apply mech-f-b-c f-x table 'b'\n", "line 2: no line creates the table 'b'"),
+        ("pcdc element create geometry layer 'out' m-s 1\n", "line 1: no line creates the geometry layer 'out'"),
         ("pcdc element create brick p0 0,0 p1 1,0 p2 0,1 n 1 1 group 'a'\npcdc e hide on range group 'b'\n",
-         "line 2: no line makes the group 'b' of elements"),
+         "line 2: no line creates the group 'b' of elements"),
     ):  # fmt: skip
         assert what in check.summary(text, "a.sc")
 

@@ -9,7 +9,7 @@ import pytest
 
 from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.pcdc import journal
-from hpcdem.lang.pcdc.journal import COMMAND, ERROR, LOOK, NAMES, Journal, decoded, encoded
+from hpcdem.lang.pcdc.journal import COMMAND, ERROR, NAMES, READ, Journal, decoded, encoded
 
 BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right\n"
 LOOP = (
@@ -154,7 +154,7 @@ def test_too_much_to_keep_is_told_and_refused(bench, monkeypatch):
 
 
 def test_damaged_journals_are_refused():
-    for entries in ([], [[LOOK, "[]"]], [[COMMAND, 1], [NAMES, {}]]):
+    for entries in ([], [[READ, "[]"]], [[COMMAND, 1], [NAMES, {}]]):
         with pytest.raises(UsageError, match="damaged"):
             Journal().replay(entries)
 

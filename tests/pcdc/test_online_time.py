@@ -180,7 +180,7 @@ def test_clocks_are_set_and_told(tmp_path):
     rock("pcdc model step 1\n")
     assert flow.conditions_at(7.0)[1][1] == pytest.approx(7e5)
     for words, why in (
-        ("reset proppant-transport current-time 0", "there is no proppant yet"),
+        ("reset proppant-transport current-time 0", "no proppant yet"),
         ("reset mechanical", "mechanical.* needs at least one of start-time, current-time, time-step"),
         ("cycle-option thermal", "thermal.* needs at least one of time-step, cycle-number"),
         ("cycle-option hydraulic c-n 3 proppant-transport c-n 4", "proppant uses the steps of the fluid"),

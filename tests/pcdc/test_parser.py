@@ -168,7 +168,7 @@ REFUSED = [
     ("model step 10 range id 1", "'model step' does not accept a range"),
     ("model solve ratio m_ratio", "read 'm_ratio'; put variables and expressions of Python in square brackets: ["),
     ("model solve ratio 1e-6*2", "put variables and expressions of Python in square brackets: [1e-6*2]"),
-    ("model solve ratio n", "a variable of Python stands in brackets: [n]"),
+    ("model solve ratio n", "put Python variables in brackets: [n]"),
     ("model solve ratio [1+]", "'[1+]' is not an expression of Python"),
     ("model solve ratio []", "read '[]', expected a Python expression"),
     ("model solve ratio [x", "does not end: ']' is missing"),
@@ -260,9 +260,9 @@ REFUSED_IN_SPACE = [
     ("mesh structured (0,0,0) (1,1,1) cells 2 2", "the line ends where a whole number above 0 for 'cells' is expected"),
     ("mesh structured (0,0,0) (1,1,1) cells 2 2 2 type tri", "type tri: in three dimensions it is tet or hex"),
     ("geometry create rectangle (0,0) (1,1) as-layer 'c'",
-     "'geometry create rectangle' is for two dimensions; in three there is geometry create box"),
-    ("element densify maximum-length 1", "'element densify' is for two dimensions; in three there is mesh create"),
-    ("element-face boundary m-s-b-c dip 1e5", "'dip' is for two dimensions; in three there is stress-xy"),
+     "'geometry create rectangle' is for two dimensions; in three dimensions use geometry create box"),
+    ("element densify maximum-length 1", "for two dimensions; in three dimensions use mesh create"),
+    ("element-face boundary m-s-b-c dip 1e5", "'dip' is for two dimensions; in three dimensions use stress-xy"),
 ]  # fmt: skip
 
 

@@ -46,7 +46,7 @@ def test_names_that_are_not_there():
     groups = Groups(g.NODE, {"bc": {"top": np.array([1])}})
     with pytest.raises(CommandError, match="set 'bc' has no group 'tip' of nodes; it has 'top'"):
         groups.members("tip", "bc")
-    with pytest.raises(CommandError, match="there is no set 'cb' of nodes; there is 'bc'"):
+    with pytest.raises(CommandError, match="there is no set 'cb' of nodes; available: 'bc'"):
         groups.members("top", "cb")
     groups.assign([3], "x")
     with pytest.raises(CommandError, match="There is a group 'top' in set 'bc'"):

@@ -151,7 +151,7 @@ def test_a_history_is_stopped_and_its_file_stays(bench):
         with pytest.raises(HpcdemError):
             bench(text)
     bench("pcdc history create 't' model value time\n")
-    with pytest.raises(HpcdemError, match="there is a history 't' already"):
+    with pytest.raises(HpcdemError, match="history 't' exists already"):
         bench("pcdc history create 't' model value time\n")
 
 

@@ -66,12 +66,12 @@ def test_names_that_no_line_makes():
     )
     said = [line for line in check.summary(text, "a.sc").splitlines() if line.startswith("warning")]
     assert said == [
-        "warning: line 4: no line makes the group 'tip' of nodes in set 'default'",
-        "warning: line 5: no line makes the group 'rock' of elements in set 'default'",
-        "warning: line 6: no line makes the group 'cap' of elements in set 'domain'",
-        "warning: line 7: no line makes the set 'bc' of nodes",
-        "warning: line 8: no line makes the geometry layer 'line'",
-        "warning: line 9: no line makes the group 'bottom' of nodes in set 'default'",
+        "warning: line 4: no line creates the group 'tip' of nodes in set 'default'",
+        "warning: line 5: no line creates the group 'rock' of elements in set 'default'",
+        "warning: line 6: no line creates the group 'cap' of elements in set 'domain'",
+        "warning: line 7: no line creates the set 'bc' of nodes",
+        "warning: line 8: no line creates the geometry layer 'line'",
+        "warning: line 9: no line creates the group 'bottom' of nodes in set 'default'",
     ]
     unknown = text.replace("node group 'top'", "node group [name]")
     assert not any("of nodes" in line for line in check.summary(unknown, "a.sc").splitlines())

@@ -182,5 +182,5 @@ def test_nodes_of_two_groups_are_both_sides(tmp_path: Path):
         numbers = sets["default"][name]
         assert (numbers[numbers >= SIDE] - SIDE).tolist() == [4 * element + cells[element].tolist().index(right)]
     assert left in sets["default"]["taken"]
-    with pytest.raises(HpcdemError, match="there is no element 7; numbers go from 0 to 1"):
+    with pytest.raises(HpcdemError, match="there is no element 7; numbers range from 0 to 1"):
         desk("pcdc node group 'x' range element 7\n")

@@ -137,7 +137,7 @@ def test_stokes_is_told_apart(tmp_path: Path) -> None:
 
 WRONG = {
     "no proppant": ("pcdc face-joint c-model hydr-p-m property f-den 1000 f-bulk 1e6 vis 1e-6 a-initial 1e-5 a-min "
-                    "1e-6\npcdc node boundary hydra-p-b p-v-c 0.1", "there is no proppant"),
+                    "1e-6\npcdc node boundary hydra-p-b p-v-c 0.1", "no proppant"),
     "both": ("pcdc node boundary hydra-p-b p-v-c 0.1 p-v-f-r 1e-6", "cannot be combined"),
     "neither": ("pcdc node boundary hydra-p-b", "hydraulic-proppant-boundary"),
     "range": ("pcdc face-joint property proppant-size 1e-3 range y 0 1", "without a range"),

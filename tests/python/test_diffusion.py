@@ -89,7 +89,7 @@ def test_wrong_parameters(name, values):
 @pytest.mark.parametrize(
     ("name", "parameters", "message"),
     [
-        ("magic", {}, "there is no physics 'magic'; there are diffusion"),
+        ("magic", {}, "there is no physics 'magic'; available: diffusion"),
         ("diffusion", {"conductance": 1.0}, "diffusion: missing 1 required positional argument: 'capacity'"),
         ("diffusion", {"conductance": 1.0, "capacity": 1.0, "colour": 1.0}, "unexpected keyword argument 'colour'"),
     ],

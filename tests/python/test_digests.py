@@ -59,4 +59,4 @@ def test_what_differs_is_named(tmp_path: Path) -> None:
 
 def test_a_model_that_is_not_there_is_named(tmp_path: Path) -> None:
     done = digests("record", "one.json", "clamps", cwd=tmp_path)
-    assert done.returncode == 2 and "there is no model clamps; there is " in done.stderr
+    assert done.returncode == 2 and "there is no model clamps; available: " in done.stderr

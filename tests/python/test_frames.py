@@ -48,13 +48,13 @@ def test_tables_are_those_of_the_file(tmp_path: Path) -> None:
 
 def test_kinds_have_to_be_said_apart(folder: Path) -> None:
     write_blocks(folder, 5)
-    with pytest.raises(HpcdemError, match=r"frames of all, .*say which"):
+    with pytest.raises(HpcdemError, match=r"frames of all, .*select one"):
         hpcdem.frames(folder)
     assert hpcdem.frames(folder, "all")[0].objects["particles"]
-    with pytest.raises(HpcdemError, match="there is no folder"):
+    with pytest.raises(HpcdemError, match="folder or file not found"):
         hpcdem.frames(folder / "nowhere")
     (folder / "empty").mkdir()
-    with pytest.raises(HpcdemError, match="there are no frames"):
+    with pytest.raises(HpcdemError, match="no frames found"):
         hpcdem.frames(folder / "empty")
 
 
@@ -87,7 +87,7 @@ def test_pandas_and_xarray(folder: Path) -> None:
 
 def test_a_missing_package_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(UsageError, match="no package pandas here: pip install pandas"):
+    with pytest.raises(UsageError, match="package pandas is not installed: pip install pandas"):
         hpcdem.frames(folder)[0].pandas()
 
 

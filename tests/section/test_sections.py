@@ -57,10 +57,10 @@ def test_each_format_has_the_same_areas(tmp_path, kind):
 
 @pytest.mark.parametrize(
     ("kind", "left", "unit"),
-    [("geojson", "1 Point of 'well'", "a unit is 1 m, interpreted as metres"),
-     ("dxf", "1 TEXT of 'labels', 1 POINT of 'well'", "kilometres ($INSUNITS 7): a unit is 1000 m"),
-     ("svg", "1 text of 'labels'", "a unit is 10 m, as scale says; y upwards from the bottom"),
-     ("shp", "", "layers.prj names metre: a unit is 1 m, as the file says")],
+    [("geojson", "1 Point of 'well'", "1 unit = 1 m, interpreted as metres"),
+     ("dxf", "1 TEXT of 'labels', 1 POINT of 'well'", "kilometres ($INSUNITS 7): 1 unit = 1000 m"),
+     ("svg", "1 text of 'labels'", "1 unit = 10 m, set by scale; y upwards from the bottom"),
+     ("shp", "", "layers.prj names metre: 1 unit = 1 m, as given in the file")],
 )  # fmt: skip
 def test_what_is_left_out_and_the_unit_are_named(tmp_path, kind, left, unit):
     section = in_format(kind, tmp_path)
@@ -153,7 +153,7 @@ SQUARE = [(0, 0), (100, 0), (100, 100), (0, 100)]
 def test_an_overlap_has_its_place_and_size(tmp_path):
     (warning,) = read(polygons(tmp_path, SQUARE, [(90, 0), (200, 0), (200, 100), (90, 100)])).warnings
     assert "'a' (feature 0) and 'b' (feature 1) overlap by 1000 m2 at (95, 50) m, 100 m long and 10 m wide" in warning
-    assert "'b', which is later in the file, counts there" in warning
+    assert "'b', which is later in the file, takes precedence there" in warning
 
 
 def test_gaps_have_their_place_and_size(tmp_path):
@@ -258,7 +258,7 @@ def test_values_that_make_no_sense(tmp_path):
         read(path, legend=path)
     with pytest.raises(CommandError, match="both of its points"):
         Placement(line=((1.0, 2.0), (1.0, 2.0)))
-    with pytest.raises(CommandError, match="metres in a unit"):
+    with pytest.raises(CommandError, match="metres per unit"):
         Placement(unit=-1.0)
     assert [shape.name for shape in read(path, only=["lower_sand", "f1"]).shapes] == ["Lower Sand", "Lower Sand", "F1"]
     assert group_name(" Lower  Sand (a) ") == "lower__sand__a_"
@@ -356,7 +356,7 @@ def test_an_inclined_layer_as_wide_as_a_disc_is_refused(tmp_path):
     text = {"type": "Feature", "properties": {"name": "thin"}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
     (tmp_path / "thin.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [text]}))
     section = read(tmp_path / "thin.geojson")
-    with pytest.raises(CommandError, match="hardly wider than its discs; take smaller radii"):
+    with pytest.raises(CommandError, match="hardly wider than its discs; use smaller radii"):
         fill.filled(section, np.array([1.0]), 0.2, 5, 0, "thin")
 
 

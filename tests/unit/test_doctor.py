@@ -811,9 +811,9 @@ LIST = "MPI plugin types are...\n\tpmix\n\tpmi2\n\tnone\nspecific pmix plugin ve
     [
         (OPEN_MPI, "pmix", LIST, None),
         (OPEN_MPI, "pmix_v4", LIST, None),
-        (OPEN_MPI, "pmi2", LIST, "SLURM_MPI_TYPE=pmi2, and Open MPI v4.1.4 wants pmix"),
+        (OPEN_MPI, "pmi2", LIST, "SLURM_MPI_TYPE=pmi2, but Open MPI v4.1.4 requires pmix"),
         (MPICH, "pmi2", LIST, None),
-        (MPICH, "none", LIST, "wants pmi2"),
+        (MPICH, "none", LIST, "requires pmi2"),
         (OPEN_MPI, "", LIST, None),
         (OPEN_MPI, "", "MPI plugin types are...\n\tpmi2\n", "this Slurm has no --mpi=pmix"),
         (OPEN_MPI, "", "", None),

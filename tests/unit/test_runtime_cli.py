@@ -201,7 +201,7 @@ def test_a_pcdc_script_is_checked_without_running_it(resident, tmp_path):
     done = resident(1, "--check", "a.sc", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "a.sc: 3 commands read, nothing was executed" in done.stdout and "1 geometry create circle" in done.stdout
-    assert "warning: line 6: no line makes the geometry layer 'whole'" in done.stdout
+    assert "warning: line 6: no line creates the geometry layer 'whole'" in done.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["a.sc"]
 
 

@@ -134,7 +134,7 @@ def test_histories_of_particles_have_the_units(tmp_path):
 
 def test_another_system_is_refused(tmp_path):
     sim = zdem(tmp_path, "SET units SI\nSET units si\n")
-    with pytest.raises(CommandError, match="units of this model are SI already"):
+    with pytest.raises(CommandError, match="already uses the units SI"):
         settings.set_option(sim, "units", "mm-mpa-s")
     with pytest.raises(CommandError, match="expected one of SI, mm-MPa-s, km-MPa-s, got cgs"):
         settings.set_option(sim, "units", "cgs")

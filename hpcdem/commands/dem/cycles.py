@@ -96,7 +96,7 @@ def stop(sim: Simulation) -> None:
 
 def _nearest(steps: float) -> int:
     if not steps <= MOST_STEPS:
-        raise CommandError(f"that would take {steps:g} steps")
+        raise CommandError(f"this would need {steps:g} steps")
     return math.floor(steps + 0.5)
 
 
@@ -155,7 +155,7 @@ def _described(sim: Simulation, which: np.ndarray, what: str) -> str:
     for part in sim.comm.allgather(dict(Counter(zip(p["group"][which].tolist(), made_in.tolist())))):
         total.update(part)
     parts = [
-        f"{number} of group {sim.groups[group]}{f', made in line {line}' if line else ''}"
+        f"{number} of group {sim.groups[group]}{f', created in line {line}' if line else ''}"
         for (group, line), number in sorted(total.items(), key=lambda item: (item[0][1], item[0][0]))
     ]
     more = f"; and {len(parts) - NAMED} more" if len(parts) > NAMED else ""

@@ -63,7 +63,7 @@ def section(
     Parameters
     ----------
     file : the section.
-    scale : metres in a unit of the file; left out, as the file says, else 1.
+    scale : metres per unit of the file; left out, as the file says, else 1.
     origin, to : point of the file, in its units, and where it is in the model [m].
     line : two points of a map, in its units: x is the distance along the line through them, y the height (z).
     legend : of an image: a file with lines colour, name.
@@ -84,7 +84,7 @@ def section(
     if (rad is not None) + cut + weak > 1:
         raise CommandError("a SECTION either fills polygons (rad), removes bonds (cut) or changes them")
     if porosity is not None and rad is None:
-        raise CommandError("porosity is for polygons that are filled: give rad")
+        raise CommandError("porosity applies to filled polygons only: give rad")
     if rad is not None and where is not None:
         raise CommandError("new particles (rad) do not accept a RANGE; use only to select polygons")
     placement = Placement(scale, origin, to, line)

@@ -54,7 +54,7 @@ def set_option(sim: Simulation, name: str, value: Any) -> None:
         sim.outdir, sim.folder_made = Path(value), False
     else:
         known = ("gravity", *CHOICES, *NUMBERS, *INTERVALS, "units", "outdir")
-        raise CommandError(f"SET has no option {name}{hint(name, known)}; there are {', '.join(known)}")
+        raise CommandError(f"SET has no option {name}{hint(name, known)}; available: {', '.join(known)}")
     sim.tables_changed()
 
 

@@ -300,7 +300,7 @@ def remove_face_conditions(project: Project, where: Range | None = None) -> None
 def _known(project: Project, *values: Number | None) -> None:
     for value in values:
         if isinstance(value, str) and value not in project.blocks.tables and value not in user_functions.FUNCTIONS:
-            raise CommandError(f"there is no table '{value}'; there is {quoted(project.blocks.tables)}")
+            raise CommandError(f"there is no table '{value}'; available: {quoted(project.blocks.tables)}")
 
 
 # ---- tables --------------------------------------------------------------------------------------------------------
@@ -314,7 +314,7 @@ def table(
     if values is not None:
         project.blocks.table(name, values)
     elif name not in project.blocks.tables:
-        raise CommandError(f"there is no table '{name}' yet: data makes it")
+        raise CommandError(f"no table '{name}' yet: create it with data")
     if relative is not None:
         (project.relative.add if relative else project.relative.discard)(name)
 

@@ -160,5 +160,5 @@ def _named(project: Project, name: str) -> str:
 
 def _chart(project: Project, name: str) -> Chart:
     if name not in project.charts:
-        raise CommandError(f"there is no chart '{name}'; there is {quoted(project.charts)}")
+        raise CommandError(f"there is no chart '{name}'; available: {quoted(project.charts)}")
     return project.charts[name]

@@ -119,7 +119,7 @@ class _Objects:
         if kind in g.FLOW:
             flow = Flow.there(project.blocks)
             if flow is None:
-                raise CommandError("there are no channels yet: assign face-joint c-model hydraulic-porous-medium first")
+                raise CommandError("no channels yet: assign face-joint c-model hydraulic-porous-medium first")
             some, null_too = flow.numbers(kind), False
             self.kind = kind = g.FLOW[kind]
         self.there = there = np.ones(len(mesh.cells), bool) if null_too else project.alive
@@ -304,7 +304,7 @@ class _Objects:
                     f"{supports.class_of(self.kind).word} delete" if self.kind in g.SUPPORTS else "element c-model null"
                 )
                 raise CommandError(f"{self.kind} {first} was removed ({how})")
-            raise CommandError(f"there is no {self.kind} {first}; numbers go from 0 to {int(known[-1])}")
+            raise CommandError(f"there is no {self.kind} {first}; numbers range from 0 to {int(known[-1])}")
         return mask
 
     def _span(self, axis: int, low: float, high: float) -> np.ndarray:
@@ -419,7 +419,7 @@ class _Objects:
     def _solids(self, layer: str) -> list[Solid]:
         if layer not in self.project.layers:
             known = ", ".join(f"'{name}'" for name in {**self.mesh.layers, **dict.fromkeys(self.project.layers)})
-            raise CommandError(f"there is no geometry layer '{layer}'; there is {known or 'none so far'}")
+            raise CommandError(f"there is no geometry layer '{layer}'; available: {known or 'none so far'}")
         return self.project.layers[layer]
 
     def _on_points(self, layer: str) -> np.ndarray:
@@ -435,7 +435,7 @@ class _Objects:
     def _curves(self, layer: str) -> list[geometry.Curve]:
         if layer not in self.project.layers:
             known = ", ".join(f"'{name}'" for name in {**self.mesh.layers, **dict.fromkeys(self.project.layers)})
-            raise CommandError(f"there is no geometry layer '{layer}'; there is {known or 'none so far'}")
+            raise CommandError(f"there is no geometry layer '{layer}'; available: {known or 'none so far'}")
         return self.project.layers[layer]
 
     def _boundary(self) -> np.ndarray:

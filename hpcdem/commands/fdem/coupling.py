@@ -97,7 +97,7 @@ def _warn(both: Coupled) -> None:
     if not options.collision:
         sim.log.warn_once(
             "collision off",
-            "model option collision off: there is no contact between blocks, but contact with particles",
+            "model option collision off: blocks do not interact with each other, only with particles",
         )
 
 

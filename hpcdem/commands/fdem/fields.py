@@ -20,7 +20,7 @@ from hpcdem.physics.fields import kinds
 def of(project: Project, name: str) -> Any:
     """The field of the model; CommandError without one."""
     if name not in kinds():
-        raise CommandError(f"there is no field {name}; there is {', '.join(kinds())}")
+        raise CommandError(f"there is no field {name}; available: {', '.join(kinds())}")
     found = kinds()[name].load_type().there(project.ready())
     if found is None:
         raise CommandError(f"no {name} yet: assign element c-model {kinds()[name].word} first")

@@ -37,7 +37,7 @@ def vtk(project: Project, file: str, every: int | None = None, off: bool = False
     if off:
         if file not in project.frames:
             known = quoted(project.frames, "none")
-            raise CommandError(f"there are no frames '{file}' to stop; there is {known}")
+            raise CommandError(f"there are no frames '{file}' to stop; available: {known}")
         del project.frames[file]
         return
     frames_name(file)

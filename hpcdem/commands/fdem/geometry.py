@@ -87,7 +87,7 @@ def import_file(
     """The lines of a DXF file, or of one of its layers, or of a section in another format; in space the solids of a
     STEP or BREP file, or what the triangles of an STL or DXF file enclose. Collective.
 
-    scale: metres in a unit of the file; None: as the file says, else 1. Of sections: named: each name becomes a layer,
+    scale: metres per unit of the file; None: as given in the file, else 1. Of sections: named: each name becomes a layer,
     and as_layer the outline of all polygons; origin, to, line: see `Placement`; legend, attribute, simplify: see
     `read`.
     """

@@ -51,7 +51,7 @@ def create(
     value law_state, a state variable of user laws that elements have."""
     history_name(name)
     if name in project.histories:
-        raise CommandError(f"there is a history '{name}' already")
+        raise CommandError(f"history '{name}' exists already")
     if value not in UNITS.get(kind, {}):
         raise CommandError(f"a history of {kind} can follow {', '.join(UNITS.get(kind, {}))}, not {value}")
     if value in ENERGIES and project.blocks.budget is None:
@@ -152,7 +152,7 @@ def delete(project: Project, name: str) -> None:
 def find(project: Project, name: str) -> History:
     """A history by its name. CommandError if missing."""
     if name not in project.histories:
-        raise CommandError(f"there is no history '{name}'; there is {quoted(project.histories)}")
+        raise CommandError(f"there is no history '{name}'; available: {quoted(project.histories)}")
     return project.histories[name]
 
 
@@ -209,7 +209,7 @@ def export(project: Project, file: str, names: Sequence[str] = ()) -> None:
     result_name(file)
     wanted = {name: find(project, name) for name in names} or project.histories
     if not wanted:
-        raise CommandError("there is no history to write")
+        raise CommandError("no histories to write")
     by_step: dict[int, dict[str, float]] = {}
     times: dict[int, float] = {}
     for name, history in wanted.items():

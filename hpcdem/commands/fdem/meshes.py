@@ -237,7 +237,7 @@ def import_file(
     scale: float = 1.0,
 ) -> None:
     """A mesh file of another program. Collective. group: one that all elements are put into; merge: points nearer than
-    this are one [m]; scale: metres in a unit of the file."""
+    this are one [m]; scale: metres per unit of the file."""
     path = project.to_read(file)
     found = project.comm.per_node(lambda: imported.read(path, merge, scale, project.dim), once=True)
     for included in found.files:
@@ -404,7 +404,7 @@ def add_element(project: Project, corners: Sequence[int]) -> None:
     points = np.concatenate([known, np.array(project.added[0], np.float64).reshape(-1, project.dim)])
     lost = [number for number in corners if number >= len(points)]
     if lost:
-        raise CommandError(f"there is no node {lost[0]}; there are {len(points)}, numbered from 0")
+        raise CommandError(f"there is no node {lost[0]}; available: {len(points)}, numbered from 0")
     if len(corners) not in ((3, 4) if project.dim == 2 else (4,)):
         raise CommandError(f"an element has {'3 or 4' if project.dim == 2 else '4'} nodes, not {len(corners)}")
     cells = np.array([[*corners, -1][:4]])

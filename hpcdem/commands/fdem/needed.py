@@ -14,9 +14,9 @@ from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import Proppant
 
 LACKS: dict[type[SurfaceLoad], str] = {
-    Flow: "there are no channels yet: assign face-joint c-model hydraulic-porous-medium first",
-    Heat: "there is no heat yet: assign element c-model thermal-iso-heat first",
-    Proppant: "there is no proppant yet: assign face-joint c-model hydraulic-porous-proppant-medium first",
+    Flow: "no channels yet: assign face-joint c-model hydraulic-porous-medium first",
+    Heat: "no heat yet: assign element c-model thermal-iso-heat first",
+    Proppant: "no proppant yet: assign face-joint c-model hydraulic-porous-proppant-medium first",
 }
 _P = TypeVar("_P", bound=SurfaceLoad)
 

@@ -198,7 +198,7 @@ def solve_hydraulic(
     if steady == (time is not None):
         raise CommandError("flow is solved for a time or until it is steady: give either time or steady")
     if auto and time is None:
-        raise CommandError("auto needs a time: steady flow is found by implicit steps")
+        raise CommandError("auto needs a time: steady flow is computed by implicit steps")
     blocks = project.ready()
     flow = Flow.there(blocks)
     if auto and flow is not None and time is not None and _explicit_is_cheaper(project, flow, time, dt, solver):
@@ -248,7 +248,7 @@ def solve_thermal(
     if steady == (time is not None):
         raise CommandError("heat is solved for a time or until it is steady: give either time or steady")
     if steady and dt is not None:
-        raise CommandError("dt needs time: the steady state of heat is found directly")
+        raise CommandError("dt needs time: the steady state of heat is computed directly")
     if dt is not None and not dt > 0.0:
         raise CommandError(f"the time step must be positive, got {dt:g}")
     blocks = project.ready()
@@ -341,7 +341,7 @@ def _tell_of_thin(project: Project, steps: int | None, time: float | None) -> No
         return
     cost = costs.explicit(flow, time)
     if log is not None and isinstance(cost, costs.Cost) and cost.seconds > costs.LONG:
-        what = "stiff fluid in thin fractures" if o.flow_dt == 0.0 else "as model time-step hydraulic says"
+        what = "stiff fluid in thin fractures" if o.flow_dt == 0.0 else "set by model time-step hydraulic"
         log.warn(
             f"{_where(project)}flow by explicit sub-steps, {what}: {cost} on one core; model solve hydraulic uses "
             "implicit steps"

@@ -100,7 +100,7 @@ def frames_name(name: str) -> None:
 def result_name(path: str) -> None:
     """CommandError if a file of the results would come to lie elsewhere without being told so."""
     if not os.path.isabs(path) and os.path.normpath(path).split(os.sep)[0] == os.pardir:
-        raise CommandError(f"'{path}' leads out of the folder of the results; for another folder give an absolute path")
+        raise CommandError(f"'{path}' lies outside the folder of the results; give an absolute path for another folder")
 
 
 def figure_name(path: str) -> None:

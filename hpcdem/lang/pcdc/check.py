@@ -188,7 +188,7 @@ def _loose_names(script: Source) -> list[str]:
                 case Drawn(of):
                     used.append((statement.line, "field", of))
     found = [(line, f"{kind} '{name}'") for line, kind, name in used if name not in made[kind]]
-    return [f"line {line}: no line makes the {what}" for line, what in sorted(found + _loose_groups(script))]
+    return [f"line {line}: no line creates the {what}" for line, what in sorted(found + _loose_groups(script))]
 
 
 def _names(value: Any) -> Iterator[str]:

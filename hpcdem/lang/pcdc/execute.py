@@ -351,7 +351,7 @@ class Interpreter:
         }  # fmt: skip
 
     def _agree(self, index: int, words: str) -> int:
-        """Collective: all ranks are at this command, or LOOK, with these values, or all raise ScriptError. Returns what
+        """Collective: all ranks are at this command, or READ, with these values, or all raise ScriptError. Returns what
         was requested from outside a while ago (runtime.stop_requests), the same on all ranks."""
         comm, stop = self.project.comm, self.project.blocks.stop
         asked = stop.overdue_request() if stop is not None else 0

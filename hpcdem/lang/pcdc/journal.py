@@ -34,9 +34,9 @@ _ERRORS: dict[str, type[HpcdemError]] = {
 
 
 class Journal:
-    """entries, in order: [COMMAND, checksum]; [LOOK, answer]; [NAMES, variables and functions] of a restored file;
+    """entries, in order: [COMMAND, checksum]; [READ, answer]; [NAMES, variables and functions] of a restored file;
     [ERROR, kind, file, line, message] of a command or look that failed; [ASK, checksum] of a method of particles, its
-    LOOK or ERROR follows, or [ALONE, answer] if it sees one rank only (None: there were several); [CALL, number] and
+    READ or ERROR follows, or [ALONE, answer] if it sees one rank only (None: there were several); [CALL, number] and
     [DONE] around what a function did that was called in the middle of a command or method.
 
     functions: those that are called so, by number. keeps_calls: ASK and what follows are kept, as they have not always

@@ -424,7 +424,7 @@ def _advice(kind: Kind, word: Word) -> str:
         return hint(word.text, kind.words)
     if "quotes" in kind.meaning:
         return f"; write {word}, or [{short(word.text)}] for a variable of Python"
-    return f"; a variable of Python stands in brackets: [{short(word.text)}]"
+    return f"; put Python variables in brackets: [{short(word.text)}]"
 
 
 def _shown(value: Any) -> str:

@@ -178,7 +178,7 @@ class _Line:
         """ValueError for a word that is not there in the dimensions of this model."""
         if self.dim is not None and self.dim not in dims:
             numbers = {2: "two", 3: "three"}
-            instead = f"; in three there is {INSTEAD[str(word)]}" if str(word) in INSTEAD else " in this version"
+            instead = f"; in three dimensions use {INSTEAD[str(word)]}" if str(word) in INSTEAD else " in this version"
             advice = "; model new dim 3 makes a model of three" if self.dim == 2 else instead
             raise Refused(f"'{word}' is for {numbers[dims[0]]} dimensions{advice}")
 

@@ -158,9 +158,9 @@ def _implicit(arguments: Mapping[str, Any], part: str) -> None:
     if ("steady" in arguments) == ("time" in arguments):
         raise ValueError(f"{part} needs either time or steady")
     if "auto" in arguments and "steady" in arguments:
-        raise ValueError("auto needs time: steady flow is found by implicit steps")
+        raise ValueError("auto needs time: steady flow is computed by implicit steps")
     if part == "thermal" and {"steady", "dt"} <= arguments.keys():
-        raise ValueError("dt needs time: the steady state of heat is found directly")
+        raise ValueError("dt needs time: the steady state of heat is computed directly")
 
 
 def _creep(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:

@@ -363,8 +363,8 @@ FIELDS_AT_FACES = {
     one.name: Model(
         one.on_faces, "", f"The flow of {one.name} through surfaces; without it surfaces are impermeable. Times of "
         "tables are those of the field.",
-        (Option("flux", (TABLED,), "what comes in", one.flux),
-         Option("transfer", (NOT_NEGATIVE,), "flow to the environment over the difference to it", one.transfer,
+        (Option("flux", (TABLED,), "inflow per area", one.flux),
+         Option("transfer", (NOT_NEGATIVE,), "flow to the environment per difference in value", one.transfer,
                 "that of the elements"),
          Option("environment", (TABLED,), "value of the environment", one.unit)), any_of=True, dims=BOTH,
                  does="fields.face_condition", of_field=one.name, by_time=True)
@@ -471,7 +471,7 @@ CONST_HEAT = Model(
     "therm{al}-c{onst}-h{eat}", "16",
     "Heat through surfaces, which are adiabatic without it; inner faces follow it once they are free. Times of tables "
     "are those of heat.",
-    (Option("h{eat}-f{lux}", (TABLED,), "heat that comes in", "W/m2"),
+    (Option("h{eat}-f{lux}", (TABLED,), "heat inflow per area", "W/m2"),
      Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer to the environment", "W/(m2 K)",
             "that of the elements",
             also=(*_COEFFICIENTS["transfer-coeficient"], "h{eat}-t{ransfer}-c{oefficent}")),
@@ -783,7 +783,7 @@ _MODEL = (
             "property, with the factor that may be missing; histories and charts show the units. No value is "
             "changed.", ("pcdc model units SI", "pcdc model units mm-MPa-s"),
             (_leading("system", choice(*UNITS), ", ".join(UNITS.values())),), dims=BOTH, does="settings.units"),
-    Command("mod{el} opt{ion}", "Switches of the calculation.",
+    Command("mod{el} opt{ion}", "Sets options of the calculation.",
             ("pcdc model option dynamic off", "pcdc model option collision on"),
             options=(
                 Option("dyn{amic}", (BOOL,), "true motion in time; off: static, towards equilibrium", default="on"),
@@ -817,7 +817,7 @@ _MODEL = (
             "value, mass-scaling and auto on applies and replaces the others.",
             ("pcdc model time-step auto off", "pcdc model time-step 1e-7", "pcdc model time-step value 0",
              "pcdc model time-step table 'dt'", "pcdc model time-step auto update-frequency 20"),
-            (_leading("value", TABLED_STEP, "as the word value", "s", False),),
+            (_leading("value", TABLED_STEP, "same as value", "s", False),),
             (
                 Option("value", (TABLED_STEP,), "the time step; 0: estimated automatically; a table over time is "
                        "evaluated every 100 steps", "s"),
@@ -923,12 +923,12 @@ _MODEL = (
             (_leading("steps", COUNT, "steps"),), dims=BOTH, idle=_WINDOW),
     Command("mod{el} r{ender}-a{uto}", "Draws the window automatically.", ("pcdc model render-auto",),
             (_leading("on", BOOL, "whether it is drawn", required=False),), dims=BOTH, idle=_WINDOW),
-    Command("mod{el} c{ollision}-d{etect}", "How contacts are searched.", ("pcdc model collision-detect bvh",),
+    Command("mod{el} c{ollision}-d{etect}", "Selects the contact search.", ("pcdc model collision-detect bvh",),
             options=tuple(Option(word, (), doc) for word, doc in (
                 ("bvh", "by a tree of boxes"), ("sap", "along an axis"), ("unif{orm}", "by cells"),
                 ("unform", "by cells, too"), ("b{roken}-j{oint}-p{air}", "between broken faces"))),
             needs_option=True, dims=BOTH, idle="hpcdem has a single search, which finds every contact in time"),
-    Command("mod{el} c{ollision}-c{ompute}", "How the force of a contact is computed.",
+    Command("mod{el} c{ollision}-c{ompute}", "Selects how contact forces are computed.",
             ("pcdc model collision-compute accurate",),
             options=(Option("accurate", (), "over the overlap"), Option("iterate", (), "step by step")),
             needs_option=True, dims=BOTH, idle="the force of a contact is always computed over its complete overlap"),
@@ -1106,7 +1106,7 @@ _GEOMETRY = (
              "pcdc geometry import 'wedge.png' legend 'wedge.txt' scale 12.5 simplify 25 named as-layer 'outline'"),
             (_leading("file", FILE, "name of the file"),),
             (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all"),
-             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "the unit given in STEP, DXF and .prj "
+             Option("scale", (POSITIVE,), "metres per unit of the file", "m", "the unit given in STEP, DXF and .prj "
                                                                                "files, else 1"),
              Option("named", (), "each name in the section becomes a layer, and as-layer the outline of all its "
                                  "polygons", dims=PLANE),
@@ -1139,7 +1139,7 @@ _GEOMETRY = (
              "pcdc geometry export 'fault' file 'fault.geojson' origin (512300,0) to (0,100)"),
             (_leading("layers", STRINGS, "names of the layers"),),
             (Option("f{ile}", (FILE,), "name of the file, in the folder of the results", required=True),
-             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1"), *_PLACEMENT),
+             Option("scale", (POSITIVE,), "metres per unit of the file", "m", "1"), *_PLACEMENT),
             does="geometry.export"),
     Command("geom{etry} d{elete}", "Forgets layers.", ("pcdc geometry delete 'hole'", "pcdc geometry delete 'a' 'b'"),
             (_leading("layers", STRINGS, "names of the layers"),), dims=BOTH, does="geometry.delete"),
@@ -1210,13 +1210,13 @@ _MESH = (
             (Option("group", (STRING,), "a group for all elements, in addition to those of the file",
                     more=(SET,)),
              Option("merge", (NOT_NEGATIVE,), "points nearer than this are merged", "m", "0"),
-             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1")), dims=BOTH,
+             Option("scale", (POSITIVE,), "metres per unit of the file", "m", "1")), dims=BOTH,
             also=("mod{el} imp{ort} gmsh", "mod{el} imp{ort} abaqus"), does="meshes.import_file"),
     Command("mesh int{ersect}", "Turns the joints on a layer into cracks: the edges of the mesh that lie on it.",
             ("pcdc mesh intersect layer 'fault'",),
             options=(Option("layer", (STRING,), "its lines are edges of the mesh, its surfaces faces", required=True),
-                     Option("follow", (), "they are not: uses the edges that follow them best, or the faces between "
-                            "elements on either side")), dims=BOTH, does="meshes.intersect"),
+                     Option("follow", (), "for lines that are not edges: uses the edges that follow them "
+                            "best, or the faces between elements on either side")), dims=BOTH, does="meshes.intersect"),
     Command("mesh glue", "Connects separately meshed bodies where their faces coincide; the faces become joints like "
             "those inside a body. Elements are cut at hanging nodes. With a range only faces of its elements are "
             "glued, to any others.",
@@ -1327,7 +1327,8 @@ _OBJECTS = (
             does="settings.collision"),
     Command("e{lement} w{ater}", "Water pressure on the surface of the model: depth below a water line times density "
             "and gravity, on all free faces of these elements below the line, also on parts of faces, as they move. "
-            "The line runs from left to right; beyond its ends is no water. The last command replaces earlier ones.",
+            "The line runs from left to right; there is no water beyond its ends. The last command replaces "
+            "earlier ones.",
             ("pcdc element water surface 'lake' density 1000", "pcdc element water surface 'lake' density 0"),
             options=(Option("s{urface}", (STRING,), "layer of the water line, in three dimensions of planes and "
                             "polygons", required=True),
@@ -1582,7 +1583,7 @@ _RECORDS = (
             "a condition starts to use it.",
             ("pcdc table 'ramp' data 0 0, 0.1 2e6, 1 2e6", "pcdc table 'ramp' data 0 0 0.1 2e6 type relative-time"),
             (_NAME,), (Option("d{ata}", (PAIRS,), "time and value, in turn", "s"),
-                       Option("t{ype}", (), "what its times count from",
+                       Option("t{ype}", (), "origin of its times",
                               more=(Option("r{elative}-t{ime}", (), "the moment when a condition starts to use it"),
                                     Option("a{bsolute}-t{ime}", (), "the beginning of the model")))),
             needs_option=True, dims=BOTH, does="table"),
@@ -1704,7 +1705,7 @@ _ONLINE = (
     Command("dev{ice} s{witch}-t{o}", "Another device.", ("pcdc device switch-to 'GPU 0'",),
             (_leading("name", STRING, "its name"),), dims=BOTH,
             idle="a run uses the ranks and threads given at its start (mpirun -n, -j)"),
-    Command("v{iew}", "What a window shows.", ("pcdc view 'stress' target element name 'stress-yy'",), (_NAME,),
+    Command("v{iew}", "Selects what is shown.", ("pcdc view 'stress' target element name 'stress-yy'",), (_NAME,),
             options=(Option("t{arget}", (), "of what", more=tuple(
                 Option(word, (), doc, more=(Option("n{ame}", (STRING,), "the field"),)) for word, doc in (
                     ("e{lement}", "elements"), ("f{ace}-j{oint}", "joints"), ("geo{metry}", "layers"),

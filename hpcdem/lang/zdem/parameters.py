@@ -69,5 +69,5 @@ class Parameters:
             if name not in self.used:
                 raise ScriptError(
                     self.file, parameter.token.line,
-                    f"parameter {name} is never used; write {{{name}}} in place of the number",
+                    f"parameter {name} is never used; write {{{name}}} instead of the number",
                 )  # fmt: skip

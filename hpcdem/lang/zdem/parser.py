@@ -240,7 +240,7 @@ class _LineParser:
         if lexer.number(token) is not None:
             self.unexpected(token, f"one of {names}; is there a number too many?")
         near = hint(token.word, [row.name for row in self.table.range_terms])
-        self.unexpected(token, f"one of {names} (RANGE stands last)", near)
+        self.unexpected(token, f"one of {names} (RANGE must be last)", near)
 
     def term(self, row: t.Option) -> sel.Selection:
         value = self.value(row)
@@ -389,7 +389,7 @@ class _LineParser:
             if not token.text.isidentifier():
                 self.unexpected(token, f"{kind.meaning} for {name}")
             if token.text in found:
-                self.fail(f"{self.context}: {name} {token.text} stands twice")
+                self.fail(f"{self.context}: {name} {token.text} is given twice")
             what = f"a number for {name} {token.text}"
             found[token.text] = self.plain_number(self.next(what), what)
             after = self.line.tokens[self.at : self.at + 2]

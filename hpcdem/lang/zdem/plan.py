@@ -199,7 +199,7 @@ def _imple(index: int, statement: Statement, known: _Known) -> Run:
         per_step = abs(speed) * known.dt
         steps = abs(distance) / per_step if per_step > 0.0 else math.inf
         if steps > LARGEST_WHOLE:
-            raise statement.error(f"{abs(distance):g} m would take {steps:g} steps")
+            raise statement.error(f"{abs(distance):g} m would need {steps:g} steps")
         return math.floor(steps + 0.5)
 
     every: dict[str, int | None] = {}

@@ -91,7 +91,7 @@ def _section(s: Statement) -> None:
     if weak and weak[-1] in BOND_MODEL_2 and weak[0] in BOND_MODEL_1:
         raise s.error(f"{weak[0]} and {weak[-1]} belong to different bond models; a bond is of one model")
     if "porosity" in s.arguments and "rad" not in s.arguments:
-        raise s.error("porosity is for polygons that are filled: give rad")
+        raise s.error("porosity applies to filled polygons only: give rad")
     if "rad" in s.arguments and s.selection is not None:
         raise s.error("RANGE selects existing particles, rad makes new ones; select polygons by only")
     if not is_section(s.get("file")):

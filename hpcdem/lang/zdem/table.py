@@ -569,7 +569,7 @@ COMMANDS = (
         source="X",
         leading=(Option("file", "section file", kind=FILE, required=True, source="X"),),
         options=(
-            Option("scale", "metres in a unit of the file", kind=POSITIVE, unit="m", default="the unit of the file, "
+            Option("scale", "metres per unit of the file", kind=POSITIVE, unit="m", default="the unit of the file, "
                    "else 1", source="X"),
             Option("origin", "point of the file, in its units, that is moved to `to`", kind=POINT, default="0 0",
                    source="X"),

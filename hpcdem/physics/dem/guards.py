@@ -63,7 +63,7 @@ def stop_on_runaway(
     rows = sorted(row for part in comm.allgather(mine) for row in part)[:NAMED]
     total = int(comm.sum_into(np.array([bad.sum()], dtype=np.int64))[0])
     what = "a number is not finite" if broken else "a particle moves over half its radius per step"
-    guess = f"the time step {dt:g} s is probably too large, or particles were made overlapping"
+    guess = f"the time step {dt:g} s is probably too large, or particles were created with overlaps"
     if broken and mixed_laws:
         guess = "some particles have different laws, and no law is assigned to pairs of them"
     named = "\n".join(

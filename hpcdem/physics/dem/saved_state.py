@@ -135,7 +135,7 @@ def tables_of(sim: Simulation) -> dict[str, Table]:
 def add_physics(sim: Simulation, name: str, parameters: dict[str, Any]) -> None:
     """Physics beside motion, by its name, with its parameters. CommandError for what there is not. Collective."""
     if name not in PHYSICS:
-        raise CommandError(f"there is no physics '{name}'; there are {', '.join(PHYSICS)}")
+        raise CommandError(f"there is no physics '{name}'; available: {', '.join(PHYSICS)}")
     sim.prepare_kernels(name)
     kind: Any = PHYSICS[name]()
     try:

@@ -225,7 +225,7 @@ def quantity(sim: Blocks, name: str) -> Quantity:
     there = [one for one, about in QUANTITIES.items() if sim.dim in about.dims]
     if name not in there:
         plane = f" in {'two' if sim.dim == 2 else 'three'} dimensions" if name in QUANTITIES else ""
-        raise CommandError(f"there is no quantity {name}{plane}; there are {', '.join(there)}")
+        raise CommandError(f"there is no quantity {name}{plane}; available: {', '.join(there)}")
     return QUANTITIES[name]
 
 

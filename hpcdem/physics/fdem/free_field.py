@@ -260,7 +260,10 @@ class FreeField(SurfaceLoad):
             self._given[i] = held or one.does_x != moving.FREE, held or one.does_y != moving.FREE
             if one.constraint == moving.ALONG:
                 if min(abs(way) for way in one.way) > UPRIGHT:
-                    return f"node {point} at the base of a free-field side moves along {one.way}: not along x or y"
+                    return (
+                        f"node {point} at the base of a free-field side moves along {one.way}, but must move along x "
+                        "or y"
+                    )
                 self._given[i, 1 if abs(one.way[0]) > 0.5 else 0] = True
             found = quiet[(ends == point).any(axis=1)]
             below[i] = found[0] if len(found) else -1

@@ -61,7 +61,7 @@ class Groups:
     def of_set(self, set_name: str) -> dict[str, np.ndarray]:
         """The groups of a set. CommandError if missing."""
         if set_name not in self.sets:
-            raise CommandError(f"there is no set '{set_name}' of {self.kind}s; there is {_listed(self.sets)}")
+            raise CommandError(f"there is no set '{set_name}' of {self.kind}s; available: {_listed(self.sets)}")
         return self.sets[set_name]
 
     def state(self) -> dict[str, dict[str, list[list[int]]]]:

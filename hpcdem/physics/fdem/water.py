@@ -67,7 +67,7 @@ class Water(SurfaceLoad):
             higher = height > best
             best[higher], which[higher] = height[higher], first + k + 1
         if density and not (which > 0).any():
-            raise CommandError("no face of these elements lies below the water line; beyond its ends is no water")
+            raise CommandError("no face of these elements lies below the water line; there is no water beyond its ends")
         if known is None and not density:
             return 0
         blocks.before_change()

@@ -47,7 +47,7 @@ def checked(tables: Mapping[str, Table], value: Number, what: str) -> np.ndarray
     if isinstance(value, str):
         if value not in tables:
             known = ", ".join(f"'{name}'" for name in tables) or "none so far"
-            raise CommandError(f"there is no table '{value}'; there is {known}")
+            raise CommandError(f"there is no table '{value}'; available: {known}")
         values = tables[value].values
     else:
         values = np.array([value], np.float64)

@@ -101,7 +101,7 @@ class FlowAssignments(Assigned, Field):
         """Return those of these points (None: all) that are flow nodes."""
         there = self.network.there
         if not len(self.network.channels):
-            raise CommandError("there are no channels yet: assign face-joint c-model hydraulic-porous-medium first")
+            raise CommandError("no channels yet: assign face-joint c-model hydraulic-porous-medium first")
         asked = np.flatnonzero(there) if points is None else self.blocks.numbers_of_nodes(points)
         found = asked[there[asked]]
         if not len(found):
@@ -203,7 +203,7 @@ class FlowAssignments(Assigned, Field):
     def drill(self, name: str, nodes: np.ndarray | None) -> None:
         """Flow nodes among these points (None: all) are a well."""
         if any(well.name == name for well in self.wells):
-            raise CommandError(f"there is a well '{name}' already")
+            raise CommandError(f"well '{name}' exists already")
         try:
             at = self.flow_nodes(nodes)
         except CommandError as error:
@@ -230,7 +230,7 @@ class FlowAssignments(Assigned, Field):
         found = next((well for well in self.wells if well.name == name), None)
         if found is None:
             known = ", ".join(f"'{well.name}'" for well in self.wells) or "none so far"
-            raise CommandError(f"there is no well '{name}'; there is {known}")
+            raise CommandError(f"there is no well '{name}'; available: {known}")
         return found
 
     def stage(self, name: str, does: str, value: Number, duration: float, limit: float) -> None:
@@ -250,7 +250,7 @@ class FlowAssignments(Assigned, Field):
     def well_value(self, name: str, quantity: str) -> float:
         """A quantity of `wells.QUANTITIES`. Not collective."""
         if quantity not in OF_WELLS:
-            raise CommandError(f"there is no quantity {quantity} of a well; there are {', '.join(OF_WELLS)}")
+            raise CommandError(f"there is no quantity {quantity} of a well; available: {', '.join(OF_WELLS)}")
         well = self.well(name)
         return float(well.number(self.time) if quantity == "stage" else getattr(well, quantity))
 

@@ -55,7 +55,7 @@ class Coupled(System):
     def __init__(self, sim: Blocks, longest: float, solver: str = "auto") -> None:
         flow = Flow.there(sim)
         if flow is None or not len(flow.network.channels):
-            raise CommandError("there are no channels yet: assign face-joint c-model hydraulic-porous-medium first")
+            raise CommandError("no channels yet: assign face-joint c-model hydraulic-porous-medium first")
         if not longest > 0.0 or solver not in equilibrium.SOLVERS:
             raise CommandError(
                 f"the time step must be positive, solver one of {', '.join(equilibrium.SOLVERS)}, got {longest:g}, "

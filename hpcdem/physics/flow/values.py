@@ -99,7 +99,7 @@ class Values(Faces):
     def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
         """A quantity of `QUANTITIES` of flow nodes or channels (None: all), on all ranks; NaN where missing."""
         if name not in QUANTITIES[kind]:
-            raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(QUANTITIES[kind])}")
+            raise CommandError(f"there is no quantity {name} of a {kind}; available: {', '.join(QUANTITIES[kind])}")
         mine = self.owned_values(kind, [name])
         numbers = self.numbers(kind) if numbers is None else numbers
         found = np.full(int(max(numbers.max(initial=-1), mine["number"].max(initial=-1))) + 1, math.nan)

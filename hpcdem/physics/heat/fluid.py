@@ -94,7 +94,7 @@ class FluidHeat(Assigned, Travelling):
         at = self.flow.network.channels if joints is None else self.blocks.numbers_of_joints(joints)
         dry = at[self.flow.row[at] == 0]
         if len(dry) or not len(at):
-            which = f"joint {dry[0]} is no channel" if len(dry) else "there are no channels yet"
+            which = f"joint {dry[0]} is no channel" if len(dry) else "no channels yet"
             raise CommandError(f"{which}: assign face-joint c-model hydraulic-porous-medium first")
         super().assign(at, given)
 

@@ -37,7 +37,7 @@ class Implicit:
         """CommandError for what implicit steps cannot do."""
         heat = Heat.there(sim)
         if heat is None or not heat.rows:
-            raise CommandError("there is no heat yet: assign element c-model thermal-iso-heat first")
+            raise CommandError("no heat yet: assign element c-model thermal-iso-heat first")
         if solver not in equilibrium.SOLVERS:
             raise CommandError(f"solver is one of {', '.join(equilibrium.SOLVERS)}, got {solver}")
         if not sim.options.thermal:

@@ -71,7 +71,7 @@ class Heat(Diffusing):
         if self.fluid is None:
             flow = Flow.there(self.blocks)
             if flow is None:
-                raise CommandError("there are no channels yet: assign face-joint c-model hydraulic-porous-medium first")
+                raise CommandError("no channels yet: assign face-joint c-model hydraulic-porous-medium first")
             self._need_model()
             self.fluid = FluidHeat(self, flow)
         return self.fluid

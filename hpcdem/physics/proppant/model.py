@@ -296,8 +296,8 @@ class Proppant(ProppantAssignments):
             self.sub_steps = max(1, math.ceil(dt / (COURANT * least)))
             if self.sub_steps > MANY:
                 raise CommandError(
-                    f"proppant would need {self.sub_steps} sub-steps in a step of flow of {dt:.3g} s: shorter ones are "
-                    "needed"
+                    f"proppant would need {self.sub_steps} sub-steps in a step of flow of {dt:.3g} s: reduce the time "
+                    "step of flow"
                 )
             self._tell_stale(dt, least)
         count = self.sub_steps

@@ -400,7 +400,7 @@ def _fluid_curves(panels: Sequence[Any], parts: Sequence[Part], power: int) -> N
     size = size**power
     what = f"length of channels ({unit})" if power == 1 else f"area of channels ({unit}²)"
     a.plot(at, [f.size / size for f in some], _marks(len(at)), ms=2.5, lw=1.2, color=LINES[0], label="wet")
-    a.plot(at, [f.open_size / size for f in some], "--", lw=1.0, color=INK, label="of it open")
+    a.plot(at, [f.open_size / size for f in some], "--", lw=1.0, color=INK, label="of these, open")
     label(a, None, what)
     key(a, loc="upper left")
     pressure, kind = _in_unit([f.pressure for f in some], "Pa")

@@ -429,10 +429,10 @@ def damage(done: Done, plan: Plan, final: Grains, log: np.ndarray | None = None)
     seen = section_view(final)
     figure, (a, b, ax) = page([4.6, 4.0, section_height(seen)], [GAP, 1.3])
     a.plot(at, c.broken, "o-", ms=2.5, lw=1.2, color=INK, label="broken")
-    a.plot(at, c.parted, lw=1.0, color=RIGHTWARD, label="of these come apart")
+    a.plot(at, c.parted, lw=1.0, color=RIGHTWARD, label="of these, open")
     a.plot(at, c.broken - c.parted, lw=1.0, color=LEFTWARD, label="still touching")
     if c.lost[-1]:
-        a.plot(at, c.lost, lw=1.0, ls=":", color="#606060", label="gone with deleted particles")
+        a.plot(at, c.lost, lw=1.0, ls=":", color="#606060", label="lost with deleted particles")
     if log is not None:
         a.plot(log[:, 0] / 1000.0, log[:, 1], "--", lw=0.9, color=RIGHTWARD, label="in tension (log)")
         a.plot(log[:, 0] / 1000.0, log[:, 2], "--", lw=0.9, color=LEFTWARD, label="in shear (log)")

@@ -93,7 +93,7 @@ def _tell(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
     count = "1 frame" if first is last else f"{len(plan.frames)} frames, {first.path.stem} to {last.path.stem}"
     row = f"{len(plan.row)} particles fixed along x and y push" if len(plan.row) else "no wall moves along x"
     wall = row if plan.wall is None else f"wall {plan.wall} moves"
-    hint = "; --from 0 for those before it moves" if plan.request.first is None and first.step > 0 else ""
+    hint = "; --from 0 includes the frames before it moves" if plan.request.first is None and first.step > 0 else ""
     log.info(f"{count}; {wall}{hint}; columns of {plan.cell:g} m")
     held, of_bed = int(final.fixed.sum()), [kind for kind in ("surface", "wedge", "tracks") if kind in what]
     if held and of_bed and held < len(final):
@@ -402,7 +402,7 @@ def _wallforce(request: Request) -> list[Path]:
         raise _NothingThere(f"wallforce: {path} has no rows of these steps")
     missing = [wall for wall in request.walls if wall not in found]
     if missing:
-        raise UsageError(f"--wall {missing[0]}: not in {path}; there are {', '.join(map(str, sorted(found)))}")
+        raise UsageError(f"--wall {missing[0]}: not in {path}; available: {', '.join(map(str, sorted(found)))}")
     driver = curves.driver(found)
     asked = request.walls or tuple(wall for wall in found if wall not in sides_of_box(found)) or tuple(found)
     chosen = {wall: found[wall] for wall in asked}

@@ -34,7 +34,7 @@ KINDS = (".step", ".stp", ".brep", ".stl", ".dxf")
 
 
 def read(path: Path, layer: str | None = None, scale: float | None = None, notes: list[str] | None = None) -> list[Any]:
-    """The bodies of a file [m]; layer: only this one of a DXF file; scale: metres in a unit of the file (STEP and DXF
+    """The bodies of a file [m]; layer: only this one of a DXF file; scale: metres per unit of the file (STEP and DXF
     files name theirs); notes: receives messages. HpcdemError with the file name for what is missing."""
     notes = [] if notes is None else notes
     kind = path.suffix.lower()
@@ -54,8 +54,8 @@ def read(path: Path, layer: str | None = None, scale: float | None = None, notes
         return [_shell(path, _faces(path, layer, scale, notes))]
     taken = 1.0 if scale is None else scale
     notes.append(
-        f"files *{kind} name no unit: a unit is {taken:g} m, "
-        + ("as scale says" * (scale is not None) or "taken as metres")
+        f"files *{kind} define no unit: 1 unit = {taken:g} m, "
+        + ("set by scale" * (scale is not None) or "interpreted as metres")
     )
     return [_shell(path, taken * _triangles(path, notes))] if kind == ".stl" else _solids(path, taken)
 

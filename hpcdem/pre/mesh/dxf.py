@@ -45,10 +45,10 @@ def metres(document: Any, scale: float | None, notes: list[str]) -> float:
     """Metres in a unit of the drawing: as given, else by its header ($INSUNITS), else 1; notes: gets what was taken."""
     code = int(document.header.get("$INSUNITS", 0))
     name, factor = UNITS.get(code, ("", 1.0))
-    unit_text = f"the drawing is in {name} ($INSUNITS {code})" if name else "the drawing names no unit ($INSUNITS)"
+    unit_text = f"the drawing is in {name} ($INSUNITS {code})" if name else "the drawing defines no unit ($INSUNITS)"
     taken = factor if scale is None else scale
-    how = "as scale says" if scale is not None else "scale says otherwise" if name else "taken as metres"
-    notes.append(f"{unit_text}: a unit is {taken:g} m, {how}")
+    how = "set by scale" if scale is not None else "replaced by scale" if name else "interpreted as metres"
+    notes.append(f"{unit_text}: 1 unit = {taken:g} m, {how}")
     return taken
 
 

@@ -42,7 +42,7 @@ def polygons(section: Section, file: str) -> np.ndarray:
         raise HpcdemError(
             f"{file}: {len(wrong)} polygons cross or touch themselves: {'; '.join(wrong[:MOST])}"
             + (f"; and {len(wrong) - MOST} more" if len(wrong) > MOST else "")
-            + ". Mend them in the drawing"
+            + ". Correct them in the drawing"
         )
     found = np.empty(len(made), object)
     found[:] = made
@@ -114,7 +114,7 @@ def _overlaps(section: Section, made: np.ndarray) -> list[str]:
         one, other = (section.polygons[i] for i in (first[k], second[k]))
         found.append(
             f"'{one.name}' ({one.where}) and '{other.name}' ({other.where}) overlap by {area[k]:.4g} m2 at "
-            f"{_place(common[k])}; '{other.name}', which is later in the file, counts there"
+            f"{_place(common[k])}; '{other.name}', which is later in the file, takes precedence there"
         )
     return _first(found, "overlaps")
 
@@ -131,7 +131,7 @@ def _gaps(made: np.ndarray) -> list[str]:
     narrow = [one for one in narrow if not any(ring.covers(one) for ring in inner)]
     found = []
     for one in sorted([*(ring for ring in inner if ring.area > least), *narrow], key=lambda one: -one.area):
-        found.append(f"gap between polygons: {one.area:.4g} m2 at {_place(one)}; nothing is there")
+        found.append(f"gap between polygons: {one.area:.4g} m2 at {_place(one)}; it remains empty")
     return _first(found, "gaps")
 
 

@@ -9,14 +9,16 @@ from hpcdem.pre.section.found import Found
 def read_dxf(found: Found) -> None:
     """Polygons and lines of the model space; arcs stay arcs. Kinds that are neither are counted."""
     if found.placement.line is not None:
-        raise found.refuse("line is for maps with heights (GeoJSON, shapefiles); a DXF section lies in its x-y plane")
+        raise found.refuse(
+            "line applies to maps with heights (GeoJSON, shapefiles); a DXF section lies in its x-y plane"
+        )
     drawing = dxf.opened(found.path)
     code = int(drawing.header.get("$INSUNITS", 0))
     if code in dxf.UNITS:
         name, found.metres = dxf.UNITS[code]
         found.unit = f"the drawing is in {name} ($INSUNITS {code})"
     else:
-        found.unit = "the drawing names no unit ($INSUNITS)"
+        found.unit = "the drawing defines no unit ($INSUNITS)"
     for layer, curves in dxf.curves(drawing, found.path, dropped=found.dropped).items():
         for number, curve in enumerate(curves):
             if curve.segments:

@@ -54,7 +54,7 @@ def filled(section: Section, radii: np.ndarray, porosity: float, seed: int, stre
         expected = int(wanted / (np.pi * float(np.mean(radii**2)))) + 1
         if expected > MOST_DISCS:
             raise CommandError(
-                f"'{section.polygons[number].name}' would take {expected} discs, at most {MOST_DISCS} are possible; "
+                f"'{section.polygons[number].name}' would need {expected} discs, at most {MOST_DISCS} allowed; "
                 "check scale and rad"
             )
         made, overlap = _fill(area, radii, wanted, expected, seed, (stream << 20) + 2 * number, section, number)
@@ -83,8 +83,8 @@ def _fill(
     if inner.is_empty:
         shape = section.polygons[number]
         raise CommandError(
-            f"the polygon '{shape.name}' ({shape.where}) is too narrow for a disc of radius {radii.max():g} m; take "
-            "smaller radii, or leave it out with only"
+            f"the polygon '{shape.name}' ({shape.where}) is too narrow for a disc of radius {radii.max():g} m; use "
+            "smaller radii, or exclude it with only"
         )
     draws = uniforms(seed, stream, np.arange(4 * expected + 8))
     r = radii[np.minimum((draws * len(radii)).astype(np.int64), len(radii) - 1)]
@@ -106,8 +106,8 @@ def _scattered(area: Any, n: int, seed: int, stream: int) -> np.ndarray:
         columns, rows = int((x1 - x0) / side) + 2, int((y1 - y0) / (side * np.sqrt(0.75))) + 2
         if columns * rows > MOST_POINTS:
             raise CommandError(
-                f"the polygon at ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m is hardly wider than its discs; take smaller "
-                "radii, or leave it out with only"
+                f"the polygon at ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m is hardly wider than its discs; use smaller "
+                "radii, or exclude it with only"
             )
         row, column = np.divmod(np.arange(columns * rows), columns)
         at = np.column_stack([x0 + side * (column + 0.5 * (row % 2) - 0.25), y0 + side * np.sqrt(0.75) * row])

@@ -30,7 +30,7 @@ class Found:
         self.notes: list[str] = []
         self.warnings: list[str] = []
         self.metres: float | None = None
-        self.unit = "the file names no unit"
+        self.unit = "the file defines no unit"
         self.axes = "y upwards"
         self.beside = 0.0
         self.points = 0

@@ -73,11 +73,11 @@ def read_image(found: Found, legend: Path | None) -> None:
     if legend is None:
         raise found.refuse("an image needs a legend: a file with lines colour, name")
     if found.placement.line is not None:
-        raise found.refuse("line is for maps with heights (GeoJSON, shapefiles), not for images")
+        raise found.refuse("line applies to maps with heights (GeoJSON, shapefiles), not for images")
     entries = read_legend(legend)
     pixels = _pixels(found)
     label = _labels(found, pixels, entries)
-    found.unit = "a unit is a pixel"
+    found.unit = "1 unit = 1 pixel"
     found.axes = f"y upwards from the lower edge; the image is {label.shape[1]} x {label.shape[0]} pixels"
     for k, entry in enumerate(entries):
         share = float((label == k).sum())
@@ -93,7 +93,7 @@ def _pixels(found: Found) -> np.ndarray:
     try:
         with Image.open(found.path) as image:
             if image.width * image.height > MOST_PIXELS:
-                raise found.refuse(f"{image.width} x {image.height} pixels; at most {MOST_PIXELS} are possible")
+                raise found.refuse(f"{image.width} x {image.height} pixels; at most {MOST_PIXELS} allowed")
             return np.asarray(image.convert("RGBA"))[::-1]
     except (OSError, UnidentifiedImageError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise found.refuse(f"not a readable image ({error})") from None

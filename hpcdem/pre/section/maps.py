@@ -29,7 +29,7 @@ def read_geojson(found: Found) -> None:
     if not isinstance(data, dict) or not isinstance(data.get("type"), str):
         raise found.refuse("not a GeoJSON file: it has no type")
     _refuse_degrees(found, json.dumps(data.get("crs", "")))
-    found.unit = "GeoJSON names no unit"
+    found.unit = "GeoJSON defines no unit"
     for number, feature in enumerate(_features(found, data)):
         attributes = feature.get("properties") or {}
         if not isinstance(attributes, dict):
@@ -107,9 +107,9 @@ def _points(rows: Any) -> np.ndarray:
     """(n, 2) or, where all have heights, (n, 3)."""
     least = min(len(row) for row in rows)
     if least < 2:
-        raise ValueError("a position has less than two numbers")
+        raise ValueError("a position has fewer than two numbers")
     if any(isinstance(value, str | bool) for row in rows for value in row):
-        raise ValueError("a position has something other than numbers")
+        raise ValueError("a position contains something other than numbers")
     return np.array([row[: min(least, 3)] for row in rows], np.float64)
 
 

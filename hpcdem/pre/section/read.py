@@ -82,12 +82,12 @@ def read(
     if found.dropped:
         warnings.append(f"ignored: {found.left_out()}")
     if placement.unit is not None:
-        how = "as scale says"
+        how = "set by scale"
     else:
-        how = "as the file says" if found.metres else "interpreted as metres"
-    notes = [f"{found.unit}: a unit is {unit:g} m, {how}; {found.axes}"]
+        how = "as given in the file" if found.metres else "interpreted as metres"
+    notes = [f"{found.unit}: 1 unit = {unit:g} m, {how}; {found.axes}"]
     if placement.line is not None:
-        notes.append(f"points are up to {found.beside * unit:g} m beside the line of the section")
+        notes.append(f"points are up to {found.beside * unit:g} m off the line of the section")
     return replace(section, notes=(*notes, *found.notes, *summary(section)), warnings=tuple(warnings))
 
 

@@ -67,7 +67,7 @@ class Placement:
 
     def __post_init__(self) -> None:
         if self.unit is not None and not (math.isfinite(self.unit) and self.unit > 0.0):
-            raise CommandError(f"scale: metres in a unit of the file, above 0, got {self.unit:g}")
+            raise CommandError(f"scale: metres per unit of the file, above 0, got {self.unit:g}")
         for name, at in (("origin", self.origin), ("to", self.to), *(("line", at) for at in self.line or ())):
             if len(at) != 2 or not all(math.isfinite(c) for c in at):
                 raise CommandError(f"{name}: expected two finite coordinates, got {tuple(at)}")

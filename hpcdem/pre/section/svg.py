@@ -30,7 +30,7 @@ def read_svg(found: Found) -> None:
     box = page.viewbox
     matrix = ~elements.Matrix(page.viewbox_transform or "")
     height = float(page.height) if box is None or page.height is None else float(box.height) + float(box.y or 0.0)
-    found.unit = "an SVG drawing has no unit of the model"
+    found.unit = "an SVG drawing defines no unit"
     found.axes = f"y upwards from the bottom of the page, which is {height:g} units high"
     _walk(found, elements, page, matrix, height, "")
 

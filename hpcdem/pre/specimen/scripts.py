@@ -96,7 +96,8 @@ def size():
 class Servo:
     """Holds walls at a stress: inward speed = GAIN error + drift, the drift following the error slowly.
 
-    GAIN: the share of a layer of grains, of stiffness KN / SIZE, that would give way in the STEPS between two looks.
+    GAIN: the share of a layer of grains, of stiffness KN / SIZE, that would be compressed in the STEPS
+    between two calls.
     """
 
     STEPS, SHARE, FASTEST = 5, 0.03, 3.0 * RATE * HEIGHT
@@ -129,7 +130,7 @@ class Servo:
         return not self.driven and self.good == 50  # True ends the cycle: at rest under this stress
 
     def run(self, steps):
-        """Let it work for so many steps, or until the stress is reached if no wall is driven."""
+        """Run the servo for a number of steps, or until the stress is reached if no wall is driven."""
         call = sim.every(self.STEPS, self)
         sim.cycle(steps)
         call.cancel()

@@ -185,5 +185,5 @@ def text(machine: Machine) -> Findings:
     codes = {"output": getattr(sys.stdout, "encoding", None) or "utf-8", "file names": sys.getfilesystemencoding()}
     wrong = [f"{what}: {code}" for what, code in codes.items() if codecs.lookup(code).name != "utf-8"]
     if wrong:
-        found = f"text is not UTF-8 ({', '.join(wrong)}): names with Chinese letters fail"
+        found = f"text is not UTF-8 ({', '.join(wrong)}): names with Chinese characters fail"
         yield warning("text", found, "export LC_ALL=C.UTF-8")

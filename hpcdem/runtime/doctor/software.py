@@ -181,13 +181,13 @@ def slurm_mpi_type(machine: Machine) -> Findings:
     library, chosen = machine.mpi_library[0], machine.environ.get("SLURM_MPI_TYPE", "")
     wanted = launch.slurm_mpi_type(library)
     if chosen and not chosen.startswith(wanted):
-        text = f"SLURM_MPI_TYPE={chosen}, and {library} wants {wanted}"
+        text = f"SLURM_MPI_TYPE={chosen}, but {library} requires {wanted}"
         yield warning("Slurm", text, f"export SLURM_MPI_TYPE={wanted}")
         return
     _, out, err = machine.run(["srun", "--mpi=list"])
     offered = (out + err).replace(",", " ").split()
     if offered and not any(word.startswith(wanted) for word in offered):
-        text = f"this Slurm has no --mpi={wanted}, which {library} wants"
+        text = f"this Slurm has no --mpi={wanted}, which {library} requires"
         yield warning("Slurm", text, f"Start with {launch.launcher_of(library, {})}, inside the job")
     elif not chosen:
         yield ok("Slurm", f"srun --mpi={wanted} suits {library}", f"srun --mpi={wanted} hpcdem ...")

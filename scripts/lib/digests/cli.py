@@ -37,7 +37,7 @@ def record(output: Path, names: tuple[str, ...], layouts: tuple[str, ...], keep:
     if the layouts of a model do not agree."""
     known = {model.name: model for model in models()}
     if unknown := [name for name in names if name not in known]:
-        raise click.UsageError(f"there is no model {unknown[0]}; there is {', '.join(known)}")
+        raise click.UsageError(f"there is no model {unknown[0]}; available: {', '.join(known)}")
     found: dict[str, dict[str, Digests]] = {}
     agree = True
     for name in names or known:

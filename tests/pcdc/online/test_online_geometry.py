@@ -87,7 +87,7 @@ HOSTILE = [
     ("geometry translate (1,1) layer", "expected texts in quotes|texts in quotes"),
     ("geometry export 'ring'", "lacks f{ile}"),
     ("geometry export 'ring' file 'a.svg'", "exported to files"),
-    ("geometry export 'ring' file '../a.dxf'", "leads out of the folder"),
+    ("geometry export 'ring' file '../a.dxf'", "lies outside the folder of the results"),
     ("geometry export 'no' file 'a.dxf'", "there is no geometry layer 'no'"),
     ("geometry delete", "texts in quotes"),
 ]
