@@ -290,7 +290,7 @@ def report_end(sim: Simulation) -> None:
     from hpcdem.commands.dem import output
 
     output.close_histories(sim)
-    output.tell_energy(sim)
+    output.report_energy(sim)
     if sim.log is not None and sim.lost:
         sim.log.info(f"{sim.lost} particles in total left the BOX and were deleted; see the lines above")
 

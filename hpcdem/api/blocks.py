@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
 
 PROPERTIES = "Change properties of the model; the others stay."
-TELL = "Report their number by model and group in the log."
+REPORT = "Report their number by model and group in the log."
 GROUP = "Assign them to a group; each is in at most one group of a set."
 
 
@@ -123,7 +123,7 @@ class Elements(Stressed):
         'parameter=[("limit", 2e5)], see docs/user_laws.md.',
     )
     property = Row("element property", doc=PROPERTIES, loose=True)
-    tell = Row("element list summary", doc=TELL)
+    report = Row("element list summary", doc=REPORT)
     law = Row("element law", "law", doc="Read, check and compile a law of a Python file before `sim.restore`.")
     null = Row("element c-model", model="null")
     hide = Row("element hide", "hidden=True")
@@ -142,7 +142,7 @@ class Faces(Fluxed):
     group = Row("element-face group", "group set?", doc=GROUP)
     model = Models("element-face c-model", "Assign the contact model and its properties.")
     property = Row("element-face property", doc=PROPERTIES, loose=True)
-    tell = Row("element-face list summary", doc=TELL)
+    report = Row("element-face list summary", doc=REPORT)
     stress = Row("element-face boundary", model="mechanical-stress-boundary-condition")
     heat = Row("element-face boundary", model="thermal-const-heat")
     free_field = Row("element-face boundary", model="free-field")
@@ -157,7 +157,7 @@ class Joints(Objects):
     group = Row("face-joint group", "group set?", doc=GROUP)
     model = Models("face-joint c-model", "Assign a model of joints, or of the fluid in them, and its properties.")
     property = Row("face-joint property", doc=PROPERTIES, loose=True)
-    tell = Row("face-joint list summary", doc=TELL)
+    report = Row("face-joint list summary", doc=REPORT)
     reset_state = Row("face-joint reset state")
 
 
@@ -359,7 +359,7 @@ class BlockCommands(Clocks):
     creep = Row("model creep", "on=True")
     plane_stress = Row("model plane-stress")
     plane_strain = Row("model plane-strain")
-    tell_devices = Row("device list")
+    report_devices = Row("device list")
     step = Row(
         "model step",
         "n",

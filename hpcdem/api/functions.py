@@ -24,7 +24,7 @@ from hpcdem.core.fields import FIX_BITS
 from hpcdem.core.material import Material
 from hpcdem.core.place import place
 from hpcdem.core.selection import Selection
-from hpcdem.lang.zdem.execute import look_at_units
+from hpcdem.lang.zdem.execute import check_units
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.lang.zdem.table import COLORS
 
@@ -32,7 +32,7 @@ MATERIAL_WORDS = tuple(Material.__annotations__)
 OF_BOTH = {"start", "save", "restore", "resume", "finish", "cycle", "imple", "energy"}
 """Methods that may find blocks alone. The others make the particles first: kernels must be settled before modules that
 have some are imported, and these import them when they are named."""
-LOOKED_AT = {
+FIELDS_READ = {
     "box": "BOX", "wall": "WALL", "ball": "BALL", "gen": "GEN", "gen_grid": "GEN", "gline": "GLINE", "prop": "PROP",
     "bond": "PROP", "set": "SET",
 }  # fmt: skip
@@ -262,10 +262,10 @@ def command(method: Method, edits: bool = True) -> Method:
             if method.__name__ not in OF_BOTH:
                 _ = self.engine
             value = method(self, *values, **options)
-            if self._engine is not None and self._engine.settings.units and method.__name__ in LOOKED_AT:
+            if self._engine is not None and self._engine.settings.units and method.__name__ in FIELDS_READ:
                 given = signature.bind(self, *values, **options).arguments
                 given |= given.pop("options", {}) | given.pop("properties", {})
-                look_at_units(self._engine, LOOKED_AT[method.__name__], given)
+                check_units(self._engine, FIELDS_READ[method.__name__], given)
             return value
 
         def done() -> Any:

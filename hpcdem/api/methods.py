@@ -338,13 +338,13 @@ def commands(cls: Kind) -> Kind:
         if isinstance(found, Row | Models):
             found = found.method(cls, name)
         if inspect.isfunction(found) and (name == "__getitem__" or not name.startswith("_")):
-            setattr(cls, name, _told(found))
+            setattr(cls, name, _documented(found))
         elif isinstance(found, property) and not name.startswith("_") and found.fget is not None:
-            setattr(cls, name, property(_told(found.fget)))
+            setattr(cls, name, property(_documented(found.fget)))
     return cls
 
 
-def _told(method: Callable[..., Any]) -> Callable[..., Any]:
+def _documented(method: Callable[..., Any]) -> Callable[..., Any]:
     name = method.__name__
     names = [parameter for parameter in inspect.signature(method).parameters if parameter != "self"]
 

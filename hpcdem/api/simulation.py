@@ -23,7 +23,7 @@ from hpcdem.core.fields import FIELDS
 from hpcdem.core.nearest import hint
 from hpcdem.core.place import place as _place
 from hpcdem.io import checkpoint
-from hpcdem.lang.zdem.execute import Interpreter, find, tell_warnings
+from hpcdem.lang.zdem.execute import Interpreter, find, report_warnings
 from hpcdem.lang.zdem.lexer import read_lines
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.physics.dem.materials import MATERIAL
@@ -376,7 +376,7 @@ class Simulation(ParticleCommands, BlockCommands):
             begins = first is not None and first.tokens[0].word[:3] in ("sta", "res", "loa")
             script = parse_text(text if begins else "RES model\n" + text, str(self.directory / "command"))
             interpreter = Interpreter(script)
-            tell_warnings(script, self.engine)
+            report_warnings(script, self.engine)
             for index in range(0 if begins else 1, len(script.statements)):
                 interpreter.carry_out(self.engine, index)
         except ScriptError as error:

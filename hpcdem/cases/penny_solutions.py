@@ -65,5 +65,5 @@ def write_sector(file: str, size: float, reach: float, far: float, turn: float, 
 def _graded(first: float, end: float, grow: float) -> np.ndarray:
     """Steps that grow from about `first` on, summed up to `end`."""
     count = max(1, round(math.log(1.0 + end * (grow - 1.0) / first) / math.log(grow)))
-    way = np.cumsum(grow ** np.arange(count))
-    return np.asarray(way * end / way[-1])
+    distance = np.cumsum(grow ** np.arange(count))
+    return np.asarray(distance * end / distance[-1])

@@ -114,7 +114,7 @@ class Support(Case):
     def loading(self) -> str:
         text = (EXCAVATED + MEASURED).replace(" PLATE", " plate" if self.plates else "")
         if self.dim == 2:
-            text = text.replace("LINED", LINED).replace("OF_LINERS", OF_LINERS).replace("TOLD", TOLD)
+            text = text.replace("LINED", LINED).replace("OF_LINERS", OF_LINERS).replace("TOLD", PRINTED)
             return text.replace("FLAT", "").replace("MIDDLE", "").replace("SPACED", " spacing [bolt_spacing]")
         for name in ("LINED", "OF_LINERS", "TOLD", "SPACED"):
             text = text.replace(name, "")
@@ -204,7 +204,7 @@ if liner:
     thrust, moment = float(along[np.abs(along).argmax()]), float(np.abs(ends).max())
     hinges = int((pcdc.values('liner-element', 'liner-state').astype(int) & 8 > 0).sum())
 """
-TOLD = """\
+PRINTED = """\
 if liner:
     print('liner: largest axial force %.4g MN/m, moment %.4g kN m/m, %d elements have yielded'
           % (thrust/1e6, moment/1e3, hinges))

@@ -138,9 +138,9 @@ def serve(talk: Talk, begin: Any, requests: IO[str], answers: IO[str]) -> None:
     for line in requests:
         wanted = json.loads(line)
         begin()
-        good, told, shown = True, True, None  # what fails, or is interrupted, may have changed the model too
+        good, accepted, shown = True, True, None  # what fails, or is interrupted, may have changed the model too
         try:
-            told = talk.carry_out(wanted["text"], wanted.get("name", ""))
+            accepted = talk.carry_out(wanted["text"], wanted.get("name", ""))
         except SystemExit:
             answers.flush()
             return
@@ -148,7 +148,7 @@ def serve(talk: Talk, begin: Any, requests: IO[str], answers: IO[str]) -> None:
             good = failed(problem)
         answers.flush()
         try:
-            shown = talk.show() if told else None
+            shown = talk.show() if accepted else None
         except (HpcdemError, KeyboardInterrupt) as problem:
             good = failed(problem)
         mark(what=DONE, good=good, frame=None if shown is None else str(shown))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("png", "jpg", "tiff", "pdf", "svg")
 FILMS = (".gif", ".mp4")
-LOOKS = {
+LAYER_OPTIONS = {
     "limits": "limits", "log": "log", "colours": "colours", "opacity": "opacity", "edges": "edges", "size": "size",
     "vectors": "vectors", "arrows": "arrows", "filter": "filter", "colour": "colour",
 }  # fmt: skip
@@ -189,12 +189,12 @@ def view_of(options: dict[str, Any], moment: Moment) -> ModelView:
     from hpcdem.post.view.scene import adjusted, default_view
 
     view = default_view(moment) if options["view_file"] is None else read_view(options["view_file"])
-    looks = {LOOKS[name]: options[name] for name in LOOKS if options[name] is not None}
+    layer_options = {LAYER_OPTIONS[name]: options[name] for name in LAYER_OPTIONS if options[name] is not None}
     more = {
         name: options[name] for name in ("deformed", "camera", "eye", "section", "title") if options[name] is not None
     }
     more |= {name: False for name in ("axes", "legend") if options[f"no_{name}"]}
-    view = adjusted(view, moment, options["field"], options["on"], looks, **more)
+    view = adjusted(view, moment, options["field"], options["on"], layer_options, **more)
     for visible, words in ((True, options["show"]), (False, options["hide"])):
         for word in words:
             moment.of(word)

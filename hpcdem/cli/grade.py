@@ -143,10 +143,10 @@ def show(made: Specimen, facts: dict[str, Any]) -> None:
         for r in made.rows
     ]  # fmt: skip
     _table(head, rows)
-    box, room, voids = facts["box"], facts["room"], facts["void_ratio"]
+    box, space, voids = facts["box"], facts["room"], facts["void_ratio"]
     click.echo(f"box {box['width']:.4g} x {box['height']:.4g} mm at a void ratio of {voids['target']:g}")
     placed = (
-        f"{made.request.placement}: {room['width']:.4g} x {room['height']:.4g} mm, void ratio {voids['reached']:.4g}"
+        f"{made.request.placement}: {space['width']:.4g} x {space['height']:.4g} mm, void ratio {voids['reached']:.4g}"
     )
     if made.request.placement == "dense":
         placed += f"; {facts['added']} placed freely, {facts['moved']} separated in {facts['sweeps']} rounds"
@@ -273,7 +273,7 @@ def draw(found: Grains, curve: Grading | None, options: dict[str, Any]) -> list[
 
     left, right, bottom, top = boxes(found.outlines).T
     x, y = float(left.min()), float(bottom.min())
-    room = float(right.max()) - x, float(top.max()) - y
+    space = float(right.max()) - x, float(top.max()) - y
     from hpcdem.physics.polyarc.outlines import Outlines
 
     o = found.outlines
@@ -286,7 +286,7 @@ def draw(found: Grains, curve: Grading | None, options: dict[str, Any]) -> list[
     target = None if curve is None else curve.percent
     drawn = {
         "grading": figures.grading_curve(found.sizes, reached.percent, target, numbers, options["falling"]),
-        "packing": figures.packing(moved, found.class_of, found.sizes, room, room),
+        "packing": figures.packing(moved, found.class_of, found.sizes, space, space),
         "sizes": figures.histogram(found.sizes, found.counts),
     }
     folder = options["out"]

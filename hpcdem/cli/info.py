@@ -33,7 +33,7 @@ def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective; rank 0 looks and prints. HpcdemError if something is damaged."""
     from hpcdem.io.agreed import on_first
 
-    def look() -> int:
+    def inspect() -> int:
         from hpcdem.post import inventory
 
         bad = 0
@@ -46,7 +46,7 @@ def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
                 show(path, facts)
         return bad
 
-    bad = on_first(comm, look)
+    bad = on_first(comm, inspect)
     if bad:
         raise HpcdemError(f"{bad} of {len(options['paths'])} are damaged or unknown")
 
@@ -114,12 +114,12 @@ def of_folder(folder: Path, every: bool = False) -> dict[str, Any]:
     facts["checkpoints"] = _range(saved, [_step(p.name) for p in saved])
     facts["frames"] = _range(frames, [f.step for f in frames])
     facts["unfinished"] = sorted(p.name for p in folder.glob("*.tmp"))
-    looked = [*saved, *(f.path for f in frames)] if every else [*saved[-2:], *(f.path for f in frames[-1:])]
-    for path in looked:
+    inspected = [*saved, *(f.path for f in frames)] if every else [*saved[-2:], *(f.path for f in frames[-1:])]
+    for path in inspected:
         seen = inventory.of_file(path)
         if not seen["whole"]:
             wrong.append(seen["why"])
-    whole = [path for path in reversed(saved) if path not in looked or inventory.of_file(path)["whole"]]
+    whole = [path for path in reversed(saved) if path not in inspected or inventory.of_file(path)["whole"]]
     if whole and (record is None or record.state != "done") and holder is None:
         facts["go_on_with"] = f"hpcdem resume {folder}"
     if wrong:

@@ -52,14 +52,16 @@ def of_field(options: dict[str, Any], files: list[Path]) -> Layer | None:
     from hpcdem.post.view.moment import read_moment
     from hpcdem.post.view.scene import shared
 
-    looks = {name: options[name] for name in ("limits", "colours") if options[name] is not None}
+    field_style = {name: options[name] for name in ("limits", "colours") if options[name] is not None}
     if options["field"] is None:
-        if looks:
+        if field_style:
             raise UsageError("--range and --colours require --field")
         return None
     if not options["ballplot"]:
         raise UsageError("--field colours particles, which --ballplot=false hides")
-    view: ModelView = view_of({"layers": [{"object": "particles", "field": options["field"], **looks}]}, "--field")
+    view: ModelView = view_of(
+        {"layers": [{"object": "particles", "field": options["field"], **field_style}]}, "--field"
+    )
     return shared(view, (read_moment(file) for file in files)).layers[0]
 
 

@@ -98,16 +98,18 @@ class Curves:
             found.append({"kind": kind, "chart": name})
         found.sort(key=lambda one: one["kind"] != "stress_strain")
         for axis in "xyz":
-            ways, loads = (
+            displacements, loads = (
                 [one for one in records if one.title == f"{word} {axis}"] for word in ("displacement", "reaction")
             )
-            if not (ways and loads):
+            if not (displacements and loads):
                 continue
-            if len(ways) == len(loads) == 2:  # two ends that approach each other: their distance, the mean load
-                x = self._positive(ways, "{0} - {1}", "shortening")
+            if (
+                len(displacements) == len(loads) == 2
+            ):  # two ends that approach each other: their distance, the mean load
+                x = self._positive(displacements, "{0} - {1}", "shortening")
                 y = [self._positive(loads, "({0} - {1}) / 2", "load")]
             else:
-                x, y = _quoted(ways[0]), [*map(_quoted, loads[:MOST])]
+                x, y = _quoted(displacements[0]), [*map(_quoted, loads[:MOST])]
             found.append({"kind": "load_way", "x": x, "y": y})
         return found
 

@@ -58,7 +58,7 @@ class Console:
         """Return whether the process is starting or executing commands."""
         return self.alive and (not self.ready or self.waiting > 0)
 
-    def said_since(self, number: Any) -> dict[str, Any]:
+    def output_since(self, number: Any) -> dict[str, Any]:
         """Lines after this one, and the state."""
         with self.lock:
             since = number if isinstance(number, int) and 0 <= number <= self.count else 0
@@ -163,8 +163,8 @@ class Desk:
     def calls(self) -> dict[str, Call]:
         """Return the handlers of POST requests by name."""
         return {
-            "console": lambda wanted: as_json(self.console.said_since(wanted.get("since"))),
-            "say": self._say,
+            "console": lambda wanted: as_json(self.console.output_since(wanted.get("since"))),
+            "say": self._input,
             "interrupt": self._interrupt,
             "restart": self._restart,
             "whole": lambda wanted: as_json({"whole": whole(wanted.get("text"), wanted.get("language"))}),
@@ -184,7 +184,7 @@ class Desk:
         self.console.start(str(wanted.get("language")))
         return as_json({})
 
-    def _say(self, wanted: dict[str, Any]) -> Answer:
+    def _input(self, wanted: dict[str, Any]) -> Answer:
         text, name = wanted.get("text"), wanted.get("name") or ""
         if not isinstance(text, str) or not isinstance(name, str) or not text.strip():
             raise HpcdemError("text: expected commands")

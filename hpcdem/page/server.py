@@ -334,7 +334,7 @@ def _read(text: bytes) -> dict[str, Any]:
     """The JSON object in a body, with numbers and texts that can be answered as JSON."""
     try:
         content = json.loads(text, parse_int=_whole, parse_float=_finite, parse_constant=_finite)
-        _look_through(content)
+        _check_depth(content)
     except (ValueError, RecursionError) as problem:
         message = str(problem) if isinstance(problem, _UnfitError) else ""
         raise _Refused(HTTPStatus.BAD_REQUEST, message or "expected a JSON object") from None
@@ -360,7 +360,7 @@ def _finite(text: str) -> float:
     return value
 
 
-def _look_through(content: Any) -> None:
+def _check_depth(content: Any) -> None:
     """Refuse what lies too deep, and halves of characters (surrogates), which no file can hold."""
     level = [content]
     for _ in range(DEEPEST):

@@ -257,11 +257,11 @@ class Viewer:
                 entry = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
             unit = shown.moment.unit_of(name)
             values.append([name, entry, unit, _printed(entry if names else value, unit)])
-        told_of = {"point": None if picture.near is None else self._hit(shown, picture, int(column), int(row))}
+        found_at = {"point": None if picture.near is None else self._hit(shown, picture, int(column), int(row))}
         number = objects.value(objects.number, which) if objects.number in objects.fields else which
         place_of = {axis: float(v) for axis, v in zip("xyz", objects.centre(which))}
         return {
-            "object": layer.object, "label": layer.label, "number": int(number), **place_of, **told_of,
+            "object": layer.object, "label": layer.label, "number": int(number), **place_of, **found_at,
             "values": values,
         }  # fmt: skip
 

@@ -176,17 +176,17 @@ def _palette(images: Sequence[Any], keep: Sequence[str] = ()) -> np.ndarray:
 
     lines = np.array([[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in keep]).reshape(-1, 3)
     shades = np.concatenate([lines + (255 - lines) * part for part in _RIMS]).round().astype(np.uint8)
-    room = 256 - len(shades)
+    free = 256 - len(shades)
     pixels = np.concatenate([np.asarray(image).reshape(-1, 3) for image in images])
     codes = _codes(pixels)
     found, counts = np.unique(codes, return_counts=True)
     order = np.lexsort((found, -counts))
-    exact, others = found[order[: min(_EXACT, room)]], found[order[min(_EXACT, room) :]]
+    exact, others = found[order[: min(_EXACT, free)]], found[order[min(_EXACT, free) :]]
     colours = _colours(exact)
-    if len(others) and room > len(exact):
+    if len(others) and free > len(exact):
         rest = Image.fromarray(np.ascontiguousarray(pixels[np.isin(codes, others)][None, :, :]))
-        cut = rest.quantize(room - len(exact), method=Image.Quantize.MEDIANCUT)
-        middle = np.array(cut.getpalette(), np.uint8).reshape(-1, 3)[: room - len(exact)]
+        cut = rest.quantize(free - len(exact), method=Image.Quantize.MEDIANCUT)
+        middle = np.array(cut.getpalette(), np.uint8).reshape(-1, 3)[: free - len(exact)]
         colours = np.concatenate([colours, middle])
     colours = np.concatenate([colours, shades])
     return np.concatenate([colours, np.repeat(colours[-1:], 256 - len(colours), axis=0)])

@@ -153,10 +153,10 @@ def frame_figure(
     left += growth * _DIGIT * max(map(len, style.ticks(seen)[1].labels), default=0)
     bar = coloured(frame, style.look)
     right += growth * BAR if bar is not None and bar.scale is not None else 0.0
-    room = style.page * CM - left - right, style.page * CM * TALLEST - bottom - top
-    if min(room) < 0.5 * CM:
+    available = style.page * CM - left - right, style.page * CM * TALLEST - bottom - top
+    if min(available) < 0.5 * CM:
         raise UsageError(f"a page of {style.page:g} cm is too small for numbers of {style.font:g} points")
-    scale = min(room[0] / seen.width, room[1] / seen.height)
+    scale = min(available[0] / seen.width, available[1] / seen.height)
     width, height = scale * seen.width, scale * seen.height
     page = left + width + right, bottom + height + top
     figure = Figure(figsize=page)

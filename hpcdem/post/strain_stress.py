@@ -424,19 +424,19 @@ def solid_fraction(
     The mean over the nodes at most AROUND spacings away that lie INSIDE spacings from any empty place; the mean over
     all of these if none is near; over all that discs reach where the model is thin everywhere.
     """
-    inner = _each_way(np.logical_and, total["number"] > 0, INSIDE)
+    inner = _in_both_directions(np.logical_and, total["number"] > 0, INSIDE)
     if not inner.any():
         fine = grids.cover(2.0 * float(np.mean(radius)), x, y, radius)
         reached = float(grids.touched(fine, x, y, radius).sum()) * fine.size**2
         return np.full(inner.shape, float(np.sum(np.pi * radius**2)) / reached)
     area = np.where(inner, total["area"], 0.0)
-    count = _each_way(np.add, inner.astype(float), AROUND)
+    count = _in_both_directions(np.add, inner.astype(float), AROUND)
     with np.errstate(invalid="ignore", divide="ignore"):
-        near = np.where(count > 0.0, _each_way(np.add, area, AROUND) / count, area.sum() / inner.sum())
+        near = np.where(count > 0.0, _in_both_directions(np.add, area, AROUND) / count, area.sum() / inner.sum())
     return near / (np.pi * grid.size**2)
 
 
-def _each_way(combine: np.ufunc, values: np.ndarray, reach: int) -> np.ndarray:
+def _in_both_directions(combine: np.ufunc, values: np.ndarray, reach: int) -> np.ndarray:
     """Combine each value with those up to `reach` places away in both directions; zero outside."""
     for axis in (0, 1):
         padded = np.pad(values, [(reach, reach) if a == axis else (0, 0) for a in (0, 1)])

@@ -129,13 +129,13 @@ def _wall_place(
     centre, along = np.stack([p["x"][a], p["y"][a]], axis=1), p2 - p1
     length2 = np.maximum((along * along).sum(axis=1), np.finfo(float).tiny)
     t = np.clip(((centre - p1) * along).sum(axis=1) / length2, 0.0, 1.0)
-    way = p1 + t[:, None] * along - centre
-    distance = np.hypot(*way.T)
+    offset = p1 + t[:, None] * along - centre
+    distance = np.hypot(*offset.T)
     # A centre that has come through the wall is pushed towards it.
-    side = np.where(way[:, 0] * force[0] + way[:, 1] * force[1] > 0.0, -1.0, 1.0)
+    side = np.where(offset[:, 0] * force[0] + offset[:, 1] * force[1] > 0.0, -1.0, 1.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         part = np.where(distance > 0.0, side * 0.5 * (p["radius"][a] + side * distance) / distance, 0.0)
-    return centre[:, 0] + part * way[:, 0], centre[:, 1] + part * way[:, 1]
+    return centre[:, 0] + part * offset[:, 0], centre[:, 1] + part * offset[:, 1]
 
 
 def volume_rule(frame: Frame, bed: np.ndarray | None = None) -> tuple[np.ndarray, float]:

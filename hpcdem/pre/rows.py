@@ -16,6 +16,6 @@ def row(p1: tuple[float, float], p2: tuple[float, float], rad: float, cratio: fl
     length = math.dist(p1, p2)
     n = math.floor(length / spacing + 1e-9) + 1
     start = np.array(p1, dtype=np.float64)
-    way = np.array(p2, dtype=np.float64) - start
-    direction = way / length if length > 0.0 else way
+    along = np.array(p2, dtype=np.float64) - start
+    direction = along / length if length > 0.0 else along
     return start + (spacing * np.arange(n))[:, None] * direction

@@ -18,7 +18,7 @@ from hpcdem.io.lock import FolderLock, Taken
 from hpcdem.runtime import launch
 from hpcdem.sweep.plan import DONE, LOG, RUNNING, STATE, Member, Plan, read_json
 
-LOOK = 0.1
+POLL_SECONDS = 0.1
 """Seconds between two looks at the members."""
 
 
@@ -83,8 +83,8 @@ class _Driver:
         if found:
             self.log.info(f"members {', '.join(found)} are still running since an earlier call: waiting for them")
         while self.open and not self.asked():
-            self._look()
-            time.sleep(LOOK)
+            self._poll()
+            time.sleep(POLL_SECONDS)
         if self.mine:
             self.log.info(f"stopping: {len(self.mine)} members write a checkpoint")
             for process in self.mine.values():
@@ -93,7 +93,7 @@ class _Driver:
                 process.wait()
         return {member.name: member.state for member in self.plan.members}
 
-    def _look(self) -> None:
+    def _poll(self) -> None:
         """Note what has ended, and start what there is room for. A member that was started by an earlier call takes
         its room too."""
         busy = 0

@@ -272,7 +272,7 @@ def test_the_tables_of_energy_close_together(tmp_path):
     assert whole["work_discs"] == pytest.approx(found["work_on_blocks"], rel=1e-9) and whole["work_discs"] > 1.0
     assert abs(whole["work_outside"]) < 1e-9 * whole["work_discs"]
 
-    output.tell_energy(sim)
+    output.report_energy(sim)
     told = said.getvalue()
     discs = rows_of(told, "energy budget")
     said.truncate(0)

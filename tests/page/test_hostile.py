@@ -178,7 +178,7 @@ class Noted:
     def interrupt(self) -> None:
         pass
 
-    def said_since(self, number: Any) -> dict[str, Any]:
+    def output_since(self, number: Any) -> dict[str, Any]:
         return {"lines": [], "last": 0}
 
 

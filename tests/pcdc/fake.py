@@ -62,7 +62,7 @@ class FakeBlocks:
         self.calls: list[tuple[str, tuple, dict]] = []
         self.clear()
 
-    def told_time(self) -> float:
+    def reported_time(self) -> float:
         return self.clock.time
 
     def changing_tables(self) -> list[str]:

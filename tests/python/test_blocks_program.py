@@ -82,7 +82,7 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model query thermal time", "sim.tell_time('thermal')"),
     ("pcdc model query hydraulic time", "sim.tell_time('hydraulic')"),
     ("pcdc model query proppant-transport time", "sim.tell_time('proppant-transport')"),
-    ("pcdc device list", "sim.tell_devices()"),
+    ("pcdc device list", "sim.report_devices()"),
     ("pcdc model time-step table 'dt'", "sim.time_step(value='dt')"),
     ("pcdc model time-step auto on update-frequency 20", "sim.time_step(auto=True, update_frequency=20)"),
     ("pcdc table 'v' data 0 0, 1 2 type relative-time", "sim.tables.create('v', [(0, 0), (1, 2)], relative=True)"),

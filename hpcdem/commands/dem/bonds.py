@@ -127,7 +127,7 @@ def _marks(sim: Simulation, given: dict[str, float], rubber: bool, conserving: b
     if rubber and sim.log is not None:
         sim.log.warn_once("rubber", "rubber: the mark is stored and written but has no effect on the motion")
     words = {"rubber": rubber, "conserving": conserving, "moment": moment}
-    return {name: 1.0 for name, said in words.items() if said}
+    return {name: 1.0 for name, is_given in words.items() if is_given}
 
 
 def _refuse_soft(kind: int, values: Mapping[str, float]) -> None:
@@ -178,9 +178,9 @@ def warn_of_stiffnesses(sim: Simulation) -> None:
     stiffness is not that of their contacts: each opening and closing under shear then changes the energy. A warning
     where nothing damps the motion, else a line. Collective."""
     state = len(sim.bond_types), len(sim.materials), sim.bonds, sim.settings.lsm
-    if state == sim.bonds_looked_at or not sim.bonds_left():
+    if state == sim.bonds_checked or not sim.bonds_left():
         return
-    sim.bonds_looked_at = state
+    sim.bonds_checked = state
     lists, p, rows = sim.lists, sim.particles, sim.materials.rows
     slots = _slots(lists)
     mine = (lists.bond[slots] > 0) & (lists.row[slots] >= p.owned.start) & (lists.row[slots] < p.owned.stop)

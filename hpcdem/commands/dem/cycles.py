@@ -27,7 +27,7 @@ STEPBAR = 1000
 """Steps between progress reports and rows of walls.csv when the script sets none."""
 NEAR = 0.5
 """Time step over the estimate of the critical one from which the true limit is computed."""
-TOLD = 1.2
+REPORT_AGAIN = 1.2
 """Factor by which the part of the stability limit must grow before it is logged again."""
 MOST_STEPS = 2**53
 """Steps are counted exactly up to here, in frames and histories too."""
@@ -64,13 +64,13 @@ def imple(
     if (xmove is None) == (ymove is None):
         raise CommandError("IMPLE needs either xmove or ymove")
     axis, name = (0, "xv") if xmove is not None else (1, "yv")
-    way = float(xmove if xmove is not None else ymove or 0.0)
+    move = float(xmove if xmove is not None else ymove or 0.0)
     speed = float(sim.walls.v[sim.walls.row(wall), axis])
     if speed == 0.0:
-        raise CommandError(f"wall {wall} does not move: {name} is 0, so it never reaches a displacement of {way:g} m")
-    if way * speed < 0.0 and sim.log is not None:
+        raise CommandError(f"wall {wall} does not move: {name} is 0, so it never reaches a displacement of {move:g} m")
+    if move * speed < 0.0 and sim.log is not None:
         sim.log.warn(
-            f"IMPLE: wall {wall} moves with {name} {speed:g}, opposite to the distance {way:g}; the sign of the "
+            f"IMPLE: wall {wall} moves with {name} {speed:g}, opposite to the distance {move:g}; the sign of the "
             "distance is ignored"
         )
     prepare(sim)
@@ -79,7 +79,7 @@ def imple(
         if distance is not None and distance < 0.0:
             raise CommandError(f"{kind} must not be negative, got {distance:g}")
     intervals = {k: max(_nearest(d / per_step), 1) if d else 0 for k, d in {**dict.fromkeys(OUTPUTS), **every}.items()}
-    _begin(sim, "IMPLE", _nearest(abs(way) / per_step), sim.clock.step, intervals, final_frame=True)
+    _begin(sim, "IMPLE", _nearest(abs(move) / per_step), sim.clock.step, intervals, final_frame=True)
 
 
 def resume(sim: Simulation) -> None:
@@ -291,7 +291,7 @@ def _watch_the_time_step(sim: Simulation) -> None:
         if math.isfinite(critical):
             sim.next_watch = step + WATCH * int(min(RELAXED, (NEAR * critical / sim.clock.dt) ** 2))
         if sim.clock.dt > NEAR * critical and critical < 0.8 * sim.step_limit:
-            _tell_limits(sim, critical, f"step {step}: ")
+            _report_limits(sim, critical, f"step {step}: ")
         _warn_of_rolling_dashpots(sim)
 
 
@@ -305,7 +305,7 @@ def _warn_of_rolling_dashpots(sim: Simulation) -> None:
         )  # fmt: skip
 
 
-def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
+def _report_limits(sim: Simulation, critical: float, when: str = "") -> None:
     """dt beside the estimate of the critical step and the true one where it comes near; once, a warning if it is beyond
     one. Collective."""
     dt, shown = sim.clock.dt, partial(with_prefix, unit="s")
@@ -329,8 +329,8 @@ def _tell_limits(sim: Simulation, critical: float, when: str = "") -> None:
                 "critical time step",
                 f"{text}. Beyond the estimate results may be noisy. Reduce the time step if the run becomes unstable",
             )
-        elif 0.5 * dt * highest > TOLD * sim.told_share:
-            sim.told_share = 0.5 * dt * highest
+        elif 0.5 * dt * highest > REPORT_AGAIN * sim.reported_share:
+            sim.reported_share = 0.5 * dt * highest
             sim.log.info(text)
     elif dt > critical:
         sim.log.warn_once(
@@ -345,7 +345,7 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
     """dt beside its limits where it comes near the estimate of the critical step; once, a warning if it is beyond one,
     or if lattice-solid damping reverses a velocity."""
     dt, sim.next_watch = sim.clock.dt, 0
-    _tell_limits(sim, diagnostics.critical_dt(sim))
+    _report_limits(sim, diagnostics.critical_dt(sim))
     _warn_of_rolling_dashpots(sim)
     damping = sim.settings.lsm * dt / diagnostics.lightest(sim)
     braking = 0.0 if sim.dashpots is None else 2.0 * dt * sim.dashpots.fastest(sim)

@@ -72,7 +72,7 @@ def load_frame(
     sim._longest2 = float(comm.max_into(np.array([np.max(longest, initial=0.0)]))[0]) ** 2
     sim.ownership.wanted = True
     sim.check_soon()
-    _tell(sim, path, p, kept, unknown)
+    _report(sim, path, p, kept, unknown)
     return kept
 
 
@@ -274,7 +274,7 @@ def _wall_contacts(frame: Frame, rows: np.ndarray, discs: _Discs) -> dict[str, n
     }  # fmt: skip
 
 
-def _tell(sim: Simulation, path: Path | str, p: dict[str, Any], number: int, unknown: int) -> None:
+def _report(sim: Simulation, path: Path | str, p: dict[str, Any], number: int, unknown: int) -> None:
     if sim.log is None:
         return
     lacking = [name for name in ("vx", "mass", "fric", "damp") if name not in p]

@@ -266,7 +266,7 @@ def physics_energies(sim: Simulation) -> dict[str, float]:
     return {name: known[name][1](sim) for physics in sim.physics for name in physics.energies}
 
 
-def tell_energy(sim: Simulation) -> None:
+def report_energy(sim: Simulation) -> None:
     """The budget as a table in the log, at the end of a run; nothing without SET energy. Collective."""
     if sim.energy is None or sim.energy.start is None:
         return

@@ -82,7 +82,7 @@ def prop(
         others = (*properties.values(), xv, yv, spin, color, group, where)
         if law is None or hertz or any(other is not None for other in others):
             raise CommandError("between accepts only a law and its parameter")
-        _say_between(sim, law, between, parameter or {}, folder)
+        _log_between(sim, law, between, parameter or {}, folder)
         return
     given = checked(properties)
     if hertz:
@@ -164,7 +164,7 @@ def _added(sim: Simulation, law: str, parameter: Mapping[str, float], folder: Pa
     return sim.own_laws.add(new), values
 
 
-def _say_between(sim: Simulation, law: str, pair: Sequence[str], parameter: Mapping[str, float], folder: Path) -> None:
+def _log_between(sim: Simulation, law: str, pair: Sequence[str], parameter: Mapping[str, float], folder: Path) -> None:
     """PROP between. Collective."""
     if len(pair) != 2:
         raise CommandError(f"between names two laws, got {len(pair)}")

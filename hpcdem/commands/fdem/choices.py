@@ -350,14 +350,14 @@ class _Objects:
             return self._along_surfaces(layer, distance, angle)
         places, found = self.places(), np.zeros(len(self.numbers), bool)
         slack, least = self._slack(TOLERANCE), math.cos(math.radians(angle + STRAIGHT)) if angle < 90.0 else 0.0
-        way = places[:, -1] - places[:, 0]
-        size = np.hypot(*way.T)
+        edge_vector = places[:, -1] - places[:, 0]
+        size = np.hypot(*edge_vector.T)
         for curve in self._curves(layer):
             ends = curve.points if curve.bulges.any() == 0 else geometry.sampled(curve, curve.length() / SIDES)
             for a, b in zip(ends, np.roll(ends, -1, axis=0)[: len(ends) - (not curve.closed)]):
                 away = geometry.distance_to_segment(a, b, 0.0, places.reshape(-1, 2)).reshape(places.shape[:2])
                 near = (away <= distance + slack).all(axis=1)
-                along = np.abs(way @ (b - a)) >= least * size * np.hypot(*(b - a))
+                along = np.abs(edge_vector @ (b - a)) >= least * size * np.hypot(*(b - a))
                 found |= near & along
         return found
 
@@ -377,7 +377,9 @@ class _Objects:
                 axis=1
             )
             if along:
-                here, above, below = (np.abs(one.distance(middle + way * normal)) for way in (0.0, 1.0, -1.0))
+                here, above, below = (
+                    np.abs(one.distance(middle + edge_vector * normal)) for edge_vector in (0.0, 1.0, -1.0)
+                )
                 near &= np.maximum(above, below) - here >= least * size
             found |= near
         return found

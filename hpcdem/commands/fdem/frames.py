@@ -226,7 +226,7 @@ def _of_mesh(project: Project) -> MeshFrame:
     of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
     clock = blocks.clock
     return MeshFrame(
-        int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
+        int(clock.step), float(blocks.reported_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
         units=declared(project.units),
     )  # fmt: skip
 
@@ -250,7 +250,7 @@ def frame(project: Project, sound: bool = True) -> MeshFrame:
         clock = blocks.clock
         there = [found for one in supports.ALL if (found := one.there(blocks)) is not None]
         return MeshFrame(
-            int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
+            int(clock.step), float(blocks.reported_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
             {found.name: found.columns() for found in there}, frame_tables.tables(blocks) if sound else {},
             declared(project.units),
         )  # fmt: skip

@@ -87,8 +87,8 @@ def import_file(
     """The lines of a DXF file, or of one of its layers, or of a section in another format; in space the solids of a
     STEP or BREP file, or what the triangles of an STL or DXF file enclose. Collective.
 
-    scale: metres per unit of the file; None: as given in the file, else 1. Of sections: named: each name becomes a layer,
-    and as_layer the outline of all polygons; origin, to, line: see `Placement`; legend, attribute, simplify: see
+    scale: metres per unit of the file; None: as given in the file, else 1. Of sections: named: each name becomes a
+    layer, and as_layer the outline of all polygons; origin, to, line: see `Placement`; legend, attribute, simplify: see
     `read`.
     """
     path = project.to_read(file)
@@ -96,7 +96,7 @@ def import_file(
         "named": named, "origin": tuple(origin) != (0.0, 0.0), "to": tuple(to) != (0.0, 0.0), "line": line is not None,
         "legend": legend is not None, "attribute": attribute is not None, "simplify": bool(simplify),
     }  # fmt: skip
-    given = [word for word, said in of_section.items() if said]
+    given = [word for word, is_given in of_section.items() if is_given]
     if project.dim == 3:
         if given:
             raise CommandError(f"{given[0]} of geometry import is for two dimensions")

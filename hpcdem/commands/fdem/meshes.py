@@ -97,7 +97,7 @@ def create(
     )
     made: Meshed = project.comm.per_node(lambda: triangulate(project.layers, settings), once=True)
     for note in made.notes:
-        _say(project, note)
+        _log(project, note)
     _add(project, lambda: made.mesh)
 
 
@@ -126,7 +126,7 @@ def _fill(
     )
     made: fill.Filled = project.comm.per_node(lambda: fill.filled(settings, group), once=True)
     for note in made.notes:
-        _say(project, note)
+        _log(project, note)
     first = 0 if project.mesh is None else int(project.mesh.crack_sets.max(initial=-1)) + 1
 
     def make() -> Mesh:
@@ -182,7 +182,7 @@ def patch(
     layers, settings = patches.settings(project.layers, shaped, size, tolerance, (set_name, group))
     made: Meshed = project.comm.per_node(lambda: triangulate(layers, settings), once=True)
     for note in made.notes:
-        _say(project, note)
+        _log(project, note)
     mesh = made.mesh
     named = {name: rows for name, rows in mesh.layers.items() if name in project.layers}
     _add(project, lambda: Mesh.of(mesh.points, mesh.cells, mesh.groups, named, mesh.cracks, mesh.crack_sets))
@@ -254,13 +254,13 @@ def import_file(
     low, high = (", ".join(f"{c:g}" for c in at) for at in (mesh.points.min(axis=0), mesh.points.max(axis=0)))
     apart = project.comm.per_node(lambda: int(bodies_of(mesh.face_partners()).max()) + 1)
     note = f"{apart} bodies, which interact by contact" if apart > 1 else "one body"
-    _say(project, f"{path.name}: from ({low}) to ({high}) m, {note}")
+    _log(project, f"{path.name}: from ({low}) to ({high}) m, {note}")
     for kind, sets in ((ELEMENT, mesh.groups), (NODE, found.nodes), (FACE, found.faces)):
         names = [f"set '{name}': " + ", ".join(f"'{group}'" for group in of) for name, of in sets.items()]
         if names:
-            _say(project, f"{path.name}: groups of {kind}s, {'; '.join(names)}")
+            _log(project, f"{path.name}: groups of {kind}s, {'; '.join(names)}")
     if found.notes:
-        _say(project, f"{path.name}: left out: " + "; ".join(found.notes))
+        _log(project, f"{path.name}: left out: " + "; ".join(found.notes))
     whole = project.whole_mesh()
     unfit = project.comm.per_node(lambda: fit.fit(whole, cells).description())
     if unfit and project.log is not None:
@@ -327,18 +327,18 @@ def glue(
         sides = some, np.ones(len(some), bool)
     made: glue_of.Glued = project.comm.per_node(lambda: glue_of.glued(mesh, tolerance, sides), once=True)
     if not made.faces:
-        _say(project, "glue: the mesh is already one body")
+        _log(project, "glue: the mesh is already one body")
         return
     project.refit(made)
     merged = len(mesh.points) - len(np.unique(made.points))
-    _say(
+    _log(
         project,
         f"glue: {made.faces} faces of different bodies are joints now, {merged} points were merged (within "
         f"{made.tolerance:g} m)",
     )
     if made.cut:
         before, after = (quality.altitudes(one).min() for one in (mesh, made.mesh))
-        _say(
+        _log(
             project,
             f"glue: {made.cut} elements were cut at hanging nodes, which adds "
             f"{len(made.mesh.cells) - len(mesh.cells)} elements; the smallest altitude was {before:.3g} m and is now "
@@ -356,7 +356,7 @@ def delete(project: Project, where: Range | None = None) -> None:
     made = project.comm.per_node(lambda: remade.without(project.whole_mesh(), elements), once=True)
     lost = len(project.whole_mesh().cells) - len(made.parent)
     project.refit(made)
-    _say(project, f"element delete: {lost} elements deleted, {len(made.parent)} left")
+    _log(project, f"element delete: {lost} elements deleted, {len(made.parent)} left")
 
 
 def densify(
@@ -370,7 +370,7 @@ def densify(
     elements, most = everything(project, ELEMENT, where), (maximum_length[0], maximum_length[-1])
     made = project.comm.per_node(lambda: quadtree.densified(mesh, elements, pattern, most), once=True)
     project.refit(made)
-    _say(project, f"element densify: {len(made.parent) - len(mesh.cells)} more elements, {len(made.parent)} in all")
+    _log(project, f"element densify: {len(made.parent) - len(mesh.cells)} more elements, {len(made.parent)} in all")
 
 
 def six_nodes(project: Project) -> None:
@@ -386,7 +386,7 @@ def six_nodes(project: Project) -> None:
             between = len(mesh.points) + np.flatnonzero(np.isin(ends, members).all(axis=1))
             sets[name] = np.unique(np.concatenate([members, between]))
     count, points = len(made.mesh.macros), len(made.mesh.points)
-    _say(project, f"mesh quadratic: {count} six-node triangles of 4 elements each, {points} points")
+    _log(project, f"mesh quadratic: {count} six-node triangles of 4 elements each, {points} points")
 
 
 def add_nodes(project: Project, points: Sequence[tuple[float, ...]]) -> None:
@@ -436,11 +436,11 @@ def _move(project: Project, factor: Any, way: Any, what: str) -> None:
     project.replace_mesh(project.comm.per_node(make))
 
 
-def tell_quality(project: Project) -> None:
+def report_quality(project: Project) -> None:
     """Sizes and angles of the mesh, in the log."""
     mesh = project.whole_mesh()
     for line in project.comm.per_node(lambda: quality.quality(mesh).lines()):
-        _say(project, line)
+        _log(project, line)
 
 
 def fracture_network(
@@ -473,7 +473,7 @@ def fracture_network(
 
     found = project.comm.per_node(make, once=True)
     project.layers.add(layer, *(geometry.polyline(ends.tolist()) for ends in found.ends))
-    _say(project, f"layer '{layer}': {len(found)} fractures of together {found.lengths().sum():g} m")
+    _log(project, f"layer '{layer}': {len(found)} fractures of together {found.lengths().sum():g} m")
 
 
 def disc_network(project: Project, layer: str, inside: str, *, seed: int, **statistics: Any) -> None:
@@ -483,7 +483,7 @@ def disc_network(project: Project, layer: str, inside: str, *, seed: int, **stat
     number, project.networks = project.networks, project.networks + 1
     found = project.comm.per_node(lambda: fracture_discs.discs(one, bodies, seed, number), once=True)
     project.layers.add(layer, *found)
-    _say(project, f"layer '{layer}': {len(found)} discs of together {fracture_discs.area(found):g} m2")
+    _log(project, f"layer '{layer}': {len(found)} discs of together {fracture_discs.area(found):g} m2")
 
 
 def _add(project: Project, make: Callable[[], Mesh]) -> Mesh:
@@ -505,10 +505,10 @@ def _add(project: Project, make: Callable[[], Mesh]) -> Mesh:
 
     mesh, text = project.comm.per_node(checked)
     project.add_mesh(mesh)
-    _say(project, text)
+    _log(project, text)
     return mesh
 
 
-def _say(project: Project, text: str) -> None:
+def _log(project: Project, text: str) -> None:
     if project.log is not None:
         project.log.info(text)

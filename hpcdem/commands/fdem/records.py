@@ -135,9 +135,9 @@ class History:
             probe = self._probe_of(blocks)
             probe.find()
             assert probe.local is not None
-            self._waits = int(clock.step), float(blocks.told_time()), probe.local, probe.local.passes
+            self._waits = int(clock.step), float(blocks.reported_time()), probe.local, probe.local.passes
         else:
-            self.rows.append((int(clock.step), float(blocks.told_time()), self.measure(blocks)))
+            self.rows.append((int(clock.step), float(blocks.reported_time()), self.measure(blocks)))
 
     def take(self, blocks: Blocks) -> None:
         """Add the record that waits, if there is one. Collective."""

@@ -31,7 +31,7 @@ from hpcdem.runtime.stop_requests import STOP
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
-LOOK_STATIC, LOOK_DYNAMIC = 50, 100
+CHECK_STATIC, CHECK_DYNAMIC = 50, 100
 """Steps between two looks at the ratio, counted from the beginning of the command, unless model solve-check says so."""
 CYCLES = 10_000
 """Steps of a model solve that is given no aim, if it does not come to RATIO before."""
@@ -93,7 +93,7 @@ def solve(
     if (run := run_time or project.run_time) and _time_passes(project):
         left = _left(project, run)
         if left <= 0.0 and project.progress is None:
-            _tell_no_time(project, run)
+            _warn_no_time(project, run)
             return
         time, bare = left if time is None else min(time, left), False
     command = "solve", {"ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit,
@@ -149,7 +149,7 @@ def _left(project: Project, run: float) -> float:
     return min((begin + run - clocks_of.time(project, part) for part, begin in project.began.items()), default=run)
 
 
-def _tell_no_time(project: Project, run: float) -> None:
+def _warn_no_time(project: Project, run: float) -> None:
     project.solved = {"reason": "time", "ratio": math.nan, "steps": 0}
     if project.log is not None:
         begins = " and ".join(f"{begin:g} s" for begin in project.began.values())
@@ -327,7 +327,7 @@ def _flow_by_steps(project: Project, flow: Flow, time: float) -> None:
         solve(project, time=time)
 
 
-def _tell_of_thin(project: Project, steps: int | None, time: float | None) -> None:
+def _report_thin(project: Project, steps: int | None, time: float | None) -> None:
     """A word on the fluid before a run of so many steps, or of so much time [s], that will take long. Collective."""
     blocks, log = project.blocks, project.log
     flow, o = Flow.there(blocks), blocks.options
@@ -416,7 +416,7 @@ def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, 
             if blocks.creep.time < end:
                 _answer_requests(project)
         project.solved = {"reason": "time", "ratio": found.ratio, "steps": project.step - first}
-        _tell_creep(project)
+        _report_creep(project)
         histories.flush(project)
         frames.settle(project)
     finally:
@@ -424,7 +424,7 @@ def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, 
         project.progress, project.stepping = None, ""
 
 
-def _tell_creep(project: Project) -> None:
+def _report_creep(project: Project) -> None:
     clock = project.blocks.creep
     if project.log is not None:
         project.log.info(f"{_where(project)}creep time {clock.time:.6g} s after {clock.steps} creep steps")
@@ -453,7 +453,7 @@ def _creep(
             return ended
         creep.finish(blocks, end)
         _write_due(project)
-    _tell_creep(project)
+    _report_creep(project)
     histories.flush(project)
     cracks.flush(project)
     return "time", ended[1], ended[2]
@@ -477,7 +477,7 @@ def _run(
         log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is executed")
     if project.progress is None:
         project.blocks.drop_creep_step()
-        _tell_of_thin(project, steps, time)
+        _report_thin(project, steps, time)
         end = None if time is None or creeps else clock.time + time
         project.progress = {"first": clock.step, "end": end, "command": command}
         if time is not None and creeps:
@@ -512,7 +512,7 @@ def _advance(
     # A checkpoint of a version that did not watch has none.
     watch = Watch(**progress["watch"]) if progress.get("watch") else Watch(0, 0, first)
     reason, found = progress.get("ended", ["", math.nan])
-    look = project.look or (LOOK_DYNAMIC if project.dynamic else LOOK_STATIC)
+    look = project.look or (CHECK_DYNAMIC if project.dynamic else CHECK_STATIC)
     report, creeps = _Report(project, name, last), "creep" in progress
     if not creeps:
         frames.write_due(project)
@@ -657,7 +657,7 @@ class _Report:
         self.project, self.name, self.last = project, name, last
         self.first = project.step if project.progress is None else project.progress["first"]
         self.began = self.told = clocks.monotonic()
-        self.began_step = self.told_step = project.step
+        self.began_step = self.reported_step = project.step
         before = project.told.get(project.line)
         self.speaks = project.comm.bcast(before is None or self.began - before >= QUIET_SECONDS)
         where = f"line {project.line}: " if project.line else ""
@@ -672,7 +672,7 @@ class _Report:
             self.project.log.at(blocks.clock.step, self.name, self.first, self.last)
         if self.project.log is None or not self.project.comm.bcast(now - self.told >= QUIET_SECONDS):
             return
-        done = blocks.clock.step - self.told_step
+        done = blocks.clock.step - self.reported_step
         speed = done / max(now - self.told, 1e-9)
         left = f" | left {duration((self.last - blocks.clock.step) / speed)}" if self.last < math.inf and speed else ""
         under_way.look(self.project.comm)
@@ -680,7 +680,7 @@ class _Report:
         self.project.log.info(
             f"{self._state(blocks)} | {rate(speed)} steps/s, {rate(speed * elements)} element-steps/s{left}"
         )
-        self.told, self.told_step, self.speaks = now, blocks.clock.step, True
+        self.told, self.reported_step, self.speaks = now, blocks.clock.step, True
 
     def _state(self, blocks: Blocks) -> str:
         clock = blocks.clock

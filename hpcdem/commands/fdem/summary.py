@@ -124,8 +124,8 @@ def close(project: Project, figure: bool = True) -> None:
     if heat is not None:
         found = heat.account()
         log.account("heat", "heat", joule, {HEAT_WORDS[k]: found[k] for k in HEAT_WORDS}, project.units)
-    _tell_fields(project)
-    _tell_both(project)
+    _report_fields(project)
+    _report_both(project)
     if figure:
         path = last_figure(project)
         log.info(f"figure: {path}")
@@ -137,7 +137,7 @@ def close(project: Project, figure: bool = True) -> None:
         log.stages_of_both(both.particles.timers, blocks.timers, project.comm)
 
 
-def _tell_fields(project: Project) -> None:
+def _report_fields(project: Project) -> None:
     """The accounts of fields that diffuse in elements. Collective."""
     blocks, log = project.blocks, project.log
     for kind in kinds().values():
@@ -148,7 +148,7 @@ def _tell_fields(project: Project) -> None:
             log.account(kind.name, kind.name, unit, entries, project.units)
 
 
-def _tell_both(project: Project) -> None:
+def _report_both(project: Project) -> None:
     """Report the exchange through contacts of discs and faces, and the sum of both energy budgets. Collective."""
     both, log = project.coupled, project.log
     if both is None or project.continues is not None or not both.accounted:

@@ -41,7 +41,7 @@ from hpcdem.lang.pcdc.vector import Vector
 from hpcdem.lang.pcdc.views import Model
 from hpcdem.runtime.progress import write
 
-LOOK = -1
+READ = -1
 """Used instead of the number of a command when a script queries values of the model."""
 SEED = 0
 """Seed of the random numbers of Python and numpy, so that all ranks draw the same."""
@@ -165,16 +165,16 @@ class Interpreter:
         if frames:
             last = frames[-1]
             statement = self.sources[last.filename].statement_at(last.lineno or 0)
-            way = _way([(f.filename, f.lineno or 0) for f in frames[:-1]])
+            calls = _calls([(f.filename, f.lineno or 0) for f in frames[:-1]])
             if isinstance(error, CommandError):
                 text = self.sources[last.filename].line(last.lineno or 0)
-                return ScriptError(last.filename, last.lineno or 0, f"{shown(text)}: {hyphened(str(error))}{way}")
+                return ScriptError(last.filename, last.lineno or 0, f"{shown(text)}: {hyphened(str(error))}{calls}")
             if statement is not None:
-                return statement.error(f"{type(error).__name__}: {error}{way}")
+                return statement.error(f"{type(error).__name__}: {error}{calls}")
             if isinstance(error, (RecursionError, MemoryError)):
                 line = last.lineno or 0
                 why = f"{type(error).__name__}: {error}".rstrip(": ")
-                return HpcdemError(f"{last.filename}:{line}: {shown(script.line(line).strip())}: {why}{way}")
+                return HpcdemError(f"{last.filename}:{line}: {shown(script.line(line).strip())}: {why}{calls}")
         trace = error.__traceback__
         while trace is not None and trace.tb_frame.f_code.co_filename not in self.sources:
             trace = trace.tb_next
@@ -206,7 +206,7 @@ class Interpreter:
             arguments, terms = statement.resolve(values)
         except ScriptError as error:
             self._agree(index, repr(error))
-            raise self._on_the_way(error) from None
+            raise self._with_calls(error) from None
         text = repr((arguments, terms))
         asked = self._agree(index, text)
         self.project.line = statement.line if self._included_at is None else self._included_at
@@ -217,22 +217,22 @@ class Interpreter:
         try:
             carry_out(Call(self.project, statement.command, arguments, where(terms), self.restore_names))
         except HpcdemError as error:
-            known = self._told_with_line(error, statement)
+            known = self._with_line(error, statement)
             if self.journal is not None:
                 self.journal.note_error(known)
             if known is error:
                 raise
             raise known from error
 
-    def _told_with_line(self, error: HpcdemError, statement: Statement) -> HpcdemError:
+    def _with_line(self, error: HpcdemError, statement: Statement) -> HpcdemError:
         """An error of a command, with the line."""
         if isinstance(error, (CommandError, ScriptError)):
-            return self._on_the_way(error if isinstance(error, ScriptError) else statement.error(hyphened(str(error))))
+            return self._with_calls(error if isinstance(error, ScriptError) else statement.error(hyphened(str(error))))
         if isinstance(error, EquilibriumError):
-            return EquilibriumError(str(self._on_the_way(statement.error(str(error)))))
+            return EquilibriumError(str(self._with_calls(statement.error(str(error)))))
         if type(error) is HpcdemError:
             # A file that could not be written: the line is not wrong, the exit code is that of a run that failed.
-            return HpcdemError(str(self._on_the_way(statement.error(str(error)))))
+            return HpcdemError(str(self._with_calls(statement.error(str(error)))))
         return error
 
     # ---- continuing from a checkpoint ------------------------------------------------------------------------------
@@ -251,7 +251,7 @@ class Interpreter:
                 return False
             given = journal.names()
         except UsageError as error:
-            raise self._took_another_way(error, f"{statement.file}:{statement.line}: {shown(statement.text)}") from None
+            raise self._diverged(error, f"{statement.file}:{statement.line}: {shown(statement.text)}") from None
         if given is not None:
             self._take_names(given, arguments["file"])
         note = PASSED_OVER.get(statement.command.name)
@@ -285,7 +285,7 @@ class Interpreter:
         def ask() -> Any:
             if together and self.project.comm.size > 1:
                 file, line = self._caller()
-                self._agree(LOOK, f"{file}:{line}: {together}")
+                self._agree(READ, f"{file}:{line}: {together}")
             return make()
 
         return ask() if journal is None else self._placed(lambda: journal.look(ask))
@@ -327,9 +327,9 @@ class Interpreter:
             return make()
         except UsageError as error:
             file, line = self._caller()
-            raise self._took_another_way(error, f"{file}:{line}" if line else "the script") from None
+            raise self._diverged(error, f"{file}:{line}" if line else "the script") from None
 
-    def _took_another_way(self, error: UsageError, place: str) -> UsageError:
+    def _diverged(self, error: UsageError, place: str) -> UsageError:
         """The error with its line, the first time that it is met."""
         if (
             self.journal is not None
@@ -371,13 +371,13 @@ class Interpreter:
             why = f"its values differ between rank 0 and rank {other}: {shown}"
         why += "; all ranks must execute the same commands with the same values"
         for at, text in everyone:
-            if at == LOOK:
+            if at == READ:
                 place, _, question = text.partition(": ")
                 raise ScriptError(place.rpartition(":")[0], int(place.rpartition(":")[2]), f"{question}: {why}")
         raise self.statements[min(i for i, _ in everyone)].error(why)
 
     def _place(self, index: int, text: str) -> str:
-        if index == LOOK:
+        if index == READ:
             return text.partition(": ")[0]
         if index >= len(self.statements):
             return "the end of the script"
@@ -388,7 +388,7 @@ class Interpreter:
         if self.statements:
             self._agree(len(self.statements), "")
 
-    def _on_the_way(self, error: ScriptError) -> ScriptError:
+    def _with_calls(self, error: ScriptError) -> ScriptError:
         """The error with the calls that led to its line, if it stands in a function."""
         places: list[tuple[str, int]] = []
         frame: FrameType | None = sys._getframe(1)
@@ -396,7 +396,7 @@ class Interpreter:
             if frame.f_code.co_filename in self.sources:
                 places.append((frame.f_code.co_filename, frame.f_lineno))
             frame = frame.f_back
-        return ScriptError(error.file, error.line, error.message + _way(places[:0:-1]))
+        return ScriptError(error.file, error.line, error.message + _calls(places[:0:-1]))
 
     # ---- names ---------------------------------------------------------------------------------------------------
 
@@ -444,7 +444,7 @@ def _checksum(key: tuple[Any, ...]) -> int:
     return zlib.crc32(described(key).encode("utf-8", "backslashreplace"))
 
 
-def _way(places: list[tuple[str, int]]) -> str:
+def _calls(places: list[tuple[str, int]]) -> str:
     """`, called from lines 30, 44`: the outermost call last."""
     if not places:
         return ""

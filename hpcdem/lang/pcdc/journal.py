@@ -26,7 +26,7 @@ MOST = 64 << 20
 ENTRY = 32
 """Bytes that an entry counts for at least."""
 
-COMMAND, LOOK, NAMES, ERROR = "command", "look", "names", "error"
+COMMAND, READ, NAMES, ERROR = "command", "look", "names", "error"
 ASK, ALONE, CALL, DONE = "ask", "alone", "call", "done"
 _ERRORS: dict[str, type[HpcdemError]] = {
     kind.__name__: kind for kind in (HpcdemError, CommandError, EquilibriumError, PhysicsError, UsageError)
@@ -77,8 +77,8 @@ class Journal:
         """Return the result of `make`, or the recorded one when replaying."""
         if self.replays:
             self._fail_again()
-            if self._past[self._at][0] != LOOK:
-                raise self._other_way("the script reads values of the model that it did not read there before")
+            if self._past[self._at][0] != READ:
+                raise self._differs("the script reads values of the model that it did not read there before")
             return decoded(self._next()[1])
         try:
             value = make()
@@ -86,7 +86,7 @@ class Journal:
             self.note_error(error)
             raise
         if not self.lost:
-            self.note(LOOK, encoded(value))
+            self.note(READ, encoded(value))
         return value
 
     def ask(self, checksum: int, make: Callable[[], Any], again: Callable[[], Any] | None, fails_again: bool) -> Any:
@@ -105,7 +105,7 @@ class Journal:
         try:
             return again()
         finally:
-            if self.replays and self._past[self._at][0] in (LOOK, ERROR):
+            if self.replays and self._past[self._at][0] in (READ, ERROR):
                 self._next()
 
     def ask_alone(self, checksum: int, make: Callable[[], Any], again: bool, alone: bool) -> Any:
@@ -118,7 +118,7 @@ class Journal:
             return value
         self._meet_call(checksum)
         if self._past[self._at][0] != ALONE:
-            raise self._other_way(_NO_CALL)
+            raise self._differs(_NO_CALL)
         answer = self._next()[1]
         if again:
             return make()
@@ -128,7 +128,7 @@ class Journal:
 
     def _meet_call(self, checksum: int) -> None:
         if self._past[self._at] != [ASK, checksum]:
-            raise self._other_way(_NO_CALL)
+            raise self._differs(_NO_CALL)
         self._next()
 
     # ---- functions that are called in the middle of a command ------------------------------------------------------
@@ -137,7 +137,7 @@ class Journal:
         """Call a function, and note what it does."""
         if self.replays:
             if self._past[self._at] != [CALL, number]:
-                raise self._other_way("a function is called that was not called there before")
+                raise self._differs("a function is called that was not called there before")
             self._next()
         else:
             self.note(CALL, number)
@@ -145,7 +145,7 @@ class Journal:
         if not self.replays:
             self.note(DONE)
         elif self._next()[0] != DONE:
-            raise self._other_way("a function that is called at some steps executes less than before")
+            raise self._differs("a function that is called at some steps executes less than before")
         return value
 
     def call_again(self) -> None:
@@ -153,7 +153,7 @@ class Journal:
         while self.replays and self._past[self._at][0] == CALL:
             number = self._past[self._at][1]
             if number >= len(self.functions):
-                raise self._other_way("a function that was called here before is missing")
+                raise self._differs("a function that was called here before is missing")
             self.call(number)
 
     # ---- bringing it back ----------------------------------------------------------------------------------------
@@ -183,7 +183,7 @@ class Journal:
         Returns True if the run continues with this command, False if the command is skipped; functions that it had
         called are called. Raises UsageError if it is another command, and an error that it had raised."""
         if self._past[self._at] != [COMMAND, checksum]:
-            raise self._other_way("another line, or other values, were executed there before")
+            raise self._differs("another line, or other values, were executed there before")
         self._next()
         self.call_again()
         if not self.replays:
@@ -206,7 +206,7 @@ class Journal:
         self.note(*entry)
         return entry
 
-    def _other_way(self, why: str) -> UsageError:
+    def _differs(self, why: str) -> UsageError:
         self.failure = UsageError(
             f"{why}: the script was changed, or its path depends on the clock or on changed files. Start again, or "
             "start another script with pcdc model restore"

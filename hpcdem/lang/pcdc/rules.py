@@ -99,14 +99,16 @@ def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
 
 
 def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    ways = {"value": "value", "auto": "auto on", "mass-scaling": "mass-scaling"}
+    settings = {"value": "value", "auto": "auto on", "mass-scaling": "mass-scaling"}
     if "auto" in arguments and arguments["auto"] == ():
         arguments = {**arguments, "auto": True}
     auto = arguments.get("auto")
     if "update-frequency" in arguments and auto is not True and not isinstance(auto, Pending):
         raise ValueError("update-frequency needs auto on")
     given = [
-        phrase for word, phrase in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)
+        phrase
+        for word, phrase in settings.items()
+        if not isinstance(arguments.get(word), Pending) and arguments.get(word)
     ]
     if len(given) > 1:
         raise ValueError(f"{given[0]} and {given[1]} cannot be combined: both set the time step")
@@ -185,7 +187,7 @@ def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | Non
         raise ValueError("every and off cannot be combined")
 
 
-LOOKS = ("limits", "full", "log", "colours", "opacity", "edges", "size", "vectors", "arrows", "filter")
+LAYER_OPTIONS = ("limits", "full", "log", "colours", "opacity", "edges", "size", "vectors", "arrows", "filter")
 
 
 def _image(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -195,7 +197,7 @@ def _image(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
     if "full" in arguments and "limits" in arguments:
         raise ValueError("limits and full cannot be combined: both set the range of colours")
     if "field" not in arguments and "object" not in arguments:
-        for word in LOOKS:
+        for word in LAYER_OPTIONS:
             if word in arguments:
                 raise ValueError(f"{word} requires field or object")
 

@@ -115,13 +115,13 @@ def _dimensions(statement: Statement, before: int | None) -> int | None:
 def _logical(lines: list[str], number: int, words: str) -> tuple[int, str]:
     """The words of a command and the number of its last line: a backslash, or three dots, at the end of a line
     continues with the next."""
-    while (end := _goes_on(words)) is not None and number + 1 < len(lines):
+    while (end := _continued(words)) is not None and number + 1 < len(lines):
         number += 1
         words = words[:end] + " " + lines[number]
     return number, words
 
 
-def _goes_on(words: str) -> int | None:
+def _continued(words: str) -> int | None:
     """Place of the backslash, or the three dots, that end the line, if they stand outside of texts and comments."""
     at, last = 0, len(words.rstrip())
     while at < last:
@@ -146,16 +146,16 @@ class _PythonText:
     def __init__(self) -> None:
         self._quote = ""
         self._depth = 0
-        self._goes_on = False
+        self._continued = False
 
     @property
     def at_statement(self) -> bool:
-        return not (self._quote or self._depth or self._goes_on)
+        return not (self._quote or self._depth or self._continued)
 
     def feed(self, line: str) -> None:
         """The next line of Python."""
         at = 0
-        self._goes_on = False
+        self._continued = False
         while at < len(line):
             if self._quote:
                 at = self._after_quote(line, at)
@@ -170,7 +170,7 @@ class _PythonText:
                 end = lexer.end_of_string(line, at)
                 if end is None:
                     # A text that continues after a backslash, or an error that Python will report.
-                    self._goes_on = line.endswith("\\")
+                    self._continued = line.endswith("\\")
                     return
                 at = end
                 continue
@@ -179,7 +179,7 @@ class _PythonText:
             elif char in ")]}":
                 self._depth = max(self._depth - 1, 0)
             elif char == "\\" and at == len(line) - 1:
-                self._goes_on = True
+                self._continued = True
             at += 1
 
     def _after_quote(self, line: str, at: int) -> int:

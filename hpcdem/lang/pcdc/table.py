@@ -1230,7 +1230,7 @@ _MESH = (
             "elements; joints, contact and loads act on the halves of its sides. The mesh must have triangles only; "
             "must precede the first model or condition.", ("pcdc mesh quadratic",), does="meshes.six_nodes"),
     Command("mesh qual{ity}", "Reports the quality of the mesh: angles, sizes.", ("pcdc mesh quality",), dims=BOTH,
-            does="meshes.tell_quality"),
+            does="meshes.report_quality"),
 )  # fmt: skip
 
 # ---- meshes in the words of the online commands -------------------------------------------------------------------

@@ -248,13 +248,13 @@ class _Follower:
     def _move(self, s: Statement) -> None:
         """A wall at one side of the bed takes this side along."""
         x, speed = self.walls.get(s.get("id"), (math.nan, 0.0))
-        way = math.copysign(abs(s.get("xmove", 0.0)), speed)
+        distance = math.copysign(abs(s.get("xmove", 0.0)), speed)
         if self.bed is None or not speed or not math.isfinite(x):
             return
         x1, x2, y1, _ = self.bed.place
         near = 0.1 * (x2 - x1)
-        x1, x2 = (x1 + way if abs(x - x1) <= near else x1), (x2 + way if abs(x - x2) <= near else x2)
-        self.walls[s.get("id")] = x + way, speed
+        x1, x2 = (x1 + distance if abs(x - x1) <= near else x1), (x2 + distance if abs(x - x2) <= near else x2)
+        self.walls[s.get("id")] = x + distance, speed
         if x2 > x1:
             self._lay(x1, x2, y1)
 

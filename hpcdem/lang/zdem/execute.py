@@ -29,7 +29,7 @@ def refuse_unexecuted(statements: Sequence[Statement]) -> None:
             )
 
 
-def tell_warnings(script: Script, sim: Any) -> None:
+def report_warnings(script: Script, sim: Any) -> None:
     """Log the places where the parser read something other than written."""
     if getattr(sim, "log", None) is not None:
         for statement in script.statements:
@@ -119,7 +119,7 @@ class Interpreter:
         refuse_unexecuted(self.script.statements)
         self.refuse_lost_files(sim)
         self.load_laws(sim)
-        tell_warnings(self.script, sim)
+        report_warnings(self.script, sim)
         sim.script = self.script.text
         if resume is not None:
             if saved_script:
@@ -172,7 +172,7 @@ class Interpreter:
             _by_name(call, call.row.does)
         else:
             _CONVERTERS[call.statement.command](call)
-        look_at_units(call.sim, call.statement.command, call.arguments)
+        check_units(call.sim, call.statement.command, call.arguments)
 
     @staticmethod
     def _guarded(statement: Statement, work: Callable[[], object]) -> None:
@@ -187,7 +187,7 @@ class Interpreter:
             raise HpcdemError(str(statement.error(str(error)))) from error
 
 
-def look_at_units(sim: Any, command: str, given: Mapping[str, Any]) -> None:
+def check_units(sim: Any, command: str, given: Mapping[str, Any]) -> None:
     """Warn of arguments of a command of the table that are unlikely in the units declared."""
     row = ZDEM.command(command.lower())
     settings = getattr(sim, "settings", None)
@@ -316,7 +316,7 @@ def _draw(call: _Call) -> None:
     dem.history.draw(call.sim, call.arguments.get("interval"), what, off)
 
 
-def _say(call: _Call, text: str) -> None:
+def _log(call: _Call, text: str) -> None:
     """A line in the log for a command without effect."""
     if getattr(call.sim, "log", None) is not None:
         call.sim.log.info(f"line {call.sim.line}: {call.statement.command}: {text}")
@@ -332,7 +332,7 @@ _CONVERTERS: dict[str, Callable[[_Call], None]] = {
     "IMPLE": _imple,
     "HIST": lambda call: dem.history.hist(call.sim, **call.given("id", "interval"), what=recorded(call.statement)),
     "DRAW": _draw,
-    "LOG": lambda call: _say(call, "the log goes to standard output: the command has no effect"),
-    "PAUSE": lambda call: _say(call, "runs are not interactive, so it has no effect"),
+    "LOG": lambda call: _log(call, "the log goes to standard output: the command has no effect"),
+    "PAUSE": lambda call: _log(call, "runs are not interactive, so it has no effect"),
 }
 """Commands whose row names no function."""

@@ -159,8 +159,8 @@ class _LineParser:
         if command is None or self.before is None:
             return ""
         rows = [*command.options, *((self.table.range_row, *self.table.range_terms) if command.ranged else ())]
-        goes_on = lexer.number(token) is not None or any(row.accepts(token.word) for row in rows)
-        return f"; it may be the rest of line {self.before.line}: {lexer.JOIN}" if goes_on else ""
+        continues = lexer.number(token) is not None or any(row.accepts(token.word) for row in rows)
+        return f"; it may be the rest of line {self.before.line}: {lexer.JOIN}" if continues else ""
 
     def leading(self, command: t.Command, arguments: dict[str, Any]) -> None:
         """Fixed words and values that follow the command itself. Words are left out of the arguments."""

@@ -36,9 +36,9 @@ def checked(points: Sequence[Sequence[float]], dim: int) -> np.ndarray:
     return line
 
 
-def lengths(ways: np.ndarray) -> np.ndarray:
+def lengths(vectors: np.ndarray) -> np.ndarray:
     """Lengths of vectors (n, 2 or 3)."""
-    found: np.ndarray = np.hypot.reduce(ways, axis=1)
+    found: np.ndarray = np.hypot.reduce(vectors, axis=1)
     return found
 
 
@@ -120,11 +120,11 @@ def _crossed_faces(a: np.ndarray, b: np.ndarray, corners: np.ndarray, cells: np.
     near = (cells[:, 0] >= 0) & (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
     p, q, r = np.moveaxis(corners[near][:, FACES].reshape(-1, 3, len(a)), 1, 0)
     d, e, f = b - a, q - p, r - p
-    normal, way = np.cross(e, f), p - a
+    normal, offset = np.cross(e, f), p - a
     along = normal @ d
-    turned = np.cross(d, way)
+    turned = np.cross(d, offset)
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = (normal * way).sum(axis=1) / along
+        t = (normal * offset).sum(axis=1) / along
         u, w = -(f * turned).sum(axis=1) / along, (e * turned).sum(axis=1) / along
         hit = (along != 0.0) & (t > 0.0) & (t < 1.0) & (u >= -INSIDE) & (w >= -INSIDE) & (u + w <= 1.0 + INSIDE)
     return np.sort(t[hit])

@@ -91,8 +91,8 @@ def _choose_fast(sim: Any, first_class: int | None, limit: float) -> None:
     which, classes = fast.classes(drift, limit)
     which = which[classes >= first_class]
     hot = p.hot[which]
-    way = np.maximum(drift[which], fast.strides(hot, dt))
-    rows = np.column_stack([hot[:, X], hot[:, Y], hot[:, RADIUS], way])
+    path = np.maximum(drift[which], fast.strides(hot, dt))
+    rows = np.column_stack([hot[:, X], hot[:, Y], hot[:, RADIUS], path])
     parts = sim.comm.allgather((p["gid"][which], p.clump[which], rows))
     gid, clump, rows = (np.concatenate([part[k] for part in parts]) for k in range(3))
     order = np.argsort(gid)
@@ -121,7 +121,7 @@ def _choose_fast(sim: Any, first_class: int | None, limit: float) -> None:
     rebuild_state.pace = rebuild_state.countdown = max(1, min(rebuild_state.countdown, int(min(wait, LONGEST_WAIT))))
 
 
-def look_at_fast(sim: Any, fall: float, found: np.ndarray) -> None:
+def measure_fast(sim: Any, fall: float, found: np.ndarray) -> None:
     """Write the result of fast.survey for the owned fast particles into found (4,)."""
     if not len(sim._fast_rows):
         return

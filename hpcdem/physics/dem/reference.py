@@ -85,7 +85,7 @@ def wall_forces(
     """Contacts with walls: forces (n, 3) [N, N, N m], and shear forces (m,) [N] and sides (m,) of all slots after the
     step. walls (w, 7): walls.py; slots (m, 2): row of the particle, of the wall; wall_laws (w, materials, 4)."""
     force, fs, new_side = np.zeros((len(hot), 3)), fs.copy(), np.zeros(len(slots))
-    goes_on = np.full(len(slots), -1)  # the slot of another wall that the disc meets and that continues from this end
+    continues = np.full(len(slots), -1)  # the slot of another wall that the disc meets and that continues from this end
     for k, (i, w) in enumerate(slots):
         x, r = hot[i, [X, Y]], hot[i, RADIUS]
         q, p1, e = wall_contact(walls[w], x, r, side[k])[-1], walls[w, P1X : P1X + 2], walls[w, P2X : P2Y + 1]
@@ -99,14 +99,14 @@ def wall_forces(
                 point = wall_contact(walls[slots[m, 1]], q, r, 0.0)[-1]
             if other != NONE and np.abs(point - q).max() <= 1e-9 * r and (other == FACE or m < k):
                 (faces if other == FACE else ends).append(m)
-        goes_on[k] = [*faces, *ends, -1][0]
-    for k in np.flatnonzero((goes_on >= 0) & (fs != 0.0)):
-        fs[goes_on[k]] += fs[k]
+        continues[k] = [*faces, *ends, -1][0]
+    for k in np.flatnonzero((continues >= 0) & (fs != 0.0)):
+        fs[continues[k]] += fs[k]
         fs[k] = 0.0
     for k, (i, w) in enumerate(slots):
         x, r = hot[i, [X, Y]], hot[i, RADIUS]
         where, n, u, new_side[k], q = wall_contact(walls[w], x, r, side[k])
-        if where in (END1, END2) and goes_on[k] >= 0:
+        if where in (END1, END2) and continues[k] >= 0:
             where = NONE
         if where == NONE:
             fs[k] = new_side[k] = 0.0

@@ -145,9 +145,9 @@ class Simulation(Model):
         self.streams = 0
         self.breaks = np.zeros(2, np.int64)
         self.bonds = 0
-        self.bonds_looked_at: tuple[float, ...] = ()  # state of the last search for bonds of two shear stiffnesses
+        self.bonds_checked: tuple[float, ...] = ()  # state of the last search for bonds of two shear stiffnesses
         self.step_limit = math.inf  # the lowest estimate of the critical time step that was reported
-        self.told_share = 0.0  # the largest part of the stability limit that was logged
+        self.reported_share = 0.0  # the largest part of the stability limit that was logged
         self.next_watch = 0  # the step from which on it is checked again
         self.lost = 0
         self.rows: list[tuple[int, int]] = []
@@ -241,7 +241,7 @@ class Simulation(Model):
         fall = 2.0 * math.hypot(self.settings.gx, self.settings.gy) * dt * dt
         motion.survey(p.hot, p.n_left, p.n_own, self.origin, dt, self._fast_rows, found[:4])
         found[4] = self.stop.local_request() if self.stop is not None else 0
-        reach.look_at_fast(self, fall, found[5:])
+        reach.measure_fast(self, fall, found[5:])
         self.comm.max_into(found)
         broken = bool(found[motion.BROKEN] or found[5 + fast.FAST_BROKEN])
         if broken or max(found[motion.STRIDE], found[5 + fast.FAST_STRIDE]) > guards.LARGEST_STRIDE:

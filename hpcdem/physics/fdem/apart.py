@@ -31,15 +31,15 @@ def check(sim: State, local: Local, error: type[Exception]) -> None:
     rows = _rows(sim, local)
     mine = rows[np.lexsort((rows[:, 1], -rows[:, 0]))[:1]]
     found = sorted((-row[0], row[1], row[2]) for each in sim.comm.allgather(mine) for row in each)
-    share, face, way = (-found[0][0], int(found[0][1]), found[0][2]) if found else (0.0, 0, 0.0)
+    share, face, displacement = (-found[0][0], int(found[0][1]), found[0][2]) if found else (0.0, 0, 0.0)
     if share <= FAR:
         return
     mesh = sim.the_mesh()
     at = ", ".join(f"{c:g}" for c in mesh.points[mesh.face_points(np.array([face]))][0].mean(axis=0))
     name = sim.joint_rows.name(sim.joint_row[face]).replace("_", "-")
     text = (
-        f"face-joint {face} ({name}) at ({at}) has slipped or opened by {way:.3g} m, {share:.2g} of its size. Its "
-        "sides still interact over the whole joint"
+        f"face-joint {face} ({name}) at ({at}) has slipped or opened by {displacement:.3g} m, {share:.2g} of its size. "
+        "Its sides still interact over the whole joint"
     )
     advice = (
         "use longer edges along the joint, or classic-intrinsic-cohesive-interface, whose broken faces are contacts"
@@ -57,6 +57,6 @@ def _rows(sim: State, local: Local) -> np.ndarray:
     if not len(slots):
         return np.empty((0, 3))
     face = local.slot_face[slots]
-    way = np.hypot(*local.joint_means(slots)[:, :2].T)
+    displacement = np.hypot(*local.joint_means(slots)[:, :2].T)
     size = sim.the_mesh().joint_lengths(face, sim.partner)
-    return np.column_stack([way / size, np.minimum(face, sim.partner[face]), way])
+    return np.column_stack([displacement / size, np.minimum(face, sim.partner[face]), displacement])

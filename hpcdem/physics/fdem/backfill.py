@@ -61,8 +61,8 @@ def depth(one: np.ndarray, other: np.ndarray) -> float:
         normal = normal / np.linalg.norm(normal, axis=1)[:, None]
         least = min(least, float(((at * normal).sum(axis=1) - (b @ normal.T).min(axis=0)).min()))
     if one.shape[1] == 3 and least > 0.0:
-        ways = [shape[EDGES[:, 1]] - shape[EDGES[:, 0]] for shape in (one, other)]
-        across = np.cross(ways[0][:, None], ways[1]).reshape(-1, 3)
+        edges_of_both = [shape[EDGES[:, 1]] - shape[EDGES[:, 0]] for shape in (one, other)]
+        across = np.cross(edges_of_both[0][:, None], edges_of_both[1]).reshape(-1, 3)
         size = np.linalg.norm(across, axis=1)
         normal = across[size > 1e-9 * size.max()] / size[size > 1e-9 * size.max(), None]
         a, b = one @ normal.T, other @ normal.T
@@ -79,8 +79,8 @@ def _outwards(shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if shape.shape[1] == 3:
         a, b, c = np.moveaxis(shape[FACES], 1, 0)
         return a, np.cross(b - a, c - a)
-    way = np.roll(shape, -1, axis=0) - shape
-    return shape, np.column_stack([way[:, 1], -way[:, 0]])
+    edges = np.roll(shape, -1, axis=0) - shape
+    return shape, np.column_stack([edges[:, 1], -edges[:, 0]])
 
 
 def deepest(

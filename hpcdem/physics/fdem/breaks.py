@@ -33,7 +33,7 @@ def waiting(sim: Any) -> list[Crack]:
     first, joints = rows[0::2], lower[0::2]
     both = rows[0::2] + rows[1::2]
     dt = clock.dt if sim.options.dynamic else 0.0
-    began = rebuild_state.time if dt else sim.told_time() + sim.creep.passed
+    began = rebuild_state.time if dt else sim.reported_time() + sim.creep.passed
     return [
         Crack(
             int(joints[k]), float(first[k, 1]), int(first[k, 2]), float(both[k, 3]),

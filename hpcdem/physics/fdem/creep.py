@@ -138,10 +138,12 @@ def _change(sim: Blocks, before: np.ndarray) -> float:
         if not len(law):
             continue
         table = local.creeping.table[law]
-        way = new[:, stress] - old[:, stress]
+        stress_change = new[:, stress] - old[:, stress]
         unit = table[:, kernels.PER_KELVIN, None] > 0.0
-        rest = np.where(unit, way - 2.0 * table[:, kernels.KELVIN, None] * (new[:, kelvin] - old[:, kelvin]), 0.0)
-        found[0] = max(found[0], _size(way).max(), _size(rest).max())
+        rest = np.where(
+            unit, stress_change - 2.0 * table[:, kernels.KELVIN, None] * (new[:, kelvin] - old[:, kelvin]), 0.0
+        )
+        found[0] = max(found[0], _size(stress_change).max(), _size(rest).max())
         found[1] = max(found[1], _size(new[:, stress]).max(), _size(old[:, stress]).max())
     change, largest = sim.comm.max_into(found).tolist()
     return change / largest if largest > 0.0 else 0.0

@@ -323,8 +323,8 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
                 if f"element_{name}_{along}" in wanted:
                     columns[f"element_{name}_{along}"] = _mean(_corners(rows, real)[:, :, axis], real, n)
             if f"element_displacement_{along}" in wanted:
-                way = _corners(x, real)[:, :, axis] - home_corners(sim, at)[:, :, axis]
-                columns[f"element_displacement_{along}"] = _mean(way, real, n)
+                gravity = _corners(x, real)[:, :, axis] - home_corners(sim, at)[:, :, axis]
+                columns[f"element_displacement_{along}"] = _mean(gravity, real, n)
         if "kinetic_energy" in wanted:
             v2 = (_corners(v, real) ** 2).sum(axis=2)
             columns["kinetic_energy"] = 0.5 * np.where(real, local.masses.of_motion[own][some] * v2, 0.0).sum(axis=1)
@@ -694,8 +694,8 @@ def contributing(sim: Blocks, seen: Evaluation) -> np.ndarray:
         parts.append(pushed)
     o = sim.options
     if o.gx or o.gy or o.gz:
-        way = np.array([o.gx, o.gy] if sim.dim == 2 else [o.gx, o.gy, o.gz, 0.0])
-        pull = local.true_mass[own][:, :, None] * way
+        gravity = np.array([o.gx, o.gy] if sim.dim == 2 else [o.gx, o.gy, o.gz, 0.0])
+        pull = local.true_mass[own][:, :, None] * gravity
         real = sim.the_mesh().cells[sim.number[own]][:, :, None] >= 0
         pull = np.where(real, pull, 0.0).reshape(-1, local.force_width)
         stress -= pull

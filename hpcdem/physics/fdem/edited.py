@@ -146,7 +146,7 @@ class Edited(State):
         if dynamic is not None and dynamic != before:
             self.drop_creep_step()
             if dynamic:
-                notices.tell_of_tables(self)
+                notices.report_tables(self)
         super().option(dynamic, collision, large_strain, overlap, potential, deep_overlap, plane_stress)
         if self.options.dynamic != before:
             self.v[:] = 0.0

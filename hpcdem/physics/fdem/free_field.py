@@ -259,7 +259,7 @@ class FreeField(SurfaceLoad):
             held = one.constraint == moving.FIXED
             self._given[i] = held or one.does_x != moving.FREE, held or one.does_y != moving.FREE
             if one.constraint == moving.ALONG:
-                if min(abs(way) for way in one.way) > UPRIGHT:
+                if min(abs(edge_vector) for edge_vector in one.way) > UPRIGHT:
                     return (
                         f"node {point} at the base of a free-field side moves along {one.way}, but must move along x "
                         "or y"
@@ -376,13 +376,13 @@ def _chains(blocks: Blocks, faces: np.ndarray) -> tuple[dict[str, np.ndarray], d
     inside = blocks.closed_faces()[faces] | ~blocks.alive[element]
     if inside.any():
         raise CommandError(f"face {faces[inside][0]} is not on the surface and cannot be a free-field side")
-    way = mesh.points[mesh.cells[element, k2]] - mesh.points[mesh.cells[element, k]]
-    leans = np.abs(way[:, 0]) > UPRIGHT * np.abs(way[:, 1])
+    edge_vector = mesh.points[mesh.cells[element, k2]] - mesh.points[mesh.cells[element, k]]
+    leans = np.abs(edge_vector[:, 0]) > UPRIGHT * np.abs(edge_vector[:, 1])
     if leans.any():
         raise CommandError(
             f"face {faces[leans][0]} is not vertical ({int(leans.sum())} in all): free-field sides must be vertical"
         )
-    sign = np.sign(way[:, 1])
+    sign = np.sign(edge_vector[:, 1])
     lower, upper = np.where(sign > 0.0, k, k2), np.where(sign > 0.0, k2, k)
     low, high = mesh.cells[element, lower], mesh.cells[element, upper]
     order = []
@@ -395,14 +395,15 @@ def _chains(blocks: Blocks, faces: np.ndarray) -> tuple[dict[str, np.ndarray], d
             while at in starts:
                 order.append(starts[at])
                 at = int(high[starts[at]])
-    way, sign, lower, upper, low, high = (part[order] for part in (way, sign, lower, upper, low, high))
+    edge_vector, sign, lower, upper, low, high = (part[order] for part in (edge_vector, sign, lower, upper, low, high))
     first = np.concatenate([[True], low[1:] != high[:-1]]) | np.concatenate([[True], sign[1:] != sign[:-1]])
     node = np.arange(len(order)) + np.cumsum(first) - 1
     points = np.zeros(int(node[-1]) + 2, np.int64)
     points[node], points[node + 1] = low, high
     n = len(points)
     of_faces = {
-        "face": faces[order], "low": node, "lower": lower, "upper": upper, "height": np.abs(way[:, 1]), "sign": sign,
+        "face": faces[order], "low": node, "lower": lower, "upper": upper,
+        "height": np.abs(edge_vector[:, 1]), "sign": sign,
     }  # fmt: skip
     return (
         {**{name: rows[:, None] for name, rows in of_faces.items()}, "hold": np.zeros((len(order), 4))},

@@ -413,8 +413,8 @@ class Local(JointTables):
         _, _, sigma, tau = self.joint_means(slots).T
         mesh = sim.the_mesh()
         ends = connectivity.face_points(mesh.cells, self.slot_face[slots])
-        way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
-        shear = np.where(sigma < 0.0, tau * np.hypot(way[:, 0], way[:, 1]), 0.0)
+        along = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
+        shear = np.where(sigma < 0.0, tau * np.hypot(along[:, 0], along[:, 1]), 0.0)
         cut = sim.cut
         sides = []
         for face in (self.slot_face[slots], sim.partner[self.slot_face[slots]]):

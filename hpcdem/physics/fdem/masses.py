@@ -76,7 +76,7 @@ class Masses:
                 if wanted:
                     sim.rebuild_state.dt = o.dt or o.mass_scaling or critical
                     sim.rebuild_state.estimated = sim.clock.step
-                    sim.tell_time_step(sim.rebuild_state.dt, critical, self.added() if o.mass_scaling > 0.0 else 0.0)
+                    sim.report_time_step(sim.rebuild_state.dt, critical, self.added() if o.mass_scaling > 0.0 else 0.0)
             sim.clock.dt = sim.rebuild_state.dt
         if sim.comm.size > 1:
             sim.halo.fill(mass)

@@ -39,5 +39,5 @@ def _gather_macros(sim: State, middle: np.ndarray) -> float:
     means = middles[first].reshape(-1, parts_of_one, dim).mean(axis=1)
     middle[mine] = means[np.searchsorted(number[::parts_of_one], mesh.macros[of[mine], -1])]
     corners = sim.x[mine].reshape(-1, sim.x.shape[1] // sim.stride, sim.stride)[:, : dim + 1, :dim]
-    way = corners - middle[mine][:, None]
-    return math.sqrt(float((way * way).sum(axis=2).max(initial=0.0)))
+    offset = corners - middle[mine][:, None]
+    return math.sqrt(float((offset * offset).sum(axis=2).max(initial=0.0)))

@@ -17,7 +17,7 @@ LOCKS = 0.45
 """Poisson's ratio above which a notice says that tetrahedra lock."""
 
 
-def tell_of_tables(sim: Any) -> None:
+def report_tables(sim: Any) -> None:
     """Static mode ends: a line in the log about tables that have another value at the model time."""
     then, now = sim.time_now(), sim.clock.time
     for name in sim.tables_over_time() if sim.log is not None else ():
@@ -48,7 +48,7 @@ def warn_of_quick_tables(sim: Any) -> None:
 def warn_of_given_stress(sim: Any) -> None:
     """A line in the log about elements that cannot bear the stress they were given. Collective."""
     if sim.stress0 is not None:
-        _tell_beyond(sim, OUTSIDE, sim.stress0_row > 0, "have an initial stress beyond their strength")
+        _report_beyond(sim, OUTSIDE, sim.stress0_row > 0, "have an initial stress beyond their strength")
 
 
 def warn_of_flow(sim: Any) -> None:
@@ -56,13 +56,13 @@ def warn_of_flow(sim: Any) -> None:
     since they were in balance. Collective."""
     sim.close_model()
     if not sim.options.dynamic and sim.options.mechanical:
-        _tell_beyond(sim,
+        _report_beyond(sim,
             MUCH, sim.alive, "exceed their strength in the present state and yield permanently before equilibrium is "
             "reached. Use model solve elastic first, or make the change in small parts",
         )  # fmt: skip
 
 
-def _tell_beyond(sim: Any, least: float, of: np.ndarray, what: str) -> None:
+def _report_beyond(sim: Any, least: float, of: np.ndarray, what: str) -> None:
     """Report the number of these elements (ne,) bool outside their strength by this part of their stress, and the
     farthest one; once for one state. Collective."""
     if not sim.local.yielding.on:

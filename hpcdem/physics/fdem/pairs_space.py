@@ -235,8 +235,8 @@ class ContactSpace:
         corners = mesh.points[mesh.face_points(face)]
         cells = mesh.cells[self.element[known[which]]]
         sides = np.swapaxes(tetrahedra.sides(mesh.points, cells), 1, 2)
-        way = corners - mesh.points[cells[:, :1]]
-        parts = np.swapaxes(np.linalg.solve(sides, np.swapaxes(way, 1, 2)), 1, 2).reshape(len(face), 9)
+        edges = corners - mesh.points[cells[:, :1]]
+        parts = np.swapaxes(np.linalg.solve(sides, np.swapaxes(edges, 1, 2)), 1, 2).reshape(len(face), 9)
         # Every pair with every face of its target.
         counts = np.diff(begin)[of_pair]
         ends = np.cumsum(counts)

@@ -150,7 +150,7 @@ class State(ModelDefinition, Model):
         """Tables of the surface for contact, in space, see `pairs_space.Surface`."""
         self.untouched = True
         """Whether nothing has moved since the mesh was made."""
-        self._told_step = 0.0
+        self._reported_step = 0.0
         self._hex_rows: tuple[np.ndarray, hexahedra.Rows] | None = None
         self._empty()
 
@@ -228,7 +228,7 @@ class State(ModelDefinition, Model):
         """Masses or the time step will be others with the next lists."""
         return self.rebuild_state.dt == 0.0 or not self.options.dynamic or self.options.mass_scaling > 0.0
 
-    def told_time(self) -> float:
+    def reported_time(self) -> float:
         """Model time [s]; in static mode with creep the time that elements have crept."""
         return self.creep.time if self.creep.on and not self.options.dynamic else self.clock.time
 
@@ -237,14 +237,14 @@ class State(ModelDefinition, Model):
         now = float(self.clock.step) if one.in_steps else self.clock.time
         return now >= one.begin + one.span or one.in_steps == self.options.dynamic
 
-    def tell_time_step(self, dt: float, critical: float, added: float) -> None:
+    def report_time_step(self, dt: float, critical: float, added: float) -> None:
         """A line in the log about the time step [s]; critical: stability limit times safety factor [s]; added: mass
         that mass scaling adds, over the true mass. A step that is followed (auto) is reported again when it has changed
         by a tenth."""
         o = self.options
-        if self.log is None or (o.auto and abs(dt - self._told_step) < 0.1 * self._told_step):
+        if self.log is None or (o.auto and abs(dt - self._reported_step) < 0.1 * self._reported_step):
             return
-        self._told_step = dt
+        self._reported_step = dt
         limit = critical / o.safety
         scaled = f"by mass scaling, which adds {added:.3g} times the mass"
         how = "given" if o.dt else scaled if o.mass_scaling else "estimated"

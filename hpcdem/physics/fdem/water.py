@@ -144,8 +144,8 @@ class Water(SurfaceLoad):
         weight *= blocks.gravity_down() * self._share
         push = (_on_edges if dim == 2 else _on_triangles)(depth) * weight[:, None]
         if dim == 2:
-            way = at[:, 1] - at[:, 0]
-            normal = np.column_stack([way[:, 1], -way[:, 0]])
+            along = at[:, 1] - at[:, 0]
+            normal = np.column_stack([along[:, 1], -along[:, 0]])
         else:
             normal = 0.5 * np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
         for corner in range(dim):

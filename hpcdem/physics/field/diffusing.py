@@ -58,7 +58,7 @@ class Diffusing(Conditions):
         self._stiffness, self._wide = np.empty(0), np.empty(0, bool)
         self._found_for: tuple[float, ...] = ()
         self._told = 0.0
-        self._told_obtuse = False
+        self._warned_obtuse = False
         self._limit = math.inf
 
     @property
@@ -172,13 +172,13 @@ class Diffusing(Conditions):
         pace = (one for one in self.blocks.surface_loads if one.keeps_time)
         return next(pace, self) is self
 
-    def _tell_obtuse(self) -> None:
+    def _warn_obtuse(self) -> None:
         """Warn where obtuse angles give negative conductance: values of explicit steps may leave the range of their
         neighbours. Rank 0 only."""
         blocks = self.blocks
-        if self._told_obtuse or blocks.log is None:
+        if self._warned_obtuse or blocks.log is None:
             return
-        self._told_obtuse = True
+        self._warned_obtuse = True
         number = np.flatnonzero(blocks.alive & (self.row > 0))
         against, edges, obtuse = elements.against(blocks.the_mesh(), number, self.at.number, self._conductivities)
         if against:
@@ -191,7 +191,7 @@ class Diffusing(Conditions):
     def _make_nodes(self) -> None:
         """Make the nodes for the present connections of faces, and update what depends on them. Collective."""
         self.at = Nodes(self.blocks, self.name, self._corner_capacity, self.held)
-        self._tell_obtuse()
+        self._warn_obtuse()
         self.exposed.bind(self.t.shape[1])
         self._find_limit()
         self._stale = False
@@ -258,9 +258,9 @@ class Diffusing(Conditions):
             )
         instead = f"a cycle of {period:.3g} s; {self.set_step} gives it a clock of its own"
         self._divide(steps, dt, period, limit, limit, instead)
-        self._tell_step()
+        self._report_step()
 
-    def _tell_step(self) -> None:
+    def _report_step(self) -> None:
         log = self.blocks.log
         if log is None or not math.isfinite(self.dt) or abs(self.dt - self._told) <= 0.1 * self._told:
             return

@@ -260,7 +260,7 @@ class FlowAssignments(Assigned, Field):
             if well.will_act(self.time) and not self.network.there[well.points].any():
                 raise CommandError(f"well '{well.name}' has no flow nodes left: the surrounding elements were removed")
 
-    def tell_stage(self, well: Well, before: float, after: float) -> None:
+    def report_stage(self, well: Well, before: float, after: float) -> None:
         """A word in the log if another stage of a well is on than before."""
         stage, log = well.number(after), self.blocks.log
         if log is not None and stage != well.number(before):

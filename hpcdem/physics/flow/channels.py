@@ -134,8 +134,8 @@ class Channels(Travelling, FlowAssignments):
         _, came = comm.to_ranks(source, places[order[np.searchsorted(number[order], asked)]])
         found = np.empty_like(came)
         found[np.argsort(target, kind="stable")] = came
-        way = middle[mine] - found
-        return math.sqrt(float(comm.max_into(np.array([(way * way).sum(axis=1).max(initial=0.0)]))[0]))
+        offset = middle[mine] - found
+        return math.sqrt(float(comm.max_into(np.array([(offset * offset).sum(axis=1).max(initial=0.0)]))[0]))
 
     def _bind(self, loaded: np.ndarray, more: int) -> np.ndarray:
         """Elements have other rows or owners, or there are other channels. The state has rows of these flow nodes too
@@ -329,9 +329,9 @@ class Channels(Travelling, FlowAssignments):
             return self._q
         x, (one, other) = self.blocks.x.reshape(-1), (of[..., None] + np.arange(3) for of in self.sides)
         at = 0.5 * (x[one] + x[other[:, TRIANGLE.facing]])
-        way = at[:, [2, 0, 1]] - at[:, [1, 2, 0]]
-        area = 0.5 * np.linalg.norm(np.cross(way[:, 0], way[:, 1]), axis=1)
-        return np.linalg.norm((self._q.reshape(-1, 3, 1) * way).sum(axis=1), axis=1) / area
+        offset = at[:, [2, 0, 1]] - at[:, [1, 2, 0]]
+        area = 0.5 * np.linalg.norm(np.cross(offset[:, 0], offset[:, 1]), axis=1)
+        return np.linalg.norm((self._q.reshape(-1, 3, 1) * offset).sum(axis=1), axis=1) / area
 
     def account(self) -> dict[str, float]:
         """Volumes of fluid at its density without pressure, since there are channels [m2]: given by conditions and at

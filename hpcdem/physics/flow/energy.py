@@ -37,10 +37,10 @@ def of_blocks(
     """Work of joints, of the fluid, and of gravity and other loads, on the way of the nodes (nn, dim) from a to b, at
     which corners are afterwards; before, after (n, kernels.STATE): states of the flow nodes there. Collective."""
     equilibrium.place_corners(sim, a)
-    way = sim.x.copy()
+    displacement = sim.x.copy()
     equilibrium.place_corners(sim, b)
     # With the time step 1 of the static mode a velocity; rows of triangles have fewer columns for these.
-    way = np.ascontiguousarray((sim.x - way)[:, : sim.v.shape[1]])
+    displacement = np.ascontiguousarray((sim.x - displacement)[:, : sim.v.shape[1]])
     shown = fluid.flow.state.copy()
 
     def done(state: np.ndarray | float, points: np.ndarray, weights: np.ndarray) -> dict[str, float]:
@@ -49,7 +49,17 @@ def of_blocks(
         for point, weight in zip(points, weights):
             equilibrium.place_corners(sim, a + 0.5 * (1.0 + point) * (b - a))
             seen = sim.local.evaluation(contact=False)
-            sim.local.book(way, way, 0.5 * weight, 0.0, seen.of_joints, seen.pushed, seen.felt, seen.outside, work)
+            sim.local.book(
+                displacement,
+                displacement,
+                0.5 * weight,
+                0.0,
+                seen.of_joints,
+                seen.pushed,
+                seen.felt,
+                seen.outside,
+                work,
+            )
         return {name: exact_sum(work[:, k], sim.comm) for k, name in enumerate(WORK)}
 
     dry = done(0.0, *np.polynomial.legendre.leggauss(POINTS))

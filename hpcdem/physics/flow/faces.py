@@ -93,7 +93,7 @@ class Faces(Channels):
         faces, mean = faces[order], mean[order]
         return {"number": faces, "size": self.blocks.the_mesh().face_sizes(faces), "pressure": mean}
 
-    def _tell_wet(self, free: np.ndarray) -> None:
+    def _report_wet(self, free: np.ndarray) -> None:
         """A word in the log about the free faces (k,) of this rank where they are others than before. Collective."""
         blocks, mesh = self.blocks, self.blocks.the_mesh()
         wet_bits, stressed = self.wet_bits[free] > 0, blocks.stressed(free)
@@ -131,7 +131,7 @@ class Faces(Channels):
         if self.pushes:
             sides, free = self._sides_and_free()
             self._wet = free[self._is_wet(free)]
-            self._tell_wet(free)
+            self._report_wet(free)
         faces = np.concatenate([sides, self._wet])
         self.shore, beyond = self._shore_of(faces)
         loaded = mesh.face_points(faces)

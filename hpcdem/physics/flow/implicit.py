@@ -362,7 +362,7 @@ class Fluid:
         well.pressure = float(state[rows[np.argmax(state[rows, kernels.E])], kernels.P])
         well.rate = came / step.dt
         well.injected += came
-        self.flow.tell_stage(well, step.before, step.after)
+        self.flow.report_stage(well, step.before, step.after)
 
 
 def reference_pressure(flow: Flow, stress: float) -> float:

@@ -143,7 +143,7 @@ class Flow(Values):
             "uses implicit steps"
         )
         self._divide(o.flow_steps, o.flow_dt, period, limit, SAFETY * limit, instead)
-        self._tell_step(limit)
+        self._report_step(limit)
 
     def _outrun(self) -> bool:
         """An estimated sub-step is more than half the stability limit, before it is checked again. Collective."""
@@ -152,7 +152,7 @@ class Flow(Values):
             return False
         return self.dt > self.limit()
 
-    def _tell_step(self, limit: float) -> None:
+    def _report_step(self, limit: float) -> None:
         log = self.blocks.log
         known, before = self._told
         if log is None or (abs(self.dt - known) <= 0.1 * known and abs(limit - before) <= 0.1 * before):
@@ -277,7 +277,7 @@ class Flow(Values):
         for well, begin, end in zip(self.wells, [0, *ends[:-1].tolist()], ends.tolist()):
             if end > begin:
                 after[begin:end] = well.filled(room[:, begin:end], before, self.time, bulk, value_at)
-            self.tell_stage(well, before, self.time)
+            self.report_stage(well, before, self.time)
         came = (after - room[0])[mine]
         self.nodes[row, kernels.W] = after[mine]
         self.nodes[row, kernels.GIVEN] += came

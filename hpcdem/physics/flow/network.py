@@ -62,10 +62,10 @@ def links_of(corners: np.ndarray) -> np.ndarray:
 
 def normals(corners: np.ndarray) -> np.ndarray:
     """Outward normals (m, dim) of faces (m, dim, dim), as long as edges, twice as long as triangles are large."""
-    way = corners[:, 1:] - corners[:, :1]
-    if way.shape[1] == 1:
-        return np.column_stack([way[:, 0, 1], -way[:, 0, 0]])
-    return np.cross(way[:, 0], way[:, 1])
+    edges = corners[:, 1:] - corners[:, :1]
+    if edges.shape[1] == 1:
+        return np.column_stack([edges[:, 0, 1], -edges[:, 0, 0]])
+    return np.cross(edges[:, 0], edges[:, 1])
 
 
 def conducting(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -80,8 +80,8 @@ def conducting(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     double = np.linalg.norm(normals(corners), axis=1)
     one, other = corners[:, [1, 2, 0]] - corners, corners[:, [2, 0, 1]] - corners
     with np.errstate(divide="ignore"):
-        way = 2.0 * double[:, None] / (one * other).sum(axis=2)
-    return sides.reshape(-1, 3), way.reshape(-1), np.repeat(double / 12.0, 3)
+        edges = 2.0 * double[:, None] / (one * other).sum(axis=2)
+    return sides.reshape(-1, 3), edges.reshape(-1), np.repeat(double / 12.0, 3)
 
 
 def at_nodes(ends: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -111,11 +111,11 @@ def path(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     order: list[int] = []
     points = [min(free)]
     while len(order) < len(ends):
-        ways = [channel for channel in beside[points[-1]] if not order or channel != order[-1]]
-        if not ways:
+        candidates = [channel for channel in beside[points[-1]] if not order or channel != order[-1]]
+        if not candidates:
             return None  # the rest is closed in itself
-        order.append(ways[0])
-        points.append(int(ends[ways[0]].sum()) - points[-1])
+        order.append(candidates[0])
+        points.append(int(ends[candidates[0]].sum()) - points[-1])
     return np.array(order), np.array(points)
 
 

@@ -81,7 +81,7 @@ class FluidHeat(Assigned, Travelling):
         self.rho_c = 0.0
         self.sub_steps = 0
         self.rate = 0.0
-        self._told_obtuse = False
+        self._warned_obtuse = False
         self._new = np.empty(0, np.int64)
         flow.carried = np.empty(0)
         flow.more["temperature"] = lambda: self.state[: len(self.number), kernels.T]
@@ -154,14 +154,14 @@ class FluidHeat(Assigned, Travelling):
         self._length = reduce(np.hypot, self._sides.T)
         self.wall_heat = np.zeros((len(self._ends), 4))
         self._held = self.held[mine].astype(np.int64) - 1
-        self._tell_obtuse()
+        self._warn_obtuse()
 
-    def _tell_obtuse(self) -> None:
+    def _warn_obtuse(self) -> None:
         """Report flat triangles that conduct from cold to warm, as flat tetrahedra do (model.py). Rank 0 only."""
         log, network = self.blocks.log, self.flow.network
-        if self._told_obtuse or log is None or self.links == 1 or self.constant("conductivity") == 0.0:
+        if self._warned_obtuse or log is None or self.links == 1 or self.constant("conductivity") == 0.0:
             return
-        self._told_obtuse = True
+        self._warned_obtuse = True
         ends = np.sort(network.ends, axis=1)
         _, at = np.unique(ends[:, 0] * len(network.there) + ends[:, 1], return_inverse=True)
         each = 1.0 / self.shapes(network.channels)[1]
@@ -296,7 +296,7 @@ class FluidHeat(Assigned, Travelling):
             rate += np.divide(passed, self.rho_c * least, out=np.zeros(len(w)), where=there)
         return float(self.blocks.comm.max_into(np.array([rate.max(initial=0.0)]))[0])
 
-    def _look_upstream(self) -> None:
+    def _find_upstream(self) -> None:
         n, t = len(self.number), self.heat.t.reshape(-1)
         kernels.upstream(self._begin, self._channel, self._side, self._ends, self._q, self._length, self._held,
                          self.state[:n], self.state)  # fmt: skip
@@ -324,7 +324,7 @@ class FluidHeat(Assigned, Travelling):
             share = min(1.0, (self._passed + (k + 1) * short) / self._period) if self._period > 0.0 else 1.0
             w = self._w0 + share * (w1 - self._w0) if share < 1.0 else w1.copy()
             if self._second:
-                self._look_upstream()
+                self._find_upstream()
             kernels.faces(self._ends, self._q, self._length, self._second, short, self.state, face)
             kernels.carry(
                 short, self._begin, self._channel, self._side, self._ends, self._q, face, self._conduct, self._walls,

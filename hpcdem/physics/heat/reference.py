@@ -33,17 +33,17 @@ def through_contacts(
     over samples of each first face, of lower number, that see a second one."""
     q = np.zeros(len(points))
     for i, (a, b) in enumerate(faces.tolist()):
-        way = points[b] - points[a]
-        length = np.hypot(*way)
-        out = np.array([way[1], -way[0]]) / length
+        edge = points[b] - points[a]
+        length = np.hypot(*edge)
+        out = np.array([edge[1], -edge[0]]) / length
         for c, d in faces[i + 1 :].tolist():
             other = points[d] - points[c]
-            if 2.0 * way @ other > -length * np.hypot(*other):
+            if 2.0 * edge @ other > -length * np.hypot(*other):
                 continue
             places = []  # along the first and the second face
             for s in (np.arange(samples) + 0.5) / samples:
-                u = ((points[a] + s * way - points[c]) @ way) / (other @ way)
-                gap = (points[c] + u * other - points[a] - s * way) @ out
+                u = ((points[a] + s * edge - points[c]) @ edge) / (other @ edge)
+                gap = (points[c] + u * other - points[a] - s * edge) @ out
                 if 0.0 <= u <= 1.0 and -deep <= gap <= near:
                     places.append((s, u))
             if len(places) < 2:
@@ -69,19 +69,19 @@ def fluid_step(
     ends (m, 2) and flows q (m,) [m2/s], between rock of these temperatures (n,); and what the rock gets [W/m]."""
     length = np.hypot(*(points[ends[:, 1]] - points[ends[:, 0]]).T)
     inflow: list[list[tuple[float, int, float]]] = [[] for _ in points]
-    for (a, b), rate, way in zip(ends.tolist(), q.tolist(), length.tolist()):
+    for (a, b), rate, edge in zip(ends.tolist(), q.tolist(), length.tolist()):
         if rate > 0.0:
-            inflow[b].append((rate, a, way))
+            inflow[b].append((rate, a, edge))
         elif rate < 0.0:
-            inflow[a].append((-rate, b, way))
+            inflow[a].append((-rate, b, edge))
     heat, passes, rise = (np.zeros(len(points)) for _ in range(3))
-    for (a, b), way, delta in zip(ends.tolist(), length.tolist(), aperture.tolist()):
+    for (a, b), edge, delta in zip(ends.tolist(), length.tolist(), aperture.tolist()):
         for node, other in ((a, b), (b, a)):
-            passes[node] += 2.0 * h * 0.5 * way * s[node] ** 2 * (3.0 - 2.0 * s[node])
-            rise[node] += k * delta * min(s[a], s[b]) / way * (t[other] - t[node])
+            passes[node] += 2.0 * h * 0.5 * edge * s[node] ** 2 * (3.0 - 2.0 * s[node])
+            rise[node] += k * delta * min(s[a], s[b]) / edge * (t[other] - t[node])
     rise = (rise + passes * (rock - t)) / (rho_c * w)
     rise[list(held)] = 0.0
-    for (a, b), rate, way, delta in zip(ends.tolist(), q.tolist(), length.tolist(), aperture.tolist()):
+    for (a, b), rate, edge, delta in zip(ends.tolist(), q.tolist(), length.tolist(), aperture.tolist()):
         up, down = (a, b) if rate > 0.0 else (b, a)
         value = t[up]
         if second and up in held and not inflow[up]:
@@ -91,13 +91,13 @@ def fluid_step(
             total = sum(one for one, _, _ in inflow[up])
             before = sum(one * t[node] for one, node, _ in inflow[up]) / total
             distance = sum(one * far for one, _, far in inflow[up]) / total
-            r = (t[up] - before) / distance / ((t[down] - t[up]) / way)
+            r = (t[up] - before) / distance / ((t[down] - t[up]) / edge)
             limiter = (r + abs(r)) / (1.0 + abs(r))
             most = 0.5 * limiter * (t[down] - t[up])
             value += np.clip(most * (1.0 - dt * abs(rate) / w[up]) + 0.5 * dt * rise[up], *sorted((0.0, most)))
         heat[down] += rho_c * abs(rate) * (value - t[down])
         heat[up] -= rho_c * abs(rate) * (value - t[up])
-        along = k * delta * min(s[a], s[b]) / way * (t[a] - t[b])
+        along = k * delta * min(s[a], s[b]) / edge * (t[a] - t[b])
         heat[b] += along
         heat[a] -= along
     after = t + dt * (heat + passes * (rock - t)) / (rho_c * w + dt * passes)

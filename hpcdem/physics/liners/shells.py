@@ -71,9 +71,9 @@ def curvatures(rest: np.ndarray) -> np.ndarray:
         )  # of component c of b along axis d, from component g of corner k: k, c, g, d
         gradient[:, :, 0, 0], gradient[:, :, 1, 1] = of_corner, of_corner
         for i, j in SIDES:
-            way = corner[:, j] - corner[:, i]
-            way /= np.linalg.norm(way, axis=1)[:, None]
-            there = 0.5 * np.eye(2) - 0.75 * way[:, :, None] * way[:, None, :]
+            edge = corner[:, j] - corner[:, i]
+            edge /= np.linalg.norm(edge, axis=1)[:, None]
+            there = 0.5 * np.eye(2) - 0.75 * edge[:, :, None] * edge[:, None, :]
             of_side = 4.0 * (weight[i] * slope[:, j] + weight[j] * slope[:, i])
             for k in (i, j):
                 gradient[:, k] += there[:, :, :, None] * of_side[:, None, None, :]
@@ -213,10 +213,10 @@ class Shells(Elements):
         stiff, turns = np.zeros((m, 3)), np.zeros((m, 3))
         for some in np.array_split(np.arange(m), m // 1000 + 1):
             rows = np.abs(stiffnesses(table[some], rest[some], self.curve[some])).reshape(-1, 3, 6, 3, 6)
-            way = rows[..., :3].sum(axis=(3, 4)), rows[..., 3:].sum(axis=(3, 4))
+            edge = rows[..., :3].sum(axis=(3, 4)), rows[..., 3:].sum(axis=(3, 4))
             size = self.sizes()[some][:, None, None]
-            stiff[some] = 0.5 * (way[0] + way[1] / size)[:, :, :3].max(axis=2)
-            turns[some] = 0.5 * (way[0] * size + way[1])[:, :, 3:].max(axis=2)
+            stiff[some] = 0.5 * (edge[0] + edge[1] / size)[:, :, :3].max(axis=2)
+            turns[some] = 0.5 * (edge[0] * size + edge[1])[:, :, 3:].max(axis=2)
         return mass, turning, stiff, turns
 
     def frames(self, frame: np.ndarray) -> None:

@@ -299,7 +299,7 @@ class Proppant(ProppantAssignments):
                     f"proppant would need {self.sub_steps} sub-steps in a step of flow of {dt:.3g} s: reduce the time "
                     "step of flow"
                 )
-            self._tell_stale(dt, least)
+            self._warn_stale(dt, least)
         count = self.sub_steps
         short = dt / count
         self._sources(dt, count)
@@ -322,9 +322,9 @@ class Proppant(ProppantAssignments):
             )  # fmt: skip
             self._refresh()
         self.time = flow.time
-        self._tell_refused(refused)
+        self._report_refused(refused)
 
-    def _tell_stale(self, dt: float, least: float) -> None:
+    def _warn_stale(self, dt: float, least: float) -> None:
         """Grains that move far by one flow around loops, which their weight would have changed meanwhile."""
         flow, log = self.flow, self.blocks.log
         if dt > STALE * least and len(flow.network.ends) >= len(flow.network.nodes) and log is not None:
@@ -353,7 +353,7 @@ class Proppant(ProppantAssignments):
             kinds, value * (dt / count), np.where(came > 0.0, value * came, leaves) / count
         )
 
-    def _tell_refused(self, refused: float) -> None:
+    def _report_refused(self, refused: float) -> None:
         self._refused += refused
         log = self.blocks.log
         if self.cycles % LOOK == LOOK - 1 or self.flow.implicit:

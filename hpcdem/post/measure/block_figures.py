@@ -72,8 +72,8 @@ class _Maps:
         right: float = RIGHT,
     ) -> None:  # fmt: skip
         seen = blocks.view(state)
-        room = (plots.PAGE_WIDTH - LEFT - bar - RIGHT - (number - 1) * GAP) / number
-        self.width = min(room, MAP_HEIGHT * seen.width / seen.height)
+        panel_width = (plots.PAGE_WIDTH - LEFT - bar - RIGHT - (number - 1) * GAP) / number
+        self.width = min(panel_width, MAP_HEIGHT * seen.width / seen.height)
         self.height = self.width * seen.height / seen.width
         self.scale, self.seen = self.width / seen.width, seen
         self.figure, axes = page([*above, self.height], gaps, right)
@@ -334,9 +334,9 @@ def regions(parts: Sequence[Part]) -> Any:
     name, many = next((name, many) for (_, name), many in reversed(series.items()))
     time = [t for t, _ in many]
     for k, c in enumerate(bodies.COMPONENTS):
-        look = {"lw": 1.2, "ls": "-" if k < 3 else "--", "color": LINES[k % 3]}
-        axes[1].plot(time, [r.stress[k] / size for _, r in many], label=c, **look)
-        axes[2].plot(time, [1e3 * r.strain[k] for _, r in many], label=c, **look)
+        style = {"lw": 1.2, "ls": "-" if k < 3 else "--", "color": LINES[k % 3]}
+        axes[1].plot(time, [r.stress[k] / size for _, r in many], label=c, **style)
+        axes[2].plot(time, [1e3 * r.strain[k] for _, r in many], label=c, **style)
     label(axes[0], None, f"mean stress ({unit})")
     label(axes[1], None, f"stress, {name} ({unit})")
     label(axes[2], axis, f"strain, {name} (‰)")
@@ -474,9 +474,9 @@ def _in_its_plane(corners: np.ndarray) -> tuple[np.ndarray | None, tuple[str, st
     up dip; None if they are not in a plane."""
     points = corners.reshape(-1, 3)
     middle = points.mean(axis=0)
-    _, way, axes = np.linalg.svd(points - middle, full_matrices=False)
+    _, axis_of_least, axes = np.linalg.svd(points - middle, full_matrices=False)
     normal = axes[2] * (np.sign(axes[2, 2]) or 1.0)
-    if way[2] > FLAT * way[1]:
+    if axis_of_least[2] > FLAT * axis_of_least[1]:
         return None, ("", "")
     along = np.abs(normal)
     if along.max() > 1.0 - 1e-9:

@@ -106,11 +106,11 @@ def key(ax: Any, columns: int = 1, **more: Any) -> None:
 def when(stamps: Sequence[Stamp], steps: bool = False) -> tuple[np.ndarray, str]:
     """Places on the axis of time and its name: shortening (or extension) where a wall moves, else (or on request)
     thousands of steps."""
-    way = np.array([s.shortening for s in stamps])
-    if not steps and np.isfinite(way).all() and np.ptp(way) > 0.0:
-        size, unit = length_unit(float(np.abs(way).max()))
-        opened = -float(way.min()) > float(way.max())
-        return (-way if opened else way) / size, f"{'extension' if opened else 'shortening'} ({unit})"
+    shortened = np.array([s.shortening for s in stamps])
+    if not steps and np.isfinite(shortened).all() and np.ptp(shortened) > 0.0:
+        size, unit = length_unit(float(np.abs(shortened).max()))
+        opened = -float(shortened.min()) > float(shortened.max())
+        return (-shortened if opened else shortened) / size, f"{'extension' if opened else 'shortening'} ({unit})"
     return np.array([s.step for s in stamps]) / 1000.0, "thousand steps"
 
 
@@ -136,8 +136,8 @@ def surface(done: Done, plan: Plan, final: Grains) -> Any:
         ax.fill_between(xs / size, lift * k / size, raised, color="white", zorder=order, lw=0.0)
         ax.fill_between(xs / size, lift * k / size, raised, color=shade, alpha=0.18, zorder=order, lw=0.0)
         ax.plot(xs / size, raised, color=shade, lw=1.1, zorder=order + 1)
-        way = "" if not np.isfinite(stamp.shortening) else f", {abs(stamp.shortening) / size:.3g} {unit}"
-        ax.annotate(f"{stamp.label}{way}", (1.01, raised[-1]), xycoords=("axes fraction", "data"),
+        shortened = "" if not np.isfinite(stamp.shortening) else f", {abs(stamp.shortening) / size:.3g} {unit}"
+        ax.annotate(f"{stamp.label}{shortened}", (1.01, raised[-1]), xycoords=("axes fraction", "data"),
                     fontsize=plots.FONT - 2.0, color=shade, va="center", annotation_clip=False)  # fmt: skip
     ax.set_xlim(left / size, right / size)
     highest = max(float(ys.max()) - low + lift * k for k, (_, (_, ys)) in enumerate(chosen))
@@ -323,14 +323,18 @@ def wallforce(curves: dict[int, Curve], pusher: Curve | None, name: str) -> Any:
     forces = max((float(np.nanmax(np.abs(c.force), initial=0.0)) for c in curves.values()), default=0.0)
     work = max((float(np.nanmax(np.abs(c.work), initial=0.0)) for c in curves.values()), default=0.0)
     (newton, force_unit), (joule, work_unit) = scale(max(forces, 1e6), "N"), scale(max(work, 1e6), "J")
-    ways = {} if pusher is None else dict(zip(pusher.step.tolist(), pusher.way.tolist()))
-    size, unit = length_unit(max(ways.values(), default=1.0))
+    displacements = {} if pusher is None else dict(zip(pusher.step.tolist(), pusher.way.tolist()))
+    size, unit = length_unit(max(displacements.values(), default=1.0))
     for k, (wall, curve) in enumerate(sorted(curves.items())):
-        at = np.array([ways.get(s, np.nan) for s in curve.step.tolist()]) / size if ways else curve.time
+        at = (
+            np.array([displacements.get(s, np.nan) for s in curve.step.tolist()]) / size
+            if displacements
+            else curve.time
+        )
         shade = LINES[k % len(LINES)]
         for ax, values in zip(axes, (curve.force[:, 0] / newton, curve.force[:, 1] / newton, curve.work / joule)):
             ax.plot(at, values, lw=0.9, color=shade, label=f"wall {wall}")
-    axis = f"displacement of {name} ({unit})" if ways else "time (s)"
+    axis = f"displacement of {name} ({unit})" if displacements else "time (s)"
     label(axes[0], None, f"$F_x$ on the wall ({force_unit})")
     label(axes[1], None, f"$F_y$ on the wall ({force_unit})")
     label(axes[2], axis, f"work of the wall ({work_unit})")

@@ -202,8 +202,8 @@ def layer_names(g: Grains, plan: Plan) -> np.ndarray:
 
 def _words(slip: float, dip: float) -> tuple[str, str, str]:
     """Return the side to which a fault dips, the direction of the hanging wall, and the sense of slip."""
-    ways = ("left", "right")
-    return ways[dip <= 0.0], ways[slip * dip > 0.0], "reverse" if slip > 0.0 else "normal"
+    senses = ("left", "right")
+    return senses[dip <= 0.0], senses[slip * dip > 0.0], "reverse" if slip > 0.0 else "normal"
 
 
 def history_sheets(stamps: Sequence[Stamp], found: fault_history.History) -> list[Sheet]:
@@ -222,7 +222,7 @@ def history_sheets(stamps: Sequence[Stamp], found: fault_history.History) -> lis
                 continue
             one = [float(getattr(p, name)[j]) for name in ("slip", "throw", "heave", "opening")]
             slip, gap = one[0] - before[1], stamp.time - stamps[before[0]].time
-            way = stamp.shortening - stamps[before[0]].shortening
+            shortened = stamp.shortening - stamps[before[0]].shortening
             rate = slip / gap if gap > 0.0 else NAN
             fastest = float(np.nanmax([fastest, abs(rate)])) if np.isfinite([fastest, rate]).any() else NAN
             known = np.flatnonzero(np.isfinite(p.x))
@@ -235,7 +235,7 @@ def history_sheets(stamps: Sequence[Stamp], found: fault_history.History) -> lis
             rows.append((
                 *stamp.row, stamp.shortening, f.number, "active" if k in active else "inactive", *middle, length,
                 abs(p.dip), *_words(one[0], p.dip), one[0], p.mean, *one[1:], rate,
-                slip / way if abs(way) > 0.0 else NAN, bands if k in active else 0.0, *ends,
+                slip / shortened if abs(shortened) > 0.0 else NAN, bands if k in active else 0.0, *ends,
             ))  # fmt: skip
             before = (k, one[0]) if gap > 0.0 else before
             known = np.isfinite(p.slip)
@@ -246,7 +246,7 @@ def history_sheets(stamps: Sequence[Stamp], found: fault_history.History) -> lis
         if last is None:
             continue
         since, until = stamps[f.born - 1], stamps[max(found.profiles[f.number])]
-        way = until.shortening - since.shortening
+        shortened = until.shortening - since.shortening
         merged = f.merged is not None
         end = f"merged into {f.merged[0]}" if f.merged else "active" if active[-1] == len(stamps) - 1 else "inactive"
         if not merged and max(found.profiles[f.number]) < len(stamps) - 1:
@@ -255,7 +255,7 @@ def history_sheets(stamps: Sequence[Stamp], found: fault_history.History) -> lis
         first = max(f.seen[f.born], key=lambda s: s.band.length).band
         summary.append((
             f.number, born.step, born.time, born.shortening, latest.step, latest.shortening, len(f.seen), end,
-            *last[:4], abs(first.dip), *last[4:], fastest, last[-2] / way if abs(way) > 0.0 else NAN,
+            *last[:4], abs(first.dip), *last[4:], fastest, last[-2] / shortened if abs(shortened) > 0.0 else NAN,
         ))  # fmt: skip
     rows.sort(key=lambda row: (row[0], row[1], row[4]))
     head = (*Stamp.HEAD, "shortening[m]")

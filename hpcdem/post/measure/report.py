@@ -66,7 +66,7 @@ def run(comm: Comm, log: Any, request: Request, without: Sequence[str] = ()) -> 
     written: list[Path] = []
     if of_frames:
         plan, final = on_first(comm, lambda: make_plan(request, of_frames))
-        on_first(comm, lambda: _tell(log, plan, final, of_frames))
+        on_first(comm, lambda: _report(log, plan, final, of_frames))
         parts = _measure(comm, log, plan, of_frames)
         history = _follow(comm, log, plan, parts["faults"]) if request.over_time and "faults" in what else None
     on_first(comm, lambda: request.target.mkdir(parents=True, exist_ok=True))
@@ -81,14 +81,14 @@ def run(comm: Comm, log: Any, request: Request, without: Sequence[str] = ()) -> 
         elif files:
             log.info(f"{kind}: {', '.join(path.name for path in files)}")
         if kind == "wedge" and files:
-            on_first(comm, lambda: _tell_of_no_wedge(log, parts["wedge"]))
+            on_first(comm, lambda: _report_no_wedge(log, parts["wedge"]))
         written += files
     written += _blocks(comm, log, request, of_blocks) if of_blocks else []
     log.info(f"{request.target}: {len(written)} files in {time.monotonic() - began:.1f} s")
     return written
 
 
-def _tell(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
+def _report(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
     first, last = plan.frames[0], plan.frames[-1]
     count = "1 frame" if first is last else f"{len(plan.frames)} frames, {first.path.stem} to {last.path.stem}"
     row = f"{len(plan.row)} particles fixed along x and y push" if len(plan.row) else "no wall moves along x"
@@ -104,7 +104,7 @@ def _tell(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
         log.warn(others)
 
 
-def _tell_of_no_wedge(log: Any, done: Done) -> None:
+def _report_no_wedge(log: Any, done: Done) -> None:
     """A line about the frames without a wedge."""
     flat = kinds.without_wedge(done)
     if flat:

@@ -79,8 +79,8 @@ def draw_folder(request: Request, comm: Comm, log: Any, workers: int = 1) -> Non
     ]
     if len(files) > 1:
         pages = math.ceil(len(files) / panels_of_a_page(seen, style))
-        room = math.ceil(len(files) / pages)
-        parts = [tuple(files[k : k + room]) for k in range(0, len(files), room)]
+        rows = math.ceil(len(files) / pages)
+        parts = [tuple(files[k : k + rows]) for k in range(0, len(files), rows)]
         for kind in request.kinds:
             for k, part in enumerate(parts, 1):
                 bars = "_sigma1" if request.sigma1 and kind.key == panels.DISTORTIONAL.key else ""
@@ -234,10 +234,10 @@ def _collective(comm: Comm, read: Callable[[], Any]) -> Any:
 def _survey(files: Sequence[Path], comm: Comm) -> list[survey.Outline]:
     mine: dict[int, survey.Outline] = {}
 
-    def look(k: int) -> None:
+    def inspect(k: int) -> None:
         mine[k] = survey.outline(read_section(files[k]), read_section(files[k - 1]) if k else None)
 
-    _shared([(look, (k,)) for k in range(len(files))], comm)
+    _shared([(inspect, (k,)) for k in range(len(files))], comm)
     found: dict[int, survey.Outline] = {}
     for part in comm.allgather(mine):
         found |= part

@@ -192,8 +192,10 @@ class Page:
 
     def say(self, ax: Any, left: str, right: str) -> None:
         """Write over a panel, at its left and at its right end; smaller if that is too much for one line."""
-        room = ax.get_position().width * self._page[0]
-        size = min(self.style.font, self.style.font * room / (sum(text_widths([left, right], self.style.font)) + 0.3))
+        available = ax.get_position().width * self._page[0]
+        size = min(
+            self.style.font, self.style.font * available / (sum(text_widths([left, right], self.style.font)) + 0.3)
+        )
         for text, place in ((left, 0.0), (right, 1.0)):
             if text:
                 ax.annotate(
@@ -242,8 +244,8 @@ class Bar:
 
     def _wrapped(self, length: float, font: float) -> str:
         """The heading in lines that fit beside a bar of this length [cm]."""
-        room = HEADING / (1.0 - HEADING) * (length + 2.0 * RIGHT) / CM_OF_POINT - 2.0 * font
-        characters = max(8, int(room / (0.54 * 0.9 * font)))
+        available = HEADING / (1.0 - HEADING) * (length + 2.0 * RIGHT) / CM_OF_POINT - 2.0 * font
+        characters = max(8, int(available / (0.54 * 0.9 * font)))
         return "\n".join(line for part in self.heading.split("\n") for line in textwrap.wrap(part, characters))
 
     def _linear_ticks(self, ax: Any) -> list[tuple[float, str]]:

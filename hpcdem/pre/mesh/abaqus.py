@@ -335,7 +335,7 @@ class _Reader:
             made.instances = {
                 s.name: np.fromiter(self.numbers[s.name].values(), np.int64) for s in self.instances.values()
             }
-        self._say()
+        self._report()
         made.files = sorted(self.files)
         return made
 
@@ -461,7 +461,7 @@ class _Reader:
             )  # fmt: skip
         return faces[[self.sides[tuple(sorted(row))] < 2 for row in faces.tolist()]]
 
-    def _say(self) -> None:
+    def _report(self) -> None:
         notes = self.made.notes
         for begins, what in (("CPS", "plane stress"), ("CAX", "rotational symmetry"), ("CGAX", "rotational symmetry")):
             labels = dict.fromkeys(block.label for block in self.made.blocks if block.label.startswith(begins))

@@ -138,10 +138,10 @@ def follow(mesh: Mesh, fractures: Fractures) -> Mesh:
     that costs least: the length of each edge times 1 + STRAYING (distance of its middle from the trace / its length)2.
     Traces shorter than the edges about them leave no crack. Edges inside a six-node triangle are no way.
     """
-    way = _Ways(mesh, _sides(mesh))
+    paths = _Paths(mesh, _sides(mesh))
     pairs, sets = [], []
     for (start, end), number in zip(fractures.ends, fractures.sets):
-        path = way.along(start, end)
+        path = paths.along(start, end)
         pairs.append(np.column_stack([path[:-1], path[1:]]))
         sets.append(np.full(len(path) - 1, number, np.int64))
     for number in np.unique(fractures.sets):
@@ -151,7 +151,7 @@ def follow(mesh: Mesh, fractures: Fractures) -> Mesh:
     return mesh
 
 
-class _Ways:
+class _Paths:
     """Ways along the edges of a mesh."""
 
     def __init__(self, mesh: Mesh, edges: Edges) -> None:

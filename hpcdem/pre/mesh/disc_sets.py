@@ -64,10 +64,10 @@ class Poles:
 
     def mean_cosine(self, along: Sequence[float]) -> float:
         """E[|cos|] of the angle between normal and a direction."""
-        way = np.array(along, np.float64)
+        direction = np.array(along, np.float64)
         middle = (np.arange(GRID) + 0.5) / GRID
         u = np.stack(np.meshgrid(middle, middle, indexing="ij"), axis=-1).reshape(-1, 2)
-        return float(np.abs(self.normals(u) @ way).mean() / math.sqrt(way @ way))
+        return float(np.abs(self.normals(u) @ direction).mean() / math.sqrt(direction @ direction))
 
 
 @dataclass(frozen=True)

@@ -111,8 +111,8 @@ def _refined(gmsh: Any, request: dict[str, Any], middle: np.ndarray, unit: float
 
     def edges(_dim: int, _tag: int, x: float, y: float, z: float, _size: float) -> float:
         at = np.array([[x, y, z]]) * unit + middle
-        ways = [(size, one.distance(at)[0] / distance) for one, size, distance in near]
-        return min(size + (rest - size) * min(max(way, 0.0), 1.0) for size, way in ways) / unit
+        distances = [(size, one.distance(at)[0] / distance) for one, size, distance in near]
+        return min(size + (rest - size) * min(max(part, 0.0), 1.0) for size, part in distances) / unit
 
     if near:
         gmsh.model.mesh.setSizeCallback(edges)

@@ -47,8 +47,8 @@ class Free:
 
     def tolerance(self) -> float:
         """TOLERANCE of the shortest edge [m]."""
-        way = np.roll(self.at, -1, axis=1) - self.at
-        return TOLERANCE * float(np.sqrt((way * way).sum(axis=2)).min()) if len(self.faces) else 0.0
+        edges = np.roll(self.at, -1, axis=1) - self.at
+        return TOLERANCE * float(np.sqrt((edges * edges).sum(axis=2)).min()) if len(self.faces) else 0.0
 
 
 def free_faces(mesh: Mesh) -> Free:
@@ -60,8 +60,8 @@ def free_faces(mesh: Mesh) -> Free:
     faces = np.flatnonzero(real & (partner < 0))
     points = mesh.face_points(faces)
     at = mesh.points[points]
-    way = at[:, 1] - at[:, 0]
-    normal = np.column_stack([way[:, 1], -way[:, 0]]) if mesh.dim == 2 else np.cross(way, at[:, 2] - at[:, 0])
+    edges = at[:, 1] - at[:, 0]
+    normal = np.column_stack([edges[:, 1], -edges[:, 0]]) if mesh.dim == 2 else np.cross(edges, at[:, 2] - at[:, 0])
     normal = normal / np.sqrt((normal * normal).sum(axis=1))[:, None]
     return Free(mesh, faces, points, at, normal, body[faces // 4], int(body.max(initial=-1)) + 1)
 

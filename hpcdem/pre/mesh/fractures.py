@@ -171,8 +171,8 @@ def _traces(
     u = np.array([[uniform(seed, stream, DRAWS * int(i) + k) for k in range(4)] for i in numbers]).reshape(-1, 4)
     centre = np.column_stack([x0 + (x1 - x0) * u[:, 0], y0 + (y1 - y0) * u[:, 1]])
     angle, half = one.orientation.angles(u[:, 2]), 0.5 * one.length.lengths(u[:, 3])
-    way = np.column_stack([half * np.cos(angle), half * np.sin(angle)])
-    return np.stack([centre - way, centre + way], axis=1)
+    half_trace = np.column_stack([half * np.cos(angle), half * np.sin(angle)])
+    return np.stack([centre - half_trace, centre + half_trace], axis=1)
 
 
 def _ended(ends: np.ndarray, older: np.ndarray, share: float, seed: int, number: int) -> np.ndarray:
@@ -182,9 +182,9 @@ def _ended(ends: np.ndarray, older: np.ndarray, share: float, seed: int, number:
         others = np.concatenate([older, out[:i]])
         t, who = crossings(a, b, others)
         for sign, end in ((-1.0, 0), (1.0, 1)):
-            way = (t - 0.5) * sign
-            order = np.argsort(way, kind="stable")
-            for k in order[way[order] > 0.0]:
+            half_trace = (t - 0.5) * sign
+            order = np.argsort(half_trace, kind="stable")
+            for k in order[half_trace[order] > 0.0]:
                 # One number per pair of traces and side: it does not depend on what else is met.
                 draw = uniform(seed, 2 * number + 1, 1 + 2 * (i * (MOST + len(older)) + int(who[k])) + end)
                 if draw < share:

@@ -92,10 +92,10 @@ def corner_angles(mesh: Mesh) -> np.ndarray:
 
 def _between_sides(xyz: np.ndarray) -> np.ndarray:
     """(m, 3 n) angles [degrees] of elements in space with corners (m, n, 3)."""
-    ways = xyz[:, _BESIDE[xyz.shape[1]]] - xyz[:, :, None]
+    edge_vectors = xyz[:, _BESIDE[xyz.shape[1]]] - xyz[:, :, None]
     out = []
     for k in range(3):
-        a, b, c = ways[:, :, k], ways[:, :, k - 1], ways[:, :, k - 2]
+        a, b, c = edge_vectors[:, :, k], edge_vectors[:, :, k - 1], edge_vectors[:, :, k - 2]
         b, c = np.cross(a, b), np.cross(a, c)
         sine = np.linalg.norm(np.cross(b, c), axis=2)
         out.append(np.degrees(np.arctan2(sine, (b * c).sum(axis=2))))

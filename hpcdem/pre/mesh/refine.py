@@ -92,10 +92,10 @@ def _between(points: np.ndarray, a: int, b: int, others: set[int], tolerance: fl
     some = np.array(sorted(others - {a, b}), np.int64)
     if not len(some):
         return []
-    way = points[b] - points[a]
-    length = float(np.sqrt(way @ way))
+    edge = points[b] - points[a]
+    length = float(np.sqrt(edge @ edge))
     off = points[some] - points[a]
-    along = off @ (way / length)
+    along = off @ (edge / length)
     across = np.sqrt(np.maximum((off * off).sum(axis=1) - along * along, 0.0))
     good = (across <= tolerance) & (along > tolerance) & (along < length - tolerance)
     return [int(p) for p in some[good][np.argsort(along[good], kind="stable")]]

@@ -80,9 +80,9 @@ def _aligned(disc: Disc, before: Sequence[Disc], size: float) -> Disc:
 def _beside(disc: Disc, other: Disc) -> bool:
     """Do they lie over each other, seen along the normal?"""
     at, along = other.plane()
-    way = np.array(disc.centre) - at
-    way = way - (way @ along) * along
-    return float(np.sqrt(way @ way)) < disc.radius + other.radius
+    offset = np.array(disc.centre) - at
+    offset = offset - (offset @ along) * along
+    return float(np.sqrt(offset @ offset)) < disc.radius + other.radius
 
 
 def _meet(disc: Disc, other: Disc) -> bool:
@@ -109,12 +109,12 @@ def _inside(disc: Disc, bodies: Sequence[Any], size: float) -> Disc | None:
     centre, normal = disc.plane()
     u, v = _frame(normal)
     angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
-    way = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
-    depths = np.linspace(0.0, 1.0, 9)[1:, None, None] * disc.radius * way
+    offset = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
+    depths = np.linspace(0.0, 1.0, 9)[1:, None, None] * disc.radius * offset
     over = np.min([one.distance(np.vstack([centre, (centre + depths).reshape(-1, 3)])) for one in bodies], axis=0)
     if (over >= 0.0).all():
         return None
-    rim = np.min([one.distance(centre + disc.radius * way) for one in bodies], axis=0)
+    rim = np.min([one.distance(centre + disc.radius * offset) for one in bodies], axis=0)
     worst = float(rim.max())
     near = NEAR * size
     if not -near < worst < near or worst <= -near:
@@ -124,7 +124,7 @@ def _inside(disc: Disc, bodies: Sequence[Any], size: float) -> Disc | None:
         radius -= max(worst + near, 1e-3 * near)
         if radius < near:
             return None
-        worst = float(np.min([one.distance(centre + radius * way) for one in bodies], axis=0).max())
+        worst = float(np.min([one.distance(centre + radius * offset) for one in bodies], axis=0).max())
         if worst <= -near * (1.0 - 1e-9):
             break
     return replace(disc, radius=radius)

@@ -282,9 +282,9 @@ def _moved(plane: Plane, xy: np.ndarray, traces: np.ndarray) -> list[str]:
         return []
     a, b, trace = np.array(rows).T
     point, trace = np.concatenate([a, b]), np.concatenate([trace, trace])
-    start, way = traces[trace, 0], traces[trace, 1] - traces[trace, 0]
-    t = np.clip(((xy[point] - start) * way).sum(axis=1) / (way * way).sum(axis=1), 0.0, 1.0)
-    far = np.hypot(*(xy[point] - start - t[:, None] * way).T)
+    start, along = traces[trace, 0], traces[trace, 1] - traces[trace, 0]
+    t = np.clip(((xy[point] - start) * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
+    far = np.hypot(*(xy[point] - start - t[:, None] * along).T)
     if far.max() < 1e-3 * plane.sizes.smallest:
         return []
     i = int(far.argmax())

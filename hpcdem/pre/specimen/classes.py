@@ -56,7 +56,7 @@ def classified(grains: PpdemGrains, sizes: np.ndarray | None = None) -> Grains:
     """Kinds and sizes of grains. sizes [mm]: classes to sort them into (the nearest on a log scale); without, every
     size there is makes one."""
     outlines = as_outlines(grains)
-    kind, size, roundness = _looked_at(grains, outlines)
+    kind, size, roundness = _measured_outlines(grains, outlines)
     found = _sizes(size / 1e-3) if sizes is None else np.sort(np.asarray(sizes, np.float64))[::-1]
     between = 0.5 * (np.log(found[1:]) + np.log(found[:-1]))
     class_of = len(found) - 1 - np.searchsorted(between[::-1], np.log(size / 1e-3))
@@ -77,7 +77,7 @@ def as_outlines(grains: PpdemGrains) -> Outlines:
     return Outlines(start, grains.x[row] + side, grains.y[row], theta)
 
 
-def _looked_at(grains: PpdemGrains, o: Outlines) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _measured_outlines(grains: PpdemGrains, o: Outlines) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     n = len(o)
     radius, cx, cy, first = arc_circles(o)
     kind = np.full(n, "polyarc", dtype="<U13")

@@ -142,12 +142,12 @@ def memory(machine: Machine) -> Findings:
     least, where = min(limits, default=(math.inf, ""))
     each = least / len(machine.here)
     if each < COMFORTABLE:
-        say = problem if each < NEEDED else warning
+        finding = problem if each < NEEDED else warning
         text = f"{size(each)} of memory for each of {len(machine.here)} ranks ({where} {size(least)}): a rank needs "
         cure = f"mpiexec -n {max(1, int(least // COMFORTABLE))} hpcdem ..."
         if machine.in_job:
             cure = "#SBATCH --mem-per-cpu=2G (a number without a unit means MiB)"
-        yield say("memory", f"{text}{size(NEEDED)} and more before the first particle", cure)
+        yield finding("memory", f"{text}{size(NEEDED)} and more before the first particle", cure)
     elif limits:
         yield ok("memory", "; ".join(f"{where} {size(limit)}" for limit, where in limits))
 

@@ -63,7 +63,7 @@ def _where(machine: Machine, path: Path) -> tuple[str, str]:
 
 def free_space(machine: Machine) -> Findings:
     """Room for results: bytes and files."""
-    yield from _room("results", machine.directory, RESULTS)
+    yield from _space("results", machine.directory, RESULTS)
 
 
 def results(machine: Machine) -> Findings:
@@ -73,11 +73,11 @@ def results(machine: Machine) -> Findings:
 
 def temporary(machine: Machine) -> Findings:
     """Check space and file operations in the folder for temporary files."""
-    yield from _room("temporary", Path(tempfile.gettempdir()), TEMPORARY)
+    yield from _space("temporary", Path(tempfile.gettempdir()), TEMPORARY)
     yield from _trial(machine, "temporary", Path(tempfile.gettempdir()), TEMPORARY)
 
 
-def _room(topic: str, path: Path, cure: str) -> Findings:
+def _space(topic: str, path: Path, cure: str) -> Findings:
     folder = existing(path)
     try:
         found = os.statvfs(folder)
@@ -86,8 +86,8 @@ def _room(topic: str, path: Path, cure: str) -> Findings:
         return
     free = found.f_bavail * found.f_frsize
     if found.f_blocks and free < LITTLE:  # some file systems do not say
-        say = problem if free < VERY_LITTLE else warning
-        yield say(topic, f"only {size(free)} free in {folder}", cure)
+        finding = problem if free < VERY_LITTLE else warning
+        yield finding(topic, f"only {size(free)} free in {folder}", cure)
     if found.f_files and found.f_favail < FEW_FILES:  # some do not count them
         yield warning(topic, f"space for only {found.f_favail} more files (inodes) in {folder}", cure)
 
