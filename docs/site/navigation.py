@@ -9,8 +9,8 @@ NAVIGATION = {
     ],
     "How to": [
         "docs/howto", "docs/packages", "docs/running", "docs/cases", "docs/specimens", "docs/specimens_page",
-        "docs/meshes", "docs/sections", "docs/python", "docs/sweep", "docs/view", "docs/pictures", "docs/measure",
-        "docs/stress_strain", "docs/zdemss", "docs/user_laws",
+        "docs/meshes", "docs/sections", "docs/surface", "docs/python", "docs/sweep", "docs/view", "docs/pictures",
+        "docs/measure", "docs/stress_strain", "docs/zdemss", "docs/user_laws",
     ],
     "Reference": [
         "docs/zdem_reference", "docs/pcdc_reference", "docs/pcdc_online", "docs/options", "docs/python_reference",
@@ -26,6 +26,6 @@ NAVIGATION = {
     "Inside": ["ARCHITECTURE", "CONTRIBUTING", "docs/writing", "CHANGELOG"],
     "中文": [
         "docs/index.zh", *(f"docs/tutorials/{page}.zh" for page in TUTORIALS), "docs/howto.zh", "docs/pcdc.zh",
-        "docs/sweep.zh", "docs/sections.zh", "docs/zdem_reference.zh", "docs/pcdc_reference.zh",
+        "docs/sweep.zh", "docs/sections.zh", "docs/surface.zh", "docs/zdem_reference.zh", "docs/pcdc_reference.zh",
     ],
 }  # fmt: skip

@@ -1204,7 +1204,7 @@ class Elements(Stressed):
         parameter : a property that the law declares, by its name, and its value.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
-    def tell(self, *, where: Where | None = None) -> None:
+    def report(self, *, where: Where | None = None) -> None:
         """Report their number by model and group in the log.
 
         Parameters
@@ -1342,7 +1342,7 @@ class Faces(Fluxed):
             surfaces applies; without effect in static runs.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
-    def tell(self, *, where: Where | None = None) -> None:
+    def report(self, *, where: Where | None = None) -> None:
         """Report their number by model and group in the log.
 
         Parameters
@@ -1833,7 +1833,7 @@ class Joints(Objects):
         proppant_stokes : True: settling after Stokes; False: after Schiller and Naumann, for any Reynolds number.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
-    def tell(self, *, where: Where | None = None) -> None:
+    def report(self, *, where: Where | None = None) -> None:
         """Report their number by model and group in the log.
 
         Parameters
@@ -2818,7 +2818,7 @@ class BlockCommands(Clocks):
         """In the plane: plane strain: no strain across the plane. This is the default of models in two dimensions; the
         command revokes `plane_stress`.
         """
-    def tell_devices(self) -> None:
+    def report_devices(self) -> None:
         """Reports the ranks, threads and cores of the run in the log."""
     def step(self, n: int) -> None:
         """Execute a number of steps of the blocks and of the particles coupled to them.

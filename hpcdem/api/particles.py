@@ -21,6 +21,7 @@ class ParticleCommands:
     gline = Function("particles.gline", "p1 p2 rad cratio")
     load = Function("particles.load", alone=True)
     section = Function("sections.section", "file")
+    surface = Function("surface.surface", "id")
     clump = Function("clumps.clump")
     join = Function("clumps.join", "where! group color")
     delete = Function("particles.delete")
@@ -39,4 +40,5 @@ class ParticleCommands:
     wall_forces = Function("queries.wall_forces", looks=True)
     kinetic_energy = Function("queries.kinetic_energy", looks=True)
     unbalanced = Function("queries.unbalanced", looks=True)
+    surface_balance = Function("surface.balance", looks=True)
     clumps = Function("queries.clumps", looks=True)

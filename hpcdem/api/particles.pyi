@@ -218,6 +218,57 @@ class ParticleCommands:
         -------
         int : how many particles got a group or are new, or how many bonds changed.
         """
+    def surface(
+        self,
+        id: int,
+        *,
+        interval: int | None = None,
+        x: tuple[float, float] | None = None,
+        spacing: float | None = None,
+        diffuse: float | None = None,
+        slope: float | None = None,
+        erode: float | None = None,
+        above: float | None = None,
+        deposit: float | None = None,
+        below: float | None = None,
+        rise: float | None = None,
+        years: float | None = None,
+        only: Sequence[str] | str = (),
+        rad: Sequence[float] | float | None = None,
+        porosity: float | None = None,
+        group: str | None = None,
+        episode: int | None = None,
+        colors: Sequence[str] | str = (),
+        off: bool = False,
+        hertz: bool = False,
+        **properties: Unpack[Material],
+    ) -> None:
+        """SURFACE: switch a surface process on or off; it acts at steps that are multiples of the interval.
+
+        Parameters
+        ----------
+        id : number of the process; a second command with it replaces the first.
+        interval : steps between two applications.
+        x : range in which it acts, (least, greatest) [m]; left out, as far as the particles reach.
+        spacing : width of the columns [m]; left out, four times the largest radius.
+        diffuse : coefficient of diffusion of the heights [m2/s].
+        slope : largest angle of the surface [deg]; what is steeper slides down.
+        erode, above : rate of erosion [m/s], and the level down to which it acts [m]; a level alone acts at once.
+        deposit, below : rate of deposition [m/s], and the level up to which it acts [m]; a level alone: a layer as
+            thick as
+            a column is wide at each application, until the level is met.
+        rise : velocity of the levels, upwards, from the command on [m/s].
+        years : years that a second of the model stands for; diffuse, erode, deposit and rise are then per year.
+        only : groups of which discs may be eroded; others protect what is under them. Left out, all.
+        rad : radii of deposited discs that are drawn from [m].
+        porosity : of what is eroded and deposited: bulk area is area of discs / (1 - porosity); 0.15.
+        group : of the deposit; growth.
+        episode : steps after which a new group begins, growth1, growth2, ...
+        colors : of these groups in turn, names.
+        off : end the process.
+        hertz : contacts of Hertz and Mindlin, by shear [Pa] and poiss.
+        properties : of the deposit, as in PROP.
+        """
     def clump(
         self,
         file: File,
@@ -394,6 +445,18 @@ class ParticleCommands:
         """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
     def unbalanced(self) -> float:
         """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
+    def surface_balance(self, id: int) -> dict[str, float]:
+        """The balance of a process of SURFACE.
+
+        Returns
+        -------
+        dict : bulk areas [m2] eroded, deposited (discs at rest), settling (not yet at rest), lost (deleted before
+            they were
+            at rest), carried (demanded, less than a disc, not yet met; negative: erosion), demanded (the sum that
+        the
+            processes wanted: deposited + settling + lost - eroded + carried); discs_eroded, discs_deposited,
+            discs_settling; mass_eroded, mass_deposited [kg].
+        """
     def clumps(self) -> dict[str, np.ndarray]:
         """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
         spin, angle, area, mass, inertia, members (how many).

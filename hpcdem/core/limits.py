@@ -7,7 +7,8 @@ give the same message. All lengths in metres.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from hpcdem.core.errors import CommandError
 
@@ -99,6 +100,68 @@ def check_row(p1: Point, p2: Point, rad: float, cratio: float) -> None:
     n = math.dist(p1, p2) / (2.0 * rad * cratio) if rad * cratio > 0.0 else math.inf
     if n > MOST:
         raise CommandError(f"the row has {n:.2g} particles; at most {MOST:g}")
+
+
+STEEPEST = 80.0
+"""Largest angle [deg] to which a slope can be limited."""
+PROCESSES = ("diffuse", "slope", "erode", "above", "deposit", "below")
+
+
+def check_surface(given: Mapping[str, Any]) -> None:
+    """CommandError unless these options of SURFACE, without None, go together."""
+    active = [name for name in PROCESSES if name in given]
+    if given.get("off"):
+        if len(given) > 2:
+            raise CommandError("off accepts only the id")
+        return
+    if not active:
+        raise CommandError(f"nothing to do; give one or more of {', '.join(PROCESSES)}, or off")
+    if not given.get("interval", 0) >= 1:
+        raise CommandError(
+            f"interval: steps between two applications, 1 or more, are needed, got {given.get('interval')}"
+        )
+    for name in ("diffuse", "erode", "deposit", "years", "spacing"):
+        if name in given and not 0.0 < given[name] <= LARGEST:
+            raise CommandError(f"{name} must be above 0, got {given[name]:g}")
+    if "rise" in given and not abs(given["rise"]) <= LARGEST:
+        raise CommandError(f"rise must be a number, got {given['rise']:g}")
+    if "rise" in given and not ("above" in given or "below" in given):
+        raise CommandError("rise is the velocity of a level: give above or below")
+    if not 0.0 < given.get("slope", 1.0) <= STEEPEST:
+        raise CommandError(f"slope: an angle above 0, at most {STEEPEST:g} degrees, got {given['slope']:g}")
+    if not 0.0 <= given.get("porosity", 0.0) < 0.9:
+        raise CommandError(f"porosity: from 0 to less than 0.9, got {given['porosity']:g}")
+    lowers, raises = ("erode" in given or "above" in given), ("deposit" in given or "below" in given)
+    above, below = given.get("above", -math.inf), given.get("below", math.inf)
+    if lowers and raises and below > above:
+        raise CommandError(
+            f"erosion (above {_level(above)}) and deposition (below {_level(below)}) would act at the same heights; "
+            "the level of erosion must not be below that of deposition"
+        )
+    _check_deposit(given, [name for name in ("diffuse", "slope", "deposit", "below") if name in given])
+
+
+def _level(level: float) -> str:
+    return f"{level:g} m" if math.isfinite(level) else "no level"
+
+
+def _check_deposit(given: Mapping[str, Any], makers: Sequence[str]) -> None:
+    """CommandError unless the discs that these processes make are described, and nothing else is."""
+    if not makers:
+        strange = [name for name in ("rad", "density", "episode", "colors", "group") if name in given]
+        if strange:
+            raise CommandError(f"{strange[0]} describes the deposit, and erosion alone makes none")
+        return
+    if not len(given.get("rad", ())):
+        raise CommandError(f"{makers[0]} deposits discs: give their radii (rad)")
+    for r in given["rad"]:
+        check_radius(r)
+    law = (given.get("shear") and given.get("hertz")) or given.get("kn")
+    missing = "density" if not given.get("density") else "" if law else "kn, or shear, poiss and hertz"
+    if missing:
+        raise CommandError(f"{makers[0]} deposits discs: give their {missing}")
+    if given.get("episode", 1) < 1:
+        raise CommandError(f"episode: steps with one group, 1 or more, are needed, got {given['episode']}")
 
 
 def _point(p: Point) -> str:

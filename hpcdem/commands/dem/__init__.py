@@ -21,12 +21,13 @@ if TYPE_CHECKING:
         queries,
         sections,
         settings,
+        surface,
         walls,
     )
 
 __all__ = [
     "bonds", "checkpoints", "clumps", "cycles", "history", "particles", "physics", "properties", "queries", "sections",
-    "settings", "walls",
+    "settings", "surface", "walls",
 ]  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from hpcdem.commands.dem import output
+from hpcdem.commands.dem import output, surface
 from hpcdem.commands.dem.bonds import warn_of_stiffnesses
 from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError
@@ -103,6 +103,7 @@ def _nearest(steps: float) -> int:
 def prepare(sim: Simulation, dt_known: bool = False) -> None:
     """Closed, checked and with a time step: ready for the first cycle. Collective."""
     _check_materials(sim)
+    surface.check(sim)
     if sim.clumps and sim.settings.disk != "on":
         raise CommandError(
             f"there are clumps, and SET disk is {sim.settings.disk}: their mass is density times area, so they need "
@@ -466,14 +467,17 @@ def _run(sim: Simulation) -> None:
             sim.log.command_finished()
     if sim.energy is not None:
         sim.energy.pause(sim)
+    surface.tell(sim)
     if progress["final_frame"]:
         output.Snapshot(sim).write_print()
     output.settle(sim)
 
 
 def _calls(sim: Simulation) -> list[Task]:
-    """The moments at which watchers are called; requested again each time, as they may come and go."""
-    return [Task(watcher.every, 0, watcher.call) for watcher in sim.watchers]
+    """The moments at which surface processes act and watchers are called; requested again each time, as they may come
+    and go."""
+    processes = [Task(land.every, 0, partial(surface.act, sim, ident)) for ident, land in sim.lands.items()]
+    return [*processes, *(Task(watcher.every, 0, watcher.call) for watcher in sim.watchers)]
 
 
 def _call_watchers(sim: Simulation) -> bool:

@@ -203,9 +203,9 @@ def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> Non
     with sim.timers("output"):
         name, unit = what.split()[0], unit_of(sim, what)
         value = OF_PARTS[name].value(sim, what, ident) if name in OF_PARTS else followed(sim)[what][1](sim)
-        _append(sim, f"hist_{ident}.csv", f"step,time [s],{what} [{unit}]", [f"{step},{time!r},{value!r}"])
+        append(sim, f"hist_{ident}.csv", f"step,time [s],{what} [{unit}]", [f"{step},{time!r},{value!r}"])
         header = f"hpcdem\nhist id {ident}\n{what} [{unit}]\nstep value"
-        _append(sim, f"hist_id_{ident}.dat", header, [f"{step} {value!r}"])
+        append(sim, f"hist_id_{ident}.dat", header, [f"{step} {value!r}"])
 
 
 def report(sim: Simulation, _: Snapshot | None = None) -> None:
@@ -220,7 +220,7 @@ def report(sim: Simulation, _: Snapshot | None = None) -> None:
             time, *rest = (repr(float(v)) for v in numbers)
             rows.append(",".join([str(clock.step), time, str(w.id[k]), *rest]))
         if rows:
-            _append(sim, "walls.csv", WALL_COLUMNS, rows)
+            append(sim, "walls.csv", WALL_COLUMNS, rows)
         own = w.side == 0
         wanted = sim.log is not None and sim.log.wants(clock.step)
         if sim.comm.bcast(wanted):
@@ -257,7 +257,7 @@ def write_energy(sim: Simulation, _: Snapshot | None = None) -> None:
         of_rolling = {name: seen.pop(name) for name in OF_ROLLING}
         of_physics = physics_energies(sim) | (of_rolling if sim.rolling is not None else {})
         numbers = (repr(v) for v in (sim.clock.time, *seen.values(), *of_physics.values()))
-        _append(sim, "energy.csv", ",".join([ENERGY_COLUMNS, *of_physics]), [",".join([str(sim.clock.step), *numbers])])
+        append(sim, "energy.csv", ",".join([ENERGY_COLUMNS, *of_physics]), [",".join([str(sim.clock.step), *numbers])])
 
 
 def physics_energies(sim: Simulation) -> dict[str, float]:
@@ -329,7 +329,7 @@ def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus
     )  # fmt: skip
 
 
-def _append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
+def append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
     """Add rows to a text file whose rows begin with the step. The first time in a run, a new model starts a new file, a
     restarted one cuts what lies after its step. If the header has gained columns, earlier rows are 0 there."""
     path = folder(sim) / name

@@ -98,6 +98,13 @@ def _section(s: Statement) -> None:
         raise s.error(f"{s.get('file')}: unknown ending of a section; known: {KNOWN}")
 
 
+def _surface(s: Statement) -> None:
+    _within(s, limits.check_surface, s.arguments)
+    for name in s.get("colors", ()):
+        if name.lower() not in t.COLORS:
+            raise s.error(f"colors: expected {', '.join(t.COLORS)}, got {name}")
+
+
 def _clump(s: Statement) -> None:
     placing = [name for name in ("x", "y", "angle", "scale") if name in s.arguments]
     if "file" in s.arguments and s.selection is not None:
@@ -202,6 +209,7 @@ _RULES: dict[str, Callable[[Statement], None]] = {
     "GLINE": _gline,
     "CLUMP": _clump,
     "SECTION": _section,
+    "SURFACE": _surface,
     "PROP": _prop,
     "FIX": _degrees,
     "FREE": _degrees,

@@ -597,6 +597,53 @@ COMMANDS = (
         does="sections.section",
     ),
     Command(
+        "SURFACE",
+        "Switches a surface process on; it acts at steps that are multiples of the interval (docs/surface.md). Eroded "
+        "discs are removed from the top of the columns, deposited ones are laid into hollows of the surface; what is "
+        "less than a disc is carried to the next application. The balance is in the log and in surface.csv. Needs SET "
+        "gravity along -y; does not support clumps.",
+        source="X",
+        options=tuple(replace(option, source="X") for option in (
+            _id("number of the process; a second command with it replaces the first"),
+            Option("interval", "steps between two applications", kind=COUNT, unit="steps"),
+            Option("x", "range in which it acts, also on a bare floor, up to the next steep walls", kind=INTERVAL,
+                   unit="m", default="as far as the particles reach"),
+            Option("spacing", "width of the columns", kind=POSITIVE, unit="m", default="4 times the largest radius"),
+            Option("diffuse", "coefficient of diffusion of the heights", kind=POSITIVE, unit="m2/s", default="off"),
+            Option("slope", "largest angle of the surface; what is steeper slides down", kind=POSITIVE, unit="deg",
+                   default="off"),
+            Option("erode", "rate of erosion", kind=POSITIVE, unit="m/s", default="at once, with above"),
+            Option("above", "level down to which it erodes", kind=FLOAT, unit="m", default="no level"),
+            Option("deposit", "rate of deposition", kind=POSITIVE, unit="m/s",
+                   default="with below, one spacing per application"),
+            Option("below", "level up to which it deposits", kind=FLOAT, unit="m", default="no level"),
+            Option("rise", "velocity of the levels, upwards, from the command on", kind=FLOAT, unit="m/s", default="0"),
+            Option("years", "years that a second of the model stands for; diffuse, erode, deposit and rise are then "
+                   "per year", kind=POSITIVE),
+            Option("only", "groups of which discs may be eroded; others protect what is under them", kind=NAMES,
+                   default="all"),
+            replace(_RADII, required=False, doc="radii of the deposit, drawn at random, a repeated one more often"),
+            Option("porosity", "of what is eroded and deposited: bulk area is area of discs / (1 - porosity)",
+                   kind=NOT_NEGATIVE, default="0.15"),
+            Option("group", "group of the deposit", kind=NAME, default="growth"),
+            Option("episode", "steps after which a new group begins: growth1, growth2, ...", kind=COUNT, unit="steps",
+                   default="one group"),
+            Option("colors", "colours of these groups in turn", also=("colours",), kind=NAMES,
+                   default="yellow|gb|green|violet"),
+            *(option for option in _PROPERTIES if option.name in (*PROPERTIES, "hertz")),
+            Option("off", "ends the process"),
+        )),
+        example=(
+            "SURFACE id 1 interval 500 diffuse 2.0 slope 30.0 rad discrete 45.0 60.0 density 2300.0 shear 2.9e9 "
+            "poiss 0.2 damp 0.4 fric 0.3 hertz group growth episode 10000 colors yellow|gb",
+            "SURFACE id 2 interval 500 erode 0.05 above 2900.0 only sand|cover",
+            "SURFACE id 3 interval 500 deposit 1e-3 below 2300.0 years 300.0 x (3000.0 18000.0) rad discrete 45.0 "
+            "density 2300.0 kn 1e8 ks 1e8 fric 0.3",
+            "SURFACE id 1 off",
+        ),
+        does="surface.surface",
+    ),
+    Command(
         "DEL",
         "Deletes particles with their contacts and bonds.",
         longest="delete",

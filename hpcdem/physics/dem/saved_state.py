@@ -43,6 +43,7 @@ from hpcdem.physics.dem.clumps import Clumps
 from hpcdem.physics.dem.kernels.contacts import LONGEST2
 from hpcdem.physics.dem.kernels.fast import Fast
 from hpcdem.physics.dem.kernels.neighbours import Histories
+from hpcdem.physics.dem.land import Land
 from hpcdem.physics.dem.particles import free_rows
 from hpcdem.physics.dem.reach import ListState
 from hpcdem.physics.dem.settings import Settings
@@ -85,6 +86,7 @@ def state_of(sim: Simulation) -> dict[str, Any]:
         "lost": sim.lost,
         "rows": sim.rows,
         "energy": sim.energy.state(sim) if sim.energy is not None else None,
+        "surface": {str(k): land.state() for k, land in sim.lands.items()},
         "pair_laws": sim.own_laws.state(),
         "stamp": sim.stamp,
         "physics": [[physics.name, physics.parameters()] for physics in sim.physics],
@@ -241,6 +243,7 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Table
     if state.get("energy") is not None:
         sim.prepare_kernels("energy")
         sim.energy = Budget.restored(state["energy"], sim.comm.rank == 0)
+    sim.lands = {int(k): Land.restored(land) for k, land in state.get("surface", {}).items()}
     sim._longest2 = state["longest2"]
     sim.restart_step = sim.clock.step
     if sim.comm.rank == 0:

@@ -26,6 +26,7 @@ from hpcdem.physics.dem.clumps import Clumps
 from hpcdem.physics.dem.kernels import contacts, fast, motion, neighbours
 from hpcdem.physics.dem.kernels.fast import Fast
 from hpcdem.physics.dem.kernels.neighbours import NO_ROWS, Histories
+from hpcdem.physics.dem.land import Land
 from hpcdem.physics.dem.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.physics.dem.particles import Particles
 from hpcdem.physics.dem.reach import ListState
@@ -153,6 +154,7 @@ class Simulation(Model):
         self.rows: list[tuple[int, int]] = []
         self._named: set[int] = set()
         self.energy: Any = None
+        self.lands: dict[int, Land] = {}  # SURFACE
         self.dashpots: Any = None  # restitution.Dashpots, while SET restitution is below 1
         self.rolling: rolling.Rolling | None = None  # while PROP rfric is above 0
         self.own_laws = ModelLaws()  # of the user; materials say which discs have them
