@@ -121,8 +121,10 @@ def after_step(n: np.poly1d, d: np.poly1d, t: float) -> float:
 @pytest.mark.some_of_each
 @EVERY_KIND
 @pytest.mark.parametrize(
-    ("time", "strain"), [(1e4, 8.98469e-4), (2e4, 1.142121e-3), (5e4, 1.442915e-3), (1e5, 1.543262e-3)]
-)
+    ("time", "strain"),
+    [(1e4, 8.98469e-4), (1e5, 1.543262e-3),
+     *(pytest.param(*one, marks=pytest.mark.slow) for one in ((2e4, 1.142121e-3), (5e4, 1.442915e-3)))],
+)  # fmt: skip
 def test_pure_shear(time, strain, kind):
     """sigma_xx = -sigma_yy = 5 MPa: shear strain 5 MPa J(t), in plane strain too, as no stress acts along z."""
     sim = loaded(LOAD, -LOAD, kind)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.physics.fdem import breaks, changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem.kernels.joint_law import MODE
+from hpcdem.physics.fdem.kernels.joints import BROKEN
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import rectangle
@@ -19,6 +23,20 @@ AREA = 0.3863073
 O_P, S_P = 2.0 * LENGTH * T / PENALTY, 2.0 * LENGTH * C / PENALTY
 O_T, S_T = GF1 / (AREA * T), GF2 / (AREA * C)
 TILTED = math.radians(30.0)
+
+
+def test_a_joint_that_breaks_in_creep_breaks_at_the_time_that_has_crept():
+    """2 s at the last creep step, and 0.5 s of this one; both sides of the joint tell it."""
+    local = SimpleNamespace(
+        slot_state=np.full(2, BROKEN), slot_face=np.array([1, 6]), slot_history=np.full((2, MODE + 5), 3.0)
+    )
+    sim = SimpleNamespace(
+        local=local, clock=SimpleNamespace(dt=7.0), rebuild_state=SimpleNamespace(time=9.0, step=3), comm=SerialComm(),
+        broken=np.zeros(8, int), partner=np.array([0, 6, 0, 0, 0, 0, 1, 0]), options=SimpleNamespace(dynamic=False),
+        reported_time=lambda: 2.0, creep=SimpleNamespace(passed=0.5),
+    )  # fmt: skip
+    (found,) = breaks.waiting(sim)
+    assert (found.joint, found.mode, found.step, found.kinetic, found.time) == (1, 3.0, 3, 6.0, 2.5)
 
 
 def pair(kind: str, turned: float = 0.0) -> Mesh:

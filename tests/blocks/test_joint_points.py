@@ -130,7 +130,7 @@ def bar(smooth: bool) -> Mesh:
     return triangulate(layers, MeshSettings([Region("o")], 0.0015, irregular=True, smooth=smooth)).mesh
 
 
-@pytest.mark.parametrize("penalty", [10.0, 100.0])
+@pytest.mark.parametrize("penalty", [10.0, pytest.param(100.0, marks=pytest.mark.slow)])
 def test_a_uniform_stress_is_uniform_on_the_joints_of_a_smooth_mesh(penalty):
     """Every point of every joint has sigma cos2: a closed form for a mesh without any pattern, whatever the penalty."""
     off, _ = pulled(bar(True), penalty * ROCK["young"])

@@ -25,6 +25,7 @@ from tests.space.support import box, hexes
 
 EDGE = 0.1
 KINDS = ("cross", "quad", "box", "hexes")
+SOME = [pytest.param(kind, marks=[pytest.mark.slow] * (kind in ("cross", "box"))) for kind in KINDS]
 COULOMB = {
     "normal_stiffness": 1e10, "shear_stiffness": 4e9, "friction": 30.0, "cohesion": 1e5, "tensile_strength": 2e4,
     "dilation": 5.0, "dilation_limit": 2e-4,
@@ -92,7 +93,7 @@ def move_top(sim: Blocks, along: float, across: float) -> np.ndarray:
     return found.mean(axis=1)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SOME)
 def test_closure(kind):
     """sigma_n = k_ni v / (1 - v / V_m), loading and unloading: 666 667 Pa at a quarter of V_m, 2 MPa at half of it."""
     sim = stack(kind, BARTON_BANDIS.name, ROUGH)
@@ -282,7 +283,7 @@ def test_another_law_forgets_what_the_first_remembered():
     assert diagnostics.values(sim, "normal_stress")[0] == pytest.approx(expected, rel=1e-3)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SOME)
 def test_forgetting_damage_leaves_stress_as_it_is(kind):
     """What has slid stays so, without a jump of the shear stress; what was torn holds again."""
     for name, values in ((COULOMB_JOINT.name, COULOMB), (BARTON_BANDIS.name, ROUGH)):
@@ -429,7 +430,7 @@ def test_cracks_cannot_slide_by_such_a_law(model, values):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SOME)
 def test_one_side_is_taken_out_and_put_back(kind):
     """The joint is gone with it, without a word of NumPy, and what comes back hangs together without it."""
     sim = stack(kind, COULOMB_JOINT.name, COULOMB, young=1e9, dynamic=True)

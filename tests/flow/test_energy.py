@@ -66,7 +66,7 @@ def test_a_joint_that_is_pumped_open() -> None:
     assert errors[0] < 0.02 and errors[1] < 0.004
 
 
-@pytest.mark.parametrize("kind", ["cross", "mixed"])
+@pytest.mark.parametrize("kind", [pytest.param("cross", marks=pytest.mark.slow), "mixed"])
 def test_what_fluid_does_on_triangles(kind: str) -> None:
     """What was pumped in, and is neither lost by the flow nor stored in the fluid, was done on the blocks."""
     sim, flow = plate(12, kind=kind)

@@ -278,7 +278,7 @@ def test_a_bar_that_cools_flows_in_balance_only(kind: str, steps: int) -> None:
     assert not diagnostics.values(sim, "plastic_state").any() and not diagnostics.values(sim, "plastic_work").any()
 
 
-@pytest.mark.parametrize("kind", ["mixed", "hexes"])
+@pytest.mark.parametrize("kind", ["mixed", pytest.param("hexes", marks=pytest.mark.slow)])
 def test_temperatures_are_brought_on_in_the_same_increments(kind: str) -> None:
     """A balance by four: what flows is as in four steps of heat, and temperatures are those of the end."""
     both = []

@@ -14,14 +14,25 @@ from hypothesis import strategies as st
 from hpcdem.commands.dem import cycles, history, particles, properties, walls
 from hpcdem.commands.dem import settings as settings_of
 from hpcdem.core.errors import CommandError
+from hpcdem.core.fields import BOX_IDS
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.kernels import walls as kernels
 from hpcdem.physics.dem.simulation import Watcher
+from hpcdem.physics.dem.walls import Walls
 from hpcdem.runtime.progress import Log
 from tests.support import at_wall, carry, force, model, only, position, steps, value, velocity
 
 R, K = 1.0, 1e6
 """Radius [m], stiffness of particle and wall in series [N/m]."""
+
+
+def test_walls_of_older_checkpoints():
+    """They lack the way since the lists were built, and which walls are those of BOX: these had ids from -1 to -4."""
+    given = {"id": [-2, 7], "p1": [[0.0, 1.0]] * 2, "p2": [[1.0, 2.0]] * 2, "v": [[3.0, 0.0]] * 2, "color": [0, 1]}
+    found = Walls()
+    found.take_columns({**given, **{key: [1.0, 2.0] for key in ("kn", "ks", "fric")}, "one_sided": [True, False]})
+    assert found.travel.tolist() == [[0.0, 0.0]] * 2 and found.v[:, 0].tolist() == [3.0, 3.0]
+    assert found.id[1] == 7 and found.id[0] in BOX_IDS.values() and (found.side > 0).tolist() == [True, False]
 
 
 def held(folder, x: float, y: float, *segments, wallside: str = "both", fric: float = 0.0):

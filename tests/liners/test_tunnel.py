@@ -31,9 +31,8 @@ def lined(p: float, k: float, slips: bool, thickness: float, around: int = 72) -
     return liners, *stiffness(concrete)
 
 
-@pytest.mark.some_of_each
-@pytest.mark.parametrize("slips", [False, True])
-@pytest.mark.parametrize(("k", "thickness"), [(0.5, 0.3), (1.6, 0.15)])
+@pytest.mark.parametrize("slips", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.parametrize(("k", "thickness"), [pytest.param(0.5, 0.3, marks=pytest.mark.slow), (1.6, 0.15)])
 def test_thrust_and_moment(slips, k, thickness) -> None:
     """Within 3.5 %, of which the fixed sides at 20 radii make 1 % and the quads at the wall the rest; small stress, so
     that the liner does not buckle a little."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
@@ -19,6 +22,24 @@ from tests.proppant.support import OIL, SAND, nodes_up, profile, slot
 
 FAST = 1e-5
 """Flow of the slots below [m2/s]."""
+
+
+def test_what_leaves_a_node_comes_to_the_other() -> None:
+    """By 0.4 m2/s there and 0.04 back: what one gives times the flow times what the other takes."""
+    nodes, state = np.ones((2, own.NODE)), np.ones((2, own.STATE))
+    nodes[:, own.N], state[:, own.GIVES], state[:, own.TAKES] = (0.3, 0.1), (0.5, 0.2), (0.4, 0.8)
+    links = np.array([0, 1, 2]), np.zeros(2, np.int64), np.array([-1.0, 1.0]), np.array([[0, 1]])
+    getattr(own.move, "py_func", own.move)(*links, np.array([[1.0, 0.5]]), 0.1, 1.0, 0.6, 2.0, 1e6, nodes, state)
+    assert nodes[:, own.N] == pytest.approx([0.264, 0.136], rel=1e-12)
+
+
+def test_only_what_is_refused_is_told() -> None:
+    told: list[str] = []
+    log = SimpleNamespace(warn_once=lambda key, text: told.append(text))
+    blocks, flow = SimpleNamespace(log=log, comm=SerialComm()), SimpleNamespace(implicit=True)
+    for refused in (0.0, 2.0):
+        Proppant._report_refused(SimpleNamespace(_refused=0.0, blocks=blocks, cycles=0, flow=flow), refused)  # type: ignore[arg-type]
+    assert told == ["inflow nodes of proppant are packed: 2 m2 of it could not enter"]
 
 
 def flowing(
