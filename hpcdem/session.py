@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import importlib
+import math
 import sys
 from collections.abc import Callable, Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -21,6 +22,7 @@ from hpcdem.core.comm import Comm
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import doctor, launch, run_folder, shutdown, speed
+from hpcdem.runtime.checkpoints import newest_first
 from hpcdem.runtime.pace import Pace
 
 if TYPE_CHECKING:
@@ -108,6 +110,11 @@ class Session:
             if kind in ("", "blocks"):
                 self.stop.install(self.comm.rank)
 
+    def newest(self, folder: Path, before: float = math.inf) -> str | None:
+        """The newest checkpoint of a folder, or the last one at or before this time [s]; searched for by rank 0."""
+        found = newest_first([folder], before)[0] if self.comm.rank == 0 else []
+        return self.comm.bcast(str(found[0]) if found else None)
+
     def _counted(self) -> AbstractContextManager[None]:
         """Time the loading of kernels in the table of stages of the last blocks, if there are any."""
         return self.projects[-1].blocks.timers.around("kernels") if self.projects else nullcontext()
@@ -136,7 +143,9 @@ class Session:
                 law = "hertz" if sim.materials.rows["hertz"].any() else "linear"
                 speed.remember_run(summary.particle_steps, summary.wall, self.comm.size * self.threads, law)
         if self.figure and sim.log is not None:
-            draw_last_state(sim, sim.log)
+            from hpcdem.commands.dem import output
+
+            output.draw_last_state(sim)
             if sim.folder_made and not sim.coupled:
                 sim.log.results(Path(sim.outdir))
         self._note(sim, "done")
@@ -293,31 +302,6 @@ def report_end(sim: Simulation) -> None:
     output.report_energy(sim)
     if sim.log is not None and sim.lost:
         sim.log.info(f"{sim.lost} particles in total left the BOX and were deleted; see the lines above")
-
-
-def draw_last_state(sim: Simulation, log: Log) -> None:
-    """Collective: the figure of the present state, `all_<step>.jpg`, by rank 0. No steps, no figure."""
-    from hpcdem.io.frame import whole
-    from hpcdem.io.frames import frame_name, read_frame
-    from hpcdem.post import plots
-
-    if not sim.timers.steps:
-        return
-    path, frame = sim.outdir / frame_name(sim.clock.step, ".jpg"), None
-    if sim.last_frame is None or sim.last_frame[0] != sim.clock.step:
-        from hpcdem.commands.dem import output
-        from hpcdem.physics.dem import diagnostics
-
-        sim.close_model()
-        output.folder(sim)
-        frame = diagnostics.frame(sim)
-        frame.tables = {"particles": frame.tables["particles"]}
-        frame = whole(frame, sim.comm)
-    elif sim.comm.rank == 0:
-        path = path.with_name(frame_name(sim.last_frame[0], ".jpg", sim.last_frame[1]))
-        frame = read_frame(path.with_suffix(".vtkhdf"), ("particles",))
-    if frame is not None:
-        log.info(f"figure: {plots.plot_frame(frame, path)}")
 
 
 def greet(

@@ -27,7 +27,6 @@ from hpcdem.lang.zdem.execute import Interpreter, find, report_warnings
 from hpcdem.lang.zdem.lexer import read_lines
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.physics.dem.materials import MATERIAL
-from hpcdem.runtime.checkpoints import newest_first
 
 if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
@@ -322,9 +321,9 @@ class Simulation(ParticleCommands, BlockCommands):
         that were coupled to blocks made before them come with these: `coupling` is there then."""
         self._refuse_coupled("resume")
         latest = math.inf if before is None else before
-        found = self._newest(self._folder, latest)
+        found = self._session.newest(self._folder, latest)
         if found is None or not self._kind(found):
-            beside = self._newest(self._folder / "blocks")
+            beside = self._session.newest(self._folder / "blocks")
             if beside is not None:
                 raise CommandError(
                     f"{beside}: the blocks were created after the particles, so resume cannot decide which checkpoint "
@@ -350,12 +349,6 @@ class Simulation(ParticleCommands, BlockCommands):
         engine = self.engine
         dem.cycles.resume(engine)
         return True
-
-    def _newest(self, folder: Path, before: float = math.inf) -> str | None:
-        """The newest checkpoint of a folder; searched for by rank 0."""
-        comm = self._session.comm
-        found = newest_first([folder], before)[0] if comm.rank == 0 else []
-        return comm.bcast(str(found[0]) if found else None)
 
     def _kind(self, path: str) -> str:
         """Return the kind of a checkpoint, read by rank 0: "" for particles and for files that are no checkpoint."""

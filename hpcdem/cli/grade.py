@@ -6,6 +6,7 @@ import json
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,9 +99,9 @@ def request(options: dict[str, Any], curve: Grading) -> Request:
 
 def make(options: dict[str, Any]) -> None:
     """Read the grading, make the specimen, write its files, say what came of it."""
+    from hpcdem.commands.specimens import Outputs, Style
     from hpcdem.core.errors import UsageError
     from hpcdem.pre.specimen import make_specimen, read_grading
-    from hpcdem.specimens import Outputs, Style
 
     if options["file"] is None:
         raise UsageError("the grading file is missing: hpcdem grade FILE ...")
@@ -234,11 +235,9 @@ def described(found: Grains, curve: Grading | None) -> dict[str, Any]:
     """Facts about the grains of a file, as JSON takes them; lengths in mm."""
     import numpy as np
 
-    from hpcdem.physics.polyarc.outlines import boxes
-
     kinds, number = np.unique(found.kind, return_counts=True)
     reached = found.grading
-    left, right, bottom, top = boxes(found.outlines).T
+    left, right, bottom, top = found.outlines.boxes().T
     known = found.roundness[np.isfinite(found.roundness)]
 
     def of(name: str) -> dict[str, float | None]:
@@ -267,17 +266,14 @@ def draw(found: Grains, curve: Grading | None, options: dict[str, Any]) -> list[
     """The figures of the grains of a file."""
     from hpcdem.core.comm import SerialComm
     from hpcdem.io.agreed import make_folder
-    from hpcdem.physics.polyarc.outlines import boxes
     from hpcdem.post import specimen as figures
     from hpcdem.post.measure.figures import save
 
-    left, right, bottom, top = boxes(found.outlines).T
+    left, right, bottom, top = found.outlines.boxes().T
     x, y = float(left.min()), float(bottom.min())
     space = float(right.max()) - x, float(top.max()) - y
-    from hpcdem.physics.polyarc.outlines import Outlines
-
     o = found.outlines
-    moved = Outlines(o.start, o.x - x, o.y - y, o.theta)
+    moved = replace(o, x=o.x - x, y=o.y - y)
     reached = found.grading
     numbers = [
         (name, math.nan if curve is None else getattr(curve, key), getattr(reached, key))

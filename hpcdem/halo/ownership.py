@@ -44,6 +44,10 @@ class Ownership:
         found: np.ndarray = columns(cell)
         return found
 
+    def order(self, cell: np.ndarray, number: np.ndarray) -> np.ndarray:
+        """Return the indices that sort rows by cell and number (n,) i8: the one order of the whole model."""
+        return strips.global_order(cell, number)
+
     def owner_of(self, place: np.ndarray) -> np.ndarray:
         """Return the rank that owns each place."""
         return strips.owner_of(place, self.borders)

@@ -28,8 +28,12 @@ class OnThreads:
         several.__module__ = made.__module__
         self.several = njit(cache=cache, parallel=True, error_model="numpy")(several)
 
-    def __call__(self, threads: int, *args: Any) -> None:
-        (self.one if threads == 1 else self.several)(threads, *args)
+    def on(self, threads: int) -> Callable[..., None]:
+        """The compiled form. Calls in each step use it: a call through Python costs as much as some elements."""
+        return self.one if threads == 1 else self.several
+
+    def __call__(self, *args: Any) -> None:
+        (self.one if args[0] == 1 else self.several)(*args)
 
 
 def on_threads(function: Callable[..., None]) -> OnThreads:

@@ -154,11 +154,10 @@ def contents(made: Specimen, style: dict[str, Any]) -> tuple[dict[str, Any], dic
 
 def described(made: Specimen) -> dict[str, Any]:
     """Describe a specimen for the page; lengths in mm."""
-    from hpcdem.physics.polyarc.outlines import boxes
     from hpcdem.post.specimen import class_colours
 
     rows, reached, asked = made.rows, made.achieved, made.request
-    left, right, bottom, top = boxes(made.outlines).T
+    left, right, bottom, top = made.outlines.boxes().T
     return {
         "shape": asked.shape,
         "number": asked.number,
@@ -220,8 +219,8 @@ def _padded(content: bytes, filling: bytes) -> bytes:
 def written(made: Specimen, style: dict[str, Any]) -> dict[str, Callable[[Path], object]]:
     """Name of each file of a specimen, and the function that writes it: those of the command line, and the PPDEM file
     in the layout of the other reading where there is one."""
+    from hpcdem.commands.specimens import Outputs, Style
     from hpcdem.pre.specimen.shapes import SIDES
-    from hpcdem.specimens import Outputs, Style
 
     style = {**style, "formats": tuple(style.get("formats", FIGURES))}
     files = Outputs(made, Style(**style)).files

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.io.axes import View
-from hpcdem.physics.polyarc.outlines import Outlines, boxes, sampled
+from hpcdem.physics.polyarc.outlines import Outlines, sampled
 from hpcdem.post import plots
 from hpcdem.post.measure.figures import INK, key, label, page
 
@@ -116,7 +116,7 @@ def packing(
     tall = min(usable * high / across, TALLEST)
     right = plots.PAGE_WIDTH - 1.75 - tall * across / high
     figure, (ax,) = page([tall], right=right)
-    _, _, bottom, top = boxes(outlines).T
+    _, _, bottom, top = outlines.boxes().T
     piece = np.clip((0.5 * (bottom + top) // high).astype(int), 0, pieces - 1)
     owner = outlines.owner
     size, unit = View(0.0, across, 0.0, high).unit

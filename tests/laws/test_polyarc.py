@@ -10,7 +10,7 @@ import pytest
 from hpcdem.numerics.rng import uniform
 from hpcdem.physics.polyarc.gap import fans, farthest, gap
 from hpcdem.physics.polyarc.moments import moments, segment
-from hpcdem.physics.polyarc.outlines import Outlines, arc_circles, boxes, sampled, uniform_outlines
+from hpcdem.physics.polyarc.outlines import Outlines, arc_circles, sampled, uniform_outlines
 from hpcdem.pre.specimen.shapes import bodies, oval, polygons
 from tests.tables import each
 
@@ -102,7 +102,7 @@ def test_boxes_and_samples(kind: int) -> None:
     outline = irregular(kind)
     p = sampled(outline, 5000)[0]
     expected = p[:, 0].min(), p[:, 0].max(), p[:, 1].min(), p[:, 1].max()
-    assert boxes(outline)[0] == pytest.approx(expected, abs=1e-6)
+    assert outline.boxes()[0] == pytest.approx(expected, abs=1e-6)
     radius, cx, cy, first = arc_circles(outline)
     arc = np.repeat(np.arange(outline.arcs_each), 5000)
     curved = np.isfinite(radius)[arc]

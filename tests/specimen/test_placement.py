@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.polyarc.outlines import boxes
 from hpcdem.pre.specimen import Request, Specimen, make_specimen
 from hpcdem.pre.specimen.dense import closest
 from tests.specimen.shapes import EXAMPLE, KINDS, WINDOW, shapely_polygons
@@ -37,7 +36,7 @@ def overlaps(made: Specimen, per_arc: int = PER_ARC) -> float:
 
 
 def inside(made: Specimen, width: float, height: float) -> bool:
-    left, right, bottom, top = boxes(made.outlines).T
+    left, right, bottom, top = made.outlines.boxes().T
     return bool(left.min() >= 0 and right.max() <= width and bottom.min() >= 0 and top.max() <= height)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.polyarc.moments import moments
-from hpcdem.physics.polyarc.outlines import arc_circles, boxes, sampled
+from hpcdem.physics.polyarc.outlines import arc_circles, sampled
 from hpcdem.pre.specimen.shapes import SIDES, bodies, oval, polygons
 
 
@@ -37,18 +37,18 @@ def test_ellipse_is_smooth_and_passes_where_it_should(ratio: float) -> None:
     turn = (np.roll(first, -1) - first - o.theta + math.pi) % (2 * math.pi) - math.pi
     assert np.abs(turn).max() < tolerance
     assert o.theta.sum() == pytest.approx(2 * math.pi, abs=1e-14)
-    assert boxes(o)[0] == pytest.approx([-a, a, -b, b], abs=a * tolerance)
+    assert o.boxes()[0] == pytest.approx([-a, a, -b, b], abs=a * tolerance)
 
 
 def test_ellipse_sizes() -> None:
     size = np.array([2.0])
     for rule, a in (("major", 1.0), ("minor", 3.0)):
         outline, reach = bodies("ellipse", size, 3.0, rule)
-        assert reach[0] == a and boxes(outline)[0] == pytest.approx([-a, a, -a / 3, a / 3])
+        assert reach[0] == a and outline.boxes()[0] == pytest.approx([-a, a, -a / 3, a / 3])
     outline, reach = bodies("ellipse", size, 3.0, "area")
     assert moments(outline)[0][0] == pytest.approx(math.pi, rel=1e-14)
     circle, _ = bodies("ellipse", size, 1.0)
-    assert circle.theta.tolist() == [math.pi, math.pi] and boxes(circle)[0] == pytest.approx([-1, 1, -1, 1])
+    assert circle.theta.tolist() == [math.pi, math.pi] and circle.boxes()[0] == pytest.approx([-1, 1, -1, 1])
 
 
 @pytest.mark.parametrize("shape", SIDES)

@@ -29,7 +29,7 @@ from hpcdem.io.dat import write_dat
 from hpcdem.io.disk import to_disk
 from hpcdem.io.files import write_sections
 from hpcdem.io.frame import Frame, whole
-from hpcdem.io.frames import frame_name
+from hpcdem.io.frames import frame_name, read_frame
 from hpcdem.io.ps import write_ps
 from hpcdem.io.vtk import write_vtk
 from hpcdem.io.vtkhdf import write_vtkhdf
@@ -110,6 +110,26 @@ class Snapshot:
                 except HpcdemError as problem:
                     error = str(problem)
             self.sim.comm.agree(error)
+
+
+def draw_last_state(sim: Simulation) -> None:
+    """The figure of the present state, `all_<step>.jpg`, by rank 0. No steps, no figure."""
+    from hpcdem.post import plots
+
+    if not sim.timers.steps:
+        return
+    path, frame = sim.outdir / frame_name(sim.clock.step, ".jpg"), None
+    if sim.last_frame is None or sim.last_frame[0] != sim.clock.step:
+        sim.close_model()
+        folder(sim)
+        frame = diagnostics.frame(sim)
+        frame.tables = {"particles": frame.tables["particles"]}
+        frame = whole(frame, sim.comm)
+    elif sim.comm.rank == 0:
+        path = path.with_name(frame_name(sim.last_frame[0], ".jpg", sim.last_frame[1]))
+        frame = read_frame(path.with_suffix(".vtkhdf"), ("particles",))
+    if frame is not None and sim.log is not None:
+        sim.log.info(f"figure: {plots.plot_frame(frame, path)}")
 
 
 def settle(sim: Simulation) -> None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from hpcdem.commands.fdem import assignments, frames, meshes, settings, steps
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.comm import SerialComm
-from hpcdem.decomp import strips
 from hpcdem.physics.fdem import saved_state
 from hpcdem.physics.fdem import warm_up as physics
 from hpcdem.physics.fdem.groups import OnLayer
@@ -28,4 +25,3 @@ def warm_up(threads: int = 1) -> None:
     steps.step(project, 2)
     frames.whole(project)
     saved_state.tables(project.blocks)
-    strips.strays(np.zeros(2, np.int64), np.array([-1, 0, 1]), 0)  # with several ranks only

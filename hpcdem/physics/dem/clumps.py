@@ -11,7 +11,7 @@ from hpcdem.core.comm import Comm
 from hpcdem.core.errors import PhysicsError
 from hpcdem.core.fields import CLUMP_SPIN, CLUMP_VX, CLUMP_VY, CLUMP_WIDTH, CLUMP_X, CLUMP_Y, FREE
 from hpcdem.core.memory import aligned, take_rows
-from hpcdem.physics.dem.kernels import rigid
+from hpcdem.physics.dem.kernels import motion, rigid
 from hpcdem.physics.dem.kernels.rigid import Bodies
 from hpcdem.physics.dem.particles import Particles, free_rows
 
@@ -26,7 +26,6 @@ class Clumps:
         self.number, self.reach = number, reach
         self._bodies: Bodies | None = None
         self._far = np.empty((0, 4))
-        self._loops: tuple = ()
         self._blocks: tuple = ()
 
     def __bool__(self) -> bool:
@@ -62,7 +61,6 @@ class Clumps:
                 f"step {step}: a clump lost members when the lists were rebuilt; they are up to {self.reach:g} m "
                 f"apart, a column is {side:g} m"
             )
-        self._loops = rigid.loops(lists.n_blocks > 1)
         self._blocks = self._bodies.blocks(lists.n_blocks)
         if halo.n_left + halo.n_right + len(halo.border):
             self._far = aligned((len(p.hot), 4))
@@ -93,16 +91,16 @@ class Clumps:
                     shift = b.foff[t] - b.lo[t]
                     self._far[i:j] = lists.force[i + shift : j + shift]
         halo.refresh_more()
-        self._loops[0](lists.n_blocks, bodies.start, bodies.source, bodies.arm, lists.force, self._far, bodies.force)
+        rigid.sum_forces(lists.n_blocks, bodies.start, bodies.source, bodies.arm, lists.force, self._far, bodies.force)
 
     def move(self, p: Particles, lists: Any, gx: float, gy: float, eta: float, dt: float) -> None:
         """Clumps by dt; their owned members follow."""
         bodies, parts = self.bodies, lists.n_blocks
-        self._loops[1](
+        motion.move(
             parts, 0, bodies.n, bodies.hot, bodies.cold, 0, *self._blocks, bodies.force, bodies.body, gx, gy,
             eta, dt,
         )  # fmt: skip
-        self._loops[2](
+        rigid.place(
             parts, bodies.hot, bodies.cold, bodies.start, bodies.row, bodies.offset, bodies.arm, p.hot, p.cold,
             p.n_left, p.n_own, dt,
         )  # fmt: skip

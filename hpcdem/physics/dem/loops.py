@@ -32,10 +32,9 @@ def refresh(sim: Any) -> None:
     sim._pushed, sim._push = _pressures(sim)
     sim._wall_table = sim.walls.table()
     sim._walls_move = bool(sim.walls.v.any())
-    threaded = lists.n_blocks > 1
-    sim._mover = motion.move_threaded if threaded else motion.move
-    sim._pair_forces = pair_forces.forces_threaded if threaded else pair_forces.forces
-    sim._wall_forces = wall_kernels.forces_threaded if threaded else wall_kernels.forces
+    sim._mover = motion.move.on(lists.n_blocks)
+    sim._pair_forces = (sim.own_laws.loops or pair_forces).forces.on(lists.n_blocks)
+    sim._wall_forces = wall_kernels.forces.on(lists.n_blocks)
     sim._move_args = (
         p.hot, p.cold, p.n_left, b.cut, b.lo, b.foff, lists.force, sim.body, s.gx, s.gy, s.lsm, dt,
     )  # fmt: skip
@@ -44,7 +43,6 @@ def refresh(sim: Any) -> None:
         sim.pair_laws, contacts.bond_table(sim.bond_laws), n_mat, dt, mass.SPHERES[s.disk], lists.tally,
     )  # fmt: skip
     if sim.own_laws.loops is not None:
-        sim._pair_forces = sim.own_laws.loops.several if threaded else sim.own_laws.loops.one
         sim._pair_args += sim.own_table, lists.memory, sim.own_laws.initial
     sim._wall_args = (
         p.hot, p.ihot, b.lo, b.foff, lists.force, lists.wptr, sim._wall_table, lists.slot_row, lists.slot_wall,

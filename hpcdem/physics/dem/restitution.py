@@ -47,8 +47,7 @@ class Dashpots:
     def _into(self, sim: Any, force: np.ndarray) -> None:
         p, lists = sim.particles, sim.lists
         b = lists.blocks
-        kernel: Any = dashpots.forces if lists.n_blocks == 1 else dashpots.forces_threaded
-        kernel(
+        dashpots.forces(
             lists.n_blocks, p.hot, p.ihot, b.cut, b.lo, b.poff, b.foff, lists.ptr, lists.partner, lists.bond,
             sim.pair_laws, lists.wptr, sim.walls.table(), lists.slot_row, lists.slot_wall, lists.slot_side,
             sim.wall_laws, len(sim.materials), self.mobility, self.beta, force, self._rates, self._on_walls,

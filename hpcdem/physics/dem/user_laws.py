@@ -415,7 +415,8 @@ def _loops_of(laws: tuple[PairLaw, ...]) -> user_pairs.Loops:
         made = [law.kept for law in laws]
         if None not in made:
             place = kept.folder(*sum((m or () for m in made), ()))
-            for what, kernel in loops._asdict().items():
+            one, several = loops.forces.one, loops.forces.several
+            for what, kernel in zip(("one", "several", "stored", "lost"), (one, several, loops.stored, loops.lost)):
                 kept.keep(kernel, place, f"pairs_{what}")
     return TOGETHER[names]
 
@@ -424,7 +425,7 @@ def _compile(loops: user_pairs.Loops, threads: int) -> None:
     """The force loop, with arguments of the types that it will have."""
     places, slots, rows = np.zeros(1, np.int64), np.zeros(0, np.int32), np.zeros((0, 8))
     nothing = np.zeros(0)
-    (loops.one if threads == 1 else loops.several)(
+    loops.forces.on(threads)(
         0, rows, rows.view(np.int64), places, places, places, places, places, places, slots, slots, nothing, slots,
         nothing, np.zeros((0, 4)), np.zeros((1, 4)), np.zeros((1, 4)), 1, 0.0, True, rows,
         np.zeros((1, 4)), np.zeros((0, 1)), np.zeros((1, 0)), 0.0,

@@ -130,20 +130,6 @@ def constants(number, points, cells, row, models, viscous, triangle_rows, quad_r
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def stress_without_strain(triangle_rows, quad_rows, n_left, own, quad_own, heat, s0, quad_s0):
-    """Fill s0 (n, 4) and quad_s0 (m, 16) [Pa], the stress without strain: the initial stress of triangles own (n, 4)
-    and of quads quad_own (m, 4), plus thermal stress heat (n_own,) in xx, yy and zz (empty without heat)."""
-    for i in range(len(triangle_rows)):
-        more = heat[triangle_rows[i] - n_left] if len(heat) else 0.0
-        s0[i, 0], s0[i, 1], s0[i, 2], s0[i, 3] = own[i, 0] + more, own[i, 1] + more, own[i, 2], own[i, 3] + more
-    for i in range(len(quad_rows)):
-        more = heat[quad_rows[i] - n_left] if len(heat) else 0.0
-        for p in range(4):
-            for c in range(4):
-                quad_s0[i, 4 * p + c] = quad_own[i, c] + (0.0 if c == 2 else more)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def links(number, rows, n, first, width, where, partner, closed, joint_row, face, at, law, kind, state):
     """Edges of elements of n edges in the given storage rows, into slots first, first + 1, ...
 

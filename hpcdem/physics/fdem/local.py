@@ -260,7 +260,7 @@ class Local(JointTables):
         self.solids.move_on(every=False)
         what = (keep, o.gx, o.gy, o.mass_damping, o.stiffness_damping)
         args: tuple[Any, ...] = *self._triangle_args, special, block_special, force, of_joints, *what, alpha, step
-        self.laws.forces(0, elements.triangles, *args, self.tally)
+        self.laws.forces(0, elements.triangles.on(sim.threads), *args, self.tally)
         if self.whole is not None:
             self.whole.add_forces(sim.v, 1.0, force)
         if not len(self.quad_rows):
@@ -273,7 +273,7 @@ class Local(JointTables):
                 yielding.table,
             )  # fmt: skip
         else:
-            self.laws.forces(1, elements.quads, *args)
+            self.laws.forces(1, elements.quads.on(sim.threads), *args)
 
     def open_joints(self) -> None:
         """Joints remember the present positions: those beyond their peak pass it, or break. Elements do not flow."""

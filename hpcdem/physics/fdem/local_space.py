@@ -166,7 +166,7 @@ class LocalSpace(Local):
         (tetrahedra, hexahedra), hexes = self.solids.blocks, self.hexes
         stressed = self.solids.stressed or self.laws.some
         some = 0 if hexes is not None and 6 * hexes.count == self.count else self.count
-        tets.forces(
+        tets.forces.on(sim.threads)(
             sim.threads, some, self.rows, sim.x, v, self.c, tetrahedra.flat(), stressed, not o.large_strain, force,
             *gravity, o.mass_damping, o.stiffness_damping, joints and self.jointed, self.slot_size, self.slot_link,
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
@@ -185,7 +185,8 @@ class LocalSpace(Local):
         """New velocities from the forces on corners. Collective."""
         sim = self.sim
         if self.some_alone:
-            space.kick(sim.threads, sim.n_left, self.kick, self.force, sim.v, 0.0 if sim.options.dynamic else ALPHA)
+            alpha = 0.0 if sim.options.dynamic else ALPHA
+            space.kick.on(sim.threads)(sim.threads, sim.n_left, self.kick, self.force, sim.v, alpha)
         self.nodes.move(self.force, self.loads)
 
     def stresses(

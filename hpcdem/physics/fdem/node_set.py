@@ -131,7 +131,7 @@ class NodeSet:
         if table is None:
             now, half = sim.time_now(), 0.5 * clock.dt if sim.options.dynamic else 0.0
             table = conditions_now(sim, self.functions, now, now + half, clock.dt)
-        self._kernel(
+        self._kernel.on(sim.threads)(
             sim.threads, self.begin, self.corner, *self._where(), self.kick, self.condition, self.share, table,
             loads.some, force, loads.applied, sim.v, 0.0 if sim.options.dynamic else ALPHA, self.outside, self.felt,
         )  # fmt: skip

@@ -148,8 +148,8 @@ class Blocks(Edited):
             budget.after_forces(self)
 
     def _move_rows(self, first: int, last: int) -> None:
-        of = tets if self.dim == 3 else elements
-        of.drift(self.threads, self.n_left + first, self.n_left + last, self.x, self.v, self.clock.dt)
+        drift = (tets if self.dim == 3 else elements).drift.on(self.threads)
+        drift(self.threads, self.n_left + first, self.n_left + last, self.x, self.v, self.clock.dt)
 
     def _moved(self) -> None:
         clock = self.clock

@@ -56,6 +56,10 @@ class Outlines:
         arcs = np.repeat(self.start[:-1][which] - start[:-1], number) + np.arange(start[-1])
         return Outlines(start, self.x[arcs], self.y[arcs], self.theta[arcs])
 
+    def boxes(self) -> np.ndarray:
+        """(n, 4) f8: left, right, bottom, top [m] of each outline, its arcs included."""
+        return _boxes(self.start, self.x, self.y, self.theta)
+
 
 def uniform_outlines(x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> Outlines:
     """Outlines of equally many arcs from (n, arcs) arrays."""
@@ -109,11 +113,6 @@ def arc_circles(outlines: Outlines) -> tuple[np.ndarray, np.ndarray, np.ndarray,
         cx = np.where(straight, np.nan, outlines.x - radius * np.cos(first))
         cy = np.where(straight, np.nan, outlines.y - radius * np.sin(first))
     return radius, cx, cy, first
-
-
-def boxes(outlines: Outlines) -> np.ndarray:
-    """(n, 4) f8: left, right, bottom, top [m] of each outline, its arcs included."""
-    return _boxes(outlines.start, outlines.x, outlines.y, outlines.theta)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -20,6 +20,7 @@ import math
 from numba import njit, prange
 
 from hpcdem.core.fields import MATERIAL, RADIUS, VX, VY, X, Y
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.dem.kernels.contacts import MODEL, A, B
 from hpcdem.physics.dem.kernels.walls import NONE, WVX, WVY, end_of_slots, meeting
@@ -91,7 +92,7 @@ def _of_walls(
         first = last
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def forces(
     n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, wptr, walls, slot_row, slot_wall, slot_side,
     table, n_mat, mobility, beta, force, rates, on_walls,
@@ -101,20 +102,6 @@ def forces(
     mobility (n, 2): 1/m along x and y, 0 where a disc keeps its velocity; rates (n,): the sum of c/m of the contacts of
     each owned particle is added [1/s]; on_walls (slots, 2): force on the particle of each wall slot [N].
     """
-    for t in range(n_blocks):
-        _of_pairs(t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, n_mat, mobility, beta, force, rates)
-        _of_walls(
-            t, hot, ihot, lo, foff, wptr, walls, slot_row, slot_wall, slot_side, table, n_mat, mobility, beta, force,
-            rates, on_walls,
-        )  # fmt: skip
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(
-    n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, wptr, walls, slot_row, slot_wall, slot_side,
-    table, n_mat, mobility, beta, force, rates, on_walls,
-):  # fmt: skip
-    """The same, a thread for each block."""
     for t in prange(n_blocks):
         _of_pairs(t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, n_mat, mobility, beta, force, rates)
         _of_walls(

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.core.fields import GID
+from hpcdem.numerics.on_threads import on_threads
 
 U = np.uint64
 # Columns of an entry: partner gid (-1 - w for wall w) and bond type, as int64 bits, and two numbers.
@@ -138,11 +139,11 @@ def _take(order, ptr, rows, new_ptr, new_rows):
 def taken_out(lists: Any, ihot: np.ndarray, stamp: float) -> Histories:
     """What the contacts of the owned particles remember. lists: neighbours.ContactLists; ihot (n, 8): their storage;
     stamp: what the memory of contacts that touch is not below of (user_pairs.py)."""
-    b, n_blocks, threaded = lists.blocks, lists.n_blocks, lists.n_blocks > 1
+    b, n_blocks = lists.blocks, lists.n_blocks
     totals, found = np.zeros(n_blocks, np.int64), np.zeros(n_blocks, np.int64)
     alive, count = np.empty(len(lists.partner), np.int32), np.empty(lists.n_own, np.int64)
     pairs = (lists.ptr, lists.row, lists.partner, lists.fs, lists.bond)
-    (_count_blocks_threaded if threaded else _count_blocks)(
+    _count_blocks(
         n_blocks, totals, found, lists.n_left, b.cut, b.lo, b.poff, *pairs, lists.memory, stamp,
         lists.wptr, lists.slot_row, lists.slot_fs, lists.slot_side, lists.slot_memory, alive, count,
     )  # fmt: skip
@@ -150,7 +151,7 @@ def taken_out(lists: Any, ihot: np.ndarray, stamp: float) -> Histories:
     ptr = np.empty(lists.n_own + 1, np.int64)
     ptr[-1] = ends[-1]
     out = Histories(ptr, np.empty((int(ends[-1]), WIDTH + lists.memory.shape[1])))
-    (_hand_out_blocks_threaded if threaded else _hand_out_blocks)(
+    _hand_out_blocks(
         n_blocks, ends - totals, found, lists.n_left, ihot, b.cut, b.poff, *pairs, lists.u_made, lists.memory, stamp,
         lists.wptr, lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side, lists.slot_memory, alive, count,
         ptr, out.rows, out.rows.view(np.int64),
@@ -244,37 +245,13 @@ def _hand_out(
             rows[q, WIDTH:] = slot_memory[k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def _count_blocks(n_blocks, totals, found, *args):
-    for t in range(n_blocks):
+    for t in prange(n_blocks):
         totals[t], found[t] = _count(t, *args)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def _count_blocks_threaded(
-    n_blocks, totals, found, n_left, cut, lo, poff, ptr, row, partner, fs, bond, memory, stamp,
-    wptr, slot_row, slot_fs, slot_side, slot_memory, alive, count,
-):  # fmt: skip
-    for t in prange(n_blocks):
-        totals[t], found[t] = _count(
-            t, n_left, cut, lo, poff, ptr, row, partner, fs, bond, memory, stamp, wptr, slot_row, slot_fs, slot_side,
-            slot_memory, alive, count,
-        )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def _hand_out_blocks(n_blocks, first, found, *args):
-    for t in range(n_blocks):
-        _hand_out(t, first[t], found[t], *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def _hand_out_blocks_threaded(
-    n_blocks, first, found, n_left, ihot, cut, poff, ptr, row, partner, fs, bond, u_made, memory, stamp,
-    wptr, slot_row, slot_wall, slot_fs, slot_side, slot_memory, alive, count, hptr, rows, bits,
-):  # fmt: skip
     for t in prange(n_blocks):
-        _hand_out(
-            t, first[t], found[t], n_left, ihot, cut, poff, ptr, row, partner, fs, bond, u_made, memory, stamp,
-            wptr, slot_row, slot_wall, slot_fs, slot_side, slot_memory, alive, count, hptr, rows, bits,
-        )  # fmt: skip
+        _hand_out(t, first[t], found[t], *args)

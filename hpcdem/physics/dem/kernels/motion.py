@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.core.fields import ANGLE, FIX, FIX_SPIN, FIX_X, FIX_Y, MATERIAL, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.dem.kernels import laws
 
 # Columns of the body table (n_own, 8) f8: mass [kg], inertia [kg m^2], local damping alpha, 1 for members of clumps
@@ -44,18 +45,11 @@ def _block(t, first, last, hot, cold, n_left, cut, lo, foff, force, body, gx, gy
         cold[c, ANGLE] += w * dt
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def move(n_blocks, *args):
-    """All blocks, one after the other."""
-    for t in range(n_blocks):
-        _block(t, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def move_threaded(n_blocks, first, last, hot, cold, n_left, cut, lo, foff, force, body, gx, gy, eta, dt):
-    """All blocks, one thread each."""
+    """All blocks, see `_block`."""
     for t in prange(n_blocks):
-        _block(t, first, last, hot, cold, n_left, cut, lo, foff, force, body, gx, gy, eta, dt)
+        _block(t, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -20,6 +20,7 @@ from numba import njit, prange
 from hpcdem.core.cells import COLUMN, column
 from hpcdem.core.fields import GID, RADIUS, WIDTH, X, Y
 from hpcdem.core.memory import aligned
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.dem.kernels import fast, histories, wall_slots
 from hpcdem.physics.dem.kernels.contacts import LONGEST2
 from hpcdem.physics.dem.kernels.histories import BOND, EXTRA, PARTNER, SHEAR, Histories
@@ -219,23 +220,10 @@ def _fill_near(
     return _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made, memory)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def _fill_blocks(n_blocks, need, placed, longest2, begin, room, *args):
-    for t in range(n_blocks):
-        need[t], placed[t], longest2[t] = _fill(t, begin[t], room[t], *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def _fill_blocks_threaded(
-    n_blocks, need, placed, longest2, begin, room,
-    more, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made, memory,
-):  # fmt: skip
     for t in prange(n_blocks):
-        need[t], placed[t], longest2[t] = _fill(
-            t, begin[t], room[t], more, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-            where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made, memory,
-        )  # fmt: skip
+        need[t], placed[t], longest2[t] = _fill(t, begin[t], room[t], *args)
 
 
 class ContactLists:
@@ -384,7 +372,6 @@ def build(
         fast_rows, at = fast_ones.among(ihot[:, GID])
         reach = fast_ones.reach[at]
         more = fast.pairs(hot, cell, fast_rows, reach, 0.5 * skin, columns, siblings)
-    fill = _fill_blocks if n_blocks == 1 else _fill_blocks_threaded
     while True:
         begin = np.concatenate(([0], np.cumsum(room)[:-1])).astype(np.int64)
         m = int(room.sum()) + 1  # a candidate is written before it is known to be near
@@ -392,7 +379,7 @@ def build(
             lists.ptr, np.empty(m, np.int32), np.empty(m, np.int32), np.empty(m), np.empty(m, np.int32), np.empty(m),
             np.empty((m, hist.memory.shape[1])),
         )  # fmt: skip
-        fill(
+        _fill_blocks(
             n_blocks, need, placed, longest2, begin, room, more, hot, ihot, cell, siblings, n_left, n_own,
             blocks.cut, blocks.lo, blocks.hi, blocks.poff, skin, bond2,
             where, hist.ptr, hist.rows, hist.rows.view(np.int64), *slots,

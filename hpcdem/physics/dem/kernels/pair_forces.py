@@ -34,6 +34,7 @@ from hpcdem.numerics.lanes import (
     offset,
     two_columns,
 )
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.dem.kernels.contacts import LONGEST2, SHEAR_BREAKS, TENSION_BREAKS
 
@@ -291,21 +292,8 @@ def _block(
     tally[t, SHEAR_BREAKS] += in_shear
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def forces(n_blocks, *args):
-    """All blocks, one after the other."""
-    for t in range(n_blocks):
-        _block(t, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(
-    n_blocks, hot, ihot, cut, lo, hi, poff, foff, ptr, row, partner, fs, bond, u_made, force,
-    pairs, bonds, n_mat, dt, spheres, tally,
-):  # fmt: skip
-    """All blocks, one thread each (numba's threads take no tuples, hence the list of names)."""
+    """All blocks, see `_block`."""
     for t in prange(n_blocks):
-        _block(
-            t, hot, ihot, cut, lo, hi, poff, foff, ptr, row, partner, fs, bond, u_made, force,
-            pairs, bonds, n_mat, dt, spheres, tally,
-        )  # fmt: skip
+        _block(t, *args)

@@ -43,7 +43,7 @@ from hpcdem.core.fields import (
     X,
     Y,
 )
-from hpcdem.physics.dem.kernels import motion
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.dem.kernels.motion import ALPHA, CLUMPED, INERTIA, KICK_SPIN, KICK_X, KICK_Y, MASS
 
 
@@ -215,19 +215,12 @@ def _sum(t, parts, start, source, arm, force, far, out):
         out[b, 0], out[b, 1], out[b, 2] = x, y, torque
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def sum_forces(parts, *args):
     """Force and torque on each clump from those on its members, into out (n, 4) f8. far (n_storage, .): those of the
     ghosts."""
-    for t in range(parts):
-        _sum(t, parts, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def sum_forces_threaded(parts, start, source, arm, force, far, out):
-    """The same by threads."""
     for t in prange(parts):
-        _sum(t, parts, start, source, arm, force, far, out)
+        _sum(t, parts, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -250,18 +243,11 @@ def _place(t, parts, bhot, bcold, start, row, offset, arm, hot, cold, n_left, n_
                 cold[i - n_left, ANGLE] = a
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def place(parts, *args):
     """Owned members go where their clumps are."""
-    for t in range(parts):
-        _place(t, parts, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def place_threaded(parts, bhot, bcold, start, row, offset, arm, hot, cold, n_left, n_own, dt):
-    """The same by threads."""
     for t in prange(parts):
-        _place(t, parts, bhot, bcold, start, row, offset, arm, hot, cold, n_left, n_own, dt)
+        _place(t, parts, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -300,10 +286,3 @@ def forces_of_members(start, row, arm, member, out):
             y += fy
             torque += member[row[k], 2] + (arm[k, 0] * fy - arm[k, 1] * fx)
         out[b, 0], out[b, 1], out[b, 2] = x, y, torque
-
-
-def loops(threaded: bool) -> tuple:
-    """The loops of a step: sum of forces, motion of bodies, places of members."""
-    if threaded:
-        return sum_forces_threaded, motion.move_threaded, place_threaded
-    return sum_forces, motion.move, place

@@ -18,6 +18,7 @@ from numba import njit, prange
 from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
 from hpcdem.numerics.lane_arguments import arguments, storing
 from hpcdem.numerics.lanes import CAPACITY, GROUP, U, four_columns, lane, offset
+from hpcdem.numerics.on_threads import OnThreads
 from hpcdem.physics.dem.kernels import energy, laws
 from hpcdem.physics.dem.kernels.contacts import USER
 from hpcdem.physics.dem.kernels.pair_forces import (
@@ -60,10 +61,9 @@ class Kernel(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """Kernels of the laws of a model: the force loop on one thread and on several; the sums of energies."""
+    """Kernels of the laws of a model: the force loop; the sums of energies."""
 
-    one: Any
-    several: Any
+    forces: OnThreads
     stored: Any
     lost: Any
 
@@ -176,19 +176,7 @@ def loops(of: Sequence[Kernel]) -> Loops:
         for r in range((cleared + shift) * FORCE, (hi[t] + shift) * FORCE):
             flat[r] = 0.0
 
-    @njit(nogil=True, error_model="numpy")
-    def on_one(
-        n_blocks, hot, ihot, cut, lo, hi, poff, foff, ptr, row, partner, fs, bond, u_made, force,
-        pairs, bonds, n_mat, dt, spheres, tally, table, memory, initial, stamp,
-    ):  # fmt: skip
-        for t in range(n_blocks):
-            block(
-                t, hot, ihot, cut, lo, hi, poff, foff, ptr, row, partner, fs, bond, u_made, force, pairs, n_mat, dt,
-                table, memory, initial, stamp,
-            )  # fmt: skip
-
-    @njit(parallel=True, error_model="numpy")
-    def on_several(
+    def forces(
         n_blocks, hot, ihot, cut, lo, hi, poff, foff, ptr, row, partner, fs, bond, u_made, force,
         pairs, bonds, n_mat, dt, spheres, tally, table, memory, initial, stamp,
     ):  # fmt: skip
@@ -198,7 +186,7 @@ def loops(of: Sequence[Kernel]) -> Loops:
                 table, memory, initial, stamp,
             )  # fmt: skip
 
-    return Loops(on_one, on_several, *_sums(of, n_states, n_columns))
+    return Loops(OnThreads(forces, cache=False), *_sums(of, n_states, n_columns))
 
 
 def _lanes_of(one: Kernel, first_column: int) -> tuple[Any, Any]:

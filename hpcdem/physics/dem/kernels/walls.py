@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.core.fields import GID, MATERIAL, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.numerics.on_threads import on_threads
 from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.dem.kernels.contacts import MODEL, MU, A, B
 
@@ -194,24 +195,11 @@ def _block(
         k = last
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@on_threads
 def forces(n_blocks, *args):
-    """All blocks, one after the other."""
-    for t in range(n_blocks):
-        _block(t, *args)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(
-    n_blocks, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side,
-    laws_table, n_mat, dt,
-):  # fmt: skip
-    """All blocks, one thread each."""
+    """All blocks, see `_block`."""
     for t in prange(n_blocks):
-        _block(
-            t, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side,
-            laws_table, n_mat, dt,
-        )  # fmt: skip
+        _block(t, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
