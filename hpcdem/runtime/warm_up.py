@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hpcdem.core import cells, memory
-from hpcdem.decomp import strips
+from hpcdem.halo import strips
 from hpcdem.io import slabs, textnum
 from hpcdem.numerics import exact_sum, lanes, rng
 

@@ -52,13 +52,32 @@ def test_a_circle_is_found(way, tmp_path, monkeypatch):
         sys.modules.pop("tied", None)
 
 
-def test_the_top_floor_has_few_rooms_and_a_short_plan():
-    """At most 20 of them, each on the plan of ARCHITECTURE.md, which a newcomer reads in one go."""
+def top_folders() -> set[str]:
+    """Folders and modules directly in the package."""
     package = ROOT / "hpcdem"
-    rooms = {path.stem for path in package.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
-    rooms -= {"__init__", "__main__"}
+    found = {path.stem for path in package.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
+    return found - {"__init__", "__main__"}
+
+
+def test_few_folders_import_each_other():
+    """At most 80 pairs of folders, of which one imports the other."""
+    graph, folders = grimp.build_graph("hpcdem", cache_dir=None), top_folders()
+    pairs = {
+        (name.split(".")[1], other.split(".")[1])
+        for name in graph.modules
+        if name.count(".")
+        for other in graph.find_modules_directly_imported_by(name)
+        if other.count(".")
+    }
+    pairs = {(one, other) for one, other in pairs if one != other and one in folders}
+    assert 40 < len(pairs) <= 80, sorted(pairs)
+
+
+def test_the_top_floor_has_few_rooms_and_a_short_plan():
+    """At most 18 of them, each on the plan of ARCHITECTURE.md, which a newcomer reads in one go."""
+    rooms = top_folders()
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
     plan = text.split("```")[1]
-    assert 10 < len(rooms) <= 20
+    assert 10 < len(rooms) <= 18
     assert [room for room in sorted(rooms) if room not in plan] == []
     assert len(text.splitlines()) <= 150

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hpcdem.core.comm import SerialComm
-from hpcdem.decomp import curve
+from hpcdem.halo import curve
 from hpcdem.physics.fdem import changes, connectivity, convergence, creep, diagnostics, equilibrium, overlaps
 from hpcdem.physics.fdem.elements.kind import SIX_NODE_TRIANGLE
 from hpcdem.physics.fdem.mesh import Mesh
