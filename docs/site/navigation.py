@@ -9,7 +9,8 @@ NAVIGATION = {
     ],
     "How to": [
         "docs/howto", "docs/packages", "docs/running", "docs/cases", "docs/specimens", "docs/specimens_page",
-        "docs/meshes", "docs/sections", "docs/surface", "docs/python", "docs/sweep", "docs/view", "docs/pictures",
+        "docs/meshes", "docs/sections", "docs/surface", "docs/flexure", "docs/python", "docs/sweep", "docs/view",
+        "docs/pictures",
         "docs/measure", "docs/stress_strain", "docs/zdemss", "docs/user_laws",
     ],
     "Reference": [
@@ -26,6 +27,7 @@ NAVIGATION = {
     "Inside": ["ARCHITECTURE", "CONTRIBUTING", "docs/writing", "CHANGELOG"],
     "中文": [
         "docs/index.zh", *(f"docs/tutorials/{page}.zh" for page in TUTORIALS), "docs/howto.zh", "docs/pcdc.zh",
-        "docs/sweep.zh", "docs/sections.zh", "docs/surface.zh", "docs/zdem_reference.zh", "docs/pcdc_reference.zh",
+        "docs/sweep.zh", "docs/sections.zh", "docs/surface.zh", "docs/flexure.zh", "docs/zdem_reference.zh",
+        "docs/pcdc_reference.zh",
     ],
 }  # fmt: skip

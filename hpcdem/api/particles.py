@@ -23,6 +23,7 @@ class ParticleCommands:
     section = Function("sections.section", "file")
     surface = Function("surface.surface", "id")
     clump = Function("clumps.clump")
+    flexure = Function("flexure.flexure", "wall where")
     join = Function("clumps.join", "where! group color")
     delete = Function("particles.delete")
     twin = Function("particles.twin", "number")

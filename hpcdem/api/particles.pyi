@@ -295,6 +295,49 @@ class ParticleCommands:
         -------
         int : how many bodies.
         """
+    def flexure(
+        self,
+        wall: int | None = None,
+        where: Selected = None,
+        *,
+        rigidity: float | None = None,
+        young: float | None = None,
+        poisson: float = 0.25,
+        te: float | None = None,
+        contrast: float | None = None,
+        x: tuple[float, float] | None = None,
+        left: str = 'infinite',
+        right: str = 'infinite',
+        load: tuple[float, float] | None = None,
+        compensated: bool = False,
+        interval: int = 1000,
+        relax: float = 0.5,
+        speed: float | None = None,
+        segments: int | None = None,
+        off: bool = False,
+    ) -> None:
+        """FLEXURE: a horizontal wall, or a row of particles fixed in x and y, bends under the contact forces on it like
+        an
+        elastic plate on a fluid: rigidity w'''' + contrast g w = load.
+
+        Parameters
+        ----------
+        wall : id of the wall, which becomes a polyline; or where: the particles of the row.
+        rigidity : flexural rigidity [N m]; or young, poisson, te: Young's modulus [Pa], Poisson's ratio, elastic
+            thickness
+            [m].
+        contrast : density of the fluid below minus that of what fills the deflection, without the particles [kg/m3].
+        x : left and right end of the plate, if it is longer than the base [m].
+        left, right : "infinite" (continues without load), "free" or "broken", "clamped" or "fixed".
+        load : a constant line load: x [m] and size, downwards [N/m].
+        compensated : the mean load of the first interval is in equilibrium with the undeformed base.
+        interval : steps between two solutions of the plate: the base moves in the first half and rests in the
+            second.
+        relax : share of the distance to equilibrium that the base moves in an interval.
+        speed : largest speed of the base [m/s]; otherwise 1e-3 of the largest radius in a step.
+        segments : of the base; otherwise 20 per flexural parameter, at least 50.
+        off : the base stays where it is.
+        """
     def join(self, where: Selected, group: str | None = None, color: str | int | None = None) -> int:
         """CLUMP RANGE: make one clump of the chosen particles; returns how many they are.
 
@@ -429,9 +472,9 @@ class ParticleCommands:
         [J]; HIST follows heat and heat_given [J], which are columns of energy.csv.
         """
     def hist(self, id: int, interval: int, what: str) -> None:
-        """HIST: record kinetic, step, time, unbalanced, contacts, bonds or energy, or "gstress group a", "gstrain group
-        a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and hist_<id>.csv;
-        strains begin at 0 here.
+        """HIST: record kinetic, step, time, unbalanced, contacts, bonds, energy or deflection, or "gstress group a",
+        "gstrain group a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and
+        hist_<id>.csv; strains begin at 0 here.
         """
     def plot(self, y: int, x: int) -> None:
         """PLOT: at `finish`, write history y against history x."""

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         checkpoints,
         clumps,
         cycles,
+        flexure,
         history,
         particles,
         physics,
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "bonds", "checkpoints", "clumps", "cycles", "history", "particles", "physics", "properties", "queries", "sections",
-    "settings", "surface", "walls",
+    "bonds", "checkpoints", "clumps", "cycles", "flexure", "history", "particles", "physics", "properties", "queries",
+    "sections", "settings", "surface", "walls",
 ]  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from hpcdem.commands.dem import output, surface
+from hpcdem.commands.dem import flexure, output, surface
 from hpcdem.commands.dem.bonds import warn_of_stiffnesses
 from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError
@@ -109,6 +109,7 @@ def prepare(sim: Simulation, dt_known: bool = False) -> None:
             f"there are clumps, and SET disk is {sim.settings.disk}: their mass is density times area, so they need "
             "SET disk on"
         )
+    flexure.check(sim)
     sim.close_model()
     _check_laws(sim)
     dt = sim.clock.dt if dt_known else time_step(sim)
@@ -390,7 +391,7 @@ class Due:
         sim, progress = self.sim, self.sim.progress
         assert progress is not None
         origin, intervals = progress["origin"], progress["intervals"]
-        tasks: list[Task] = []
+        tasks = flexure.tasks(sim)
         for ident, (every, _) in sorted(sim.history_requests.items()):
             tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
         last = -1 if progress["last"] is None else progress["last"]
@@ -411,6 +412,7 @@ class Due:
         return tasks
 
     def _report(self, _: object = None) -> None:
+        flexure.write(self.sim)
         output.report(self.sim)
         self._at_reports()
 

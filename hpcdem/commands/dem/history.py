@@ -14,15 +14,17 @@ DRAW_INTERVAL = 1000
 
 
 def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
-    """HIST: record kinetic, step, time, unbalanced, contacts, bonds or energy, or "gstress group a", "gstrain group
-    a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and hist_<id>.csv;
-    strains begin at 0 here."""
+    """HIST: record kinetic, step, time, unbalanced, contacts, bonds, energy or deflection, or "gstress group a",
+    "gstrain group a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and
+    hist_<id>.csv; strains begin at 0 here."""
     if interval <= 0:
         raise CommandError(f"HIST INTERVAL must be positive, got {interval}")
     if what == "energy" and (law := sim.own_laws.unaccounted()):
         raise CommandError(
             f"HIST energy: the stored energy of the law {law} is not known: define it with pair_law(energy=)"
         )
+    if what == "deflection" and not sim.bases:
+        raise CommandError("HIST deflection: no base bends; FLEXURE must precede it")
     sim.history_origins.pop(id, None)
     name = what.split()[0] if what.split() else ""
     if name in OF_PARTS:

@@ -36,6 +36,7 @@ from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.physics.dem import budget, diagnostics, saved_state
 from hpcdem.physics.dem.platens import OF_PARTS
 from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.dem.walls import total
 from hpcdem.runtime import launch, run_folder
 from hpcdem.runtime.progress import StepStatus
 
@@ -196,6 +197,7 @@ HISTORIES = {
     "contacts": ("1", lambda sim: float(diagnostics.survey(sim).contacts)),
     "bonds": ("1", lambda sim: float(sim.bonds_left())),
     "energy": ("J", budget.stored_energy),
+    "deflection": ("m", lambda sim: max(float(base.now(sim.clock.step)[base.nodes, 0].max()) for base in sim.bases)),
 }
 """Quantities that HIST can record: unit and function of the simulation."""
 
@@ -234,17 +236,18 @@ def report(sim: Simulation, _: Snapshot | None = None) -> None:
         _under_way.look(sim.comm)
         force = diagnostics.wall_forces(sim)
         w, clock = sim.walls, sim.clock
-        rows = []
-        for k in w.in_output_order():
-            numbers = (clock.time, *w.p1[k], *w.p2[k], *force[k])
+        rows, walls = [], []
+        for id, parts in w.polylines().items():
+            on_wall = total(force, parts)
+            numbers = (clock.time, *w.ends(parts).ravel(), *on_wall)
             time, *rest = (repr(float(v)) for v in numbers)
-            rows.append(",".join([str(clock.step), time, str(w.id[k]), *rest]))
+            rows.append(",".join([str(clock.step), time, str(id), *rest]))
+            if w.side[parts[0]] == 0:
+                walls.append((id, float(on_wall[0]), float(on_wall[1])))
         if rows:
             append(sim, "walls.csv", WALL_COLUMNS, rows)
-        own = w.side == 0
         wanted = sim.log is not None and sim.log.wants(clock.step)
         if sim.comm.bcast(wanted):
-            walls = [(int(i), float(fx), float(fy)) for i, (fx, fy) in zip(w.id[own], force[own], strict=True)]
             sim.log.step(status(sim, walls))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from hpcdem.commands.dem import output
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.dem.walls import total
 
 
 def extents(sim: Simulation) -> dict[str, float]:
@@ -16,9 +17,9 @@ def extents(sim: Simulation) -> dict[str, float]:
 
 def wall_force(sim: Simulation, id: int) -> tuple[float, float]:
     """Force on a wall (x, y) [N], exactly summed."""
-    row = sim.walls.row(id)
+    parts = sim.walls.parts(id)
     sim.close_model()
-    x, y = diagnostics.wall_forces(sim)[row]
+    x, y = total(diagnostics.wall_forces(sim), parts)
     return float(x), float(y)
 
 
@@ -26,7 +27,8 @@ def wall_forces(sim: Simulation) -> dict[int, tuple[float, float]]:
     """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
     sim.close_model()
     force = diagnostics.wall_forces(sim)
-    return {int(i): (float(x), float(y)) for i, (x, y) in zip(sim.walls.id, force, strict=True)}
+    of = {id: total(force, parts) for id, parts in sim.walls.polylines().items()}
+    return {id: (float(x), float(y)) for id, (x, y) in of.items()}
 
 
 def kinetic_energy(sim: Simulation) -> float:

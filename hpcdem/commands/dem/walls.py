@@ -34,21 +34,16 @@ def wall(
     """
     if id < 0:
         raise CommandError(f"wall id must not be negative, got {id}")
+    if sim.walls.find(id) is not None:
+        _leave_bending(sim, id, nodes is not None or bool(xv) or bool(yv) or delete)
     if delete:
         if any(given is not None for given in (nodes, kn, ks, fric, color, xv, yv)):
             raise CommandError(f"wall {id}: delete accepts only the id")
         _delete(sim, id)
         return
-    if nodes is not None and not np.isfinite(nodes).all():
-        raise CommandError(f"nodes of wall {id} must be finite numbers, got {nodes}")
     if nodes is not None:
-        limits.check_nodes(*nodes, name=f"wall {id}")
-        at_box = sim.walls.find(id)
-        if at_box is not None and sim.walls.side[at_box]:
-            raise CommandError(f"wall {id} is a side of BOX, and only BOX can move it; choose another id")
-        forget(sim, sim.walls.find(id))
-        sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")
-    at = sim.walls.row(id)
+        _place(sim, id, nodes)
+    at = sim.walls.parts(id)
     for name, value in (("kn", kn), ("ks", ks), ("fric", fric)):
         if value is not None and value < 0.0:
             raise CommandError(f"{name} must not be negative, got {value:g}")
@@ -94,6 +89,27 @@ def box(
         _set(sim, sim.walls.put_side(side, p1, p2), kn, ks, fric)
 
 
+def _leave_bending(sim: Simulation, id: int, moves: bool) -> None:
+    """CommandError for a segment of a wall, and for a wall that a plate bends, where the command would move it."""
+    sim.walls.parts(id)
+    if moves and any(base.wall == id for base in sim.bases):
+        raise CommandError(f"wall {id} bends on an elastic plate, which alone can move it; end it by FLEXURE off first")
+
+
+def _place(sim: Simulation, id: int, nodes: tuple[tuple[float, float], tuple[float, float]]) -> None:
+    """Make a wall between two nodes, or replace the one with this id."""
+    if not np.isfinite(nodes).all():
+        raise CommandError(f"nodes of wall {id} must be finite numbers, got {nodes}")
+    limits.check_nodes(*nodes, name=f"wall {id}")
+    before = sim.walls.find(id)
+    if before is not None and sim.walls.side[before]:
+        raise CommandError(f"wall {id} is a side of BOX, and only BOX can move it; choose another id")
+    if before is not None:
+        _remove(sim, sim.walls.parts(id)[1:])
+    forget(sim, sim.walls.find(id))
+    sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")
+
+
 def _delete(sim: Simulation, id: int) -> None:
     """Remove a wall. CommandError for a side of BOX and for a wall that a HIST follows."""
     row = sim.walls.row(id)
@@ -103,12 +119,18 @@ def _delete(sim: Simulation, id: int) -> None:
         name, *of = what.split()
         if of[:1] == ["wall"] and str(id) in of[1].split("|"):
             raise CommandError(f"wall {id} cannot be deleted: HIST {number} records its {name}")
-    forget(sim, row)
-    partner = sim.hist.partner
-    partner[partner < -1 - row] += 1
-    sim.walls.remove(row)
+    _remove(sim, sim.walls.parts(id))
     sim.tables_changed()
     sim.check_soon()
+
+
+def _remove(sim: Simulation, rows: np.ndarray) -> None:
+    """Take walls out of the table, with their contacts."""
+    for row in rows[::-1].tolist():
+        forget(sim, row)
+        partner = sim.hist.partner
+        partner[partner < -1 - row] += 1
+        sim.walls.remove(row)
 
 
 def forget(sim: Simulation, row: int | None) -> None:
@@ -118,7 +140,7 @@ def forget(sim: Simulation, row: int | None) -> None:
         sim.hist = sim.hist.keep(sim.hist.partner != -1 - row)
 
 
-def _set(sim: Simulation, at: int, kn: float | None, ks: float | None, fric: float | None) -> None:
+def _set(sim: Simulation, at: int | np.ndarray, kn: float | None, ks: float | None, fric: float | None) -> None:
     for name, value in (("kn", kn), ("ks", ks), ("fric", fric)):
         if value is not None:
             getattr(sim.walls, name)[at] = value

@@ -276,6 +276,12 @@ def _clump(call: _Call) -> None:
         dem.clumps.join(call.sim, call.where, **call.given())
 
 
+def _flexure(call: _Call) -> None:
+    given = call.given()
+    wall = given.pop("wall", (None,))[0]
+    dem.flexure.flexure(call.sim, wall, call.where, **given)
+
+
 def _prop(call: _Call) -> None:
     properties = {name: value for name, value in call.given().items() if name not in BOND_KEYS}
     if call.given(*BOND_MODEL_1, *BOND_MODEL_2):
@@ -325,6 +331,7 @@ def _log(call: _Call, text: str) -> None:
 _CONVERTERS: dict[str, Callable[[_Call], None]] = {
     "GEN": _gen,
     "CLUMP": _clump,
+    "FLEXURE": _flexure,
     "PROP": _prop,
     "FIX": lambda call: dem.properties.fix(call.sim, tuple(call.arguments), where=call.where),
     "FREE": lambda call: dem.properties.free(call.sim, tuple(call.arguments), where=call.where),

@@ -93,6 +93,8 @@ def follow(
                 _box(statement, known)
             case "WALL":
                 _wall(statement, known)
+            case "FLEXURE":
+                _flexure(statement, known)
             case "PROP" if statement.get("xp") or statement.get("yp"):
                 known.pressure = True
                 _no_energy_with_pressure(statement, known)
@@ -166,6 +168,16 @@ def _wall(statement: Statement, known: _Known) -> None:
         return
     x, y = known.walls.get(wall, (None, None))
     known.walls[wall] = (statement.get("xv", x), statement.get("yv", y))
+
+
+def _flexure(statement: Statement, known: _Known) -> None:
+    wall = statement.get("wall", (None,))[0]
+    if wall is not None and known.boxed and wall in BOX_IDS.values():
+        raise statement.error(f"wall {wall} is a side of BOX, which cannot bend; create a WALL above it")
+    if wall is not None and wall not in known.walls and known.complete:
+        raise statement.error(f"there is no wall {wall} ({_walls(known)})")
+    if wall is not None and "off" not in statement.arguments and any(known.walls.get(wall, ())):
+        raise statement.error(f"wall {wall} has a velocity; the plate alone can move it")
 
 
 def _plot(statement: Statement, known: _Known) -> None:

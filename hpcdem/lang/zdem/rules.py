@@ -105,6 +105,23 @@ def _surface(s: Statement) -> None:
             raise s.error(f"colors: expected {', '.join(t.COLORS)}, got {name}")
 
 
+def _flexure(s: Statement) -> None:
+    if ("wall" in s.arguments) == (s.selection is not None):
+        raise s.error("give either a wall, or the particles of a row by RANGE")
+    if "off" in s.arguments:
+        others = s.arguments.keys() - {"off", "wall"}
+        if others:
+            raise s.error(f"off accepts only the base, not {min(others)}")
+        return
+    of_plate = [name for name in ("young", "te", "poisson") if name in s.arguments]
+    if "rigidity" in s.arguments and of_plate:
+        raise s.error(f"rigidity and {of_plate[0]} exclude each other; give rigidity, or young, poisson and te")
+    if "rigidity" not in s.arguments and not {"young", "te"} <= s.arguments.keys():
+        raise s.error("give the flexural rigidity: rigidity, or young and te")
+    if "contrast" not in s.arguments:
+        raise s.error("give contrast, the difference of densities that restores the plate")
+
+
 def _clump(s: Statement) -> None:
     placing = [name for name in ("x", "y", "angle", "scale") if name in s.arguments]
     if "file" in s.arguments and s.selection is not None:
@@ -208,6 +225,7 @@ _RULES: dict[str, Callable[[Statement], None]] = {
     "GEN": _gen,
     "GLINE": _gline,
     "CLUMP": _clump,
+    "FLEXURE": _flexure,
     "SECTION": _section,
     "SURFACE": _surface,
     "PROP": _prop,

@@ -414,6 +414,11 @@ _SETTINGS = (
            source="X"),
 )  # fmt: skip
 
+_PLATE_END = Choice(
+    "infinite|free|broken|clamped|fixed", "infinite, free (or broken), or clamped (or fixed)",
+    tuple((name, name) for name in ("infinite", "free", "broken", "clamped", "fixed")),
+)  # fmt: skip
+
 COMMANDS = (
     # ---- beginning and end
     Command("START", "Begins a new calculation: no particles, no walls, step 0.", example=("START",),
@@ -478,6 +483,50 @@ COMMANDS = (
         example=("WALL ID 1, NODES ( 10.0 , 10000.0 ) ( 10.0 , 10.0 ), kn=0e10 ks=0e10 fric 0.0 COLOR blue",
                  "WALL id 1 xv 2.0", "WALL id 1 delete"),
         does="walls.wall",
+    ),
+    Command(
+        "FLEXURE",
+        "A base that bends under its load like an elastic plate on a fluid (flexural isostasy): the plate is in "
+        "equilibrium with its load and a restoring pressure contrast g w, w being the deflection. The base is a "
+        "horizontal wall, which becomes a polyline, or a horizontal row of particles fixed in x and y, selected by "
+        "RANGE. The load is the mean of the contact forces in an interval of steps. Writes flexure.csv with the rows "
+        "of walls.csv: deflection, equilibrium, load and bending moment along the plate (docs/flexure.md).",
+        source="X",
+        options=(
+            Option("wall", "the wall", kind=OF_WALL, source="X"),
+            Option("rigidity", "flexural rigidity D", kind=POSITIVE, unit="N m", source="X"),
+            Option("young", "Young's modulus of the plate, instead of rigidity", kind=POSITIVE, unit="Pa", source="X"),
+            Option("poisson", "Poisson's ratio of the plate, with young",
+                   kind=Number("<float>", "a number not below 0, below 0.5", low=0.0, high=0.4999), default="0.25",
+                   source="X"),
+            Option("te", "elastic thickness of the plate, with young", kind=POSITIVE, unit="m", source="X"),
+            Option("contrast", "density of the fluid minus that of what fills the deflection besides the particles",
+                   kind=POSITIVE, unit="kg/m3", source="X"),
+            Option("x", "left and right end of the plate", kind=INTERVAL, unit="m", default="those of the base",
+                   source="X"),
+            Option("left", "left end of the plate: continues without load, free, or clamped", kind=_PLATE_END,
+                   default="infinite", source="X"),
+            Option("right", "right end of the plate", kind=_PLATE_END, default="infinite", source="X"),
+            Option("load", "constant line load on the plate: x and size, downwards", kind=POINT, unit="m, N/m",
+                   source="X"),
+            Option("compensated", "the mean load of the first interval is in equilibrium with the horizontal base",
+                   source="X"),
+            Option("interval", "steps between two solutions of the plate", kind=COUNT, unit="steps", default="1000",
+                   source="X"),
+            Option("relax", "share of the distance to equilibrium that the base moves in an interval", kind=RATIO,
+                   default="0.5", source="X"),
+            Option("speed", "largest speed of the base", kind=POSITIVE, unit="m/s",
+                   default="1e-3 of the largest radius in a step", source="X"),
+            Option("segments", "segments of the base", kind=COUNT,
+                   default="20 per flexural parameter, at least 50", source="X"),
+            Option("off", "the base stays as it is", source="X"),
+        ),
+        ranged=True,
+        example=(
+            "FLEXURE wall id 5 rigidity 1e22 contrast 3300.0 right broken compensated",
+            "FLEXURE young 7e10 poisson 0.25 te 8e3 contrast 2300.0 x (-2e5, 3e5) interval 500 RANGE group base",
+            "FLEXURE wall id 5 off",
+        ),
     ),
     # ---- particles
     Command(
@@ -758,6 +807,7 @@ COMMANDS = (
             Option("energy", "record the kinetic and elastic energy", source="X"),
             Option("time", "record the time", source="X"),
             Option("unbalanced", "record the unbalanced force over the mean contact force", source="X"),
+            Option("deflection", "record the largest deflection of the bases of FLEXURE", source="X"),
             Option("contacts", "record the number of closed contacts", source="X"),
             Option("bonds", "record the number of bonds", source="X"),
             Option("gstress", "record the axial stress [Pa] on an end wall made of the particles of a group: force of "

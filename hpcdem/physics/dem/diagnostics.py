@@ -378,7 +378,8 @@ def fingerprint(sim: Simulation) -> dict[str, str]:
     remembered = [column[once] for column in (owner, hist.partner, hist.fs, hist.extra, hist.bond, *hist.memory.T)]
     sums = np.array([of_rows(list(columns.values())), of_rows(remembered)], np.uint64)
     sim.comm.sum_into(sums)  # integers without sign go round, as they should
-    walls = of_rows([w.ids_of_earlier_versions(), *w.p1.T, *w.p2.T, *w.v.T, w.kn, w.ks, w.fric])
+    bend = w.bend.T if w.bend.any() else ()
+    walls = of_rows([w.ids_of_earlier_versions(), *w.p1.T, *w.p2.T, *w.v.T, w.kn, w.ks, w.fric, *bend])
     return {"particles": as_text(sums[0]), "contacts": as_text(sums[1]), "walls": as_text(walls)}
 
 

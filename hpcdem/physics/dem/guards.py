@@ -85,7 +85,7 @@ def name_slipped(sim: Any) -> None:
         sim.halo.fill(origin)
         chain = slips.neighbours_in_rows(p.ihot[:, GID], p.hot[:, [X, Y]], origin, sim.rows, sim.rebuild_state.side)
         sim.halo.fill(chain)
-    paths = np.where(mine[:, None], walls.travel, np.nan)
+    paths = np.where(mine[:, None], walls.ways(), np.nan)
     kinds = slips.found(sim.lists, p.hot, origin, chain, np.hstack([walls.p1, walls.p2]), paths)
     if not sim.comm.any(bool(kinds.any())):
         return

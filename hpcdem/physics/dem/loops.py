@@ -31,7 +31,7 @@ def refresh(sim: Any) -> None:
     sim.bond_laws = contacts.bond_laws(sim.bond_types.rows)
     sim._pushed, sim._push = _pressures(sim)
     sim._wall_table = sim.walls.table()
-    sim._walls_move = bool(sim.walls.v.any())
+    sim._walls_move = sim.walls.moves
     sim._mover = motion.move.on(lists.n_blocks)
     sim._pair_forces = (sim.own_laws.loops or pair_forces).forces.on(lists.n_blocks)
     sim._wall_forces = wall_kernels.forces.on(lists.n_blocks)

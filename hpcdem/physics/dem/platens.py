@@ -19,6 +19,7 @@ from hpcdem.core.selection import Group
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.dem import diagnostics, loops
 from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.dem.walls import total
 
 AXES = "xy"
 
@@ -113,18 +114,19 @@ def group_strain(sim: Simulation, what: str, ident: int) -> float:
 # ---- walls -----------------------------------------------------------------------------------------------------------
 
 
-def _row(sim: Simulation, name: str) -> int:
-    return sim.walls.row(int(name))
+def _ends(sim: Simulation, name: str) -> np.ndarray:
+    return sim.walls.ends(sim.walls.parts(int(name)))
 
 
-def _middle(sim: Simulation, row: int) -> np.ndarray:
-    return 0.5 * (sim.walls.p1[row] + sim.walls.p2[row])
+def _middle(sim: Simulation, name: str) -> np.ndarray:
+    first, last = _ends(sim, name)
+    return np.asarray(0.5 * (first + last))
 
 
 def _wall_width(sim: Simulation, what: str) -> float:
     """Extent of the wall across the axis of ``xstress wall 3`` [m]."""
-    row, across = _row(sim, _parts(what)[0]), 1 - AXES.index(what[0])
-    return abs(float(sim.walls.p1[row, across] - sim.walls.p2[row, across]))
+    first, last = _ends(sim, _parts(what)[0])[:, 1 - AXES.index(what[0])]
+    return abs(float(first - last))
 
 
 def _begin_wall_stress(sim: Simulation, what: str) -> None:
@@ -135,14 +137,14 @@ def _begin_wall_stress(sim: Simulation, what: str) -> None:
 def wall_stress(sim: Simulation, what: str, _: int) -> float:
     """Force of the particles on a wall in x or y, over its width across and SET thickness [Pa]; positive where it
     points away from the particles. Collective."""
-    row, axis = _row(sim, _parts(what)[0]), AXES.index(what[0])
-    force = float(diagnostics.wall_forces(sim)[row, axis])
-    away = _middle(sim, row)[axis] - _mean_place(sim, np.ones(len(sim.particles), bool))[axis]
+    name, axis = _parts(what)[0], AXES.index(what[0])
+    force = float(total(diagnostics.wall_forces(sim), sim.walls.parts(int(name)))[axis])
+    away = _middle(sim, name)[axis] - _mean_place(sim, np.ones(len(sim.particles), bool))[axis]
     return force * (-1.0 if away < 0.0 else 1.0) / (_wall_width(sim, what) * sim.settings.thickness or math.nan)
 
 
 def _walls_apart(sim: Simulation, what: str) -> np.ndarray:
-    first, second = (_middle(sim, _row(sim, name)) for name in _parts(what))
+    first, second = (_middle(sim, name) for name in _parts(what))
     return np.abs(first - second)
 
 

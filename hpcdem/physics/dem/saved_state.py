@@ -40,6 +40,7 @@ from hpcdem.io.slabs import ask, holders, order_of, to_slabs
 from hpcdem.physics.dem import user_laws
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.clumps import Clumps
+from hpcdem.physics.dem.flexing_base import Base
 from hpcdem.physics.dem.kernels.contacts import LONGEST2
 from hpcdem.physics.dem.kernels.fast import Fast
 from hpcdem.physics.dem.kernels.neighbours import Histories
@@ -98,6 +99,7 @@ def state_of(sim: Simulation) -> dict[str, Any]:
         "script": sim.script,
         "plots": sim.plots,
         "drawing": sim.drawing,
+        "bases": [base.state() for base in sim.bases],
     }
 
 
@@ -237,6 +239,7 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Table
     sim.plots = [(int(y), int(x)) for y, x in state["plots"]]
     if state.get("drawing") is not None:
         sim.drawing = int(state["drawing"][0]), tuple(state["drawing"][1])
+    sim.bases = [Base.restored(base) for base in state.get("bases", [])]
     sim.bonds = state["bonds"]
     sim.lost = state.get("lost", 0)
     sim.rows = [(int(first), int(end)) for first, end in state.get("rows", [])]
@@ -308,13 +311,13 @@ def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray)
     positions put in. Order, ownership and lists depend on the former alone."""
     p, walls = sim.particles, sim.walls
     saved_lattice = dataclasses.replace(sim.rebuild_state)
-    travel = walls.travel.copy()
+    travel, bent = walls.travel.copy(), walls.bent.copy()
     now = walls.p1.copy(), walls.p2.copy()
     gid, moving = p["gid"].copy(), np.hstack([p.positions(), p.cold[:, FX : TORQUE + 1]])
     p["x"][:], p["y"][:] = origin.T
-    walls.p1, walls.p2 = walls.p1 - travel, walls.p2 - travel
+    walls.p1, walls.p2 = walls.at_last_list()
     sim.close_as_saved()
-    walls.p1, walls.p2, walls.travel = now[0], now[1], travel
+    walls.p1, walls.p2, walls.travel, walls.bent = now[0], now[1], travel, bent
     sim.rebuild_state = saved_lattice
     gid, moving = sim.trail.follow(sim.comm, p["gid"], gid, moving)
     order = np.argsort(gid)

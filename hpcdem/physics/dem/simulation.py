@@ -125,9 +125,7 @@ class Simulation(Model):
         self.coupled = False  # to blocks, which step them both (physics/coupling)
         self.resume_advice = "--resume"
         self.draws = False
-        self.script = ""
-        self.position = 0
-        self.line = 0
+        self.script, self.position, self.line = "", 0, 0
         self.clear()
 
     def clear(self) -> None:
@@ -164,6 +162,7 @@ class Simulation(Model):
         self.history_origins: dict[int, tuple[int, float]] = {}  # axis and distance of strains
         self.plots: list[tuple[int, int]] = []
         self.drawing: tuple[int, tuple[str, ...]] | None = None
+        self.bases: list[Any] = []  # flexing_base.Base: walls and rows that an elastic plate carries
         self.progress: dict | None = None
         self.last_frame: tuple[int, bool] | None = None
         self.edited = True  # by a command, since the last `_ini` frame of a coupled run
@@ -386,7 +385,7 @@ class Simulation(Model):
         clump = None if p.rigid is None else p.rigid.view(np.int64)[:, CLUMP].copy()
         cell = np.concatenate([keys(p.hot[: p.n_left], side), cell, keys(p.hot[p.owned.stop :], side)])
         self.origin = p.positions()
-        self.walls.travel[:] = 0.0
+        self.walls.list_built()
         self._wall_table = self.walls.table()
         bond_reach = min(side, rebuild_state.bond_reach + skin) if self.bonds else 0.0
         self._lists = neighbours.build(

@@ -1,6 +1,8 @@
-"""The walls, known to every rank: segments with a velocity, and the four sides of the BOX."""
+"""The walls, known to every rank: segments with a velocity, the four sides of the BOX, and polylines that bend."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -15,7 +17,8 @@ _SIDES = f"{min(BOX_IDS.values())} to {max(BOX_IDS.values())}"
 
 class Walls:
     """Columns by name: id (n,) i8; p1, p2, v (n, 2) f8; kn, ks, fric (n,) f8; color (n,) i8; one_sided (n,) bool;
-    side (n,) i8: 0, or 1 to 4 for the walls of BOX in the order of BOX_IDS.
+    side (n,) i8: 0, or 1 to 4 for the walls of BOX in the order of BOX_IDS; whole (n,) i8: the wall that a segment is a
+    part of, its own id for others; bend (n, 2) f8: velocities in y of P1 and P2 besides v [m/s].
 
     Contact histories refer to walls by their rows, which change only when an earlier wall is removed.
     """
@@ -29,8 +32,12 @@ class Walls:
         self.side = np.empty(0, np.int64)
         self.travel = np.empty((0, 2))
         """Way of each wall since the contact lists were built [m]."""
+        self.whole = np.empty(0, np.int64)
+        self.bend, self.bent = np.empty((0, 2)), np.empty((0, 2))
+        """bent: way of P1 and P2 in y besides `travel` [m]."""
 
-    COLUMNS = ("id", "p1", "p2", "v", "kn", "ks", "fric", "color", "one_sided", "side", "travel")
+    COLUMNS = ("id", "p1", "p2", "v", "kn", "ks", "fric", "color", "one_sided", "side", "travel", "whole", "bend",
+               "bent")  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.id)
@@ -44,9 +51,41 @@ class Walls:
         """Row of the wall with this id; CommandError if missing."""
         at = self.find(wall_id)
         if at is None:
-            known = ", ".join(map(str, self.id[self.side == 0])) or "none"
+            known = ", ".join(map(str, self.id[(self.side == 0) & (self.whole == self.id)])) or "none"
             raise CommandError(f"there is no wall with id {wall_id} (walls so far: {known})")
         return at
+
+    def parts(self, wall_id: int) -> np.ndarray:
+        """Rows of the segments of a wall from its P1 to its P2, usually one; CommandError if missing."""
+        first = self.row(wall_id)
+        if self.whole[first] != wall_id:
+            raise CommandError(f"wall {wall_id} is a segment of wall {self.whole[first]}, which FLEXURE bends")
+        return np.flatnonzero(self.whole == wall_id)
+
+    def polylines(self) -> dict[int, np.ndarray]:
+        """Rows of the segments of each wall by its id, in output order."""
+        order = self.in_output_order()
+        return {int(self.id[row]): self.parts(int(self.id[row])) for row in order if self.whole[row] == self.id[row]}
+
+    def ends(self, rows: np.ndarray) -> np.ndarray:
+        """First and last point (2, 2) of the wall with these segments [m]."""
+        return np.stack([self.p1[rows[0]], self.p2[rows[-1]]])
+
+    def split(self, row: int, x: np.ndarray) -> np.ndarray:
+        """Cut a wall at x (k,), ascending or descending from P1 to P2; returns the rows of its segments (k + 1,), which
+        have its properties and, but for the first, new ids."""
+        ends = np.concatenate([[self.p1[row, 0]], x, [self.p2[row, 0]]])
+        share = (ends - ends[0]) / (ends[-1] - ends[0])
+        y = self.p1[row, 1] + share * (self.p2[row, 1] - self.p1[row, 1])
+        rows = np.concatenate([[row], len(self) + np.arange(len(x))])
+        new_ids = max(int(self.id.max()), *BOX_IDS.values()) + 1 + np.arange(len(x))
+        for name in self.COLUMNS:
+            column = getattr(self, name)
+            setattr(self, name, np.concatenate([column, np.repeat(column[row : row + 1], len(x), axis=0)]))
+        self.id[rows[1:]], self.whole[rows] = new_ids, self.id[row]
+        places = np.column_stack([ends, y])
+        self.p1[rows], self.p2[rows] = places[:-1], places[1:]
+        return rows
 
     def put(self, wall_id: int, p1: tuple[float, float], p2: tuple[float, float], one_sided: bool = False) -> int:
         """Make a wall, or give an existing id new end points and default properties; returns its row."""
@@ -61,6 +100,7 @@ class Walls:
         for name in self.COLUMNS:
             getattr(self, name)[at] = 0
         self.id[at], self.p1[at], self.p2[at], self.one_sided[at] = wall_id, p1, p2, one_sided
+        self.whole[at] = wall_id
         return at
 
     def remove(self, row: int) -> None:
@@ -110,11 +150,15 @@ class Walls:
                 at = self.id == -number
                 self.side[at] = 1 + list(BOX_IDS).index(side)
                 self.id[at] = BOX_IDS[side] if free else -number
+        if "whole" not in columns:
+            self.whole = self.id.copy()
 
     def table(self) -> np.ndarray:
         """(n, 8) f8 for the kernels, see physics.dem.walls."""
         out = np.zeros((len(self), 8))
         out[:, 0:2], out[:, 2:4], out[:, 4:6], out[:, 6] = self.p1, self.p2, self.v, self.one_sided
+        if self.bend.any():
+            out[:, 5] += 0.5 * self.bend.sum(axis=1)  # the velocity of the middle
         return out
 
     def move(self, dt: float) -> None:
@@ -123,14 +167,41 @@ class Walls:
         self.p1 += step
         self.p2 += step
         self.travel += step
+        if self.bend.any():
+            step = self.bend * dt
+            self.p1[:, 1] += step[:, 0]
+            self.p2[:, 1] += step[:, 1]
+            self.bent += step
+
+    @property
+    def moves(self) -> bool:
+        """Whether a wall has a velocity."""
+        return bool(self.v.any() or self.bend.any())
+
+    def ways(self) -> np.ndarray:
+        """Way of the middle of each wall since the lists were built (n, 2) [m]."""
+        ways = self.travel.copy()
+        ways[:, 1] += 0.5 * self.bent.sum(axis=1)
+        return ways
+
+    def list_built(self) -> None:
+        """Begin to count the ways of walls at the present positions."""
+        self.travel[:], self.bent[:] = 0.0, 0.0
+
+    def at_last_list(self) -> tuple[np.ndarray, np.ndarray]:
+        """P1 and P2 (n, 2) when the lists were built [m]."""
+        p1, p2 = self.p1 - self.travel, self.p2 - self.travel
+        p1[:, 1] -= self.bent[:, 0]
+        p2[:, 1] -= self.bent[:, 1]
+        return p1, p2
 
     def longest_travel(self) -> float:
         """Largest way of any wall since the lists were built [m]."""
-        return float(np.hypot(self.travel[:, 0], self.travel[:, 1]).max()) if len(self) else 0.0
+        return _longest(self.travel, self.bent)
 
     def fastest(self) -> float:
         """Speed of the fastest wall [m/s]."""
-        return float(np.hypot(self.v[:, 0], self.v[:, 1]).max()) if len(self) else 0.0
+        return _longest(self.v, self.bend)
 
     def box(self) -> tuple[float, float, float, float] | None:
         """(left, right, bottom, top) of the BOX, or None."""
@@ -143,3 +214,13 @@ class Walls:
         """Rows with the BOX first (in the order of BOX_IDS), then by making."""
         sides = np.flatnonzero(self.side)
         return np.concatenate([sides[np.argsort(self.side[sides])], np.flatnonzero(self.side == 0)])
+
+
+def total(force: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Sum of the forces (n, 2) on the segments of one wall; that of a single one is unchanged."""
+    return force[rows[0]] if len(rows) == 1 else np.array([math.fsum(axis) for axis in force[rows].T])
+
+
+def _longest(of_all: np.ndarray, in_y: np.ndarray) -> float:
+    """Length of the longest of vectors (n, 2), lengthened by the larger one of two numbers each (n, 2)."""
+    return float((np.hypot(of_all[:, 0], of_all[:, 1]) + np.abs(in_y).max(axis=1)).max()) if len(of_all) else 0.0

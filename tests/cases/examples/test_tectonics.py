@@ -27,8 +27,9 @@ NAMES = (
     "fault",
     "sedimentation_erosion",
     "growth_strata",
+    "foreland",
 )
-QUICK = ("basement_high", "extension_ductile", "sedimentation_erosion")
+QUICK = ("basement_high", "extension_ductile", "sedimentation_erosion", "foreland")
 """Of which a shortened run is made every time: with these all commands of the examples are carried out."""
 
 
@@ -277,6 +278,18 @@ def growth_strata(run: Run) -> None:
     rock_x, rock_y = run.of_group("rock")
     over = [((np.abs(rock_x - a) < 100.0) & (rock_y > b + 150.0)).any() for a, b in zip(x, y)]
     assert sum(over) > 10
+
+
+def foreland(run: Run) -> None:
+    """A wedge at the wall; the base below it sinks by some hundred metres, and rises a little in front of the basin."""
+    wall = run.last["walls"][1]
+    x, y = run.of_group("sand")
+    assert wall == pytest.approx(7000.0, abs=1.0)
+    assert y[x < wall + 3000.0].max() > y[x > 40000.0].max() + 700.0
+    lowest = np.array([y[(x > a) & (x <= a + 3000.0)].min() for a in np.arange(wall, 57000.0, 3000.0)]) - 150.0
+    assert lowest[0] < -350.0 and (lowest[:8] < lowest[-1] - 50.0).all()
+    assert lowest.max() < 100.0
+    assert lowest.argmax() > 10
 
 
 @pytest.mark.slow
