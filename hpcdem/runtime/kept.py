@@ -53,7 +53,10 @@ class Files:
 
         target.refresh()
         data = self._read(signature)
-        return None if data is None else CompileResult._rebuild(target, *pickle.loads(data))
+        try:
+            return None if data is None else CompileResult._rebuild(target, *pickle.loads(data))
+        except ImportError:  # of a version in which the module had another name
+            return None
 
     def _read(self, signature: Any) -> bytes | None:
         path = self.path(signature)
