@@ -1,4 +1,4 @@
-"""One order of the cells of space along Hilbert's curve. Pure functions of arrays.
+"""The order of the cells of space along Hilbert's curve. Pure functions of arrays.
 
 Space is cut into cubes of a side of at least one reach. A grid of 2^levels cubes along each axis covers the model; what
 lies outside of it counts to the cubes at its faces. The curve passes every cube once, from neighbour to neighbour, so a

@@ -1,4 +1,4 @@
-"""Strips: who owns which column. Pure functions of arrays.
+"""Strips: which rank owns which column. Pure functions of arrays.
 
 Space is cut into square cells of side h, at least one reach wide; a column is all cells of one x index. Rank p owns
 the columns borders[p] : borders[p+1]; the first and the last rank own everything beyond as well. Borders decide who
