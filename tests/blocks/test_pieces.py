@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+import gc
+import weakref
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ import pytest
 from hpcdem.physics.fdem import connectivity, node_conditions, tetrahedra
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories
 from hpcdem.physics.fdem.kernels import joint_law, joints
-from hpcdem.physics.fdem.pairs_space import face_areas
 from hpcdem.physics.fdem.principal import principal
+from tests.blocks.support import model, rectangle
+from tests.space.support import body, box
 
 
 def some() -> Histories:
@@ -64,9 +66,25 @@ def test_each_edge_is_told_once_also_across_the_first_face() -> None:
 
 def test_areas_of_faces() -> None:
     points = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]])
-    mesh = SimpleNamespace(points=points, cells=np.array([[9, 9, 9, 9], [0, 1, 2, 3]]))
+    cells = np.array([[0, 1, 2, 3]])
     slanted = 0.5 * np.linalg.norm(np.cross(points[2] - points[1], points[3] - points[1]))
-    assert sorted(face_areas(mesh, np.array([1]))[0].tolist()) == pytest.approx(sorted([3.0, 4.0, 6.0, slanted]))
+    assert sorted(tetrahedra.face_areas(points, cells)[0].tolist()) == pytest.approx(sorted([3.0, 4.0, 6.0, slanted]))
+    assert tetrahedra.volumes(points, np.concatenate([cells, cells[:, [0, 2, 1, 3]]])).tolist() == [4.0, -4.0]
+
+
+@pytest.mark.parametrize("points_of_face", [2, 3])
+def test_faces_with_equal_points_are_paired_and_three_of_them_reported(points_of_face: int) -> None:
+    """In every order of what lies between them, with gaps for faces that do not exist."""
+    rng = np.random.default_rng(points_of_face)
+    known = np.unique(np.sort(rng.integers(0, 9, (400, points_of_face)), axis=1), axis=0)
+    known = known[(np.diff(known, axis=1) > 0).all(axis=1)]
+    rows = rng.permutation(np.concatenate([known, known[::2], np.full((5, points_of_face), -1)])).astype(np.int32)
+    partner = np.empty(len(rows), np.int64)
+    assert connectivity.pair_equal(rows, 9, partner) == -1
+    same = (rows[:, None] == rows).all(axis=2) & (rows[:, 0] >= 0) & ~np.eye(len(rows), dtype=bool)
+    assert partner.tolist() == np.where(same.any(axis=1), same.argmax(axis=1), -1).tolist()
+    rows = np.concatenate([rows, rows[partner >= 0][:1]])
+    assert connectivity.pair_equal(rows, 9, np.empty(len(rows), np.int64)) == np.flatnonzero(partner >= 0)[0]
 
 
 def test_cross_products_in_the_plane_and_in_space() -> None:
@@ -85,3 +103,16 @@ def test_principal_stresses_of_any_size(size: float) -> None:
     values, axes = principal(stress)
     assert values == pytest.approx(np.linalg.eigvalsh(stress), rel=1e-12, abs=1e-13 * size)
     assert axes @ (values[:, :, None] * axes.transpose(0, 2, 1)) == pytest.approx(stress, rel=1e-12, abs=1e-13 * size)
+
+
+def test_tables_of_the_last_storage_are_gone_when_it_is_made_again() -> None:
+    """At once, not when Python next collects circles of references: they would be there besides the new ones."""
+    for sim in (model(rectangle(3, 2, 3.0, 2.0)), body(box((2, 2, 1), (1.0, 1.0, 0.5)))):
+        sim.close_model()
+        tables = weakref.ref(sim.local)
+        gc.disable()
+        try:
+            sim.rebuild()
+            assert tables() is None
+        finally:
+            gc.enable()

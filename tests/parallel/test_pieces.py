@@ -13,6 +13,7 @@ from hpcdem.core.errors import UsageError
 from hpcdem.halo.exchange import Halo
 from hpcdem.halo.ownership import Curve
 from hpcdem.physics.fdem import changes, saved_state
+from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.models import COHESIVE
 from tests.pretended import Pretended, Ranks
@@ -66,6 +67,8 @@ def any_cuts(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def elsewhere(self: Curve, place: np.ndarray, side: float, step: int, *more: Any) -> None:
         renew(self, place, side, step, *more)
+        if self.comm.size == 1:
+            return
         cells = np.unique(np.concatenate(self.comm.allgather(np.unique(place))))
         cuts = np.sort(np.random.default_rng(step).choice(cells, self.comm.size - 1))
         cuts[2:4] = cuts[2]
@@ -98,6 +101,43 @@ def test_a_checkpoint_resumes_on_pieces(alone: tuple[dict, Path, dict], any_cuts
         return run(sim, STEPS)
 
     assert together(Ranks(5).run(resumed)) == alone[2]
+
+
+def colliding(comm: Any) -> Blocks:
+    """Two soft bodies without joints, the upper one thrown at the lower one, across its edges."""
+    lower, upper = box((4, 4, 2), (1.0, 1.0, 0.5), shaken=0.2), box((3, 3, 3), (0.8, 0.7, 0.6), shaken=0.2)
+    upper_points = upper.points + (0.35, 0.25, 0.501)
+    n = len(lower.points)
+    sim = Blocks(comm)
+    sim.take_mesh(Mesh.of(np.concatenate([lower.points, upper_points]), np.concatenate([lower.cells, upper.cells + n])))
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e7, "friction": 20.0})
+    changes.set_velocity(sim, np.arange(n, n + len(upper_points)), 3.0, 1.0, -8.0)
+    return sim
+
+
+def test_bodies_without_joints_collide_to_the_same_bits(any_cuts: None) -> None:
+    """Inside of them ghosts are only what shares corners; at the surface what may touch before the next storage."""
+
+    def collide(comm: Any) -> tuple[dict, int]:
+        sim = colliding(comm)
+        return run(sim, 60), int(sim.local.pairs.touching.sum())
+
+    (alone, touching), parts = collide(SerialComm()), Ranks(5).run(collide)
+    assert touching > 3 and together([part for part, _ in parts]) == alone
+
+
+def test_a_model_without_joints_has_fewer_ghosts() -> None:
+    def ghosts(comm: Pretended, joints: bool) -> int:
+        sim = Blocks(comm)
+        sim.take_mesh(box((8, 8, 8), (1.0, 1.0, 1.0), shaken=0.2))
+        changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+        if joints:
+            sim.joint_model(None, COHESIVE, WEAK)
+        sim.close_model()
+        return len(sim.number) - sim.n_own
+
+    few, many = (sum(Ranks(4).run(lambda comm, of=joints: ghosts(comm, of))) for joints in (False, True))
+    assert 0 < few < 0.9 * many
 
 
 def test_ghosts_are_those_near_the_piece() -> None:

@@ -12,9 +12,9 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, connectivity, convergence, diagnostics, overlaps
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.pairs import Kinds
-from hpcdem.physics.fdem.pairs_space import AllPairs, ContactSpace, Surface, face_areas
+from hpcdem.physics.fdem.pairs_space import AllPairs, ContactSpace, Surface
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.tetrahedra import FACES
+from hpcdem.physics.fdem.tetrahedra import FACES, face_areas
 from hpcdem.pre.mesh import fill, solids
 from tests.pcdc.test_time import Rock
 from tests.space.support import ROCK, box, faces_on
@@ -155,7 +155,7 @@ def test_a_flat_contact_gives_way_by_its_penalty() -> None:
     """p = P d (1 / h_1 + 1 / h_2), h the median altitude of a body, P = 10 E; 4 P d (1 / H_1 + 1 / H_2) of Munjiza's
     potential, H the altitudes on the surface of the elements that touch. Both lose at the rims of elements."""
     cube = box((2, 2, 2), (1.0, 1.0, 1.0), 5)
-    altitudes = 3.0 * cube.areas()[:, None] / face_areas(cube, np.arange(len(cube.cells)))
+    altitudes = 3.0 * cube.areas()[:, None] / face_areas(cube.points, cube.cells)
     h, p = float(np.median(altitudes)), 1e4
     usual = pressed(top=p)
     assert usual == pytest.approx(p * h / (2.0 * 10.0 * ROCK["young"]), rel=0.05)

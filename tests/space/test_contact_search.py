@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+import pytest
 
 from hpcdem.physics.fdem.kernels import detect_space
 
@@ -25,9 +26,11 @@ def meets(face: np.ndarray, tet: np.ndarray) -> bool:
     return True
 
 
-def test_the_search_finds_what_trying_all_pairs_finds() -> None:
+@pytest.mark.parametrize("per_face", [detect_space.PER_FACE, 0])
+def test_the_search_finds_what_trying_all_pairs_finds(per_face: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Tetrahedra of many sizes; some hang together at a point, two pairs by an open and a closed face,
-    and some are another rank's."""
+    and some are another rank's; also where more pairs are found than were expected."""
+    monkeypatch.setattr(detect_space, "PER_FACE", per_face)
     rng = np.random.default_rng(4)
     n = 40
     x = rng.uniform(-1.0, 1.0, (n, 1, 3)) + rng.uniform(0.05, 0.4, (n, 1, 1)) * rng.normal(size=(n, 4, 3))

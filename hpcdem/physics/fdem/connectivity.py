@@ -44,44 +44,53 @@ def _ends(cells, face):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _pair_faces(cells, n_points, partner):
-    """Fill partner (4 ne,) i8; returns the lowest face whose edge is used by three or more elements, or -1.
+def _ends_of_faces(cells, points):
+    for f in range(len(points)):
+        points[f, 0] = -1
+        if f % 4 < 3 or cells[f // 4, 3] >= 0:
+            a, b = _ends(cells, f)
+            points[f, 0], points[f, 1] = min(a, b), max(a, b)
 
-    Faces are sorted by their upper and then by their lower end point, by counting, so equal edges come to lie next to
-    each other in ascending order of faces.
-    """
-    m = 4 * len(cells)
-    low, high = np.empty(m, np.int64), np.empty(m, np.int64)
-    by_high, by_low = np.zeros(n_points + 1, np.int64), np.zeros(n_points + 1, np.int64)
-    count = 0
-    for f in range(m):
-        partner[f] = -1
-        low[f] = -1
-        if f % 4 == 3 and cells[f // 4, 3] < 0:
-            continue
-        a, b = _ends(cells, f)
-        low[f], high[f] = min(a, b), max(a, b)
-        by_high[high[f] + 1] += 1
-        by_low[low[f] + 1] += 1
-        count += 1
-    for p in range(n_points):
-        by_high[p + 1] += by_high[p]
-        by_low[p + 1] += by_low[p]
-    first, order = np.empty(count, np.int64), np.empty(count, np.int64)
-    for f in range(m):
-        if low[f] >= 0:
-            first[by_high[high[f]]] = f
-            by_high[high[f]] += 1
-    for i in range(count):
-        f = first[i]
-        order[by_low[low[f]]] = f
-        by_low[low[f]] += 1
+
+def pair_faces(cells: np.ndarray, n_points: int, partner: np.ndarray) -> int:
+    """Fill partner (4 ne,) i8; returns the lowest face whose edge is used by three or more elements, or -1."""
+    points = np.empty((4 * len(cells), 2), np.int32)
+    _ends_of_faces(cells, points)
+    return int(pair_equal(points, n_points, partner))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _in_order(points, n_points):
+    """Faces sorted by their last point, then by the one before it, and so on, by counting: equal ones come to lie next
+    to each other in ascending order."""
+    before = np.flatnonzero(points[:, 0] >= 0).astype(np.int32)
+    order = np.empty_like(before)
+    for k in range(points.shape[1] - 1, -1, -1):
+        begin = np.zeros(n_points + 1, np.int64)
+        for f in before:
+            begin[points[f, k] + 1] += 1
+        for p in range(n_points):
+            begin[p + 1] += begin[p]
+        for f in before:
+            order[begin[points[f, k]]] = f
+            begin[points[f, k]] += 1
+        order, before = before, order
+    return before
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pair_equal(points, n_points, partner):
+    """Fill partner (m,) i8 with the other face with the same points (m, k) i4, ascending in each row, the first -1: no
+    face. Returns the lowest face of three or more with the same points, or -1."""
+    partner[:] = -1
+    order = _in_order(points, n_points)
+    count = len(order)
     bad = -1
     i = 0
     while i < count:
         f = order[i]
         j = i + 1
-        while j < count and low[order[j]] == low[f] and high[order[j]] == high[f]:
+        while j < count and (points[order[j]] == points[f]).all():
             j += 1
         if j - i == 2:
             partner[f], partner[order[i + 1]] = order[i + 1], f
@@ -97,7 +106,7 @@ def face_partners(cells: np.ndarray, n_points: int) -> np.ndarray:
     ValueError if three elements share an edge (`mesh.check` says which).
     """
     partner = np.empty(4 * len(cells), np.int64)
-    bad = _pair_faces(cells, n_points, partner)
+    bad = pair_faces(cells, n_points, partner)
     if bad >= 0:
         raise ValueError(f"the edge of face {bad} is used by more than two elements")
     return partner

@@ -388,6 +388,10 @@ class Local(JointTables):
 
     # ---- what is extracted from the tables ---------------------------------------------------------------------------
 
+    def release(self) -> None:
+        """Free all tables. They refer to each other, so they would last until Python next collects such circles."""
+        vars(self).clear()
+
     def histories(self, transfer: bool) -> Histories:
         """Histories of joints and contacts of the owned elements.
 

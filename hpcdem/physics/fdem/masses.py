@@ -14,11 +14,12 @@ from hpcdem.physics.fdem.hexes import place_masses
 from hpcdem.physics.fdem.joints import laws_of
 from hpcdem.physics.fdem.kernels import joint_law, limits, space
 from hpcdem.physics.fdem.loads import impedances
+from hpcdem.physics.fdem.mesh import pieces
 from hpcdem.physics.fdem.moduli import element_table
 from hpcdem.physics.fdem.node_set import ALPHA
 from hpcdem.physics.fdem.pairs import Surfaces
-from hpcdem.physics.fdem.pairs_space import ShapesSpace, face_areas
-from hpcdem.physics.fdem.tetrahedra import FACES
+from hpcdem.physics.fdem.pairs_space import ShapesSpace
+from hpcdem.physics.fdem.tetrahedra import FACES, face_areas
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
@@ -29,6 +30,12 @@ def quarters(sim: State, number: np.ndarray) -> np.ndarray:
     mesh, mass = sim.reference, np.zeros((len(number), 4))
     space.masses(number, mesh.points, mesh.cells, sim.element_row, element_table(sim), mass)
     return mass
+
+
+def _faces(number: np.ndarray) -> np.ndarray:
+    """(4 n,) faces of elements (n,)."""
+    faces: np.ndarray = (4 * number[:, None] + np.arange(4)).reshape(-1)
+    return faces
 
 
 class Masses:
@@ -200,16 +207,49 @@ class MassesSpace(Masses):
         """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: of its joints,
         k = P sqrt(A) / 3 with the largest P, and what the contact of its free faces can have, k = P A (1 / h + 1 /
         h_other) / 3 per face, h_other: the smallest of all; rho c_p A / 3 of quiet faces."""
-        sim, own = self.sim, self.sim.owned
-        springs, dashpots = np.zeros((sim.n_own, 4)), np.zeros((sim.n_own, 4))
-        faces = (4 * sim.number[own][:, None] + np.arange(4)).reshape(-1)
+        sim, n = self.sim, self.sim.n_own
+        springs, dashpots = np.zeros((n, 4)), np.zeros((n, 4))
+        highest, some, ratio = self._of_contact() if sim.options.collision else (0.0, 0.0, 0.0)
+        heavy = self.true[sim.owned].max(axis=1, initial=0.0)
+        for at in pieces(n):
+            self._add_springs(at, highest, some == 0.0, ratio, heavy[at], springs[at], dashpots[at])
+        sim.surface_loads.springs(sim, springs)
+        sim.surface_loads.dashpots(sim, dashpots)
+        return springs, dashpots
+
+    def _surfaces(self, at: slice) -> tuple[ShapesSpace, Surfaces]:
+        """Shapes of some of the owned elements, and properties of their faces."""
+        number = self.sim.number[self.sim.owned][at]
+        shapes = ShapesSpace(self.sim, number)
+        return shapes, Surfaces(self.sim, shapes, _faces(number), np.repeat(np.arange(len(number)), 4))
+
+    def _of_contact(self) -> list[float]:
+        """Largest 1 / h [1/m], 1 if a face does not leave its contact to joints, largest damping ratio. Collective."""
+        found = np.zeros(3)
+        for at in pieces(self.sim.n_own):
+            shapes, surfaces = self._surfaces(at)
+            silent = np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal)
+            np.maximum(found, [(1.0 / shapes.double_area).max(), float(silent.any()), surfaces.ratio.max()], out=found)
+        most: list[float] = self.sim.comm.max_into(found).tolist()
+        return most
+
+    def _add_springs(
+        self, at: slice, highest: float, among: bool, ratio: float, heavy: np.ndarray, springs: np.ndarray,
+        dashpots: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Add those of some of the owned elements; heavy: their heaviest corner [kg]; the others see `_of_contact` and
+        `Surfaces.most_penalty`."""
+        sim = self.sim
+        number = sim.number[sim.owned][at]
+        faces, slots = _faces(number), slice(4 * at.start, 4 * at.stop)
         quiet = sim.quiet_faces()[faces].reshape(-1, 4)
         if quiet.any():
-            impedance = impedances(sim, sim.number[own])[0][:, None] / 3.0
-            each = np.where(quiet, impedance * face_areas(sim.reference, sim.number[own]), 0.0)
+            impedance = impedances(sim, number)[0][:, None] / 3.0
+            areas = face_areas(sim.reference.points, sim.reference.cells[number])
+            each = np.where(quiet, impedance * areas, 0.0)
             for k in range(4):
                 dashpots[:, FACES[k]] += each[:, k, None]
-        size = self.local.slot_size[: self.local.slots]
+        size = self.local.slot_size[slots]
         penalty = joint_law.stiffest(
             sim.joint_rows.column, laws_of(sim.joint_rows), sim.joint_row[faces],
             lambda: np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0),
@@ -219,34 +259,25 @@ class MassesSpace(Masses):
         each[tied] = penalty[tied] / size[tied] / 3.0
         each = np.repeat(each.reshape(-1, 4, 1), 3, axis=2)
         if (sides := self.local.sides) is not None:
-            each.reshape(-1, 3)[sides.slot[sides.quad]] *= sides.shares()
+            slot = sides.slot[sides.quad]
+            here = (slot >= slots.start) & (slot < slots.stop)
+            each.reshape(-1, 3)[slot[here] - slots.start] *= sides.shares()[here]
         if not sim.options.collision:
             for k in range(4):
                 springs[:, FACES[k]] += each[:, k]
-            sim.surface_loads.springs(sim, springs)
-            sim.surface_loads.dashpots(sim, dashpots)
-            return springs, dashpots
-        shapes = ShapesSpace(sim, sim.number[own])
-        length = shapes.double_area
-        surfaces = Surfaces(sim, shapes, faces, np.repeat(np.arange(sim.n_own), 4))
-        silent = np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal)
-        ratio = surfaces.ratio.max(initial=0.0)
-        found = np.array([float(np.max(1.0 / length, initial=0.0)), float(silent.any()), ratio])
-        highest, some, ratio = sim.comm.max_into(found).tolist()
-        most = surfaces.slope * surfaces.most_penalty(some == 0.0).reshape(-1, 4)
-        contact = most * shapes.area / 3.0 * (1.0 / length[:, None] + highest)
+            return
+        shapes, surfaces = self._surfaces(at)
+        most = surfaces.slope * surfaces.most_penalty(among).reshape(-1, 4)
+        contact = most * shapes.area / 3.0 * (1.0 / shapes.double_area[:, None] + highest)
         may_touch = ~sim.closed_faces()[faces]
         if sim.options.dynamic:
             may_touch |= tied  # once they break
         contact = np.where(may_touch.reshape(-1, 4), contact, 0.0)
         # A third of 2 xi sqrt(k m) A, with k A = 3 `contact` and m A no more than three corners of the element have.
-        drag = 2.0 * ratio * np.sqrt(contact * self.true[own].max(axis=1, initial=0.0)[:, None])
+        drag = 2.0 * ratio * np.sqrt(contact * heavy[:, None])
         for k in range(4):
             springs[:, FACES[k]] += np.maximum(each[:, k], contact[:, k, None])
             dashpots[:, FACES[k]] += drag[:, k, None]
-        sim.surface_loads.springs(sim, springs)
-        sim.surface_loads.dashpots(sim, dashpots)
-        return springs, dashpots
 
     def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
         o = self.sim.options

@@ -7,7 +7,8 @@ plane calls an edge is a face with three points. `hpcdem.pre.mesh` makes meshes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -25,6 +26,9 @@ from hpcdem.physics.fdem.elements.kind import HEXAHEDRON, MACROS, Kind
 CONNECTIVITY = {2: connectivity, 3: tetrahedra}
 FLAT = 1e-9
 """A corner spans less than this much of the square of the longest edge: the element is flat."""
+MANY = 1 << 16
+"""Elements or faces that are checked together: what is known of all of them at once would take more memory than the
+mesh."""
 SAME = 1e-9
 """Points nearer than this part of the shortest edge are one point."""
 
@@ -307,6 +311,11 @@ class Mesh:
         return float(np.sqrt((way * way).sum(axis=1)).mean())
 
 
+def pieces(n: int) -> Iterator[slice]:
+    """Ranges of n rows, `MANY` at a time."""
+    return (slice(at, min(at + MANY, n)) for at in range(0, n, MANY))
+
+
 def sizes(corners: np.ndarray) -> np.ndarray:
     """(n,) lengths [m] of edges with these ends (n, 2, 2), areas [m2] of faces with these corners (n, 3, 3)."""
     if corners.shape[2] == 3:
@@ -409,9 +418,10 @@ def _bad_hexes(mesh: Mesh, names: Names) -> str | None:
 def _bad_shapes(mesh: Mesh, names: Names) -> str | None:
     """Each corner of a convex counter-clockwise element turns left; a tetrahedron has a volume."""
     if mesh.dim == 3:
-        side = tetrahedra.sides(mesh.points, mesh.cells)
-        longest = np.sqrt((side * side).sum(axis=2).max(axis=1))
-        volume = mesh.areas()
+        longest, volume = np.empty(len(mesh.cells)), mesh.areas()
+        for at in pieces(len(longest)):
+            side = tetrahedra.sides(mesh.points, mesh.cells[at])
+            longest[at] = np.sqrt((side * side).sum(axis=2).max(axis=1))
         bad = np.flatnonzero(~(volume > FLAT * longest**3))
         if not len(bad):
             return None
@@ -444,8 +454,10 @@ def _bad_points(mesh: Mesh, names: Names) -> str | None:
         lost = int(np.flatnonzero(~used)[0])
         return f"point {names.point(lost)} at {_at(mesh, lost)} belongs to no element"
     corners = mesh.cells[:, : mesh.dim + 1]
-    a, b = mesh.points[corners], mesh.points[np.roll(corners, -1, axis=1)]
-    shortest = float(np.sqrt(((b - a) ** 2).sum(axis=2)).min())
+    shortest = math.inf
+    for at in pieces(len(corners)):
+        a, b = mesh.points[corners[at]], mesh.points[np.roll(corners[at], -1, axis=1)]
+        shortest = min(shortest, float(np.sqrt(((b - a) ** 2).sum(axis=2)).min()))
     twins = cKDTree(mesh.points).query_pairs(SAME * shortest, output_type="ndarray")
     if len(twins):
         twins = twins[_of_one_body(mesh, twins)]
@@ -470,10 +482,7 @@ def _of_one_body(mesh: Mesh, pairs: np.ndarray) -> np.ndarray:
 
 def _bad_edges(mesh: Mesh, names: Names) -> str | None:
     partner = np.empty(4 * len(mesh.cells), np.int64)
-    if mesh.dim == 3:
-        face, what = tetrahedra.pair_faces(mesh.cells, partner), "face"
-    else:
-        face, what = connectivity._pair_faces(mesh.cells, len(mesh.points), partner), "edge"
+    face, what = mesh._of.pair_faces(mesh.cells, len(mesh.points), partner), "face" if mesh.dim == 3 else "edge"
     if face >= 0:
         points = mesh.face_points(np.array([face]))[0].tolist()
         both = np.flatnonzero(np.all([(mesh.cells == p).any(axis=1) for p in points], axis=0))
@@ -482,15 +491,17 @@ def _bad_edges(mesh: Mesh, names: Names) -> str | None:
             f"more than two elements: {', '.join(map(names.element, both[:5].tolist()))}"
         )
     lower = np.flatnonzero(partner > np.arange(len(partner)))
-    mine, other = (mesh.face_points(f) for f in (lower, partner[lower]))
-    # From outside of both elements the points of a common face run opposite ways.
-    if mesh.dim == 3:
-        after = (np.argmax(other == mine[:, :1], axis=1) + 1) % 3
-        bad = np.flatnonzero(other[np.arange(len(other)), after] == mine[:, 1])
-    else:
-        bad = np.flatnonzero(mine[:, 0] == other[:, 0])
-    if len(bad):
-        f = int(lower[bad[0]])
+    for at in pieces(len(lower)):
+        mine, other = (mesh.face_points(f) for f in (lower[at], partner[lower[at]]))
+        # From outside of both elements the points of a common face run opposite ways.
+        if mesh.dim == 3:
+            after = (np.argmax(other == mine[:, :1], axis=1) + 1) % 3
+            bad = np.flatnonzero(other[np.arange(len(other)), after] == mine[:, 1])
+        else:
+            bad = np.flatnonzero(mine[:, 0] == other[:, 0])
+        if not len(bad):
+            continue
+        f = int(lower[at][bad[0]])
         return _given_twice(mesh, f // 4, names) or (
             f"{_element(mesh, f // 4, names)} lies on the same side of a common {what} as element "
             f"{names.element(int(partner[f] // 4))}"
@@ -518,6 +529,8 @@ def _bad_names(mesh: Mesh, names: Names) -> str | None:
                 twice = int(rows[taken[rows]][0]) if taken[rows].any() else int(rows[0])
                 return f"element {twice} is in two groups of set '{set_name}', one of them '{name}'"
             taken[rows] = True
+    if not mesh.layers and not len(mesh.cracks):
+        return None
     edges = mesh.edges()
     for name, pairs in mesh.layers.items():
         rows = mesh.find_edges(edges, pairs)

@@ -8,6 +8,7 @@ import numpy as np
 
 from hpcdem.physics.fdem.assignments import COMPONENTS
 from hpcdem.physics.fdem.kernels import joint_law
+from hpcdem.physics.fdem.mesh import pieces
 from hpcdem.physics.fdem.state import State
 
 OUTSIDE, MUCH = 1e-6, 1e-3
@@ -115,7 +116,9 @@ def warn_of_snap_back(sim: State) -> None:
     def find() -> np.ndarray:
         faces = np.flatnonzero(sim.closed_faces() & (sim.joint_row > 0))
         longest = np.zeros(len(sim.joint_rows))
-        np.maximum.at(longest, sim.joint_row[faces], sim.the_mesh().joint_lengths(faces, sim.partner))
+        for at in pieces(len(faces)):
+            length = sim.the_mesh().joint_lengths(faces[at], sim.partner)
+            np.maximum.at(longest, sim.joint_row[faces[at]], length)
         return longest
 
     longest = sim.per_node(find)

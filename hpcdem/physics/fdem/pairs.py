@@ -15,7 +15,7 @@ from hpcdem.numerics.lanes import as_bits
 from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.histories import FIRST, KEY, WORDS
 from hpcdem.physics.fdem.kernels import contact, detect, elements
-from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.mesh import Mesh, pieces
 from hpcdem.physics.fdem.properties import Rows
 
 if TYPE_CHECKING:
@@ -105,15 +105,18 @@ class Kinds(NamedTuple):
         body = kind(sim.element_rows, "friction", "penalty", "damp_b")
 
         def alike() -> bool:
-            faces = np.flatnonzero(sim.face_exists())
-            model, of_joints = sim.face_row[faces], joint[sim.joint_row[faces]]
-            of_bodies = body[sim.element_row[faces // 4]]
-            return bool(
-                (model == model[:1]).all()
-                and (
-                    (model[:1] > 0).all() or ((of_joints == of_joints[:1]).all() and (of_bodies == of_bodies[:1]).all())
-                )
-            )
+            exists, ends = sim.face_exists(), list[np.ndarray]()
+            for at in pieces(len(exists)):
+                faces = at.start + np.flatnonzero(exists[at])
+                if len(faces):
+                    of = sim.face_row[faces], joint[sim.joint_row[faces]], body[sim.element_row[faces // 4]]
+                    ends.append(np.array([(one.min(), one.max()) for one in of]))
+            if not ends:
+                return True
+            every = np.array(ends)
+            low, high = every.min(axis=(0, 2)), every.max(axis=(0, 2))
+            same = low == high
+            return bool(same[0] and (low[0] > 0 or same.all()))
 
         return Kinds(sim.face_row, sim.joint_row, joint, sim.element_row, body, sim.per_node(alike))
 

@@ -16,15 +16,12 @@ from hpcdem.physics.fdem.kernels import detect_space as detect
 from hpcdem.physics.fdem.kernels.tets import ROW, STRIDE
 from hpcdem.physics.fdem.pairs import Kinds, Surfaces, smallest_overlay
 from hpcdem.physics.fdem.settings import MUNJIZA
-from hpcdem.physics.fdem.tetrahedra import FACES
+from hpcdem.physics.fdem.tetrahedra import FACES, face_areas
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.mesh import Mesh
     from hpcdem.physics.fdem.state import State
 
 
-MANY = 1 << 16
-"""Elements that are checked together."""
 OF_CONTACTOR = [0, 1, 2, 3, 5, 6]
 """Columns of `Surfaces.of_pairs` that a pair has: of T the part of the face, which is the contactor."""
 
@@ -112,18 +109,10 @@ class Surface(NamedTuple):
         return high[self.clusters].max(axis=1) > low[self.clusters].min(axis=1)
 
 
-def face_areas(mesh: Mesh, elements: np.ndarray) -> np.ndarray:
-    """(ne, 4) [m2] of the faces of tetrahedra."""
-    a, b, c = np.moveaxis(mesh.points[mesh.cells[elements][:, FACES]], 2, 0)
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=2)
-
-
 def lengths(sim: State) -> np.ndarray:
     """(ne,) [m] median altitude of the elements of each element's body in the mesh."""
-    altitudes = np.empty((len(sim.areas), 4))
-    for at in range(0, len(altitudes), MANY):  # corners of all faces at once would be the largest table of all
-        some = np.arange(at, min(at + MANY, len(altitudes)))
-        altitudes[some] = 3.0 * sim.areas[some, None] / face_areas(sim.reference, some)
+    altitudes = face_areas(sim.reference.points, sim.reference.cells)
+    np.divide(3.0 * sim.areas[:, None], altitudes, out=altitudes)
     body = connectivity.bodies(sim.partner)
     order = np.argsort(body, kind="stable")
     parts = np.split(altitudes[order], np.flatnonzero(np.diff(body[order])) + 1)
@@ -139,7 +128,7 @@ class ShapesSpace:
     def __init__(self, sim: State, numbers: np.ndarray) -> None:
         munjiza = sim.options.potential == MUNJIZA
         self.slope = 4.0 if munjiza else 1.0
-        self.area = face_areas(sim.reference, numbers)
+        self.area = face_areas(sim.reference.points, sim.reference.cells[numbers])
         self.double_area = Surface.of(sim).length[numbers]
         if munjiza:
             self.double_area = (3.0 * sim.areas[numbers][:, None] / self.area).mean(axis=1)

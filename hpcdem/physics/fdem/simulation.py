@@ -21,6 +21,7 @@ import numpy as np
 from hpcdem.core.errors import PhysicsError
 from hpcdem.core.heap import give_back
 from hpcdem.core.memory import aligned
+from hpcdem.decomp.curve import Grid
 from hpcdem.engine.model import FRESH, LISTS, STORAGE
 from hpcdem.engine.rebuild import LONGEST_WAIT
 from hpcdem.halo.ownership import Curve, Ownership
@@ -41,9 +42,10 @@ from hpcdem.physics.fdem.kernels import detect_space, elements, space, tets
 from hpcdem.physics.fdem.kernels.strength import HISTORY as STRENGTH_HISTORY
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.local_space import LocalSpace
-from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.mesh import Mesh, pieces
 from hpcdem.physics.fdem.middles import middles
 from hpcdem.physics.fdem.pairs import cut_corner
+from hpcdem.physics.fdem.pairs_space import Surface
 from hpcdem.physics.fdem.state import NARROW, WIDE, ListState
 
 ROOM = 0.6
@@ -116,8 +118,7 @@ class Blocks(Edited):
         self.areas, self.mean_edge, self.cut = self.per_node(
             lambda: (mesh.areas(), mesh.mean_edge(), cut_corner(mesh) if mesh.dim == 2 else np.empty(0, np.int64))
         )
-        n, size, rank = len(mesh.cells), self.comm.size, self.comm.rank
-        self.number = np.arange(n * rank // size, n * (rank + 1) // size)
+        self.number = _first_share(self, mesh)
         if mesh.dim == 3:
             self.x, self.v = (np.zeros((len(self.number), tets.ROW)) for _ in range(2))
             space.corners(mesh.points, mesh.cells, self.number, self.x)
@@ -287,9 +288,11 @@ class Blocks(Edited):
             self._longest = math.sqrt(float(self.comm.max_into(np.array([longest2]))[0]))
             self.histories = local.histories(transfer=True)
             breaks.collect(self)
+            local.release()
             self.where[self.number] = -1
             self.halo.close()
             own = self.owned
+            self.origin = self.listed = np.empty((0, 0))
             self.number, self.x, self.v = self.number[own].copy(), self.x[own].copy(), self.v[own].copy()
             self.closed = False
 
@@ -381,11 +384,12 @@ class Blocks(Edited):
         middle, radius = middles(self)
         of_loads = 0.0 if frozen else self.surface_loads.reach(self, middle)
         radius = float(self.comm.max_into(np.array([radius]))[0])
-        self._apart = rebuild_state.side
+        self._apart = self._linked = rebuild_state.side
         if not frozen:
             rebuild_state.skin = self._skin()
             margin = ROOM * self.mean_edge if self.options.collision else 0.0
-            self._apart = max(margin, self._longest, of_loads) * (1.0 + 1e-9)
+            self._linked = max(self._longest, of_loads) * (1.0 + 1e-9)
+            self._apart = max(margin * (1.0 + 1e-9), self._linked)
             needed = max(2.0 * radius, self._longest, of_loads) * (1.0 + 1e-9) + margin
             if not needed <= rebuild_state.side <= 1.2 * needed:
                 rebuild_state.side = 1.05 * needed
@@ -469,16 +473,43 @@ def _nodes_of_corners(mesh: Mesh, alive: np.ndarray, node: np.ndarray, lead: np.
     return node, shared, begin, member, at_points, np.full(len(mesh.cells), -1, np.int64)
 
 
+def _first_share(sim: Blocks, mesh: Mesh) -> np.ndarray:
+    """Numbers of the elements that a rank holds at first, ascending; in space near what it will own, so that few change
+    ranks when the model is closed. Collective."""
+    n, size, rank = len(mesh.cells), sim.comm.size, sim.comm.rank
+    first, last = n * rank // size, n * (rank + 1) // size
+    if mesh.dim == 2 or size == 1:
+        return np.arange(first, last)
+    return np.sort(sim.per_node(lambda: _along_curve(mesh, sim.mean_edge))[first:last])
+
+
+def _along_curve(mesh: Mesh, side: float) -> np.ndarray:
+    """Elements (ne,) in the order of cells of this side [m] along a space-filling curve."""
+    grid, keys = (
+        Grid.around(mesh.points.min(axis=0), mesh.points.max(axis=0), side),
+        np.empty(len(mesh.cells), np.int64),
+    )
+    for at in pieces(len(keys)):
+        keys[at] = grid.keys(mesh.points[mesh.cells[at]].mean(axis=1))
+    return np.argsort(keys, kind="stable")
+
+
 def _boxes(sim: Blocks, order: np.ndarray) -> np.ndarray | None:
     """Boxes (n, 6) [m] of the elements in this order, in the plane None: those of elements that one rank must hold
-    overlap. Middles lie in boxes, so boxes of partners of a joint are not farther apart than these."""
+    overlap. Middles lie in boxes, so boxes of partners of a joint are not farther apart than these. In a model without
+    joints, elements without a corner on the surface meet others only where they share corners."""
     if sim.dim == 2 or sim.comm.size == 1:
         return None
-    boxes = np.empty((len(order), 6))
-    detect_space.boxes(tets.ROW * order[:, None] + tets.STRIDE * np.arange(4), sim.x, sim._apart, boxes)
-    mesh = sim.the_mesh()
+    boxes, mesh = np.empty((len(order), 6)), sim.the_mesh()
+    number, inner = sim.number[order], np.zeros(len(order), bool)
+    if sim._linked < sim._apart and not sim.joint_row.any():
+        inner = Surface.of(sim).first[number] < 0
+    for some, margin in ((np.flatnonzero(inner), sim._linked), (np.flatnonzero(~inner), sim._apart)):
+        part = np.empty((len(some), 6))
+        detect_space.boxes(tets.ROW * order[some, None] + tets.STRIDE * np.arange(4), sim.x, margin, part)
+        boxes[some] = part
     if len(mesh.macros):  # all parts of one go together
-        of = mesh.macro_of()[sim.number[order]]
+        of = mesh.macro_of()[number]
         some = np.flatnonzero(of >= 0)
         which = np.unique(of[some], return_inverse=True)[1]
         whole = np.full((len(some), 6), np.inf)

@@ -9,10 +9,12 @@ Cells are (ne, 4) i8 point numbers.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
-from hpcdem.physics.fdem.connectivity import Edges, join_corners, root_of
+from hpcdem.physics.fdem.connectivity import Edges, join_corners, pair_equal, root_of
 
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 """Corners of the faces, outwards."""
@@ -59,38 +61,35 @@ def face_corners(_cells: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return 4 * e[:, None] + FACES[k]
 
 
-def pair_faces(cells: np.ndarray, partner: np.ndarray) -> int:
+@njit(cache=True, nogil=True, error_model="numpy")
+def _points_of_faces(cells, faces, points):
+    for f in range(len(points)):
+        e, k = f // 4, f % 4
+        a, b, c = cells[e, faces[k, 0]], cells[e, faces[k, 1]], cells[e, faces[k, 2]]
+        points[f, 0], points[f, 2] = min(min(a, b), c), max(max(a, b), c)
+        points[f, 1] = a + b + c - points[f, 0] - points[f, 2]
+
+
+def pair_faces(cells: np.ndarray, n_points: int, partner: np.ndarray) -> int:
     """Fill partner (4 ne,) i8; returns the lowest face that is used by three or more elements, or -1."""
-    partner[:] = -1
-    a, b, c = (cells[:, FACES[:, k]].reshape(-1) for k in range(3))
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    a += b
-    a += c
-    a -= low
-    a -= high  # what is left is the point in the middle
-    order = np.lexsort((high, a, low))  # stable: equal faces ascend
-    same = np.ones(max(len(order) - 1, 0), bool)
-    for column in (low, a, high):
-        same &= np.diff(column[order]) == 0
-    bad = order[:-2][same[1:] & same[:-1]]
-    first = np.flatnonzero(same)
-    partner[order[first]], partner[order[first + 1]] = order[first + 1], order[first]
-    return int(bad.min()) if len(bad) else -1
+    points = np.empty((len(partner), 3), np.int32)
+    _points_of_faces(cells, FACES, points)
+    return int(pair_equal(points, n_points, partner))
 
 
-def face_partners(cells: np.ndarray, _points: int = 0) -> np.ndarray:
+def face_partners(cells: np.ndarray, n_points: int = 0) -> np.ndarray:
     """(4 ne,) i8: the face on the other side of each face, -1 at a surface. ValueError if three elements share one.
-    (Arguments of what the plane has too are those of connectivity.py, which asks for the number of points.)"""
+    n_points: 0: as many as the cells name."""
     partner = np.empty(4 * len(cells), np.int64)
-    bad = pair_faces(cells, partner)
+    bad = pair_faces(cells, n_points or int(cells.max(initial=-1)) + 1, partner)
     if bad >= 0:
         raise ValueError(f"face {bad} is used by more than two elements")
     return partner
 
 
-def edges_of(cells: np.ndarray, _points: int = 0, partner: np.ndarray | None = None) -> Edges:
+def edges_of(cells: np.ndarray, n_points: int, partner: np.ndarray | None = None) -> Edges:
     """All faces, each once, ascending by number."""
-    partner = face_partners(cells) if partner is None else partner
+    partner = face_partners(cells, n_points) if partner is None else partner
     face = np.arange(len(partner))
     lower = face[(partner < 0) | (partner > face)]
     return Edges(np.column_stack([lower, partner[lower]]), face_points(cells, lower))
@@ -149,8 +148,40 @@ def sides(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 def volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """(ne,) [m3], negative if the corners run the other way."""
-    u, w, t = np.moveaxis(sides(points, cells), 1, 0)
-    return (np.cross(u, w) * t).sum(axis=1) / 6.0
+    out = np.empty(len(cells))
+    _volumes(np.ascontiguousarray(points), np.ascontiguousarray(cells), out)
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _volumes(points, cells, out):
+    u, w, t = np.empty(3), np.empty(3), np.empty(3)
+    for e in range(len(cells)):
+        for k in range(3):
+            first = points[cells[e, 0], k]
+            u[k], w[k] = points[cells[e, 1], k] - first, points[cells[e, 2], k] - first
+            t[k] = points[cells[e, 3], k] - first
+        x, y = (u[1] * w[2] - u[2] * w[1]) * t[0], (u[2] * w[0] - u[0] * w[2]) * t[1]
+        out[e] = ((x + y) + (u[0] * w[1] - u[1] * w[0]) * t[2]) / 6.0
+
+
+def face_areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """(ne, 4) [m2]."""
+    out = np.empty((len(cells), 4))
+    _face_areas(points, cells, FACES, out)
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _face_areas(points, cells, faces, out):
+    u, w = np.empty(3), np.empty(3)
+    for e in range(len(cells)):
+        for f in range(4):
+            a, b, c = cells[e, faces[f, 0]], cells[e, faces[f, 1]], cells[e, faces[f, 2]]
+            for k in range(3):
+                u[k], w[k] = points[b, k] - points[a, k], points[c, k] - points[a, k]
+            x, y, z = u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]
+            out[e, f] = 0.5 * math.sqrt((x * x + y * y) + z * z)
 
 
 areas = volumes

@@ -9,10 +9,13 @@ import math
 import numpy as np
 from numba import njit
 
-from hpcdem.core.cells import index
+from hpcdem.core.cells import first_not_before, index
 
 _HALF = 1 << 20
 """Cells are counted from -2^20 to 2^20 along each axis; those farther off count as the last."""
+
+PER_FACE = 8
+"""Pairs of a face that find space before they are counted: most bodies have fewer."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -39,20 +42,32 @@ def _key(i, j, k):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _spread(box, side, key, body):
-    """Entries (cell, body) of all boxes; with key of length 0 only their number is counted."""
+def _place_of(cells, key):
+    """Place of a key among cells, ascending; -1: none."""
+    at = first_not_before(cells, key, 0, len(cells))
+    return at if at < len(cells) and cells[at] == key else -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _spread(box, side, wanted, key, body):
+    """Entries (cell, body) of all boxes, of cells that are wanted, ascending, if there are any; with key of length 0
+    only their number is counted."""
     n = 0
     for b in range(len(box)):
         low_i, high_i = _cell(box[b, 0], side), _cell(box[b, 3], side)
         low_j, high_j = _cell(box[b, 1], side), _cell(box[b, 4], side)
         low_k, high_k = _cell(box[b, 2], side), _cell(box[b, 5], side)
-        if len(key) == 0:
+        if len(key) == 0 and len(wanted) == 0:
             n += (high_i - low_i + 1) * (high_j - low_j + 1) * (high_k - low_k + 1)
             continue
         for i in range(low_i, high_i + 1):
             for j in range(low_j, high_j + 1):
                 for k in range(low_k, high_k + 1):
-                    key[n], body[n] = _key(i, j, k), b
+                    cell = _key(i, j, k)
+                    if len(wanted) > 0 and _place_of(wanted, cell) < 0:
+                        continue
+                    if len(key) > 0:
+                        key[n], body[n] = cell, b
                     n += 1
     return n
 
@@ -111,7 +126,7 @@ def _pairs(
     cells, begin, body, side, face_box, box, corner, target, x, buffer, face, face_owned, element, owned, clusters,
     partner, closed, first, second,
 ):  # fmt: skip
-    """Pairs of faces and targets into first, second (either of length 0: count only)."""
+    """Pairs of faces and targets into first, second, as many as find space; returns how many there are."""
     n, points = 0, np.empty((7, 3))
     x = x.reshape(x.size)
     for f in range(len(face)):
@@ -122,14 +137,8 @@ def _pairs(
             for j in range(low_j, high_j + 1):
                 for k in range(low_k, high_k + 1):
                     key = _key(i, j, k)
-                    at, stop = 0, len(cells)
-                    while at < stop:
-                        middle = (at + stop) // 2
-                        if cells[middle] < key:
-                            at = middle + 1
-                        else:
-                            stop = middle
-                    if at == len(cells) or cells[at] != key:
+                    at = _place_of(cells, key)
+                    if at < 0:
                         continue
                     for m in range(begin[at], begin[at + 1]):
                         t = body[m]
@@ -150,7 +159,7 @@ def _pairs(
                             continue
                         if _separated(corner[f], target[t], x, buffer, points):
                             continue
-                        if len(first) > 0:
+                        if n < len(first):
                             first[n], second[n] = f, t
                         n += 1
     return n
@@ -175,18 +184,23 @@ def find(
     boxes(target, x, buffer, box)
     size = (box[:, 3:] - box[:, :3]).max(axis=1)
     side = max(1.5 * float(np.median(size)), float(size.max()) / 16.0)  # a few large boxes must not fill many cells
-    entries = _spread(box, side, nothing, nothing)
+    near = np.empty(_spread(face_box, side, nothing, nothing, nothing), np.int64)
+    _spread(face_box, side, nothing, near, np.empty_like(near))
+    near = np.unique(near)  # of targets only what is in these cells counts
+    entries = _spread(box, side, near, nothing, nothing)
     key, body = np.empty(entries, np.int64), np.empty(entries, np.int64)
-    _spread(box, side, key, body)
+    _spread(box, side, near, key, body)
     order = np.argsort(key, kind="stable")
     cells, begin = np.unique(key[order], return_index=True)
     args = (
         cells, np.append(begin, entries), body[order], side, face_box, box, corner, target, x, buffer, face, face_owned,
         element, owned, clusters, partner, closed,
     )  # fmt: skip
-    count = _pairs(*args, nothing, nothing)
-    first, second = np.empty(count, np.int64), np.empty(count, np.int64)
-    if count:
+    count = PER_FACE * len(face)
+    first, second = np.empty((2, count), np.int64)
+    count = _pairs(*args, first, second)
+    if count > len(first):
+        first, second = np.empty((2, count), np.int64)
         _pairs(*args, first, second)
-    order = np.lexsort((element[second], face[first]))
+    order = np.lexsort((element[second[:count]], face[first[:count]]))
     return first[order], second[order]
