@@ -33,9 +33,10 @@ def test_a_model_that_cannot_fit_is_refused_with_what_it_takes():
 def test_models_one_after_another_and_ranks_of_other_nodes_take_no_memory_here():
     one = footprint.expected(6_000_000, 3, 8, 8)
     assert check.memory(BOX + BOX, "a.py", 8, 8, one.node) == check.memory(BOX, "a.py", 8, 8, one.node)
-    assert "of 20000 MB" in check.memory(BOX, "a.py", 64, 8, 20e9)
+    free = 0.9 * footprint.expected(6_000_000, 3, 64, 64).node
+    assert f"of {free * 1e-6:.0f} MB" in check.memory(BOX, "a.py", 64, 8, free)
     with pytest.raises(HpcdemError, match="does not fit"):
-        check.memory(BOX, "a.py", 64, 64, 20e9)
+        check.memory(BOX, "a.py", 64, 64, free)
 
 
 def test_of_meshes_of_unknown_size_nothing_is_foretold():
@@ -44,3 +45,22 @@ def test_of_meshes_of_unknown_size_nothing_is_foretold():
     assert check.memory(unknown, "a.py", 1, 1, 1.0) == ""
     both = check.memory(f"{unknown}pcdc mesh structured (2,0) (3,1) cells 30 20\n", "a.py", 1, 1, None)
     assert "without the mesh of line 2" in both
+
+
+def test_joints_and_ghosts_of_the_curve_take_memory():
+    """Joints by themselves, ghosts the more the smaller the pieces are; one rank has none."""
+    law = "property friction 30 cohesion 1e6 tensile-strength 1e6 gf1 5 gf2 9"
+    jointed = f"{BOX}pcdc face-joint c-model classic-i-c-i {law}\n"
+    said, plain = (check.memory(text, "a.py", 16, 16, None) for text in (jointed, BOX))
+    each, with_joints = footprint.expected(6_000_000, 3, 16, 16), footprint.expected(6_000_000, 3, 16, 16, True)
+    assert f"{with_joints.rank * 1e-6:.0f} MB per rank" in said and f"{each.rank * 1e-6:.0f} MB per rank" in plain
+    assert with_joints.rank - each.rank == pytest.approx(footprint.OF_JOINTS * 6e6 / 16)
+    assert footprint.ghosts(1e6, 1) == 0.0
+    shares = [footprint.ghosts(1e6 / ranks, ranks) * ranks for ranks in (2, 4, 16, 64)]
+    assert shares == sorted(shares) and 1.5 < shares[3] / shares[2] < 3.0
+
+
+@pytest.mark.parametrize(("elements", "ranks", "counted"), [(105_456, 4, 6494), (998_250, 16, 24_900)])
+def test_ghosts_of_the_curve_are_foretold(elements: int, ranks: int, counted: int):
+    """Mean per rank, counted in cubes of tetrahedra (docs/scaling.md)."""
+    assert footprint.ghosts(elements / ranks, ranks) == pytest.approx(counted, rel=0.2)

@@ -112,19 +112,21 @@ def memory(text: str, file: str, ranks: int, here: int, free: float | None) -> s
     """A line about the memory that the largest model of a script will take on these ranks, as far as it tells the sizes
     of its meshes; "" if it tells none. here: ranks per node; free [B]: of a node, None: not known. HpcdemError if the
     model cannot fit."""
-    models, other = [(0, 2)], 0
+    models, other = [(0, 2, False)], 0
     for statement in read(text, file).statements:
         if statement.command.name == "model new":
-            models.append((0, 2))
+            models.append((0, 2, False))
+        if statement.command.name == "face-joint c-model":
+            models[-1] = *models[-1][:2], True
         elements = _elements(statement)
         other = other or statement.line * (elements < 0)
         if elements > 0:
             cells = statement.arguments.get("cells", statement.arguments.get("n"))
-            models[-1] = models[-1][0] + elements, len(cells)
-    count, dim = max(models)
+            models[-1] = models[-1][0] + elements, len(cells), models[-1][2]
+    count, dim, joints = max(models)
     if not count:
         return ""
-    one, mega = footprint.expected(count, dim, ranks, here), 1e-6
+    one, mega = footprint.expected(count, dim, ranks, here, joints), 1e-6
     text = (
         f"memory: {count} elements on {ranks} rank{'s' * (ranks > 1)} take about {one.rank * mega:.0f} MB per rank, at "
         f"most {one.most * mega:.0f} MB, and {one.shared * mega:.0f} MB shared by the ranks of a node: on one node "

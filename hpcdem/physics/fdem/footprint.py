@@ -6,13 +6,19 @@ from typing import NamedTuple
 
 EMPTY = 140e6
 """Memory of a rank without a model, with its kernels and libraries [B]."""
-OWN = {2: 650.0, 3: 1200.0}
-"""Memory of all ranks together per element, by dimensions [B], with joints before their peak or without."""
+OWN = {2: 650.0, 3: 625.0}
+"""Memory of an owned element, by dimensions [B], in space without joints."""
+OF_JOINTS = 275.0
+"""More of an element in space with joints before their peak [B]."""
+GHOST = 650.0
+"""Memory of a ghost in space, with that of its exchange [B]; in the plane ghosts are few."""
+LAYER = 1.75
+"""Thickness of the ghosts around a piece of the curve, in sides of a cube of six tetrahedra."""
 NODE = {2: 205.0, 3: 230.0}
 """Memory of a node of the machine per element [B]: mesh, connectivity, the definition of the model."""
-REBUILDING = 2.3
-"""A rank takes so many times its own memory while storage is made again: old and new tables are there at once."""
-MAKING = 800.0
+REBUILDING = 1.4
+"""A rank takes so many times its own memory while storage is made again: old and new positions are there at once."""
+MAKING = 330.0
 """Memory of the first rank of a node per element, while the mesh and its connectivity are made [B]."""
 
 
@@ -25,9 +31,19 @@ class Footprint(NamedTuple):
     node: float
 
 
-def expected(elements: int, dim: int, ranks: int, here: int) -> Footprint:
+def ghosts(elements: float, ranks: int) -> float:
+    """Estimate the ghosts of a rank with so many elements in space: a layer around a cube, where it does not end at the
+    surface of the body, a cube of the cubes of all ranks."""
+    side = (elements / 6.0) ** (1.0 / 3.0)
+    return elements * ((1.0 + 2.0 * LAYER / side) ** 3 - 1.0) * (1.0 - ranks ** (-1.0 / 3.0))
+
+
+def expected(elements: int, dim: int, ranks: int, here: int, joints: bool = False) -> Footprint:
     """Estimate the memory of a model of so many elements, evenly distributed over so many ranks, `here` of them on a
-    node."""
-    own, shared = elements * OWN[dim] / ranks, elements * NODE[dim]
+    node; joints: it has joints."""
+    each = elements / ranks
+    own, shared = each * OWN[dim], elements * NODE[dim]
+    if dim == 3:
+        own += each * OF_JOINTS * joints + GHOST * ghosts(each, ranks)
     most = max(here * REBUILDING * own, elements * MAKING)
     return Footprint(EMPTY + own, EMPTY + REBUILDING * own, shared, here * EMPTY + shared + most)
