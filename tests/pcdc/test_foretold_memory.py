@@ -64,3 +64,13 @@ def test_joints_and_ghosts_of_the_curve_take_memory():
 def test_ghosts_of_the_curve_are_foretold(elements: int, ranks: int, counted: int):
     """Mean per rank, counted in cubes of tetrahedra (docs/scaling.md)."""
     assert footprint.ghosts(elements / ranks, ranks) == pytest.approx(counted, rel=0.2)
+
+
+@pytest.mark.parametrize(("elements", "ranks", "joints", "own", "most"), [
+    (998_250, 2, False, 352e6, 449e6), (998_250, 2, True, 414e6, 506e6),
+])  # fmt: skip
+def test_memory_is_foretold_as_it_was_measured(elements: int, ranks: int, joints: bool, own: float, most: float):
+    """Of the busiest rank, beyond an empty one (docs/scaling.md)."""
+    one = footprint.expected(elements, 3, ranks, ranks, joints)
+    assert one.rank - footprint.EMPTY == pytest.approx(own, rel=0.1)
+    assert one.most - footprint.EMPTY == pytest.approx(most, rel=0.1)

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 EMPTY = 140e6
 """Memory of a rank without a model, with its kernels and libraries [B]."""
-OWN = {2: 650.0, 3: 625.0}
+OWN = {2: 650.0, 3: 660.0}
 """Memory of an owned element, by dimensions [B], in space without joints."""
-OF_JOINTS = 275.0
+OF_JOINTS = 140.0
 """More of an element in space with joints before their peak [B]."""
 GHOST = 650.0
 """Memory of a ghost in space, with that of its exchange [B]; in the plane ghosts are few."""
@@ -16,8 +16,9 @@ LAYER = 1.75
 """Thickness of the ghosts around a piece of the curve, in sides of a cube of six tetrahedra."""
 NODE = {2: 205.0, 3: 230.0}
 """Memory of a node of the machine per element [B]: mesh, connectivity, the definition of the model."""
-REBUILDING = 1.4
-"""A rank takes so many times its own memory while storage is made again: old and new positions are there at once."""
+REBUILDING = {2: 2.3, 3: 1.3}
+"""A rank takes so many times its own memory, by dimensions, while storage is made again: old and new positions are
+there at once."""
 MAKING = 330.0
 """Memory of the first rank of a node per element, while the mesh and its connectivity are made [B]."""
 
@@ -45,5 +46,6 @@ def expected(elements: int, dim: int, ranks: int, here: int, joints: bool = Fals
     own, shared = each * OWN[dim], elements * NODE[dim]
     if dim == 3:
         own += each * OF_JOINTS * joints + GHOST * ghosts(each, ranks)
-    most = max(here * REBUILDING * own, elements * MAKING)
-    return Footprint(EMPTY + own, EMPTY + REBUILDING * own, shared, here * EMPTY + shared + most)
+    again = REBUILDING[dim] * own
+    most = max(here * again, elements * MAKING)
+    return Footprint(EMPTY + own, EMPTY + again, shared, here * EMPTY + shared + most)
