@@ -236,6 +236,7 @@ class ParticleCommands:
         only: Sequence[str] | str = (),
         rad: Sequence[float] | float | None = None,
         porosity: float | None = None,
+        compact: tuple[float, float] | None = None,
         group: str | None = None,
         episode: int | None = None,
         colors: Sequence[str] | str = (),
@@ -262,6 +263,9 @@ class ParticleCommands:
         only : groups of which discs may be eroded; others protect what is under them. Left out, all.
         rad : radii of deposited discs that are drawn from [m].
         porosity : of what is eroded and deposited: bulk area is area of discs / (1 - porosity); 0.15.
+        compact : of the deposit: porosity of the sediment at the surface, and depth at which it is smaller by e [m];
+            discs
+            shrink as they are buried and keep their mass.
         group : of the deposit; growth.
         episode : steps after which a new group begins, growth1, growth2, ...
         colors : of these groups in turn, names.
@@ -497,7 +501,9 @@ class ParticleCommands:
             they were
             at rest), carried (demanded, less than a disc, not yet met; negative: erosion), demanded (the sum that
         the
-            processes wanted: deposited + settling + lost - eroded + carried); discs_eroded, discs_deposited,
+            processes wanted: deposited + settling + lost - eroded + carried), compacted (lost by discs of the
+        deposit as
+            they shrink, part of the deposited area); discs_eroded, discs_deposited,
             discs_settling; mass_eroded, mass_deposited [kg].
         """
     def clumps(self) -> dict[str, np.ndarray]:

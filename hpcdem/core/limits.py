@@ -123,10 +123,6 @@ def check_surface(given: Mapping[str, Any]) -> None:
     for name in ("diffuse", "erode", "deposit", "years", "spacing"):
         if name in given and not 0.0 < given[name] <= LARGEST:
             raise CommandError(f"{name} must be above 0, got {given[name]:g}")
-    if "rise" in given and not abs(given["rise"]) <= LARGEST:
-        raise CommandError(f"rise must be a number, got {given['rise']:g}")
-    if "rise" in given and not ("above" in given or "below" in given):
-        raise CommandError("rise is the velocity of a level: give above or below")
     if not 0.0 < given.get("slope", 1.0) <= STEEPEST:
         raise CommandError(f"slope: an angle above 0, at most {STEEPEST:g} degrees, got {given['slope']:g}")
     if not 0.0 <= given.get("porosity", 0.0) < 0.9:
@@ -138,7 +134,16 @@ def check_surface(given: Mapping[str, Any]) -> None:
             f"erosion (above {_level(above)}) and deposition (below {_level(below)}) would act at the same heights; "
             "the level of erosion must not be below that of deposition"
         )
+    _check_rise(given)
     _check_deposit(given, [name for name in ("diffuse", "slope", "deposit", "below") if name in given])
+
+
+def _check_rise(given: Mapping[str, Any]) -> None:
+    """CommandError for a velocity of levels that is not finite, or moves none."""
+    if "rise" in given and not abs(given["rise"]) <= LARGEST:
+        raise CommandError(f"rise must be a number, got {given['rise']:g}")
+    if "rise" in given and not ("above" in given or "below" in given):
+        raise CommandError("rise is the velocity of a level: give above or below")
 
 
 def _level(level: float) -> str:
@@ -148,7 +153,7 @@ def _level(level: float) -> str:
 def _check_deposit(given: Mapping[str, Any], makers: Sequence[str]) -> None:
     """CommandError unless the discs that these processes make are described, and nothing else is."""
     if not makers:
-        strange = [name for name in ("rad", "density", "episode", "colors", "group") if name in given]
+        strange = [name for name in ("rad", "density", "episode", "colors", "group", "compact") if name in given]
         if strange:
             raise CommandError(f"{strange[0]} describes the deposit, and erosion alone makes none")
         return
@@ -160,6 +165,11 @@ def _check_deposit(given: Mapping[str, Any], makers: Sequence[str]) -> None:
     missing = "density" if not given.get("density") else "" if law else "kn, or shear, poiss and hertz"
     if missing:
         raise CommandError(f"{makers[0]} deposits discs: give their {missing}")
+    if "compact" in given and not (0.0 < given["compact"][0] < 0.9 and 0.0 < given["compact"][1] <= LARGEST):
+        raise CommandError(
+            f"compact: a porosity above 0 and below 0.9 and a depth above 0, got {given['compact'][0]:g} and "
+            f"{given['compact'][1]:g}"
+        )
     if given.get("episode", 1) < 1:
         raise CommandError(f"episode: steps with one group, 1 or more, are needed, got {given['episode']}")
 

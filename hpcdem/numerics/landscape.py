@@ -138,3 +138,21 @@ def lowered(height: np.ndarray, most: float, level: float) -> np.ndarray:
 def raised(height: np.ndarray, most: float, level: float) -> np.ndarray:
     """Gain (n,) [m], not negative, of what lies below a level, `most` at most."""
     return np.where(np.isnan(height), 0.0, np.clip(level - height, 0.0, most))
+
+
+COMPACTIONS = 32
+"""Steps of porosity between that at the surface and none."""
+
+
+def compaction(depth: np.ndarray, scale: float) -> np.ndarray:
+    """Number (n,) i8 of steps by which porosity has decreased at these depths [m]: p0 exp(-depth / scale) at most.
+
+    Source: Athy 1930, AAPG Bulletin 14, 1.
+    """
+    steps = COMPACTIONS * (1.0 - np.exp(-np.maximum(depth, 0.0) / scale))
+    return np.floor(steps).astype(np.int64)
+
+
+def shrinkage(level: int, porosity: float) -> float:
+    """Length of a side of sediment over that at the surface, of which the solid area is the same."""
+    return math.sqrt((1.0 - porosity) / (1.0 - porosity * (1.0 - level / COMPACTIONS)))

@@ -129,6 +129,29 @@ def test_discs_count_when_they_are_at_rest(scarp: str, tmp_path) -> None:
     assert seen["discs_settling"] <= 3 and seen["discs_deposited"] + seen["discs_settling"] == second.sum()
 
 
+def test_what_is_buried_is_compacted(tmp_path) -> None:
+    """Radii follow the porosity of Athy at the depth of a disc, p0 exp(-z / 10 m), within three of 32 steps, and masses
+    stay; the area that is lost is in the balance."""
+    sim = basin(tmp_path, 40.0)
+    porosity, scale = 0.5, 10.0
+    surface.surface(sim, 1, 100, x=(0.0, 40.0), below=12.0, compact=(porosity, scale), **SAND)
+    cycles.cycle(sim, 8000)
+    p, land = sim.particles, sim.lands[1]
+    depth = heights(sim, 1, 40.0)[1].mean() - p["y"]
+    levels = np.array([land.levels.get(gid, 0) for gid in p["gid"].tolist()])
+    wanted = landscape.compaction(depth, scale)
+    assert levels.max() >= 18 and (levels >= wanted - 3).mean() > 0.97 and (np.abs(levels - wanted) <= 3).mean() > 0.8
+    assert surface.balance(sim, 1)["discs_settling"] == 0
+    mass = sim.materials.rows["density"][p["material"]] * math.pi * p["radius"] ** 2
+    ratio = np.array([landscape.shrinkage(k, porosity) for k in levels.tolist()])
+    original = p["radius"] / ratio
+    assert np.minimum(np.abs(original - 0.8), np.abs(original - 1.0)).max() < 1e-12
+    assert mass == pytest.approx(math.pi * original**2, rel=1e-12)
+    lost = (math.pi * (original**2 - p["radius"] ** 2)).sum() / (1.0 - surface.POROSITY)
+    assert surface.balance(sim, 1)["compacted"] == pytest.approx(lost, rel=1e-5)
+    assert_adds_up(sim, 1)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -151,6 +174,7 @@ def test_discs_count_when_they_are_at_rest(scarp: str, tmp_path) -> None:
         ({"interval": 5, "below": 3.0, **SAND, "porosity": 0.95}, "porosity: from 0 to less than 0.9"),
         ({"interval": 5, "above": 3.0, "spacing": 1.0}, "spacing 1 m is less than a largest particle, 2 m"),
         ({"interval": 5, "above": 3.0, "x": (0.0, 1.0)}, "x from 0 to 1 m is narrower than a column"),
+        ({"interval": 5, "below": 3.0, **SAND, "compact": (0.0, 5.0)}, "compact: a porosity above 0 and below 0.9"),
         ({"off": True}, "there is no process 7 of SURFACE; active: 1"),
         ({"interval": 5, "below": 19.0, **SAND}, "SURFACE 7 and 1 would erode and deposit at the same heights"),
     ],

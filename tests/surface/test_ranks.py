@@ -28,13 +28,13 @@ CYC 300
 PROP ebmod 2e8 gbmod 2e8 tstrength 1e6 sstrength 2e6 fric 0.3
 WALL id 1 fric 0.3 xv 12.0
 SURFACE id 1 interval 25 diffuse 1e4 slope 25 rad discrete 40 50 {LAW} group growth episode 200 colors red|blue
-SURFACE id 2 interval 50 x (2000.0 {{right}}) deposit 20.0 below 1500.0 rad discrete 40 {LAW} group fill
+SURFACE id 2 interval 50 x 2000.0 {{right}} deposit 20.0 below 1250.0 compact 0.5 800.0 rad discrete 40 {LAW} group fill
 SET save 325 print 300
 CYC 300
 """
 REST = """\
 CYC 300
-SURFACE id 3 interval 40 erode 4.0 above 1500.0 only bed|fill
+SURFACE id 3 interval 40 erode 9.0 above 1250.0 only bed|fill
 SURFACE id 1 off
 CYC 200
 EXP end.dat group
@@ -56,8 +56,9 @@ def test_the_model_does_all_that_it_is_for(one: Path) -> None:
     assert counts["growth1"] > 3 and counts["growth2"] > 0 and counts["fill"] > 40, counts
     rows = [line.split(",") for line in (one / "data" / "surface.csv").read_text().splitlines()]
     last = {row[2]: dict(zip(rows[0], row)) for row in rows[1:]}
-    assert int(last["1"]["discs_eroded"]) > 3 and int(last["3"]["discs_eroded"]) > 1
-    assert any(row[0] == "650" and int(row[10]) > 0 for row in rows[1:])
+    assert int(last["1"]["discs_eroded"]) > 3 and int(last["3"]["discs_eroded"]) > 0
+    assert float(last["2"]["compacted"]) > 0.0
+    assert any(row[0] == "650" and int(row[11]) > 0 for row in rows[1:])
 
 
 @pytest.mark.mpi

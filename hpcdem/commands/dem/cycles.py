@@ -396,7 +396,7 @@ class Due:
             tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
         last = -1 if progress["last"] is None else progress["last"]
         tasks.append(Task(self._bar, progress["first"], self._report, also=last))
-        if not _is_surely_small(sim):
+        if sim.lands or not _is_surely_small(sim):  # deposits may be stiffer or smaller than all others
             tasks.append(Task(WATCH, 0, lambda _: _watch_the_time_step(sim)))
         for kind in OUTPUTS:
             if kind != "save" and intervals.get(kind, 0) > 0:  # older checkpoints have fewer kinds

@@ -27,7 +27,7 @@ from hpcdem.core.picture_words import NUMBERS
 from hpcdem.numerics import landscape
 from hpcdem.numerics.rng import uniforms
 from hpcdem.physics.dem import rolling
-from hpcdem.physics.dem.kernels.mass import volume
+from hpcdem.physics.dem.kernels.mass import SPHERES, volume
 from hpcdem.physics.dem.kernels.motion import MASS
 from hpcdem.physics.dem.land import Land, carried_over, smallest_unit
 from hpcdem.physics.dem.simulation import Simulation
@@ -68,6 +68,7 @@ def surface(
     only: Sequence[str] | str = (),
     rad: Sequence[float] | float | None = None,
     porosity: float | None = None,
+    compact: tuple[float, float] | None = None,
     group: str | None = None,
     episode: int | None = None,
     colors: Sequence[str] | str = (),
@@ -93,6 +94,8 @@ def surface(
     only : groups of which discs may be eroded; others protect what is under them. Left out, all.
     rad : radii of deposited discs that are drawn from [m].
     porosity : of what is eroded and deposited: bulk area is area of discs / (1 - porosity); 0.15.
+    compact : of the deposit: porosity of the sediment at the surface, and depth at which it is smaller by e [m]; discs
+        shrink as they are buried and keep their mass.
     group : of the deposit; growth.
     episode : steps after which a new group begins, growth1, growth2, ...
     colors : of these groups in turn, names.
@@ -104,7 +107,8 @@ def surface(
     optional = {
         "interval": interval, "x": x, "spacing": spacing, "diffuse": diffuse, "slope": slope, "erode": erode,
         "above": above, "deposit": deposit, "below": below, "rise": rise, "years": years, "only": only, "rad": radii,
-        "porosity": porosity, "group": group, "episode": episode, "colors": colors, "off": off, "hertz": hertz,
+        "porosity": porosity, "compact": compact, "group": group, "episode": episode, "colors": colors, "off": off,
+        "hertz": hertz,
     }  # fmt: skip
     material = checked(properties)
     given = {name: value for name, value in optional.items() if value not in (None, (), "", False)} | material
@@ -147,6 +151,7 @@ def surface(
         group=(group or GROUP).lower(), episode=int(episode or 0),
         colors=_colors((colors,) if isinstance(colors, str) else colors), material=row, begun=sim.clock.step,
         last=sim.clock.time, since=sim.clock.time, stream=sim.streams, unit=smallest_unit(radius),
+        compact=None if compact is None else (float(compact[0]), float(compact[1])),
     )  # fmt: skip
     sim.streams += 1
     _refuse_contradictions(sim, id, land)
@@ -337,6 +342,7 @@ def _apply(
     for gid, falling, _ in land.settling:
         if gid in places:
             in_flight[places[gid]] += falling
+    measured = height
     height = height + (owed + in_flight) * land.unit / width
     demanded = _demand(land, height, width, np.maximum(there + owed, 0), elapsed)
     owed += demanded
@@ -353,9 +359,12 @@ def _apply(
         sim.remove(np.isin(sim.particles["gid"], near.ids[gone, 0]))
     if len(rows):
         step = sim.clock.step
+        land.made.append((sim.next_gid, sim.next_gid + len(rows)))
         for k, (_, _, r) in enumerate(rows):
             land.settling.append((sim.next_gid + k, land.of_disc(r), r))
         add(sim, np.array(rows), sim.group_number(land.group_at(step)), land.color_at(step), material=land.material)
+    if land.compact is not None:
+        _compacted(sim, land, measured, sides)
 
 
 def _book(entry: list[float], area: int, mass: float) -> None:
@@ -461,6 +470,43 @@ def _deposited(
         total -= area
 
 
+def _compacted(sim: Simulation, land: Land, height: np.ndarray, sides: np.ndarray) -> None:
+    """Let the discs of the deposit shrink by one step where they are buried deeply enough. Collective."""
+    assert land.compact is not None
+    porosity, scale = land.compact
+    p, n = sim.particles, len(height)
+    gid = p["gid"]
+    made = np.array(land.made, np.int64).reshape(-1, 2)
+    at = np.searchsorted(made[:, 0], gid, side="right") - 1
+    mine = np.flatnonzero((at >= 0) & (gid < (made[at, 1] if len(made) else 0)))
+    mine = mine[~np.isin(gid[mine], [one for one, _, _ in land.settling])]
+    column = np.clip(np.searchsorted(sides, p["x"][mine], side="right") - 1, 0, n - 1)
+    wanted = landscape.compaction(np.nan_to_num(height[column] - p["y"][mine]), scale)
+    level = np.array([land.levels.get(one, 0) for one in gid[mine].tolist()], np.int64)
+    deeper = wanted > level
+    mine, level = mine[deeper], level[deeper]
+    power = 3.0 if SPHERES[sim.settings.disk] else 2.0
+    parts = sim.comm.allgather((gid[mine], level, p["radius"][mine]))
+    every = {one: (k, r) for part in parts for one, k, r in zip(*(column.tolist() for column in part))}
+    ratios = {k: landscape.shrinkage(k + 1, porosity) / landscape.shrinkage(k, porosity) for k, _ in every.values()}
+    for one in sorted(every):
+        k, r = every[one]
+        land.levels[one] = k + 1
+        land.compacted += land.of_disc(r) - land.of_disc(r * ratios[k])
+    if not every:
+        return
+    sim.open_model()
+    material = p["material"][mine]
+    for k in sorted(ratios):
+        some = level == k
+        p["radius"][mine[some]] *= ratios[k]
+        for row in np.flatnonzero(sim.used(material[some], sim.materials)).tolist():
+            density = float(sim.materials.rows["density"][row]) / ratios[k] ** power
+            mapping = sim.materials.changed(np.arange(len(sim.materials)) == row, density=density)
+            p["material"][mine[some & (material == row)]] = mapping[row]
+    sim.tables_changed()
+
+
 def _count_settled(sim: Simulation, land: Land) -> None:
     """Book the discs that are at rest now. Collective."""
     if not land.settling:
@@ -490,7 +536,7 @@ def _count_settled(sim: Simulation, land: Land) -> None:
 # ---- the balance -----------------------------------------------------------------------------------------------------
 
 COLUMNS = (
-    "step,time,surface,eroded,deposited,settling,lost,carried,discs_eroded,discs_deposited,discs_settling,mass_eroded,"
+    "step,time,surface,eroded,deposited,settling,lost,carried,compacted,discs_eroded,discs_deposited,discs_settling,mass_eroded,"
     "mass_deposited"
 )
 
@@ -502,7 +548,8 @@ def balance(sim: Simulation, id: int) -> dict[str, float]:
     -------
     dict : bulk areas [m2] eroded, deposited (discs at rest), settling (not yet at rest), lost (deleted before they were
         at rest), carried (demanded, less than a disc, not yet met; negative: erosion), demanded (the sum that the
-        processes wanted: deposited + settling + lost - eroded + carried); discs_eroded, discs_deposited,
+        processes wanted: deposited + settling + lost - eroded + carried), compacted (lost by discs of the deposit as
+        they shrink, part of the deposited area); discs_eroded, discs_deposited,
         discs_settling; mass_eroded, mass_deposited [kg].
     """
     if id not in sim.lands:
@@ -511,6 +558,7 @@ def balance(sim: Simulation, id: int) -> dict[str, float]:
     areas = {
         "eroded": land.eroded[0], "deposited": land.deposited[0], "settling": sum(area for _, area, _ in land.settling),
         "lost": land.lost[0], "carried": sum(land.owed.values()), "demanded": land.asked,
+        "compacted": land.compacted,
     }  # fmt: skip
     return {
         **{name: value * land.unit for name, value in areas.items()},
@@ -540,9 +588,10 @@ def tell_one(sim: Simulation, ident: int) -> None:
     seen = balance(sim, ident)
     net = seen["deposited"] + seen["settling"] + seen["lost"] - seen["eroded"]
     lost = f"; deleted before they were at rest: {seen['lost']:.4g} m2" if seen["lost"] else ""
+    compacted = f"; compacted by {seen['compacted']:.4g} m2" if seen["compacted"] else ""
     sim.log.info(
         f"SURFACE {ident}: eroded {seen['eroded']:.6g} m2 ({seen['discs_eroded']} discs, {seen['mass_eroded']:.4g} kg)"
         f", deposited {seen['deposited']:.6g} m2 ({seen['discs_deposited']} discs, {seen['mass_deposited']:.4g} kg)"
         f", settling {seen['settling']:.4g} m2 ({seen['discs_settling']} discs); net {net:.6g} m2, demanded "
-        f"{seen['demanded']:.6g} m2, carried {seen['carried']:.3g} m2{lost}"
+        f"{seen['demanded']:.6g} m2, carried {seen['carried']:.3g} m2{lost}{compacted}"
     )

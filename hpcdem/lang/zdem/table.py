@@ -674,6 +674,8 @@ COMMANDS = (
             replace(_RADII, required=False, doc="radii of the deposit, drawn at random, a repeated one more often"),
             Option("porosity", "of what is eroded and deposited: bulk area is area of discs / (1 - porosity)",
                    kind=NOT_NEGATIVE, default="0.15"),
+            Option("compact", "of the deposit: porosity of the sediment at the surface, and depth in m at which it is "
+                   "smaller by e; discs shrink as they are buried and keep their mass", kind=POINT, default="off"),
             Option("group", "group of the deposit", kind=NAME, default="growth"),
             Option("episode", "steps after which a new group begins: growth1, growth2, ...", kind=COUNT, unit="steps",
                    default="one group"),

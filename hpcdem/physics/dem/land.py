@@ -28,6 +28,10 @@ class Land:
     owed: by number of column, the area that the process demands and whole discs have not yet met (negative: erosion);
     settling: ids, areas and radii of discs that are not yet at rest; drawn: discs made; eroded, deposited, lost: areas
     of discs removed, at rest, and gone otherwise before they were at rest, with their numbers and masses [kg].
+
+    compact: porosity of the sediment at the surface, and the depth [m] at which it is smaller by e, or None; made:
+    first id and the one after the last of the discs of each application; levels: by id, compaction of a disc, if any;
+    compacted: area that discs lost by it.
     """
 
     every: int
@@ -59,6 +63,10 @@ class Land:
     deposited: list[float] = field(default_factory=lambda: [0, 0, 0.0])
     lost: list[float] = field(default_factory=lambda: [0, 0, 0.0])
     asked: int = 0
+    compact: tuple[float, float] | None = None
+    made: list[tuple[int, int]] = field(default_factory=list)
+    levels: dict[int, int] = field(default_factory=dict)
+    compacted: int = 0
 
     @property
     def deposits(self) -> bool:
@@ -87,7 +95,7 @@ class Land:
 
     def state(self) -> dict[str, Any]:
         """JSON values of all fields."""
-        return {**dataclasses.asdict(self), "owed": sorted(self.owed.items())}
+        return {**dataclasses.asdict(self), "owed": sorted(self.owed.items()), "levels": sorted(self.levels.items())}
 
     @staticmethod
     def restored(state: dict[str, Any]) -> Land:
@@ -95,8 +103,13 @@ class Land:
         tuples = {name: tuple(state[name]) for name in ("only", "rad", "colors")}
         x = None if state["x"] is None else tuple(state["x"])
         owed = {int(k): int(v) for k, v in state["owed"]}
+        more = {
+            "compact": tuple(state["compact"]) if state.get("compact") else None,
+            "made": [(int(first), int(end)) for first, end in state.get("made", [])],
+            "levels": {int(gid): int(level) for gid, level in state.get("levels", [])},
+        }
         settling = [(int(gid), int(area), float(r)) for gid, area, r in state["settling"]]
-        return Land(**{**state, **tuples, "x": x, "owed": owed, "settling": settling})
+        return Land(**{**state, **tuples, "x": x, "owed": owed, "settling": settling, **more})
 
 
 def smallest_unit(radius: float) -> float:
