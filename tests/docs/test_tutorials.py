@@ -91,12 +91,8 @@ WANTED = {
 }  # fmt: skip
 
 
-QUICK = ("thrust_belt",)
-
-
-@pytest.mark.parametrize(
-    "page", [page if page in QUICK else pytest.param(page, marks=pytest.mark.slow) for page in SHORTER]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("page", list(SHORTER))
 def test_tutorial(page: str, tmp_path: Path) -> None:
     """Quickly; those that are not changed print what they say."""
     done(page, tmp_path, SHORTER[page])

@@ -32,6 +32,18 @@ def test_the_residual_moisture_is_below_that_of_saturation() -> None:
     _order({"moisture_residual": np.array([0.1, 0.2]), "moisture_saturated": 0.3})
 
 
+def test_each_element_conducts_by_its_own_density() -> None:
+    sim = Blocks()
+    sim.take_mesh(rectangle(2, 1, 1.0, 0.5))
+    density = 1000.0 + 100.0 * np.arange(len(sim.mesh.cells))
+    for element, value in enumerate(density):
+        changes.element_model(sim, [element], "mech_iso_elastic", {**SOIL, "density": value})
+    moisture = Moisture.of(sim)
+    moisture.assign(None, CLAY)
+    found = moisture._conductivities(np.arange(len(density)))
+    assert found[:, 0] == pytest.approx(D * density) and (found[:, [0, 1, 3]] == found[:, :1]).all()
+
+
 def bar(kind: str) -> Mesh:
     """A metre along x."""
     if kind == "tetrahedra":
