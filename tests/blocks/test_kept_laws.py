@@ -91,6 +91,13 @@ def test_a_law_is_compiled_once(tmp_path, monkeypatch):
     loop.write_bytes(whole)
     assert files_.load_overload(signature, law.loops.triangle.one.targetctx) is not None
 
+    def of_a_moved_module(data: bytes) -> None:
+        raise ModuleNotFoundError("No module named 'hpcdem.moved'")
+
+    with monkeypatch.context() as moved:
+        moved.setattr(kept.pickle, "loads", of_a_moved_module)
+        assert files_.load_overload(signature, law.loops.triangle.one.targetctx) is None
+
 
 def parts(tmp_path: Path, text: str) -> str | None:
     """What the function `law` of a text is made of."""

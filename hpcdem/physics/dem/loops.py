@@ -27,7 +27,7 @@ def refresh(sim: Any) -> None:
     sim.own_table, bounds = sim.own_laws.tables(rows) if sim.own_laws else (None, None)
     sim.own_laws.compile_loops(sim)
     sim.pair_laws = contacts.pair_table(rows, sim.own_laws.which(rows), bounds)
-    sim.wall_laws = wall_kernels.wall_table(rows, sim.walls.kn, sim.walls.ks, sim.walls.fric)
+    sim.wall_laws = _wall_laws(sim.walls, rows)
     sim.bond_laws = contacts.bond_laws(sim.bond_types.rows)
     sim._pushed, sim._push = _pressures(sim)
     sim._wall_table = sim.walls.table()
@@ -61,6 +61,16 @@ def refresh(sim: Any) -> None:
         sim.rolling = rolling.Rolling(sim)
     for physics in sim.physics:
         physics.prepare(sim)
+
+
+def _wall_laws(walls: Any, rows: np.ndarray) -> np.ndarray:
+    """The table of kernels.walls.wall_table, each distinct wall computed once: a polyline has many equal segments."""
+    properties = np.stack([walls.kn, walls.ks, walls.fric], axis=1)
+    if len(walls) < 2:
+        return wall_kernels.wall_table(rows, *properties.T)
+    distinct, of = np.unique(properties, axis=0, return_inverse=True)
+    table = wall_kernels.wall_table(rows, *distinct.T).reshape(len(distinct), len(rows), 4)
+    return table[of.reshape(-1)].reshape(-1, 4)
 
 
 def pressed(sim: Any) -> np.ndarray:
