@@ -7,6 +7,7 @@ compiled, and replaces it.
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import hashlib
 import itertools
@@ -130,7 +131,7 @@ class _OfPackage(Files):
         given = _sources_of(function) - _sources(source)  # a factory's module does not know its arguments
         digests = "".join(sorted(map(_digest, given)))
         made = hashlib.sha256((_made_of(function) + digests).encode()).hexdigest()[:8]
-        super().__init__(place, f"{name}-{function.__code__.co_firstlineno}-{made}")
+        super().__init__(place, f"{name}-{_line(source, function.__code__.co_firstlineno)}-{made}")
 
     def save_overload(self, signature: Any, found: Any) -> None:
         if not _warming:
@@ -144,7 +145,8 @@ def _made_of(function: Any) -> str:
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     inner = [_made_of(cell.py_func) if hasattr(cell, "py_func") else repr(cell) for cell in cells]
     code = function.__code__
-    return repr((function.__qualname__, code.co_firstlineno, code.co_code.hex(), code.co_names, inner))
+    line = _line(Path(code.co_filename), code.co_firstlineno)
+    return repr((function.__qualname__, line, code.co_code.hex(), code.co_names, inner))
 
 
 def _sources_of(function: Any) -> set[Path]:
@@ -205,29 +207,50 @@ def has(kernel: Any, types: tuple[Any, ...]) -> bool:
     return path is not None and path.is_file()
 
 
+_WORDS = re.compile(r'\n[ \t]*(?:r?"""(?s:.*?)"""|#[^\n]*)(?=\n)|  #[^"\'\n]*(?=\n)|\n(?=\n)')
+"""Docstrings, comments and blank lines, which change no kernel. A test compares the rest with what Python parses."""
+
+
+@cache
+def _code(source: Path) -> tuple[str, list[int]]:
+    """Return the text of a module without its docstrings, comments and blank lines, and the numbers of these lines."""
+    text = "\n" + source.read_text(encoding="utf-8")
+    omitted: list[int] = []
+    line, at = 1, 0
+    for words in _WORDS.finditer(text):
+        line += text.count("\n", at, words.start())
+        at = words.start()
+        omitted += range(line, line + words[0].count("\n"))
+    return _WORDS.sub("", text), omitted
+
+
+def _line(source: Path, line: int) -> int:
+    """Return the number of a line among those of `_code`; of what was typed, the line itself."""
+    return line - bisect.bisect_left(_code(source)[1], line) if source.is_file() else line
+
+
 @cache
 def _digest(source: Path) -> str:
-    """Of a module and of all modules that its first column imports: kernels take functions and constants from them, and
-    numba does not see when these change."""
-    digest = hashlib.sha256(source.read_bytes())
+    """Return a digest of a module and of all modules that its first column imports: kernels take functions and
+    constants from them, and numba does not see when these change."""
+    digest = hashlib.sha256(_code(source)[0].encode())
     for name in _reached(source):
-        digest.update((_PACKAGE / name).read_bytes())
+        digest.update(_code(_PACKAGE / name)[0].encode())
     return digest.hexdigest()[:12]
 
 
 @cache
 def _sources(source: Path) -> frozenset[Path]:
-    """What the digest of a module is made of."""
+    """Return the files from which the digest of a module is computed."""
     return frozenset({source, *(_PACKAGE / name for name in _reached(source))})
 
 
 @cache
 def _reached(source: Path) -> list[str]:
     """The modules of hpcdem that a module imports in its first column, and those that these import."""
-    wanted = sorted(_imported(source.read_text(encoding="utf-8")) & _files(), key=_parts)
+    wanted = sorted(_imported(_code(source)[0]) & _files(), key=_parts)
     for name in wanted:
-        text = (_PACKAGE / name).read_text(encoding="utf-8")
-        wanted += sorted((_imported(text) & _files()).difference(wanted), key=_parts)
+        wanted += sorted((_imported(_code(_PACKAGE / name)[0]) & _files()).difference(wanted), key=_parts)
     return wanted
 
 
@@ -265,9 +288,9 @@ def sources() -> str:
 
 
 def deciding() -> dict[str, str]:
-    """The modules of hpcdem with kernels, all that these import, and those that call them with types of their choice;
-    with their texts."""
-    texts = {name: (_PACKAGE / name).read_text(encoding="utf-8") for name in _files()}
+    """Return the code of the modules of hpcdem with kernels, of all that these import, and of those that call them with
+    types of their choice."""
+    texts = {name: _code(_PACKAGE / name)[0] for name in _files()}
     indented = re.compile(r"^[ \t]+from ", re.MULTILINE)
     imports = {name: _imported(indented.sub("from ", text)) & texts.keys() for name, text in texts.items()}
     kernels = {name for name, text in texts.items() if _COMPILES.search(text)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import errno
 import importlib
 import importlib.util
@@ -101,7 +102,7 @@ def test_kernels_are_known_by_what_they_are_made_of(base, tmp_path, monkeypatch,
     source = tmp_path / "kernels_of_a_test.py"
 
     def digest() -> str:
-        for known in (kept._digest, kept._reached, kept._sources, kept._files):
+        for known in (kept._digest, kept._reached, kept._sources, kept._files, kept._code):
             known.cache_clear()
         return kept._digest(source)
 
@@ -116,8 +117,41 @@ def test_kernels_are_known_by_what_they_are_made_of(base, tmp_path, monkeypatch,
     assert len({first, second, third}) == 3
     (package / "other.py").write_text("C = 3\n")
     assert digest() == third
-    for known in (kept._digest, kept._reached, kept._sources, kept._files):
+    (package / "inner.py").write_text(
+        '"""Words."""\n\n# why\nB = 2  # another unit\n"""More words,\nof two lines."""\n'
+    )
+    assert digest() == third
+    (package / "inner.py").write_text('B = "2"\n')
+    assert digest() != third
+    for known in (kept._digest, kept._reached, kept._sources, kept._files, kept._code):
         known.cache_clear()
+
+
+def test_docstrings_and_comments_change_no_digest_of_kernels() -> None:
+    """What the digest omits are docstrings, comments and blank lines, in all modules on which kernels depend."""
+
+    def parsed(text: str) -> str:
+        tree = ast.parse(text)
+        for node in ast.walk(tree):
+            body = getattr(node, "body", None)
+            if isinstance(body, list):
+                rest = [
+                    line for line in body if not (isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant))
+                ]
+                body[:] = rest or [ast.Pass()]
+        return ast.dump(tree)
+
+    for name in kept.deciding():
+        text = (kept._PACKAGE / name).read_text(encoding="utf-8")
+        code = kept._WORDS.sub(
+            lambda words: words[0][: words[0].find('"""')] + '""' if '"""' in words[0] else "", "\n" + text
+        )
+        assert parsed(code) == parsed(text), name
+        kernels = [line for line, words in enumerate(text.splitlines(), 1) if words.startswith(("def ", "@"))]
+        lines = kept._code(kept._PACKAGE / name)[0].split("\n")
+        assert [lines[kept._line(kept._PACKAGE / name, line)] for line in kernels] == [
+            re.sub(r"  #[^\"']*$", "", text.splitlines()[line - 1]) for line in kernels
+        ], name
 
 
 def test_kernels_of_a_factory_are_told_apart_by_what_was_put_into_them(base):
@@ -158,7 +192,7 @@ def test_a_kernel_of_a_factory_is_made_anew_when_a_kernel_that_it_was_given_chan
         return found
 
     def value(factor):
-        for known in (kept._digest, kept._reached, kept._sources):
+        for known in (kept._digest, kept._reached, kept._sources, kept._code):
             known.cache_clear()
         run = module("factory", factory + "    return run\n").loop(module("law", law.format(factor)).law)
         return run(1.0), sum(run.stats.cache_hits.values())
