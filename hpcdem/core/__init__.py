@@ -1,1 +1,2 @@
-"""What every part needs: errors, tables of fields, cells, clock, timers, limits. Imports nothing else of hpcdem."""
+"""Define what every part needs: errors, tables of fields, cells, clock, timers, limits. Imports nothing else of
+hpcdem."""

@@ -19,7 +19,8 @@ T = TypeVar("T")
 
 
 class Comm(Protocol):
-    """What every communicator can do. All operations but `wait`, `wait_all`, `start_all` and `abort` are collective."""
+    """Operations of every communicator. All operations but `wait`, `wait_all`, `start_all` and `abort` are
+    collective."""
 
     rank: int
     size: int

@@ -41,7 +41,7 @@ class Property(NamedTuple):
         return f"{self.noun} {f'above {self.low:g}, at most' if self.above else f'from {self.low:g} to'} {self.high:g}"
 
     def allows(self, value: float) -> bool:
-        """Whether the property may have this value."""
+        """Return whether the property may have this value."""
         return self.low <= value <= self.high and not (self.above and value == self.low)
 
 

@@ -98,7 +98,7 @@ def system(name: str) -> System:
 
 
 def label(name: str, unit: str) -> str:
-    """What a unit of SI is called by a model that declared these units, "" none."""
+    """Return the name of a unit of SI in a model that declared these units ("" for none)."""
     return SYSTEMS[name].label(unit) if name else unit
 
 
@@ -182,7 +182,7 @@ def ladder(unit: str) -> Sequence[tuple[float, str]]:
 
 
 def scale(largest: float, unit: str, digits: int = 4) -> tuple[float, str]:
-    """In what people write a value of this magnitude.
+    """Choose the customary unit of a value of this magnitude.
 
     Parameters
     ----------

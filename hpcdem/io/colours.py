@@ -31,8 +31,8 @@ def numbers(color: np.ndarray) -> np.ndarray:
 
 
 def find_palette(name: str, folder: str | os.PathLike) -> Path:
-    """Where a colour file is: a path is used unchanged; a bare name is searched for in the current folder, in `folder`
-    and in the home folder. Raises HpcdemError without one."""
+    """Return where a colour file is: a path is used unchanged; a bare name is searched for in the current folder, in
+    `folder` and in the home folder. Raises HpcdemError without one."""
     given = Path(name).expanduser()
     bare = given.name == name
     places = [Path(), Path(folder), Path.home()] if bare else [Path()]

@@ -47,7 +47,7 @@ class Columns(Mapping[str, np.ndarray]):
         return len(self._readers)
 
     def was_read(self, name: str) -> bool:
-        """Whether a column was used before."""
+        """Return whether a column was used before."""
         return name in self._read
 
     @property
@@ -63,7 +63,7 @@ def part(columns: Mapping[str, np.ndarray], name: str, rows: slice) -> np.ndarra
 
 @dataclass
 class Table:
-    """This rank's rows ``offset : offset + len`` of a table of `total` rows; columns are 1-d arrays by name."""
+    """Hold this rank's rows ``offset : offset + len`` of a table of `total` rows; columns are 1-d arrays by name."""
 
     columns: dict[str, np.ndarray]
     offset: int = 0
@@ -75,7 +75,7 @@ class Table:
 
 @dataclass
 class Frame:
-    """All that is written at one output time.
+    """Everything that is written at one output time.
 
     tables: "particles", "contacts", "bonds", "wall_contacts"; walls: columns of the wall table (BOX walls first,
     ids fields.BOX_IDS, in this order); settings: left, right, bottom, height, gx, gy, disk, frac, lsm, and units where

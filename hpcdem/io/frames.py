@@ -1,4 +1,4 @@
-"""Which frames a folder holds, and reading one, whatever its format."""
+"""List the frames of a folder and read one of any format."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _of_blocks(path: Path) -> bool:
 
 @functools.lru_cache(maxsize=1 << 14)
 def _known(path: Path, changed: int) -> bool:
-    """Whether a file is a frame of blocks: those who follow a run ask every second."""
+    """Return whether a file is a frame of blocks: those who follow a run ask every second."""
     from hpcdem.io.vtkhdf_mesh import is_mesh_frame
 
     return is_mesh_frame(path)

@@ -32,8 +32,8 @@ _FAILURES = (OSError, RuntimeError, ValueError)
 
 
 def has_mpi(comm: Comm) -> bool:
-    """Whether this h5py can write through `comm` in parallel, and should: on a crowded host every collective write
-    waits for its turn on a core, and rank 0 alone is quicker."""
+    """Return whether this h5py can write through `comm` in parallel, and should: on a crowded host every collective
+    write waits for its turn on a core, and rank 0 alone is quicker."""
     return comm.mpi is not None and comm.size > 1 and not comm.crowded and bool(h5py.get_config().mpi)
 
 
@@ -86,7 +86,7 @@ class _Sketch:
         """Nothing is held back."""
 
     def extents(self) -> list[tuple[int, bytearray]]:
-        """What was written, the last word on each byte, as pieces (place, bytes) that do not touch."""
+        """Return the written bytes as separate pieces (place, bytes); where writes overlap, the last one counts."""
         ends: list[list[int]] = []
         for first, last in sorted((at, at + len(data)) for at, data in self.pieces):
             if ends and first <= ends[-1][1]:
@@ -130,7 +130,8 @@ class _Description:
         self._starts[name] = made.get_offset() or 0
 
     def finish(self) -> Description:
-        """Where the rows of each dataset belong, the description as pieces of the file, and the file's size."""
+        """Return the places of the rows of each dataset, the description as pieces of the file, and the size of the
+        file."""
         self._file.close()
         return self._starts, self._sketch.extents(), self._sketch.size
 

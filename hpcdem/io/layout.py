@@ -1,4 +1,4 @@
-"""How numbers are written as text: what those who lay out columns share with the kernels that fill them."""
+"""Layout of numbers as text, shared by the code that lays out columns and the kernels that fill them."""
 
 SCI, INT, FIXED, WORD = range(4)
 """Kinds of columns, see textnum.Column."""

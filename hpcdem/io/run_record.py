@@ -28,7 +28,7 @@ _FRAME = re.compile(r".+_(\d{10,})(_ini)?\.(vtkhdf|dat)")
 
 @dataclass
 class Record:
-    """What run.json says."""
+    """Contents of run.json."""
 
     script: str = ""
     language: str = ""
@@ -61,14 +61,14 @@ def read(folder: Path) -> Record | None:
 
 
 def is_older(path: Path, record: Record | None) -> bool:
-    """Whether a file was there before the run began, and has not been written again since."""
+    """Return whether a file was there before the run began, and has not been written again since."""
     if record is None or path.name not in record.older:
         return False
     return _signature(path) == record.older[path.name]
 
 
 def is_earlier_frame(path: Path, record: Record | None) -> bool:
-    """Whether a frame is of a run before the one that wrote run.json. In a copy of a folder times of change say
+    """Return whether a frame is of a run before the one that wrote run.json. In a copy of a folder times of change say
     nothing; frames from beyond the end of the run are known there by their names."""
     found = _FRAME.fullmatch(path.name)
     if record is None or found is None or path.name not in record.older:

@@ -1,4 +1,4 @@
-"""From rows anywhere to slabs in one global order.
+"""Sort rows of all ranks into slabs of one global order.
 
 Strips hand particles about, files must not show it: every table is written in ascending order of its keys, each
 rank holding one contiguous slab. No rank ever holds more than its own rows and its own slab.

@@ -16,7 +16,7 @@ from hpcdem.io.layout import WORD as WORD
 
 @dataclass(frozen=True)
 class Column:
-    """How one column is written, right-aligned in `width` characters (at least one blank in front).
+    """Layout of one column, right-aligned in `width` characters (at least one blank in front).
 
     kind SCI: scientific notation with `digits` significant digits (at most 15);
     INT: an integer; FIXED: `digits` decimals, for numbers below 1e9 in size; WORD: index into a list of words.
@@ -105,7 +105,7 @@ class TextTable:
 
 
 def format_table(columns: Sequence[tuple[Column, np.ndarray]], words: Sequence[str] = ()) -> bytes:
-    """All rows of a table as text; see TextTable."""
+    """Return all rows of a table as text; see TextTable."""
     return b"".join(block.tobytes() for block in TextTable(columns, words).blocks())
 
 

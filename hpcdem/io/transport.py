@@ -130,7 +130,7 @@ def used(data: np.ndarray) -> None:
 
 
 class Places:
-    """Where the bytes of one rank go that come one after the other: runs (part of the file, place in it, bytes)."""
+    """Places of consecutive bytes of one rank in a file: runs (part of the file, place in it, bytes)."""
 
     def __init__(self, runs: Iterable[tuple[str, int, int]]) -> None:
         self._runs = [run for run in runs if run[2]]

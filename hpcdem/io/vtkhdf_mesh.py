@@ -120,7 +120,7 @@ def _flat(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def is_mesh_frame(path: str | os.PathLike) -> bool:
-    """Whether a file is a frame of blocks; False for what cannot be read, too."""
+    """Return whether a file is a frame of blocks; False for what cannot be read, too."""
     try:
         with h5.reading(path) as file:
             return bytes(file["VTKHDF"].attrs["Type"]) == b"UnstructuredGrid" and "hpcdem" in file

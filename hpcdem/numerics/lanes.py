@@ -33,13 +33,13 @@ _ROWS = types.UniTuple(types.uint64, GROUP)
 
 
 def lane(number: int) -> np.uint64:
-    """Where a lane begins."""
+    """Return where a lane begins."""
     return U(number * CAPACITY)
 
 
 @njit(cache=True, nogil=True)
 def offset(row, width):
-    """Where a row begins in a flat table."""
+    """Return where a row begins in a flat table."""
     return U(row) * U(width)
 
 
@@ -65,7 +65,7 @@ def as_bits(typingctx: Any, a: Any) -> Any:
 
 @intrinsic
 def as_number(typingctx: Any, mask: Any) -> Any:
-    """The same mask, as a number of which the compiler does not know that it is a question.
+    """Return the mask as a number of which the compiler does not know that it is a question.
 
     It would turn what is done with the mask into a jump, and a jump that no predictor can guess costs more than the
     whole contact law. (An empty piece of assembly, on any CPU.)
@@ -141,7 +141,7 @@ put_two_columns, put_four_columns = _put(2), _put(4)
 
 @intrinsic
 def add_in_turn(typingctx: Any, force: Any, i: Any, j: Any, lanes: Any, at: Any) -> Any:
-    """For each of four pairs, one after the other: force[i] += (a, b, c, 0), then force[j] += (-a, -b, d, 0).
+    """Add for each of four pairs, in sequence: force[i] += (a, b, c, 0), then force[j] += (-a, -b, d, 0).
 
     a..d: four lanes, the first from `at` on. The order of additions is that of the pairs, even where rows repeat.
     """

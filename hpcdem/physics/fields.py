@@ -22,10 +22,10 @@ FIELDS = ("moisture",)
 
 @dataclass(frozen=True)
 class Kind:
-    """What a field is called: name of its quantity at nodes, of mean_NAME of elements, of its conditions in scripts;
-    unit and doc of these. amount, flux, transfer: units of its content per metre of thickness, of what passes through
-    faces, and of that per difference. load: name of its class in
-    model.py; derived: unit and doc of quantities of elements that its methods of these names give."""
+    """Names of a field: name of its quantity at nodes, of mean_NAME of elements, of its conditions in scripts; unit and
+    doc of these. amount, flux, transfer: units of its content per metre of thickness, of what passes through faces, and
+    of that per difference. load: name of its class in model.py; derived: unit and doc of quantities of elements that
+    its methods of these names give."""
 
     name: str
     unit: str
@@ -59,6 +59,6 @@ class Kind:
 
 @functools.cache
 def kinds() -> dict[str, Kind]:
-    """All of them, by name."""
+    """Return all kinds of fields, by name."""
     found = (importlib.import_module(f"hpcdem.physics.{name}.properties").KIND for name in FIELDS)
     return {kind.name: kind for kind in found}

@@ -44,7 +44,7 @@ LawKind = TypeVar("LawKind", bound="Declared")
 
 @dataclass(frozen=True)
 class StateVariable:
-    """What an element or a contact remembers; initial: its value when the element gets the law, or discs touch."""
+    """State variable of an element or a contact; initial: its value when the element gets the law, or discs touch."""
 
     name: str
     unit: str
@@ -64,12 +64,12 @@ class Declared:
 
     @property
     def line(self) -> int:
-        """Where its function begins in its file."""
+        """Return where its function begins in its file."""
         return self.function.__code__.co_firstlineno
 
 
 class Wrong(Exception):
-    """What is wrong with a file; line: 0 if it has none."""
+    """Error in a file; line: 0 if it has none."""
 
     def __init__(self, line: int, message: str) -> None:
         super().__init__(message)
@@ -81,8 +81,8 @@ class UnknownLaw(CommandError):
 
 
 def agreed(sim: Model, path: Path, what: str, kind: str, take: Callable[[str, str, str, str], Made]) -> Made:
-    """What `take` makes of (text, path, name with digest, function) of 'file.py:function', on all ranks from the text
-    that rank 0 reads. kind: what it is, in messages. CommandError with file and line. Collective."""
+    """Return the result of `take` for (text, path, name with digest, function) of 'file.py:function', on all ranks from
+    the text that rank 0 reads. kind: what it is, in messages. CommandError with file and line. Collective."""
     file, _, function = what.rpartition(":")
     if not file.endswith(".py") or not function.isidentifier():
         raise CommandError(f"a {kind} is named 'file.py:function', got '{what}'")
@@ -138,9 +138,9 @@ def in_turn(comm: Comm, act: Callable[[], None]) -> float:
 
 
 def made_of(function: Callable[..., Any], path: str) -> str | None:
-    """What a function of the file `path` is made of when it is compiled, besides the text of the file: values of the
-    global names that it and the functions that it calls use. None if there is something among them of another file, or
-    for which this is unknown: then compiled code must not be kept."""
+    """Return the sources of a function of the file `path` when it is compiled, besides the text of the file: values of
+    the global names that it and the functions that it calls use. None if there is something among them of another file,
+    or for which this is unknown: then compiled code must not be kept."""
     told: list[str] = []
     seen: set[FunctionType] = set()
 
@@ -196,13 +196,13 @@ def law_of(text: str, path: str, name: str, function: str, kind: type[LawKind], 
     names = executed(text, path, name)
     if function not in names:
         laws = [key for key, value in names.items() if isinstance(value, kind)]
-        raise Wrong(0, f"there is no law '{function}' in it; there is {', '.join(laws) or 'none'}")
+        raise Wrong(0, f"there is no law '{function}' in it; available: {', '.join(laws) or 'none'}")
     declared = names[function]
     if isinstance(declared, kind):
         return declared
     code = getattr(getattr(declared, "function", declared), "__code__", None)
     line = code.co_firstlineno if code is not None and code.co_filename == path else 0
-    raise Wrong(line, f"'{function}' is not declared as a law: @{decorator}() stands before it, with brackets")
+    raise Wrong(line, f"'{function}' is not declared as a law: write @{decorator}(), with brackets, before it")
 
 
 def checked(
@@ -222,29 +222,31 @@ def checked(
         if not isinstance(name, str) or not name.isidentifier():
             raise Wrong(line, f"{name!r} cannot be the name of an argument")
         if every.count(name) > 1:
-            raise Wrong(line, f"'{name}' stands for something already; a law may declare other names only")
+            raise Wrong(line, f"'{name}' is reserved or declared twice: choose another name")
     for state in states:
         if not math.isfinite(state.initial):
-            raise Wrong(line, f"state variable '{state.name}' begins with {state.initial}")
+            raise Wrong(line, f"state variable '{state.name}': its initial value {state.initial} is not finite")
     arguments = inspect.signature(declared.function).parameters
     for argument in arguments.values():
         if argument.kind is not inspect.Parameter.POSITIONAL_OR_KEYWORD or argument.name not in every:
-            raise Wrong(line, f"'{argument}' is no argument of a law; there is {', '.join(every)}")
+            raise Wrong(line, f"'{argument}' is not an argument of a law; available: {', '.join(every)}")
         if argument.default is not inspect.Parameter.empty:
-            raise Wrong(line, f"'{argument}': arguments of a law have no defaults; {of.__name__}(..., default=) has")
+            raise Wrong(
+                line, f"'{argument}': arguments of a law cannot have defaults; use {of.__name__}(..., default=)"
+            )
     lost = [one for one in (*needed, *(s.name for s in states)) if one not in arguments]
     if lost:
-        raise Wrong(line, f"the law does not take {', '.join(lost)}")
+        raise Wrong(line, f"the law does not accept {', '.join(lost)}")
     takes = set(arguments)
     if callable(declared.stiffness):
         takes_too = inspect.signature(declared.stiffness).parameters
         others = [n for n in takes_too if n not in {*base, *(p.name for p in own)}]
         if others:
-            raise Wrong(line, f"stiffness takes properties, '{others[0]}' is none")
+            raise Wrong(line, f"stiffness accepts properties only, and '{others[0]}' is not a property")
         takes |= set(takes_too)
     idle = [p.name for p in own if p.name not in takes]
     if idle:
-        raise Wrong(line, f"property '{idle[0]}' is declared, but neither the law nor its stiffness takes it")
+        raise Wrong(line, f"property '{idle[0]}' is declared, but neither the law nor its stiffness uses it")
     return list(arguments)
 
 
@@ -262,8 +264,8 @@ def check_what_returns(kernel: Any, count: int, wanted: Sequence[str], path: str
 
 
 def stiffness_of(declared: Declared, law: str, values: Mapping[str, np.ndarray], unit: str) -> np.ndarray | None:
-    """What a law is never stiffer than (n,), of properties (n,) by name; None if it does not say. law: its place and
-    name. CommandError."""
+    """Return the largest stiffness of a law (n,) for properties (n,) by name; None if it does not say. law: its place
+    and name. CommandError."""
     if declared.stiffness is None:
         return None
     if callable(declared.stiffness):
@@ -297,10 +299,10 @@ def compiled(kernel: Any, types: Any, path: str, line: int) -> Any:
 
 
 def _message(error: BaseException) -> str:
-    """What a user's own code raised."""
+    """Return the message of an error in a user's code."""
     if isinstance(error, SystemExit):
         code = "" if error.code is None else repr(error.code)
-        return f"sys.exit({code}) would end the whole run: take it out"
+        return f"sys.exit({code}) would end the whole run: remove it"
     return f"{type(error).__name__}: {error}"
 
 

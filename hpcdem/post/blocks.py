@@ -137,7 +137,8 @@ def stress_range(state: MeshState) -> tuple[float, float]:
 
 
 def plastic_range(state: MeshState) -> tuple[float, float]:
-    """From 0 to the greatest plastic strain without the extreme percent of the elements that have some."""
+    """Return the range from 0 to the greatest plastic strain without the extreme percent of the elements that have
+    some."""
     values = plastic_shear(state)
     values = values[values > 0.0]
     return 0.0, float(np.percentile(values, 99.0)) if len(values) else 0.0
@@ -381,7 +382,7 @@ def unit_of(shown: Contours | fluid.Shown, span: tuple[float, float], state: Mes
 
 
 def titled(shown: Contours | fluid.Shown, span: tuple[float, float], state: MeshState) -> str:
-    """What stands over a bar."""
+    """Return the title of a colour bar."""
     return f"{shown.title} ({unit_of(shown, span, state)[1] or '-'})"
 
 

@@ -35,7 +35,7 @@ class Shown:
         return found
 
     def range(self, state: MeshState) -> tuple[float, float]:
-        """From 0, or the least value where that is a little below the greatest, to the greatest."""
+        """Return the range from 0, or the least value where that is a little below the greatest, to the greatest."""
         values = self.values(state)
         values = values[np.isfinite(values)]
         if not len(values):
@@ -55,12 +55,12 @@ PICTURES = {
 
 
 def there(state: MeshState) -> bool:
-    """Whether a frame has channels."""
+    """Return whether a frame has channels."""
     return bool(np.isfinite(state.of_joints.get("aperture", np.empty(0))).any())
 
 
 def with_proppant(state: MeshState) -> bool:
-    """Whether the fluid of a frame carries proppant."""
+    """Return whether the fluid of a frame carries proppant."""
     return "proppant_concentration" in state.of_joints
 
 

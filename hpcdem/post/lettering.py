@@ -67,8 +67,8 @@ def font_of(letters: frozenset[str]) -> tuple[str, str] | None:
 
 @cache
 def _cubic(path: str) -> bool:
-    """Whether the letters of a font are not those of TrueType: files of matplotlib that hold such fonts are read by
-    nobody."""
+    """Return whether the letters of a font are not those of TrueType: files of matplotlib that hold such fonts are read
+    by nobody."""
     with open(path, "rb") as file:
         head = file.read(16)
         if head[:4] == b"ttcf":  # several in one file
@@ -96,7 +96,7 @@ def _fonts() -> Iterator[tuple[str, str]]:
 
 @cache
 def _letters(path: str) -> frozenset[str]:
-    """What a font can write."""
+    """Return the characters of a font."""
     from matplotlib.font_manager import get_font
 
     try:

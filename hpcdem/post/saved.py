@@ -1,4 +1,4 @@
-"""How figures of matplotlib become files: the same figure gives the same bytes."""
+"""Save figures of matplotlib as files: equal figures give equal bytes."""
 
 from __future__ import annotations
 

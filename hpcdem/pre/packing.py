@@ -108,7 +108,7 @@ def insert_randomly(
 
 
 def nodes(radii: np.ndarray, x: tuple[float, float], y: tuple[float, float]) -> tuple[int, int]:
-    """How many nodes a square lattice of spacing 2 max(radii) has along x and y of a rectangle [m]."""
+    """Return how many nodes a square lattice of spacing 2 max(radii) has along x and y of a rectangle [m]."""
     spacing = 2.0 * float(np.max(radii))
     nx, ny = (max(int(np.floor((b - a) / spacing + 1e-9)), 0) for a, b in (x, y))
     return nx, ny

@@ -1,4 +1,5 @@
-"""What a control group (of a container or a job) allows; versions 1 and 2, where systemd mounts them, see cgroups(7).
+"""Read the limits of a control group (of a container or a job); versions 1 and 2, where systemd mounts them, see
+cgroups(7).
 
 root: where proc and sys are.
 """
@@ -29,7 +30,8 @@ def memory(root: Path) -> int | None:
 
 
 def free_memory(root: Path) -> int | None:
-    """What processes of this host can still take, and their control group allows [bytes]; None: nobody knows."""
+    """Return the memory that processes of this host can still take, and their control group allows [bytes]; None:
+    nobody knows."""
     free = re.search(r"^MemAvailable:\s+(\d+)", read(root / "proc/meminfo"), re.MULTILINE)
     found = [limit for limit in (memory(root), int(free[1]) * 1024 if free else None) if limit is not None]
     return min(found, default=None)

@@ -47,7 +47,7 @@ class Job:
 
 
 class _Count:
-    """How many kernels of the list were taken, how many of them had to be compiled and are, and how many have to."""
+    """Counters shared by processes: kernels taken from the list, kernels compiled, and kernels to be compiled."""
 
     def __init__(self, file: int) -> None:
         self.file = file
@@ -66,7 +66,7 @@ class _Count:
         return before
 
     def expect(self, count: int) -> None:
-        """So many have to be compiled, if nobody has said it before."""
+        """Set the number of kernels to be compiled, unless it is set already."""
         with _locked(self.file):
             if not any(self.read()):
                 os.pwrite(self.file, count.to_bytes(8, "little"), 16)
@@ -203,7 +203,8 @@ def _calls_recorded() -> Iterator[dict[tuple[Any, tuple[Any, ...]], None]]:
 
 
 def _length(function: FunctionType, seen: set[FunctionType]) -> int:
-    """Of its byte code and of that of all kernels it calls: about how long it takes to compile."""
+    """Return the length of the byte code of a function and of all kernels it calls, a measure of the time to compile
+    it."""
     if function in seen:
         return 0
     seen.add(function)

@@ -36,13 +36,14 @@ _DAY = 86400.0
 
 
 class Files:
-    """What a dispatcher of numba takes for its cache: a folder, and how the names of the kernel's files begin."""
+    """Cache of a dispatcher of numba: a folder, and how the names of the kernel's files begin."""
 
     def __init__(self, place: Path, name: str) -> None:
         self.cache_path, self._place, self._name = str(place), place, name
 
     def path(self, signature: Any) -> Path | None:
-        """Where a kernel with these types of arguments is; None if the text of the types does not tell them apart."""
+        """Return where a kernel with these types of arguments is; None if the text of the types does not tell them
+        apart."""
         text = str(signature)
         if " at 0x" in text:  # a function as argument
             return None
@@ -121,7 +122,7 @@ _warming = 0
 
 
 class _OfPackage(Files):
-    """Of a kernel of hpcdem: the folder is that of its module and of all that this imports, as they are now."""
+    """Cache of a kernel of hpcdem: the folder belongs to its module and of all that this imports, as they are now."""
 
     def __init__(self, kernel: Any) -> None:
         function = kernel.py_func
@@ -140,8 +141,8 @@ class _OfPackage(Files):
 
 
 def _made_of(function: Any) -> str:
-    """Its code, and what the function that made it has put into it: values, and other kernels, whose text would be the
-    place in memory."""
+    """Return the code of a function and what its factory has put into it: values, and other kernels, whose text would
+    be the place in memory."""
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     inner = [_made_of(cell.py_func) if hasattr(cell, "py_func") else repr(cell) for cell in cells]
     code = function.__code__
@@ -159,7 +160,7 @@ def _sources_of(function: Any) -> set[Path]:
 
 @contextlib.contextmanager
 def warming() -> Iterator[None]:
-    """What is compiled meanwhile is not late."""
+    """Do not count kernels that are compiled meanwhile as late."""
     global _warming
     _warming += 1
     try:
@@ -169,7 +170,7 @@ def warming() -> Iterator[None]:
 
 
 def install() -> None:
-    """From now on kernels of hpcdem are taken from the store, or go into it, also those that are imported already."""
+    """Take kernels of hpcdem from the store from now on, or go into it, also those that are imported already."""
     global _usual
     from numba.core.caching import FunctionCache
     from numba.core.dispatcher import Dispatcher
@@ -202,7 +203,7 @@ def install() -> None:
 
 
 def has(kernel: Any, types: tuple[Any, ...]) -> bool:
-    """Whether a kernel with these types of arguments is in the store."""
+    """Return whether a kernel with these types of arguments is in the store."""
     path = kernel._cache.path(types) if isinstance(kernel._cache, Files) else None
     return path is not None and path.is_file()
 
@@ -353,7 +354,7 @@ def cache_base(environ: Mapping[str, str] = os.environ) -> Path:
 
 
 def can_write(base: Path) -> bool:
-    """Whether files can be made in the folder, which is made first."""
+    """Return whether files can be made in the folder, which is made first."""
     try:
         base.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=base, buffering=0) as file:
@@ -418,18 +419,19 @@ def tidy(base: Path) -> None:
 
 
 def folder(*made_of: str) -> Path:
-    """Of the kernels that are made of these texts by this version on this type of machine. numba keeps a kernel by the
-    place of its source, and those that are made of other kernels not at all; here who asks says what it is made of."""
+    """Return the folder of the kernels that are made of these texts by this version on this type of machine. numba
+    keeps a kernel by the place of its source, and those that are made of other kernels not at all; here who asks says
+    what it is made of."""
     digest = hashlib.sha256(repr((version(), sources(), made_of)).encode()).hexdigest()
     return store()[0] / f"user-{digest[:32]}"
 
 
 def knows(place: Path, name: str) -> bool:
-    """Whether a kernel of this name is kept."""
+    """Return whether a kernel of this name is kept."""
     return any(place.glob(f"{name}-*"))
 
 
 def keep(kernel: Any, place: Path, name: str) -> None:
-    """From now on a kernel that has not been compiled yet is taken from this folder, or goes into it."""
+    """Take a kernel that has not been compiled yet from this folder from now on, or goes into it."""
     name_kernels_apart()
     kernel._cache = Files(place, name)

@@ -1,4 +1,4 @@
-"""Who compiles kernels, and when.
+"""Compile kernels, once per machine type.
 
 A kernel is compiled once per machine type and kept in the store (`kept.py`) as soon as it is done; every process takes
 from there what it calls, when it first calls it. What a kind of model may call is compiled before the model is made, by
@@ -80,7 +80,8 @@ def prepare_kernels(comm: Comm, log: Log, warm_ups: Mapping[str, Callable[[], No
 
 
 def ready(kind: str) -> bool:
-    """Whether all kernels of a kind are in the store: with threads there are more of them than with one thread."""
+    """Return whether all kernels of a kind are in the store: with threads there are more of them than with one
+    thread."""
     names = [_name(kind, threaded) for threaded in {True, _threaded()}]
     return any((kept.store()[0] / name).is_file() for name in names)
 
@@ -94,8 +95,8 @@ def _name(kind: str, threaded: bool) -> str:
 
 
 def turn_of(ranks: Sequence[tuple[str, str]], rank: int) -> int:
-    """When a rank compiles, 0 to 2: first one of each machine type, then one of each host, then the rest. ranks: host
-    and machine type of each."""
+    """Return the turn in which a rank compiles, 0 to 2: first one of each machine type, then one of each host, then the
+    rest. ranks: host and machine type of each."""
     host, key = ranks[rank]
     if next(r for r, one in enumerate(ranks) if one[1] == key) == rank:
         return 0
@@ -145,7 +146,7 @@ def _alone(place: Path, log: Log | None) -> Iterator[None]:
 
 
 def builder() -> str:
-    """Which process of this host compiles kernels at the moment, in words; "" none."""
+    """Return which process of this host compiles kernels at the moment, in words; "" none."""
     words = _text(kept.store()[0] / f"building-{socket.gethostname()}")
     try:
         os.kill(int(words.split()[1]), 0)

@@ -1,4 +1,4 @@
-"""From a process to a rank: environment, MPI, refusals and the start report.
+"""Turn a process into a rank: environment, MPI, refusals and the start report.
 
 Nothing here imports numpy, numba or mpi4py before it must: several of their settings are read only once, at
 their import.
@@ -120,7 +120,8 @@ def physical_cores(root: str = "/") -> int:
 
 
 def let_waiting_threads_sleep(threads: int) -> None:
-    """With more threads on a host than cores, a thread that waits by spinning takes a core from one that works."""
+    """Let waiting threads sleep where a host has more threads than cores: a spinning thread takes a core from one that
+    works."""
     counts = (os.environ.get(name, "") for name in LOCAL_RANKS)
     ranks = next((int(count) for count in counts if count.isdigit()), 1)
     if threads > 1 and ranks * threads > (os.cpu_count() or 1):
@@ -148,7 +149,7 @@ def started_threads() -> int | None:
 
 
 def openmp_runtime_found() -> bool:
-    """Whether numba's OpenMP layer finds the library it is linked against."""
+    """Return whether numba's OpenMP layer finds the library it is linked against."""
     if sys.platform != "linux":
         return True
     try:
@@ -173,7 +174,7 @@ def mask() -> frozenset[int]:
 
 @dataclass(frozen=True)
 class Launcher:
-    """What the launcher says: its name, the number of processes (None: it does not say) and which one this is."""
+    """Launcher of a process: its name, the number of processes (None: it does not say) and which one this is."""
 
     name: str
     size: int | None
@@ -191,7 +192,7 @@ def launcher() -> Launcher | None:
 
 
 def speaks_for_all() -> bool:
-    """Whether this process is the one that prints before MPI runs (the launcher's rank 0)."""
+    """Return whether this process is the one that prints before MPI runs (the launcher's rank 0)."""
     who = launcher()
     return who is None or who.rank == 0
 
@@ -274,7 +275,7 @@ def copies_of_rank_0(who: Launcher, library: str) -> str:
 
 
 def launcher_of(library: str, environ: Mapping[str, str] = os.environ) -> str:
-    """What starts ranks that this MPI library knows of."""
+    """Return the launcher whose ranks this MPI library knows."""
     if "SLURM_JOB_ID" in environ:
         return f"srun --mpi={slurm_mpi_type(library)} (srun --mpi=list shows the choices)"
     if "Open MPI" in library:
@@ -283,7 +284,7 @@ def launcher_of(library: str, environ: Mapping[str, str] = os.environ) -> str:
 
 
 def slurm_mpi_type(library: str) -> str:
-    """How srun has to tell the ranks about each other."""
+    """Return the PMI type with which srun connects ranks of this MPI library."""
     return "pmix" if "Open MPI" in library else "pmi2"
 
 
@@ -300,7 +301,7 @@ def patient_barrier(comm: Comm) -> None:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a rank runs: host and the cores in its mask before and after MPI began."""
+    """Place of a rank: host and the cores in its mask before and after MPI began."""
 
     host: str
     cores_before: int

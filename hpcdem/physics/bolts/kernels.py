@@ -55,7 +55,7 @@ def apart(a, b):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def led(conditions, dim):
-    """Whether a node moves as its conditions (9,) say, in one direction at least."""
+    """Return whether a node moves as its conditions (9,) say, in one direction at least."""
     found = conditions[DOES] != FREE or conditions[DOES + 2] != FREE
     return found or (dim == 3 and conditions[DOES + 4] != FREE)
 
@@ -83,8 +83,8 @@ def directions(first, x, state, along, tangent):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def host_points(node, row, weight, x, stride, seen):
-    """Where the rock is at nodes whose host is held here: rows (k,) of seen (n, d + 1) get weight (n, 4) times the
-    corners of x (rows, 4 stride or more), of which one begins every `stride` words."""
+    """Compute the position of the rock at nodes whose host is held here: rows (k,) of seen (n, d + 1) get weight (n, 4)
+    times the corners of x (rows, 4 stride or more), of which one begins every `stride` words."""
     dim = seen.shape[1] - 1
     for m in range(len(node)):
         i, r = node[m], row[m]

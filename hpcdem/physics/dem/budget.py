@@ -31,8 +31,8 @@ _wall_energy: Any = energy.wall_energy
 
 @dataclass(frozen=True)
 class Energy:
-    """All in joules but `relative`. Flows count since the start of the account: work_* was done on the model, loss_* it
-    lost, commands and box came with commands and with particles deleted by the BOX.
+    """Energy budget in joules; `relative` has no unit. Flows count since the start of the account: work_* was done on
+    the model, loss_* it lost, commands and box came with commands and with particles deleted by the BOX.
 
     closing: change of what is stored + losses - work - commands - box; relative: that over the largest flow (over
     what is stored, where nothing flowed).

@@ -104,7 +104,7 @@ class Rolling:
 
     @property
     def damped(self) -> bool:
-        """Whether there are dashpots."""
+        """Return whether there are dashpots."""
         return bool((self._of[:, rolling.DAMPING] > 0.0).any())
 
     def fastest(self, sim: Any) -> float:

@@ -141,8 +141,8 @@ class PairLaw:
         return [state.initial for state in self.declared.state]
 
     def of_pairs(self, mixed: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Of pairs of materials with these properties (m,) each: the table (m, columns) of the kernel, and bounds (m,
-        2) of dFn/du and dFs/ds [N/m]. CommandError if the law makes no sense with them."""
+        """Return for pairs of materials with these properties (m,) each: the table (m, columns) of the kernel, and
+        bounds (m, 2) of dFn/du and dFs/ds [N/m]. CommandError if the law makes no sense with them."""
         bounds = np.stack([mixed["kn"], mixed["ks"]], axis=1)
         stiff = stiffness_of(self.declared, self.place, mixed, "N/m")
         if stiff is not None:
@@ -211,7 +211,7 @@ class ModelLaws:
         if found:
             return found[-1]
         known = ", ".join((*BUILT_IN, *(one.title for one in self.laws)))
-        raise CommandError(f"no disc was given the law {title}; there is {known}")
+        raise CommandError(f"no disc has the law {title}; available: {known}")
 
     def title_of(self, material: Any) -> str:
         """The law of discs of a row of materials."""
@@ -255,7 +255,7 @@ class ModelLaws:
         return out
 
     def mixed(self, materials: np.ndarray) -> bool:
-        """Whether some pairs of materials have no common law."""
+        """Return whether some pairs of materials have no common law."""
         return bool(np.isnan(self.which(materials)).any())
 
     def which(self, materials: np.ndarray) -> np.ndarray:
@@ -268,8 +268,8 @@ class ModelLaws:
         return out
 
     def tables(self, materials: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of all pairs of materials: properties (n*n, columns), of its law each, and bounds (n, n, 2) of dFn/du and
-        dFs/ds [N/m]. CommandError if a law makes no sense with them."""
+        """Return for all pairs of materials: properties (n*n, columns), of its law each, and bounds (n, n, 2) of dFn/du
+        and dFs/ds [N/m]. CommandError if a law makes no sense with them."""
         n, which = len(materials), self.which(materials).reshape(-1)
         table = np.zeros((n * n, max(len(law.kernel.columns) for law in self.laws)))
         bounds = np.zeros((n * n, 2))
@@ -303,7 +303,7 @@ class ModelLaws:
 
     @staticmethod
     def restored(state: dict[str, Any]) -> ModelLaws:
-        """From the state of a checkpoint. UnknownLaw unless its laws were named in this run."""
+        """Restore from the state of a checkpoint. UnknownLaw unless its laws were named in this run."""
         found = state.get("pair_laws") or {"names": [state["pair_law"]] if state.get("pair_law") else []}
         out = ModelLaws()
         out.take(tuple(_known(name) for name in found["names"]))
@@ -362,7 +362,7 @@ def _made(text: str, path: str, name: str, function: str) -> PairLaw:
     line, own = declared.line, declared.properties
     arguments = checked(declared, PairProperty, tuple(BASE), user_pairs.GIVEN, ("u", "fs"))
     if len(own) > len(OWN):
-        raise Wrong(line, f"the law declares {len(own)} properties; at most {len(OWN)} are possible")
+        raise Wrong(line, f"the law declares {len(own)} properties; at most {len(OWN)} are allowed")
     for one in own:
         if one.mix not in MIXES:
             raise Wrong(line, f"property '{one.name}': mix is '{one.mix}', expected {', '.join(MIXES)}")
@@ -397,7 +397,9 @@ def _of_energy(declared: _Declared, columns: Sequence[str], states: Sequence[str
     takes = list(inspect.signature(function).parameters)
     for name in takes:
         if name not in known:
-            raise Wrong(_line(function), f"'{name}' is no argument of an energy function; there is {', '.join(known)}")
+            raise Wrong(
+                _line(function), f"'{name}' is not an argument of an energy function; available: {', '.join(known)}"
+            )
     return takes
 
 

@@ -113,7 +113,7 @@ def face_partners(cells: np.ndarray, n_points: int) -> np.ndarray:
 
 
 def edges_of(cells: np.ndarray, n_points: int, partner: np.ndarray | None = None) -> Edges:
-    """All edges, ascending by number; `partner` of `face_partners` if it is there already."""
+    """Return all edges, ascending by number; `partner` of `face_partners` if it is there already."""
     partner = face_partners(cells, n_points) if partner is None else partner
     face = np.arange(4 * len(cells))
     real = np.ones(len(face), bool)

@@ -199,9 +199,9 @@ class Mesh:
         return out
 
     def on_sides(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Which of these faces (n,) are half a side of a hexahedron (k,), the corner (k,), element * 4 + k, that only
-        the other half has, and how corners share what is bilinear: g (k, 4) of the three and this one, e (k, 3), see
-        kernels/joints_hexes.py. The same bits from both sides of a face."""
+        """Find which of these faces (n,) are half a side of a hexahedron (k,), the corner (k,), element * 4 + k, that
+        only the other half has, and how corners share what is bilinear: g (k, 4) of the three and this one, e (k, 3),
+        see kernels/joints_hexes.py. The same bits from both sides of a face."""
         at = np.empty(0, np.int64) if not len(self.hexes) else np.flatnonzero(self._other_half[faces] >= 0)
         if not len(at):
             return at, at, np.empty((0, 4)), np.empty((0, 3))
@@ -260,7 +260,7 @@ class Mesh:
         return sizes(self.points[self.face_points(faces)])
 
     def edges(self) -> Edges:
-        """All edges, in space all faces, ascending by number. Computed again at each call."""
+        """Return all edges, in space all faces, ascending by number. Computed again at each call."""
         found: Edges = self._of.edges_of(self.cells, len(self.points))
         return found
 
@@ -293,7 +293,8 @@ class Mesh:
         return centres(self.points, self.cells[elements]) if self.macro.stress_of_parts else self.centroids(elements)
 
     def nearest_element(self, points: np.ndarray, cells: np.ndarray, at: tuple[float, ...], among: np.ndarray) -> int:
-        """Which of the cells (n, 4) of points (m, dim) holds the point `at`, or is nearest to it; among: of these."""
+        """Return which of the cells (n, 4) of points (m, dim) holds the point `at`, or is nearest to it; among: of
+        these."""
         return int(self._of.nearest_element(points, cells, at, among))
 
     def mean_edge(self) -> float:
@@ -395,7 +396,7 @@ def _bad_numbers(mesh: Mesh, names: Names) -> str | None:
 
 
 def _bad_hexes(mesh: Mesh, names: Names) -> str | None:
-    """All tetrahedra of both overlays have a volume."""
+    """Find hexahedra with a tetrahedron of either overlay that has no volume."""
     if not len(mesh.hexes):
         return None
     points = mesh.hexes[:, :8]

@@ -114,7 +114,7 @@ class NodeSet:
         return self.begin, self.corner
 
     def _where(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where their corners are, as the kernel takes it besides."""
+        """Return where their corners are, as the kernel takes it besides."""
         return self.place, self.again
 
     def move(self, force: np.ndarray, loads: Loads) -> None:
@@ -148,7 +148,7 @@ class NodeSet:
 
     @cached_property
     def mine(self) -> np.ndarray:
-        """Whether the lowest corner of each node is on an element of this rank, bool."""
+        """Return whether the lowest corner of each node is on an element of this rank, bool."""
         row, own = self.sim.where[self.first_corners // 4], self.sim.owned
         return (row >= own.start) & (row < own.stop)
 

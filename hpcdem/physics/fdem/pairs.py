@@ -32,7 +32,7 @@ def cut_corner(mesh: Mesh) -> np.ndarray:
 
 
 class Measures(Protocol):
-    """What contact needs to know of the shapes of elements (n,), in the plane and in space.
+    """Shapes of elements for contact (n,), in the plane and in space.
 
     double_area: twice the area of a body [m2], in space the length h of the potential [m]; edge: mean edge [m], in
     space 1; slender: mean edge squared over double_area, in space the root of a face's area over it; overlay: smallest
@@ -81,8 +81,8 @@ def smallest_overlay(sim: State, numbers: np.ndarray) -> np.ndarray:
 
 
 class Kinds(NamedTuple):
-    """What tells properties of faces in contact apart: by face the rows of its contact model and of its joint, by
-    element that of its model, and the kinds of rows; alike: all faces of the model are of one kind."""
+    """Rows that determine the properties of faces in contact: by face the rows of its contact model and of its joint,
+    by element that of its model, and the kinds of rows; alike: all faces of the model are of one kind."""
 
     model: np.ndarray
     joint_row: np.ndarray
@@ -214,8 +214,8 @@ class Surfaces:
 
 
 class ElementTables(Protocol):
-    """What contact asks of the tables of elements (local.py). triangle_of_row (n_own,): place of an owned element among
-    the triangles, -1: none; quad_rows: storage rows of the quads; head: one word per block of triangles."""
+    """Tables of elements that contact uses (local.py). triangle_of_row (n_own,): place of an owned element among the
+    triangles, -1: none; quad_rows: storage rows of the quads; head: one word per block of triangles."""
 
     triangle_of_row: np.ndarray
     quad_rows: np.ndarray
@@ -227,7 +227,7 @@ class ElementTables(Protocol):
 
     @property
     def kinds(self) -> Kinds:
-        """What tells properties of faces in contact apart."""
+        """Return the rows that determine the properties of faces in contact."""
 
 
 class Bodies:
@@ -556,7 +556,7 @@ def touched_rows(number, cells, on_surface, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _like(f, g, model, joint_row, joint, element_row, body):
-    """Whether two faces have the same properties: see `Kinds`."""
+    """Return whether two faces have the same properties: see `Kinds`."""
     if model[f] != model[g]:
         return False
     return model[f] > 0 or (
@@ -575,8 +575,9 @@ def touched_faces(
     element, start, points, cells, partner, closed, model, joint_row, joint, element_row, body, alike, free, face,
     several, found
 ):  # fmt: skip
-    """At which faces bodies can be touched: their own free edges, and the free faces that end, or begin, where a corner
-    of theirs is on the surface (found from element to element through closed faces). model ... alike: see `Kinds`.
+    """Return the faces at which bodies can be touched: their own free edges, and the free faces that end, or begin,
+    where a corner of theirs is on the surface (found from element to element through closed faces). model ... alike:
+    see `Kinds`.
 
     free (n,): bits of the free edges; face (n,): the first of the faces, -1: none; several (n,): 1 if others have other
     properties. found (n * MOST_FACES, 5), or without rows: number of each face, then CORNER ... ALONG_3 of contact.py;

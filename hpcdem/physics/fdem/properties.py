@@ -79,7 +79,7 @@ class Model:
     dims: tuple[int, ...] = (2, 3)
 
     def has(self, name: str) -> bool:
-        """Whether it has a property of this name."""
+        """Return whether it has a property of this name."""
         return any(one.name == name for one in self.properties)
 
     def property(self, name: str) -> Property:
@@ -105,7 +105,7 @@ class Model:
         return values
 
     def complete(self, given: Mapping[str, float]) -> dict[str, float]:
-        """All values of the model, checked, in the order of `properties`.
+        """Return all values of the model, checked, in the order of `properties`.
 
         CommandError for an unknown name, a value out of range, or a compulsory property that is missing.
         """
@@ -147,7 +147,7 @@ MODULI = ("young", "poisson_ratio", "shear", "bulk")
 
 
 def _elastic(values: dict[str, Any]) -> None:
-    """All four moduli from two of them."""
+    """Complete the four moduli from two of them."""
     given = [name for name in MODULI if name in values]
     if len(given) != 2:
         got = f"got {', '.join(given)}" if given else "got none"
@@ -214,13 +214,14 @@ def _temperature_tables(*properties: Property) -> tuple[Property, ...]:
 
 
 def _strength(values: dict[str, Any]) -> None:
-    """All four moduli; no more dilation than friction, or flow would give energy."""
+    """Complete the four moduli and check that dilation is at most friction, or flow would give energy."""
     _elastic(values)
     _no_more_dilation(values)
 
 
 def _agree(values: dict[str, Any]) -> bool:
-    """Whether E and Poisson's ratio are those of the bulk and Maxwell shear modulus beside them, but for rounding."""
+    """Return whether E and Poisson's ratio are those of the bulk and Maxwell shear modulus beside them, but for
+    rounding."""
     one = {"shear": values["maxwell_shear"], "bulk": values["bulk"]}
     _elastic(one)
     near = (np.isclose(one[name], values[name], rtol=1e-9, atol=1e-9) for name in ("young", "poisson_ratio"))
@@ -228,8 +229,8 @@ def _agree(values: dict[str, Any]) -> bool:
 
 
 def _burgers(values: dict[str, Any]) -> None:
-    """All four moduli from Young's modulus and Poisson's ratio, of which a bulk or Maxwell shear modulus that is given
-    takes the place of what they give, or from two of the four."""
+    """Complete the four moduli from Young's modulus and Poisson's ratio, of which a bulk or Maxwell shear modulus that
+    is given takes the place of what they give, or from two of the four."""
     _kelvin_zz(values)
     own = ("young", "poisson_ratio", "maxwell_shear", "bulk")
     given = [name for name in own if name in values]
@@ -363,7 +364,7 @@ MECH_BURGERS = Model(
 SOLID = Model(
     "of elements",
     ELEMENT,
-    "all that an element may have, whatever its model",
+    "properties of elements of any model",
     tuple({p.name: p for m in (MECH_BURGERS, MECH_MOHR_COULOMB, MECH_ISO_ELASTIC) for p in m.properties}.values()),
 )
 
@@ -455,7 +456,7 @@ BARTON_BANDIS = Model(
 OF_JOINTS = Model(
     "of joints",
     JOINT,
-    "all that a joint may have, whatever its model",
+    "properties of joints of any model",
     tuple({p.name: p for m in (BARTON_BANDIS, COULOMB_JOINT, COHESIVE) for p in m.properties}.values()),
 )
 
@@ -486,7 +487,7 @@ def model(name: str, on: str) -> Model:
     found = MODELS.get(name)
     if found is None or found.on != on:
         known = ", ".join(m.name for m in MODELS.values() if m.on == on and type(m) is Model)
-        raise CommandError(f"there is no model {name} for an {on}; there is {known}")
+        raise CommandError(f"there is no model {name} for an {on}; available: {known}")
     return found
 
 

@@ -1,4 +1,4 @@
-"""What supports of rock have in common, which nodes and elements of their own make up: bolts, liners.
+"""Common parts of supports of rock, which nodes and elements of their own make up: bolts, liners.
 
 All ranks have all of them: per step they hand each other where the rock is at the nodes, one reduction of integers, and
 then compute the same. So the bits depend on neither ranks nor threads.
@@ -38,7 +38,7 @@ Columns = Mapping[str, tuple[type, int]]
 
 
 class Prescribed(SurfaceLoad):
-    """What is prescribed at the nodes of a structure. nodes: columns by name, among them the row of `conditions`."""
+    """Conditions at the nodes of a structure. nodes: columns by name, among them the row of `conditions`."""
 
     blocks: Blocks
     nodes: dict[str, np.ndarray]
@@ -60,7 +60,7 @@ class Prescribed(SurfaceLoad):
         for value in changes.values():
             if isinstance(value, str) and value not in self.blocks.tables:
                 known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
-                raise CommandError(f"there is no table '{value}'; there is {known}")
+                raise CommandError(f"there is no table '{value}'; available: {known}")
             if not isinstance(value, str) and not math.isfinite(value):
                 raise CommandError(f"a condition of a {self.word} must be finite, got {value:g}")
         self.blocks.before_change()
@@ -80,7 +80,7 @@ class Prescribed(SurfaceLoad):
         self.blocks.changed(stiffness=False)
 
     def uses_table(self, name: str) -> bool:
-        """Whether a node follows this table. Not collective."""
+        """Return whether a node follows this table. Not collective."""
         used = {self.conditions[row] for row in np.unique(self.nodes["condition"]).tolist()}
         return any(name in asdict(one).values() for one in used)
 
@@ -115,8 +115,8 @@ class Prescribed(SurfaceLoad):
 
 
 class Structure(Prescribed):
-    """All of a kind in a model of blocks. nodes, elements: columns by name, equal on all ranks. Methods are collective
-    unless they say otherwise; CommandError, alike on all ranks, for what makes no sense."""
+    """All supports of a kind in a model of blocks. nodes, elements: columns by name, equal on all ranks. Methods are
+    collective unless they say otherwise; CommandError, alike on all ranks, for what makes no sense."""
 
     of_mesh: ClassVar[bool] = True
     quantities: ClassVar[Mapping[str, Mapping[str, tuple[str, str]]]]
@@ -167,7 +167,7 @@ class Structure(Prescribed):
 
     @abstractmethod
     def _arrange(self) -> None:
-        """All that follows from columns, properties and hosts."""
+        """Compute everything that follows from columns, properties and hosts."""
 
     @abstractmethod
     def _find_forces(self) -> None:
@@ -210,7 +210,7 @@ class Structure(Prescribed):
 
     @abstractmethod
     def _seen(self) -> np.ndarray:
-        """What points see of the rock that holds them, where this rank owns it; zeros elsewhere."""
+        """Return what points see of the rock that holds them, where this rank owns it; zeros elsewhere."""
 
     @abstractmethod
     def _move(self, seen: np.ndarray, conditions: np.ndarray, alpha: float, work: np.ndarray) -> None:
@@ -352,7 +352,7 @@ class Structure(Prescribed):
         """CommandError if there is no such quantity here. Not collective."""
         known = self._known(kind)
         if name not in known:
-            raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(known)}")
+            raise CommandError(f"there is no quantity {name} of a {kind}; available: {', '.join(known)}")
 
     def _known(self, kind: str) -> list[str]:
         """Quantities that can be queried; none along z in two dimensions."""
@@ -378,7 +378,7 @@ class Structure(Prescribed):
             self.work[:] = -self._half_step(blocks.clock.dt) if self._account is not None else 0.0
 
     def _held_here(self) -> tuple[np.ndarray, np.ndarray]:
-        """Which of its points are held by an element that this rank owns, and the storage rows of these."""
+        """Return which of its points are held by an element that this rank owns, and the storage rows of these."""
         blocks, host = self.blocks, self._hosts()
         row = np.where(host >= 0, blocks.where[host], -1)
         at = np.flatnonzero((row >= blocks.owned.start) & (row < blocks.owned.stop))
@@ -421,7 +421,7 @@ class Structure(Prescribed):
             work_on_rock(before, self._on_rock, self._rock, work)
 
     def elements_removed(self, elements: np.ndarray) -> None:
-        """What these elements of the rock held is free of them from now on."""
+        """Release the nodes that these elements of the rock held."""
         lost = np.isin(getattr(self, self.held)["host"], elements)
         if not lost.any():
             return
@@ -431,7 +431,7 @@ class Structure(Prescribed):
             self.blocks.log.info(f"{int(lost.sum())} {self.word} {self.held} lost their rock, which was removed")
 
     def mesh_replaced(self) -> None:
-        """There is another mesh: `of_mesh` says that these are gone with the one before."""
+        """Handle a replaced mesh: `of_mesh` says that these are gone with the one before."""
 
     def _tell_of_mass(self, mass: np.ndarray, more: str) -> None:
         """Say once in a while how much mass the time step adds to the nodes."""
@@ -449,7 +449,7 @@ class Structure(Prescribed):
     # ---- state on disk -----------------------------------------------------------------------------------------------
 
     def saved_state(self) -> dict[str, Any]:
-        """All but the columns, as JSON values."""
+        """Return the state without its columns, as JSON values."""
         return {
             "rows": [list(row) for row in self.rows], "conditions": [asdict(one) for one in self.conditions],
             "work": self.work.tolist(), "commands": self.commands, "start": self._stored_at_start,

@@ -19,7 +19,8 @@ SHARED_OUT = ("flow_nodes", "proppant_nodes", "fluid_heat")
 
 
 class SurfaceLoad(ABC):
-    """What blocks ask of one; `name` is one of ORDER; of_mesh: it goes with the mesh that it was made for."""
+    """Interface of a load on the surfaces of blocks; `name` is one of ORDER; of_mesh: it goes with the mesh that it was
+    made for."""
 
     name: ClassVar[str]
     of_mesh: ClassVar[bool] = False
@@ -32,18 +33,18 @@ class SurfaceLoad(ABC):
 
     @property
     def keeps_time(self) -> bool:
-        """Whether model time advances although the blocks are at rest; the first such load determines it. Not
+        """Return whether model time advances although the blocks are at rest; the first such load determines it. Not
         collective."""
         return False
 
     @classmethod
     def there(cls, blocks: Any) -> Self | None:
-        """That of a model, None if it has none. Not collective."""
+        """Return the load of a model, None if it has none. Not collective."""
         return next((load for load in blocks.surface_loads if isinstance(load, cls)), None)
 
     @classmethod
     def of(cls, blocks: Any) -> Self:
-        """That of a model, made on the first call. Not collective."""
+        """Return the load of a model, made on the first call. Not collective."""
         found = cls.there(blocks)
         if found is None:
             found = cls.new(blocks)
@@ -57,7 +58,7 @@ class SurfaceLoad(ABC):
 
     @property
     def stays(self) -> bool:
-        """Whether its forces stay constant while the static solver iterates."""
+        """Return whether its forces stay constant while the static solver iterates."""
         return False
 
     @abstractmethod
@@ -74,7 +75,7 @@ class SurfaceLoad(ABC):
 
     @abstractmethod
     def mesh_replaced(self) -> None:
-        """There is another mesh."""
+        """Handle a replaced mesh."""
 
     def springs(self, blocks: Any) -> np.ndarray | None:
         """(n_own, 4) stiffness [N/m per m] that it brings to corners of owned elements, for masses and time step."""
@@ -107,7 +108,7 @@ class SurfaceLoad(ABC):
         return None
 
     def balance(self) -> tuple[np.ndarray, np.ndarray]:
-        """This rank's share of its own unbalanced and contributing forces [N/m], for the ratio of the model."""
+        """Return this rank's share of its own unbalanced and contributing forces [N/m], for the ratio of the model."""
         return np.empty(0), np.empty(0)
 
     def work_done(self) -> float:
@@ -116,20 +117,20 @@ class SurfaceLoad(ABC):
         return 0.0
 
     def elements_removed(self, elements: np.ndarray) -> None:  # noqa: B027 - most have nothing to do here
-        """These elements are removed; the model is open. Collective."""
+        """Update the load for removed elements; the model is open. Collective."""
 
     def uses_table(self, name: str) -> bool:
-        """Whether something of it follows this table of time. Not collective."""
+        """Return whether something of it follows this table of time. Not collective."""
         return False
 
     def balanced(self) -> None:  # noqa: B027 - most have nothing to do here
         """The static solve found equilibrium with the present forces. Collective."""
 
     def stop(self) -> None:  # noqa: B027 - most have nothing to do here
-        """All velocities become zero. Not collective."""
+        """Set all velocities to zero. Not collective."""
 
     def saved_state(self) -> dict[str, Any] | None:
-        """What a checkpoint holds of it, as JSON values; None: it is saved elsewhere. Collective."""
+        """Return what a checkpoint holds of it, as JSON values; None: it is saved elsewhere. Collective."""
         return None
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
@@ -183,7 +184,7 @@ class SurfaceLoads:
             load.storage_rebuilt()
 
     def mesh_replaced(self) -> None:
-        """There is another mesh, or none."""
+        """Handle a replaced or deleted mesh."""
         for load in self._loads:
             load.mesh_replaced()
         self._loads = [load for load in self._loads if not load.of_mesh]
@@ -227,7 +228,7 @@ class SurfaceLoads:
             load.follow()
 
     def balance(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """This rank's share of their own unbalanced and contributing forces [N/m]. Not collective."""
+        """Return this rank's share of their own unbalanced and contributing forces [N/m]. Not collective."""
         found = [load.balance() for load in self._loads]
         return [one for one, _ in found], [other for _, other in found]
 
@@ -236,12 +237,12 @@ class SurfaceLoads:
         return {load.name: load.work_done() for load in self._loads}
 
     def elements_removed(self, elements: np.ndarray) -> None:
-        """These elements are removed; the model is open. Collective."""
+        """Update the load for removed elements; the model is open. Collective."""
         for load in self._loads:
             load.elements_removed(elements)
 
     def saved_state(self) -> dict[str, dict[str, Any]]:
-        """By name what a checkpoint holds of them, as JSON values. Collective."""
+        """Return by name the parts of a checkpoint, as JSON values. Collective."""
         found = {load.name: load.saved_state() for load in self._loads}
         return {name: state for name, state in found.items() if state is not None}
 

@@ -72,7 +72,11 @@ def _made(text: str, path: str, name: str, function: str) -> UserFunction:
     line = made.__code__.co_firstlineno
     names = tuple(inspect.signature(made).parameters)
     if not names or set(names) - set(ARGUMENTS):
-        raise Wrong(line, f"a boundary condition is a function of {', '.join(ARGUMENTS)}, '{function}' is of {names}")
+        raise Wrong(
+            line,
+            f"a boundary condition must be a function of {', '.join(ARGUMENTS)}, but '{function}' is a function of "
+            f"{names}",
+        )
     kernel = njit(error_model="numpy", nogil=True)(made)
     found = compiled(kernel, (types.float64,) * len(names), path, line)
     if found != types.float64:

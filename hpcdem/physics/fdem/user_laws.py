@@ -191,7 +191,7 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     except NumbaError as error:
         raise Wrong(line, numba_message(error)) from None
     title, _, _ = name.partition(MARK)
-    bound = Property(BOUND, "Pa", "what the slope of the law is never above", optional=True, low_itself=False,
+    bound = Property(BOUND, "Pa", "upper bound of the slope of the law", optional=True, low_itself=False,
                      internal=True)  # fmt: skip
 
     def derive(values: dict[str, Any]) -> None:

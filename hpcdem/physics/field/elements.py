@@ -128,7 +128,7 @@ def _at_places(part, threads, at, g, t, q):
 
 @on_threads
 def conduct(threads, g, at, g_there, t, q):
-    """What flows to the corners of elements by conduction in them, stored in q (flat), with values t (flat): g (n, 3 or
+    """Compute the flows to the corners of elements by conduction, stored in q (flat), with values t (flat): g (n, 3 or
     6) between those of rows of storage, then g_there (m, 24) between those at places at (m, 8)."""
     for part in prange(threads):
         _in_rows(part, threads, g, t, q)
@@ -137,7 +137,7 @@ def conduct(threads, g, at, g_there, t, q):
 
 
 def of_kinds(mesh: Mesh, number: np.ndarray) -> Iterator[tuple[Kind, np.ndarray, np.ndarray]]:
-    """These elements (n,) of the mesh by their kinds: which they are (m,), of hexahedra their first parts, and where
+    """Sort these elements (n,) of the mesh by kind: which they are (m,), of hexahedra their first parts, and where
     their corners are (m, c), element * 4 + k. All kinds that the mesh has, also those that none of these are of: ranks
     gather matrices kind by kind, so all have them in one order."""
     hexes, there = mesh.hexes, np.ones(len(number), bool)
@@ -155,7 +155,7 @@ def of_kinds(mesh: Mesh, number: np.ndarray) -> Iterator[tuple[Kind, np.ndarray,
 
 
 class Conduction:
-    """What flows between the corners of the elements that a rank holds, ghosts too.
+    """Conduction between the corners of the elements that a rank holds, ghosts too.
 
     g (n, 3 or 6): between those of rows of storage, 0 of parts of hexahedra; hexes (m, 8), g_hexes (m, 24): where the
     corners of hexahedra are in t, flat, and what flows between them; sizes (n, w): half the sum of what flows to each
@@ -181,11 +181,11 @@ class Conduction:
                 sizes[places[:, b]] += each[:, pair]
 
     def _places(self, corners: np.ndarray) -> np.ndarray:
-        """Where corners, element * 4 + k, are in t, flat."""
+        """Return where corners, element * 4 + k, are in t, flat."""
         return self.blocks.where[corners // 4] * self.width + corners % 4
 
     def conduct(self, t: np.ndarray, q: np.ndarray) -> None:
-        """What flows to corners into q (flat), with values t (flat)."""
+        """Compute the flows to corners into q (flat), with values t (flat)."""
         conduct(self.blocks.threads, self.g, self.hexes, self.g_hexes, t, q)
 
     def by_kind(self) -> Iterator[tuple[Kind, np.ndarray, np.ndarray, np.ndarray]]:

@@ -174,7 +174,7 @@ def longest_step(begin, channel, ends, channels, nodes, state, bulk):
 
 @njit(cache=True, error_model="numpy")
 def _along(c, ends, channels, state):
-    """What flows in a channel from its first end on."""
+    """Return the flow in a channel from its first end on."""
     a, b = ends[c, 0], ends[c, 1]
     head = (state[a, P] - state[b, P]) + (state[a, E] - state[b, E]) * channels[c, WEIGHT]
     s = 0.5 * (state[a, S] + state[b, S])
@@ -184,7 +184,7 @@ def _along(c, ends, channels, state):
 
 @njit(cache=True, error_model="numpy")
 def _leaking(c, ends, row, began, before, after, channels, state):
-    """What each end of a channel loses to the rock in a sub-step."""
+    """Return the leak-off of each end of a channel in a sub-step."""
     a, b = ends[c, 0], ends[c, 1]
     over = 0.5 * (state[a, P] + state[b, P]) - row[PORE]
     if over > 0.0 and row[LEAK] > 0.0 and began <= before:
@@ -291,7 +291,7 @@ def _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table
 
 @on_threads
 def fill(threads, *args):
-    """What `sub_step` does with the nodes after `flows`, on several threads. begin (n + 1,), channel, side (k,): see
+    """Update the nodes as `sub_step` does after `flows`, on several threads. begin (n + 1,), channel, side (k,): see
     network.at_nodes."""
     for t in prange(threads):
         _fill(t, threads, *args)

@@ -9,7 +9,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def touching(first, second, start, free, element, cells, where, x, h, near, deep, wide, corner, weight, pass_on):
-    """Where faces of bodies touch: how many places, and as many rows of the rest as there are.
+    """Return where faces of bodies touch: how many places, and as many rows of the rest as there are.
 
     first, second (m,): pairs of bodies; start, free, element (bodies,): see pairs.Bodies; h (rows,) [W/(m2 K)]:
     transfer coefficients of the elements held here, of two bodies in contact the harmonic mean of both. Faces that look

@@ -1,4 +1,4 @@
-"""What heat in space has of its own: friction, and where faces touch."""
+"""Kernels of heat in space: friction, and where faces touch."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _seen(one, two, near, deep, polygon, other, onto):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def touching(first, second, share, x, h, near, deep, corner, weight, pass_on):
-    """Where faces touch: how many places, and as many rows of the rest as there are; see `kernels.touching`.
+    """Return where faces touch: how many places, and as many rows of the rest as there are; see `kernels.touching`.
 
     first, second (m, 3): corners of pairs of triangles, 4 row + k of storage; share (m,): which part of their heat
     counts; x (n, 16); h (rows,) [W/(m2 K)]. The part of a face that sees the other one is a polygon; triangles from the

@@ -37,7 +37,8 @@ COS_SMOOTH = math.cos(math.radians(SMOOTH))
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def largest_moment(force, tension, compression, plastic):
-    """At a force across the section: M = 4 Mp (Nt - N) (N + Nc) / (Nt + Nc)^2, of a rectangle the exact limit."""
+    """Return the largest moment at a force across the section: M = 4 Mp (Nt - N) (N + Nc) / (Nt + Nc)^2, of a rectangle
+    the exact limit."""
     if math.isinf(tension):
         return math.inf
     both = tension + compression
@@ -101,7 +102,8 @@ def bond(ends, frame, state, bound, points, step, rock, gap, slip, pressure, she
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def given(conditions, nodes, parts, dim, total, on_rock):
-    """What conditions and gravity do, total (n, len(parts)); nothing on the rock, on_rock (k m, d) [N]."""
+    """Compute the forces of conditions and gravity, total (n, len(parts)); nothing on the rock, on_rock (k m, d)
+    [N]."""
     for i in range(len(total)):
         for c in range(len(parts)):
             total[i, c] = conditions[i, FORCE + parts[c]]
@@ -153,8 +155,8 @@ def move(x, v, spin, parts, total, conditions, nodes, dt, alpha, reaction, step,
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def host_points(point, row, corner, x, stride, seen):
-    """Where the rock is at points (k,) whose host is held here: corner of storage row of x, of which one begins every
-    `stride` words; fills seen (all points, d)."""
+    """Return where the rock is at points (k,) whose host is held here: corner of storage row of x, of which one begins
+    every `stride` words; fills seen (all points, d)."""
     for m in range(len(point)):
         q = point[m]
         for c in range(seen.shape[1]):

@@ -1,4 +1,4 @@
-"""What kernels.py lacks in space: arithmetic of flat triangular shells that may turn by any angle.
+"""Arithmetic of flat triangular shells that may turn by any angle.
 
 Element e of (m,) has the nodes ends[e], counter-clockwise as seen from outside of the rock. Its frame (3, 3) has two
 unit vectors in its plane, which turn with it as the rotation of its deformation gradient says, and the normal, away

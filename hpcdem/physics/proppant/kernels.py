@@ -47,7 +47,7 @@ def _across(down, ax, ay, az, nx, ny, nz):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def falls(one, other, x, down, out):
-    """What a unit velocity down (dim,), a direction, brings along links, out (l,). one, other (m, dim): where the
+    """Compute the transport along links by a unit velocity down (dim,), out (l,). one, other (m, dim): where the
     corners of both faces of channels begin in x. Of an edge the cosine of its angle to it; of a triangle what crosses
     the medians [m]: of the velocity only what is in its plane counts."""
     x = x.reshape(x.size)
@@ -72,11 +72,11 @@ def falls(one, other, x, down, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def carry(ends, fall, carries, q, channels, fluid, narrow, speed, state, out):
-    """What channels carry, out (m, 2) [m2/s]: volume rates of proppant. fall (m,): see `falls`; carries (m,) bool; q
-    (m,): flow of slurry [m2/s]; fluid: state of the flow's nodes, grains settle in as much of a channel as is filled at
-    both ends; narrow [m]: least aperture that grains pass; speed: of a single grain that settles [m/s]. Slurry that
-    flows brings none into a pack and takes none out of it; grains settle into one that is not quite full, and out of
-    one with room below."""
+    """Compute the flow of proppant in channels, out (m, 2) [m2/s]: volume rates of proppant. fall (m,): see `falls`;
+    carries (m,) bool; q (m,): flow of slurry [m2/s]; fluid: state of the flow's nodes, grains settle in as much of a
+    channel as is filled at both ends; narrow [m]: least aperture that grains pass; speed: of a single grain that
+    settles [m/s]. Slurry that flows brings none into a pack and takes none out of it; grains settle into one that is
+    not quite full, and out of one with room below."""
     for c in range(len(ends)):
         a, b = ends[c, 0], ends[c, 1]
         forth = back = 0.0
@@ -139,7 +139,7 @@ def give(begin, channel, side, out, dt, nodes, state):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def come(begin, channel, side, ends, out, dt, nodes, state):
-    """What channels bring to the owned nodes in dt [s]."""
+    """Compute what channels bring to the owned nodes in dt [s]."""
     for i in range(len(nodes)):
         comes = 0.0
         for m in range(begin[i], begin[i + 1]):
@@ -204,23 +204,23 @@ def settle(part, limit, power, modulus, nodes, state):
 
 @njit(cache=True, error_model="numpy")
 def resistance(state, node, delta, factor, permeability):
-    """Of a channel's part at a node over that of the fluid alone, see `thicken`: a slurry is at most as stiff as the
-    fluid in a pack."""
+    """Return the resistance of a channel's part at a node over that of the fluid alone, see `thicken`: a slurry is at
+    most as stiff as the fluid in a pack."""
     pack = 1.0 / (factor * factor * factor) if factor > 0.0 else max(delta * delta / (12.0 * permeability), 1.0)
     return pack if state[node, PACKED] > 0.0 else min(state[node, THICK], pack)
 
 
 @njit(cache=True, error_model="numpy")
 def weight(state, a, b, heavier):
-    """Of what is between two nodes over that of the fluid alone. A pack rests on its walls."""
+    """Return the weight of the content between two nodes over that of the fluid alone. A pack rests on its walls."""
     return 1.0 + heavier * 0.5 * ((1.0 - state[a, PACKED]) * state[a, C] + (1.0 - state[b, PACKED]) * state[b, C])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def thicken(links, ends, state, factor, permeability, heavier, channels):
-    """What proppant does to the links of channels (l, flowing.CHANNEL): their conductance, and the weight of what is in
-    them over that of the fluid. factor: aperture of a pack over that of the channel, 0: by its permeability [m2];
-    heavier: rho_p / rho_f - 1. The parts of a channel at its corners are one behind the other, so that links of a
+    """Apply the effect of proppant to the links of channels (l, flowing.CHANNEL): their conductance, and the weight of
+    what is in them over that of the fluid. factor: aperture of a pack over that of the channel, 0: by its permeability
+    [m2]; heavier: rho_p / rho_f - 1. The parts of a channel at its corners are one behind the other, so that links of a
     triangle keep their shares: one of a negative conductance has to be outweighed by the others."""
     for first in range(0, len(ends), links):
         delta, total, parts = channels[first, flowing.APERTURE], 0.0, links

@@ -104,7 +104,7 @@ class _Range:
         self.text, self.words = text, _WORDS.findall(text)[1:]
 
     def expression(self) -> str:
-        """All terms, as one expression."""
+        """Return all terms as one expression."""
         found: list[str] = []
         negated = False
         while self.words:
@@ -126,7 +126,7 @@ class _Range:
         return " and ".join(found)
 
     def _term(self, word: str) -> str:
-        """What this word, and those that belong to it, say."""
+        """Return the expression of this word and the words that belong to it."""
         if word in ("x", "y", "z", "id"):
             low = self._taken("a number")
             return f"{low} <= {word} <= {self._number(whole=word == 'id') or low}"

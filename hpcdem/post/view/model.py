@@ -1,4 +1,4 @@
-"""What a view is: the objects that are shown and how, the part of the plane, and what stands around it.
+"""Data of a view: the objects that are shown and how, the part of the plane, and what stands around it.
 
 Files `*.mv` hold it as JSON, with the names used here; missing names have their default, other names are rejected.
 """
@@ -59,7 +59,7 @@ class Layer(_Table):
 
     @property
     def label(self) -> str:
-        """What the tree calls it."""
+        """Return its name in the tree."""
         return self.name or self.object
 
     @property
@@ -113,11 +113,11 @@ class ModelView(_Table):
         return next((layer for layer in self.layers if layer.label == label), None)
 
     def changed(self, **values: Any) -> ModelView:
-        """This view with other values. HpcdemError for invalid ones."""
+        """Return this view with other values. HpcdemError for invalid ones."""
         return view_of({**self.model_dump(), **values}, "view")
 
     def with_layer(self, label: str, **values: Any) -> ModelView:
-        """This view with other values of one layer. HpcdemError for invalid ones."""
+        """Return this view with other values of one layer. HpcdemError for invalid ones."""
         layers = [
             {**layer.model_dump(), **(values if layer.label == label else {})} for layer in self.layers
         ]  # fmt: skip
@@ -137,7 +137,7 @@ _FORMS = {"limits": "two numbers", "camera": "left, right, bottom, top"}
 
 
 def _wrong(errors: Sequence[Mapping[str, Any]], given: Mapping[str, Any]) -> str:
-    """What is wrong with a view, and where: "layer 2 (joints), opacity: expected at most 1, read 2"."""
+    """Describe the errors of a view and their places: "layer 2 (joints), opacity: expected at most 1, read 2"."""
     first = errors[0]
     loc, known = _place(first), ModelView.model_fields
     place: list[str] = []
@@ -166,7 +166,7 @@ def _wrong(errors: Sequence[Mapping[str, Any]], given: Mapping[str, Any]) -> str
 
 
 def _place(error: Mapping[str, Any]) -> list[str | int]:
-    """Where an error is: without the names of kinds that a value may be of."""
+    """Return where an error is: without the names of kinds that a value may be of."""
     return [part for part in error["loc"] if isinstance(part, int) or not set(part) & set("[(")]
 
 

@@ -1,4 +1,4 @@
-"""What a frame holds, as kinds of objects with fields. Columns are read when they are needed, and only these."""
+"""Contents of a frame as kinds of objects with fields. Columns are read when they are needed, and only these."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class Objects:
         return shape[0][corners[corners >= 0]].mean(axis=0)
 
     def value(self, name: str, row: int) -> Any:
-        """Of a field or vector of one object."""
+        """Return the value of a field or vector of one object."""
         return part(self.fields if name in self.fields else self.vectors, name, slice(row, row + 1))[0]
 
     def values(self, name: str, label: str) -> np.ndarray:
@@ -145,11 +145,11 @@ class Objects:
         return HpcdemError(f"{label} have no field {name} in this frame; known: {', '.join(self.known())}")
 
     def has(self, name: str) -> bool:
-        """Whether there is a field, a vector or a component of this name."""
+        """Return whether there is a field, a vector or a component of this name."""
         return name in self.fields or name in self.vectors or bool(self.component(name)[0])
 
     def filled(self, name: str) -> bool:
-        """Whether it has a value somewhere."""
+        """Return whether it has a value somewhere."""
         if name not in self.fields:
             return self.has(name)
         return any(there(part(self.fields, name, slice(first, first + CHUNK))) for first in range(0, self.count, CHUNK))
@@ -183,7 +183,7 @@ def lengths(vectors: np.ndarray) -> np.ndarray:
 
 
 def there(values: np.ndarray) -> bool:
-    """Whether a column says anything: what an object does not have is NaN, or -1 in whole numbers."""
+    """Return whether a column says anything: what an object does not have is NaN, or -1 in whole numbers."""
     if not len(values) or values.dtype.kind != "f":
         return values.dtype.kind != "f" and bool(len(values)) and bool((values != -1).any())
     return bool(np.isfinite(values[0])) or bool(np.isfinite(values).any())
@@ -258,7 +258,7 @@ def _with_faults(moment: Moment, path: Path) -> Moment:
 
 
 def _with_origin(moment: Moment, path: Path) -> Moment:
-    """With the displacement of discs since the last frame of the folder before this one that was written as a command
+    """Add the displacement of discs since the last frame of the folder before this one that was written as a command
     began (`_ini`); NaN of those that were not there yet."""
     try:
         begun = [file.path for file in list_frames(path.parent) if file.ini and file.step < moment.step]
@@ -474,8 +474,8 @@ def of_blocks(state: MeshState) -> Moment:
 
 
 def _of_stress(given: Mapping[str, np.ndarray], dim: int) -> dict[str, _Reader]:
-    """What is computed of the stresses of elements (tension positive), where they are all there: mean, von Mises, and
-    in space the middle principal stress."""
+    """Compute further stresses of elements (tension positive), where they are all there: mean, von Mises, and in space
+    the middle principal stress."""
     shears = ("xy", "xz", "yz") if dim == 3 else ("xy",)
     if not {f"stress_{c}" for c in ("xx", "yy", "zz", *shears)} <= given.keys():
         return {}

@@ -90,7 +90,7 @@ class Scale:
         return f"{self.name} ({unit})" if unit else self.name
 
     def ticks(self) -> list[tuple[float, str]]:
-        """Where numbers stand along the bar, from 0 to 1, and which."""
+        """Return where numbers stand along the bar, from 0 to 1, and which."""
         size = self.unit[0]
         low, high = self.low / size, self.high / size
         if not 1e-290 < high - low < 1e290:  # no round step is a number any more
@@ -135,8 +135,8 @@ class Painted:
 
 @dataclass
 class Scene:
-    """All of a picture. seen: the part of the plane, in space of that of the picture; turn (3, 3): in space right, up
-    and towards the eye."""
+    """Everything in a picture. seen: the part of the plane, in space of that of the picture; turn (3, 3): in space
+    right, up and towards the eye."""
 
     moment: Moment
     view: ModelView
@@ -195,7 +195,7 @@ def telling(moment: Moment) -> str:
 
 
 def _varies(objects: Objects, name: str) -> bool:
-    """Whether there is such a field, and not of one value."""
+    """Return whether there is such a field, and not of one value."""
     if not objects.has(name):
         return False
     values = objects.values(name, "")
@@ -277,7 +277,7 @@ def plane_of(moment: Moment, view: ModelView) -> tuple[np.ndarray, np.ndarray] |
 
 
 def sliced(view: ModelView) -> bool:
-    """Whether of bodies in space only a cut is shown."""
+    """Return whether of bodies in space only a cut is shown."""
     return bool(view.section) and section_of(view.section).alone
 
 
@@ -319,7 +319,7 @@ def chosen_rows(moment: Moment, layer: Layer, only: np.ndarray | None = None) ->
 
 
 class _Words(Mapping[str, np.ndarray]):
-    """What a filter can name: fields, lengths of vectors, and the place of an object."""
+    """Names that a filter can use: fields, lengths of vectors, and the place of an object."""
 
     def __init__(self, objects: Objects) -> None:
         self.objects = objects
@@ -590,7 +590,7 @@ def _as_usual(result: Painted, objects: Objects) -> None:
 
 
 def _arrows(moment: Moment, objects: Objects, result: Painted, seen: View) -> tuple[np.ndarray, np.ndarray]:
-    """From the middle of the objects; in space from that of their faces that are seen."""
+    """Draw arrows from the middle of the objects; in space from that of their faces that are seen."""
     layer, rows = result.layer, result.rows
     if layer.vectors not in objects.vectors:
         known = ", ".join(objects.vectors) or "none"

@@ -201,7 +201,8 @@ def _side(ax, ay, bx, by, px, py):
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _owns(ax, ay, bx, by):
-    """Whether a pixel on the edge from a to b belongs to the triangle on its positive side, one of two neighbours."""
+    """Return whether a pixel on the edge from a to b belongs to the triangle on its positive side, one of two
+    neighbours."""
     return by - ay > 0.0 or (by == ay and bx - ax < 0.0)
 
 

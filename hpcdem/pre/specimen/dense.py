@@ -207,7 +207,8 @@ def _add(fan, reach, angle, order, level, width, height, seed, tries, is_round):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _face(fan, k, angle, ux, uy):
-    """Where the part of body k that faces (ux, uy) begins and ends, along the direction a quarter turn further [m]."""
+    """Return where the part of body k that faces (ux, uy) begins and ends, along the direction a quarter turn further
+    [m]."""
     c, s = np.cos(_FACE), np.sin(_FACE)
     ax, ay = farthest(fan, k, angle, c * ux + s * uy, c * uy - s * ux)
     bx, by = farthest(fan, k, angle, c * ux - s * uy, c * uy + s * ux)

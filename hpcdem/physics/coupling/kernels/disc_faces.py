@@ -37,7 +37,8 @@ SCRATCH = 9
 
 @njit(cache=True, error_model="numpy")
 def closest(p1x, p1y, p2x, p2y, x, y):
-    """Where a point meets a face: (FACE, END1 or END2; t; distance to the line, positive outside; nearest point)."""
+    """Return where a point meets a face: (FACE, END1 or END2; t; distance to the line, positive outside; nearest
+    point)."""
     ex, ey = p2x - p1x, p2y - p1y
     length2 = ex * ex + ey * ey
     rx, ry = x - p1x, y - p1y
@@ -53,8 +54,8 @@ def closest(p1x, p1y, p2x, p2y, x, y):
 
 @njit(cache=True, error_model="numpy")
 def share(ax, ay, bx, by):
-    """How far two contacts with these normals are one and the same: cos of twice the angle between them, from 1 (equal
-    normals) to 0 (45 degrees and more)."""
+    """Return the degree to which two contacts with these normals are the same: cos of twice the angle between them,
+    from 1 (equal normals) to 0 (45 degrees and more)."""
     c = ax * bx + ay * by
     return max(0.0, 2.0 * c * c - 1.0) if c > 0.0 else 0.0
 
@@ -112,8 +113,8 @@ def _weight(k, n, seen):
 
 @njit(cache=True, error_model="numpy")
 def _inherit(first, last, slot_on, slot_fs, seen):
-    """What a contact that begins takes over: the friction of that contact of the disc whose normal is nearest to its
-    own, as far as they share. Into HISTORY."""
+    """Copy the history that a new contact inherits: the friction of that contact of the disc whose normal is nearest to
+    its own, as far as they share. Into HISTORY."""
     for k in range(first, last):
         s = seen[k - first]
         s[HISTORY] = slot_fs[k]

@@ -69,7 +69,7 @@ def _of_walls(
     t, hot, ihot, lo, foff, wptr, walls, slot_row, slot_wall, slot_side, table, n_mat, mobility, beta, force, rates,
     on_walls,
 ):  # fmt: skip
-    """The same for the contacts of the owned particles of block t with walls."""
+    """Add the forces of dashpots at the wall contacts of the owned particles of block t."""
     shift = foff[t] - lo[t]
     first = wptr[t]
     while first < wptr[t + 1]:

@@ -1,4 +1,4 @@
-"""Where energy is and where it goes: the sums of the energy budget (docs/physics.md, Energy). Reads only.
+"""Compute the sums of the energy budget: stored energy and flows (docs/physics.md, Energy). Reads only.
 
 Flows are booked in passes beside those of the step: `kicks` and `wall_work` before the particles move, `pair_losses`
 and `wall_losses` after the forces, with the shear forces of the step before. What is stored is summed when somebody
@@ -124,7 +124,7 @@ def pair_losses(
     t, hot, ihot, cut, lo, poff, ptr, partner, fs, bond, u_made, fs_before, bond_before, pairs, bonds, n_mat, dt,
     spheres, bins,
 ):  # fmt: skip
-    """What the pairs of block t lost in the step whose forces have just been computed.
+    """Compute the losses of the pairs of block t in the step whose forces have just been computed.
 
     fs_before, bond_before: shear forces and bonds of the slots before that. The work done on the spring of a pair in
     the step is (Fs before + Fs now)/2 ds, the trapezium that belongs to work with mean velocities. Of it are stored
@@ -231,8 +231,8 @@ def _jump(where, u, way, law, two_r, was, u_before, way_before):
 def wall_losses(
     hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, fs_before, side_before, laws_table, n_mat, dt, bins
 ):  # fmt: skip
-    """The same as pair_losses for the contacts with walls; fs_before and side_before: histories before the forces, of
-    which those that went from wall to wall go with them here."""
+    """Compute the losses of the contacts with walls, as `pair_losses`; fs_before and side_before: histories before the
+    forces, of which those that went from wall to wall go with them here."""
     before_walls = walls.copy()
     for w in range(len(walls)):
         before_walls[w, P1X] -= walls[w, WVX] * dt

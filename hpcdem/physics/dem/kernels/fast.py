@@ -78,12 +78,12 @@ class Fast:
         return rows, at[rows]
 
     def state(self) -> list:
-        """As JSON values, for checkpoints."""
+        """Return the state as JSON values, for checkpoints."""
         return [list(row) for row in zip(self.gid.tolist(), self.reach.tolist(), self.alone.tolist(), strict=True)]
 
     @staticmethod
     def restored(rows: list) -> Fast:
-        """From what `state` has made."""
+        """Restore from the result of `state`."""
         gid, reach, alone = zip(*rows, strict=True) if rows else ((), (), ())
         return Fast(np.array(gid, np.int64), np.array(reach, float), np.array(alone, bool))
 
@@ -107,8 +107,8 @@ def strides(hot: np.ndarray, dt: float) -> np.ndarray:
 
 
 def classes(way: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
-    """Who goes farther than `limit` [m] per step, as indices of way (n,) [m], and the class of each: class k is above
-    limit 2^k, the last one open. Exact, so that it does not matter which rank counts whom."""
+    """Find the particles that move farther than `limit` [m] per step, as indices of way (n,) [m], and the class of
+    each: class k is above limit 2^k, the last one open. Exact, so that it does not matter which rank counts whom."""
     which = np.flatnonzero(way > limit)
     _, exponent = np.frexp(way[which] / limit)
     return which, np.clip(exponent - 1, 0, CLASSES - 1)
@@ -147,7 +147,7 @@ def nearest(hot, slow, places, out):
 def free_way(
     asked: np.ndarray, gaps: np.ndarray, places: np.ndarray, clump: np.ndarray, walls: np.ndarray, half: float
 ) -> np.ndarray:
-    """How far fast particles can go without meeting anybody (m,) [m]; negative: not at all, or not asked.
+    """Compute the distance that fast particles can move without contact (m,) [m]; negative: not at all, or not asked.
 
     asked (k,): for which of them, and the way gaps (k,) [m] from their centres to the surface of the nearest slow one;
     places (m, 3): x, y, radius [m]; clump (m,) i8: the clump of each, -1 for none; walls (w, 4): ends [m]; half: the

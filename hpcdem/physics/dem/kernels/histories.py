@@ -1,4 +1,4 @@
-"""What contacts remember while there are no lists: out of the slots of the old ones, for those of the new ones."""
+"""Histories of contacts while there are no lists: out of the slots of the old ones, for those of the new ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WIDTH = 4
 
 @dataclass
 class Histories:
-    """What contacts remember, per owned particle (CSR): the entries of particle c are rows[ptr[c] : ptr[c+1]].
+    """Histories of contacts by owned particle (CSR): the entries of particle c are rows[ptr[c] : ptr[c+1]].
 
     ptr (n + 1,) i8; rows (m, 4 + memory) f8: partner, shear force [N], a second number (overlap at bonding of a pair
     [m], normal force of a user law [N]; side of a wall contact), bond type, memory of a user law or of
@@ -44,7 +44,7 @@ class Histories:
         bond: np.ndarray,
         memory: np.ndarray | None = None,
     ) -> Histories:
-        """From one array (m,) per column, and (m, columns) of a user law."""
+        """Build histories from one array (m,) per column, and (m, columns) of a user law."""
         out = Histories(ptr, np.empty((len(partner), WIDTH + (0 if memory is None else memory.shape[1]))))
         out.rows[:, SHEAR], out.rows[:, EXTRA] = fs, extra
         if memory is not None:
@@ -78,7 +78,7 @@ class Histories:
         return self.rows[:, WIDTH:]
 
     def resized(self, columns: int) -> Histories:
-        """With so many columns of memory; new ones are 0."""
+        """Return histories with this number of columns of memory; new columns are 0."""
         if WIDTH + columns == self.rows.shape[1]:
             return self
         rows = np.zeros((len(self.rows), WIDTH + columns))
@@ -102,11 +102,11 @@ class Histories:
         return out
 
     def joined(self, counts: np.ndarray, rows: np.ndarray) -> Histories:
-        """These particles, then others that have so many entries each."""
+        """Append particles with these numbers of entries."""
         return Histories(_starts(np.concatenate([self.counts(), counts])), np.concatenate([self.rows, rows]))
 
     def extended(self, n: int) -> Histories:
-        """With n more particles at the end that remember nothing."""
+        """Append n particles without histories."""
         return Histories(np.concatenate((self.ptr, np.full(n, self.ptr[-1]))), self.rows)
 
     def keep(self, mask: np.ndarray) -> Histories:

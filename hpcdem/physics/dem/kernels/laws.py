@@ -29,8 +29,8 @@ def series_stiffness(ka, kb):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def pair_geometry(dx, dy, ri, rj):
-    """Of two discs, the centre of the second at (dx, dy) from that of the first: (distance squared [m^2], n_x, n_y,
-    overlap U [m], 2 Rt [m]).
+    """Return the geometry of a pair of discs, the centre of the second at (dx, dy) from that of the first: (distance
+    squared [m^2], n_x, n_y, overlap U [m], 2 Rt [m]).
 
     The normal is +x if both centres are in one place (rows from one corner).
     """
@@ -139,14 +139,16 @@ def contact_bond(model, a, b, two_rt, u_made, u):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def contact_state(model, a, b, two_rt, u):
-    """Of a touching pair (u >= 0) or wall contact: (Fn [N], shear stiffness ks, dFn/dU [N/m], energy of Fn [J])."""
+    """Return the state of a touching pair (u >= 0) or wall contact: (Fn [N], shear stiffness ks, dFn/dU [N/m], energy
+    of Fn [J])."""
     fn, ks = contact(model, a, b, two_rt, u)
     return fn, ks, tangent_normal_stiffness(model, a, two_rt, u), normal_energy(model, fn, u)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def pair_state(kind, model, a, b, e, g, two_rt, length, spheres, u_made, u):
-    """The same of any pair at overlap u: of its contact if it touches, else of its bond, zeros if there is neither.
+    """Return the state of any pair at overlap u: of its contact if it touches, else of its bond, zeros if there is
+    neither.
 
     kind: of the bond, 0: none; model, a, b: see `contact`; e, g, length (Ra + Rb) and spheres: see `elastic_bond` and
     `bond_area`; u_made: see `contact_bond`. g below 0: of a conserving bond, which has its own shear stiffness where

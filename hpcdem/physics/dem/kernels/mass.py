@@ -11,7 +11,7 @@ SPHERES = {"on": False, "hex": False, "off": True, "0": True}
 
 
 def shape(disk: str) -> tuple[float, bool, float]:
-    """Of a rule: (volume over r^2 or r^3, whether it is r^3, moment of inertia over m r^2).
+    """Return the shape that a rule defines: (volume over r^2 or r^3, whether it is r^3, moment of inertia over m r^2).
 
     4/3 pi r^3 [m^3] (off, 0), pi r^2 [m^2 x 1 m] (on), 2 sqrt(3) r^2 (hex: the cell of a close-packed lattice); 2/5 for
     spheres, 1/2 for disks.

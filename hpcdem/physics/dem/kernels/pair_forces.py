@@ -146,7 +146,7 @@ def contact_lanes(n, lanes, dt):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _bond_lanes(n, lanes, dt, spheres, springs, longest):
-    """The same for pairs that touch or are bonded or both; FAILURE says which bonds break now.
+    """Apply the law of n pairs that touch or are bonded or both; FAILURE says which bonds break now.
 
     springs: there are contact bonds. Returns the larger of `longest` and the longest bonded distance squared, as bits,
     and whether there is any failure.

@@ -73,7 +73,7 @@ class Bodies:
         return _blocks(self.n, parts)
 
     def mine_as_block(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same, of one block with those that are counted by this rank."""
+        """Return the members as one block with those that this rank counts."""
         return _blocks(self.mine, 1)
 
     def write_back(self, rigid: np.ndarray, n_left: int, n_own: int) -> None:
@@ -252,8 +252,8 @@ def place(parts, *args):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def stiffness(start, row, arm, bbody, member, out):
-    """Of each clump the stiffness [N/m] that gives mass over stiffness its meaning, out (n,) f8, from those of its
-    members, member (n_storage,): sum of k (1 + |arm|^2 m / I).
+    """Compute for each clump the stiffness [N/m] that gives mass over stiffness its meaning, out (n,) f8, from those of
+    its members, member (n_storage,): sum of k (1 + |arm|^2 m / I).
 
     A contact spring k at a lever arm h bears the mass 1 / (1/m + h^2/I); the sum over the springs of a body bounds its
     highest frequency, and h is at most the distance of the member.

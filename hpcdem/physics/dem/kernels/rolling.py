@@ -85,7 +85,7 @@ def _open(memory, k, rate, dt):
 
 @njit(cache=True, error_model="numpy")
 def second_moment(two_rt, spheres):
-    """Of the cross-section of a bond about its middle [m^4]."""
+    """Return the second moment of the cross-section of a bond about its middle [m^4]."""
     rt = 0.5 * two_rt
     return 0.25 * math.pi * rt**4 if spheres else 2.0 / 3.0 * rt**3
 
@@ -164,7 +164,7 @@ def _of_walls(
     t, hot, ihot, lo, foff, wptr, walls, slot_row, slot_wall, slot_side, memory, table, properties, n_mat,
     inverse_inertia, dt, constant, spheres, stamp, force, lost,
 ):  # fmt: skip
-    """The same for the contacts of the owned particles of block t with walls."""
+    """Add the moments at the wall contacts of the owned particles of block t."""
     shift = foff[t] - lo[t]
     first = wptr[t]
     while first < wptr[t + 1]:
@@ -254,7 +254,7 @@ def stiffnesses(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def stiffnesses_at_walls(hot, ihot, walls, slot_row, slot_wall, slot_side, table, of_walls, n_mat, spheres, out):
-    """The same for wall slots."""
+    """Return the rolling stiffnesses of wall slots."""
     first = 0
     while first < len(slot_row):
         last = end_of_slots(slot_row, first, len(slot_row))

@@ -1,4 +1,4 @@
-"""Who has slipped through a row of GLINE or a wall since the lists were built.
+"""Find particles that slipped through a row of GLINE or a wall since the lists were built.
 
 A row is a chain of particles with successive ids. A particle has passed it when its centre has crossed the line between
 two neighbours of the chain. To do so it must have touched one of them, so the pairs of the lists are all that is
@@ -57,7 +57,8 @@ def found(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _crosses(px, py, qx, qy, x, y, dp, dq, dd):
-    """Whether a point now at (x, y) has crossed the segment now from p to q; dp, dq, dd: how far each has gone."""
+    """Return whether a point now at (x, y) has crossed the segment now from p to q; dp, dq, dd: how far each has
+    gone."""
     now = (qx - px) * (y - py) - (qy - py) * (x - px)
     ex, ey = qx - dq[0] - px + dp[0], qy - dq[1] - py + dp[1]
     before = ex * (y - dd[1] - py + dp[1]) - ey * (x - dd[0] - px + dp[0])

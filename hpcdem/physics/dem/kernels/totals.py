@@ -110,8 +110,9 @@ def kinetic(hot, n_left, body, bins):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def extremes(icold, body, force, gx, gy, stiffness):
-    """Of the owned particles but members of clumps: largest force (fx, fy) + m g in the directions that are not fixed
-    [N] (NaN if any is), and least m / sum k [s^2] of those that move and touch something (infinite without)."""
+    """Return for the owned particles without members of clumps: largest force (fx, fy) + m g in the directions that are
+    not fixed [N] (NaN if any is), and least m / sum k [s^2] of those that move and touch something (infinite
+    without)."""
     largest, shortest, broken = 0.0, math.inf, False
     for c in range(len(body)):
         if body[c, CLUMPED] != 0.0:

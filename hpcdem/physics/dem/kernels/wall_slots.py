@@ -1,4 +1,4 @@
-"""Which particles may touch which walls: the wall slots of the lists.
+"""Build the wall slots of the lists: which particles may touch which walls.
 
 Particles are sorted by column, then row. What is near a wall in a column lies between two rows, and these are found by
 bisection, so that the many particles far from all walls cost nothing.

@@ -28,7 +28,8 @@ NONE, FACE, END1, END2 = 0, 1, 2, 3
 
 @njit(cache=True, error_model="numpy")
 def closest(wall, x, y):
-    """Where a point meets a wall: (FACE, END1 or END2; signed distance to the line, left positive; nearest point)."""
+    """Return where a point meets a wall: (FACE, END1 or END2; signed distance to the line, left positive; nearest
+    point)."""
     ex, ey = wall[P2X] - wall[P1X], wall[P2Y] - wall[P1Y]
     length = math.sqrt(ex * ex + ey * ey)
     ex /= length

@@ -404,8 +404,8 @@ def _flow(kind: Kind) -> Any:
 
     @njit(nogil=True, error_model="numpy")
     def choose(n, first, overlay, who, g, tile, which):
-        """Those parts that are outside, or may be, side by side; which (each block,) i8: which they are. Returns their
-        number."""
+        """Collect the parts that are, or may be, outside the yield surface; which (each block,) i8: which they are.
+        Returns their number."""
         m = 0
         for j in range(each):
             for e in range(n):

@@ -30,7 +30,7 @@ SPACE = (*PLANE, "13", "23")
 
 
 class Tables(NamedTuple):
-    """What describes the elements of a kind that a rank holds.
+    """Tables of the elements of a kind that a rank holds.
 
     rows (n + 3,) i4: storage row of each, of a macro-element the first of its own; first: of the first owned element;
     x: where corners are, flat, `width` words a row; c (n or n + 3, columns): constants, see `Kind`; place (n + 3, k)
@@ -48,7 +48,7 @@ class Tables(NamedTuple):
 
 
 class Triangles(Tables):
-    """Of each kind there is a class, by which kernels tell them apart while they are compiled."""
+    """Tables of triangles. Each kind has a class, so that kernels are compiled for each kind."""
 
 
 class Quads(Tables):
@@ -103,8 +103,8 @@ class Kind:
     laws: tuple[str, ...] = ()
 
     def only(self, law: str, follow: Sequence[str]) -> str:
-        """For messages, what elements of this kind can have in place of this model ("": the one that they have), or of
-        properties of it that follow a field; "": they can have it."""
+        """Return, for messages, what elements of this kind can have in place of this model ("": the one that they
+        have), or of properties of it that follow a field; "": they can have it."""
         if not self.laws or ((not law or law in self.laws) and not follow):
             return ""
         if not law or law in self.laws:

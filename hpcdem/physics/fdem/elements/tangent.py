@@ -338,7 +338,8 @@ def principal_slopes(s1, s2, s3, n, m, k, t, a, b, slopes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def plane_slopes(low, high, n, m, k, t, a, b, slopes):
-    """The same in plane stress, of the high stress in row and column 2 and of the low one in 0, and where they go."""
+    """Return the slopes in plane stress, of the high stress in row and column 2 and of the low one in 0, and where they
+    go."""
     t = min(t, k / n)
     r_low, r_high, where = plane_stress_return(low, high, n, m, k, t, a, b)
     slopes[:] = 0.0

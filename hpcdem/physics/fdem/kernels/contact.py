@@ -105,7 +105,7 @@ def _corners(a, n, slots, first, second, place, x, lanes, at_a, at_b):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _beyond(x0, y0, x1, y1, ax, ay, bx, by, cx, cy):
-    """Whether three points all lie to the right of, or on, the line from 0 to 1."""
+    """Return whether three points all lie to the right of, or on, the line from 0 to 1."""
     ux, uy = x1 - x0, y1 - y0
     a = ux * (ay - y0) - uy * (ax - x0)
     b = ux * (by - y0) - uy * (bx - x0)
@@ -174,7 +174,7 @@ def _clip(a, d, t0, t1):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _crossing(a, da, b, db, t0, t1):
-    """Where a + t da = b + t db, or t0 if that is not between t0 and t1."""
+    """Return where a + t da = b + t db, or t0 if that is not between t0 and t1."""
     t = (a - b) / (db - da)
     return t if (t > t0) & (t < t1) else t0
 
@@ -303,7 +303,7 @@ _edge_b0, _edge_b1, _edge_b2 = _edge_loop(1, 0), _edge_loop(1, 1), _edge_loop(1,
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _damp(n, side, m, slots, dampers, largest, lanes):
-    """What is left by damping of the normal force of edge m of triangle A (side 0) or B, into the lane LESS; the
+    """Compute what damping leaves of the normal force of edge m of triangle A (side 0) or B, into the lane LESS; the
     history moves on.
 
     While surfaces approach sigma = min(sigma_try, T_side), T_side the part of T of edges of this triangle, sigma_try
@@ -420,7 +420,7 @@ def _choose(n, slots, first, second, x_place, x, pairs, dampers, chosen, choice_
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _edges(n, dt, lanes):
-    """All edges of both triangles in the other one."""
+    """Compute the forces of all edges of both triangles in the other one."""
     for e in range(U(n)):
         lanes[LESS + e] = 1.0
     _edge_a0(n, dt, lanes)
@@ -438,7 +438,7 @@ _FIRST, _SECOND, _THIRD = np.int64(0), np.int64(1), np.int64(2)
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _damped_edges(n, slots, dampers, largest, dt, lanes):
-    """The same with normal damping."""
+    """Compute the forces of all edges of both triangles with normal damping."""
     _damp(n, _A_SIDE, _FIRST, slots, dampers, largest, lanes)
     _edge_a0(n, dt, lanes)
     _damp(n, _A_SIDE, _SECOND, slots, dampers, largest, lanes)
@@ -604,17 +604,17 @@ def _parts(t, threads, first, second, x_place, x, pairs, touching, part):
 
 @on_threads
 def parts(threads, *args):
-    """How deep the contactors of each row are in the other body, over its altitude there: part (m,), at most 1/3, 0
-    where they do not touch. Arguments as those of `forces`."""
+    """Return how deep the contactors of each row are in the other body, over its altitude there: part (m,), at most
+    1/3, 0 where they do not touch. Arguments as those of `forces`."""
     for t in prange(threads):
         _parts(t, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def depths(first, second, free, x_place, x, depth):
-    """How deep the free edges (bits of `free`) of the two bodies of each pair are in the other one: depth (m, 3) [m],
-    and where. It is the distance to the nearest side of the target, so no more than the radius of its inscribed circle.
-    """
+    """Return how deep the free edges (bits of `free`) of the two bodies of each pair are in the other one: depth (m, 3)
+    [m], and where. It is the distance to the nearest side of the target, so no more than the radius of its inscribed
+    circle."""
     x = x.reshape(x.size)
     for p in range(len(first)):
         depth[p] = 0.0

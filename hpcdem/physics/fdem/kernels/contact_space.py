@@ -250,9 +250,9 @@ def _nearest(px, py, pz, a, b, c, near):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _choose(begin, end, choices, px, py, pz, nx, ny, nz, t, x, corner, near):
-    """Which of the faces choices[begin:end] the pair touches: the one nearest to the centre of the force (px, py, pz)
-    among those that do not look the same way as the contactor, with the normal (nx, ny, nz), if there are any. corner
-    (3, 3), near (3,): scratch."""
+    """Return which of the faces choices[begin:end] the pair touches: the one nearest to the centre of the force (px,
+    py, pz) among those that do not look the same way as the contactor, with the normal (nx, ny, nz), if there are any.
+    corner (3, 3), near (3,): scratch."""
     best, nearest, against = begin, math.inf, False
     for q in range(begin, end):
         for i in range(3):
@@ -443,16 +443,16 @@ def _parts(t, threads, first, second, corner, place, x, touching, part):
 
 @on_threads
 def parts(threads, *args):
-    """How deep the face of each pair is in its target, over its altitude there: part (m,), at most 1/4, 0 where they do
-    not touch. Arguments as those of `forces`."""
+    """Return how deep the face of each pair is in its target, over its altitude there: part (m,), at most 1/4, 0 where
+    they do not touch. Arguments as those of `forces`."""
     for t in prange(threads):
         _parts(t, threads, *args)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def depths(first, second, corner, place, x, depth):
-    """How deep the contactor of each pair is in the target: depth (m, 4) [m], and where. It is the distance to the
-    nearest side of the target, so no more than the radius of its inscribed sphere."""
+    """Return how deep the contactor of each pair is in the target: depth (m, 4) [m], and where. It is the distance to
+    the nearest side of the target, so no more than the radius of its inscribed sphere."""
     x, w = x.reshape(x.size), np.zeros(SCRATCH)
     for p in range(len(first)):
         for k in range(4):

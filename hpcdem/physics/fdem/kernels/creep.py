@@ -247,7 +247,7 @@ def as_elastic(who, g, base, law, table, dt, memory, like, s0):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _stored(size, i, p, j, o, base, moduli, kelvin, memory):
-    """What `stored` adds for a part [J/m3]; kelvin: G_K, 0: there is no Kelvin unit."""
+    """Return what `stored` adds for a part [J/m3]; kelvin: G_K, 0: there is no Kelvin unit."""
     lame, two_mu, free = moduli
     crept = in_kelvin = (0.0, 0.0, 0.0)
     normal = shear = 0.0

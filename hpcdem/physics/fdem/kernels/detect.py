@@ -1,4 +1,4 @@
-"""Who may touch whom until something has moved half the buffer: pairs of triangles whose boxes come near each other.
+"""Find pairs of triangles that may touch before something has moved half the buffer: their boxes are near each other.
 
 Only triangles (or halves of quads, along the shorter diagonal) with a corner on a free face are examined. The pairs
 found are all in which the box around the free faces of one and that around the other, half the buffer wider on every
@@ -43,7 +43,7 @@ def boxes(body_place, free, x, buffer, box, around_faces):
 
 @njit(cache=True, error_model="numpy")
 def _meet(a, b):
-    """Whether two boxes overlap."""
+    """Return whether two boxes overlap."""
     return max(a[0], b[0]) <= min(a[2], b[2]) and max(a[1], b[1]) <= min(a[3], b[3])
 
 
@@ -65,8 +65,8 @@ def _spread(box, side, key, body):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _connected(e, f, cells, partner, closed):
-    """Whether elements e and f are connected: across the face between them if they share one, else around a point of
-    the mesh that they share, through closed faces."""
+    """Return whether elements e and f are connected: across the face between them if they share one, else around a
+    point of the mesh that they share, through closed faces."""
     ne = 4 if cells[e, 3] >= 0 else 3
     nf = 4 if cells[f, 3] >= 0 else 3
     for k in range(ne):

@@ -1,4 +1,4 @@
-"""Which faces may touch which tetrahedra until something has moved half the buffer: pairs whose boxes overlap, each
+"""Find faces and tetrahedra that may touch before something has moved half the buffer: pairs whose boxes overlap, each
 half the buffer wider on every side, unless along the normal of a side of the tetrahedron, or of the face, they are
 farther apart than the buffer. The counterpart of detect.py in space, which states which pairs are omitted."""
 
@@ -74,7 +74,7 @@ def _spread(box, side, wanted, key, body):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _apart(face, target, clusters, partner, closed):
-    """Whether element `target` may touch `face`: it is another element that is not connected to the one of the
+    """Return whether element `target` may touch `face`: it is another element that is not connected to the one of the
     face, across the face between them if they share one, else around a point."""
     e = face >> 2
     if e == target:
@@ -92,8 +92,8 @@ def _apart(face, target, clusters, partner, closed):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _separated(corner, target, x, buffer, points):
-    """Whether one of five normals separates a face and a target by more than the buffer; places of their corners in x,
-    points (7, 3): scratch."""
+    """Return whether one of five normals separates a face and a target by more than the buffer; places of their corners
+    in x, points (7, 3): scratch."""
     for c in range(7):
         at = corner[c] if c < 3 else target[c - 3]
         for k in range(3):

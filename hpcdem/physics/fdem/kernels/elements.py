@@ -201,7 +201,7 @@ def _any_past_peak(n, lanes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _any_quad_past_peak(n, lanes):
-    """The same of quads."""
+    """Return a negative number if a joint of these quads has passed its peak."""
     bits = lanes.view(np.int64)
     found = np.int64(0)
     for e in range(U(n)):
@@ -448,7 +448,7 @@ def _part(x1, y1, x2, y2, x3, y3, a, b, c, d, small):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def part_stretch(p, xy, c, small):
-    """The same of triangle p of a quad with the corners xy (8,) and the row c (32,) of the table."""
+    """Return sides, rotation and strain of triangle p of a quad with corners xy (8,) and row c (32,) of the table."""
     i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
     return _part(
         xy[i], xy[i + 1], xy[j], xy[j + 1], xy[k], xy[k + 1], c[4 * p], c[4 * p + 1], c[4 * p + 2], c[4 * p + 3], small
@@ -465,7 +465,7 @@ def _rate(vx1, vy1, vx2, vy2, vx3, vy3, a, b, c, d, cs, sn):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _part_rate(p, vel, c, cs, sn):
-    """The same of triangle p of a quad with the velocities vel (8,) and the row c (32,) of the table."""
+    """Return the strain rate of triangle p of a quad with the velocities vel (8,) and the row c (32,) of the table."""
     i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
     return _rate(
         vel[i], vel[i + 1], vel[j], vel[j + 1], vel[k], vel[k + 1], c[4 * p], c[4 * p + 1], c[4 * p + 2], c[4 * p + 3],
@@ -627,7 +627,7 @@ def _energy(e11, e22, e12, lam, two_mu, s0):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _quad_kinetic(c, vel):
-    """The same of a quad."""
+    """Return the kinetic energy of a quad."""
     v2 = 0.0
     for m in range(4):
         v2 += c[Q_WEIGHT + m] * (vel[2 * m] ** 2 + vel[2 * m + 1] ** 2)

@@ -46,7 +46,7 @@ def _viscous_triangle(xy, vel, c, small, beta, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _viscous_quad(xy, vel, c, small, beta, out):
-    """The same for the eight of a quad."""
+    """Compute the corner forces (8,) of the viscous stress of a quad."""
     out[:] = 0.0
     eta = c[Q_ETA] + beta * c[Q_TWO_MU]
     for overlay in range(2):

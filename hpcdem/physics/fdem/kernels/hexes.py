@@ -295,7 +295,7 @@ def _large(n, beta, lanes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _small(n, beta, lanes):
-    """The same with small strains: area vectors are those of the mesh."""
+    """Compute the forces with small strains: area vectors are those of the mesh."""
     for e in range(U(n)):
         s11, s22, s12, s33, s13, s23, p = stress(beta, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), e, lanes)
         lanes[P + e] += lanes[SH + e] * p

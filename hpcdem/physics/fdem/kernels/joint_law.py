@@ -114,7 +114,7 @@ def tables(column: Callable[[str], np.ndarray], of: np.ndarray) -> tuple[np.ndar
 def stiffest(
     column: Callable[[str], np.ndarray], of: np.ndarray, row: np.ndarray, h: Callable[[], np.ndarray]
 ) -> np.ndarray:
-    """Of joints with these rows the largest penalty [Pa]: no slope of a stress over o / h or s / h is above it.
+    """Return the largest penalty of joints with these rows [Pa]: no slope of a stress over o / h or s / h is above it.
 
     h: lengths [m], or one, if some law asks."""
     found = np.max([column(name) for name in PENALTIES], axis=0)[row]
@@ -144,7 +144,7 @@ def softening(d):
 
 @njit(cache=True, error_model="numpy")
 def softening_curve(d, e):
-    """The same, where e is exp(d RISE / FALL)."""
+    """Return the strength that is left, as `softening`, for e = exp(d RISE / FALL)."""
     rest = 1.0 - d
     cube = rest * rest * rest
     left = max((1.0 - (A + B - 1.0) / (A + B) * e) * (A * rest + B * (cube * cube)), 0.0)
@@ -222,7 +222,7 @@ def yielded_point(
     o, s, h, per_h, kop, tensile, overlay, tan_phi, cohesion, per_o_t, per_s_t, per_kop, per_half_shear, o_u, s_u,
     damage,
 ):  # fmt: skip
-    """The same for a joint that has passed its peak somewhere, with what the point remembers.
+    """Evaluate a point of a joint that has passed its peak somewhere, with the history of the point.
 
     o, s, h: opening, slip, length of the joint [m]; o_t, s_t: openings beyond the peak at which nothing is left [m]
     (per_...: one over it; per_o_t, per_s_t: 0 where there is nothing to lose); o_u, s_u: largest o and |s| beyond the
@@ -368,8 +368,8 @@ def stored(o, s, h, law, beyond, history, g):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def breaks(history, first2, second2):
-    """Whether a joint has no strength left at two of its three points; then it has none, and a mode. first2, second2:
-    largest squares of both parts of the damage."""
+    """Return whether a joint has no strength left at two of its three points; then it has none, and a mode. first2,
+    second2: largest squares of both parts of the damage."""
     gone = 0
     for g in range(3):
         gone += history[DAMAGE + g] >= 1.0
@@ -443,7 +443,7 @@ def _coulomb(o, s, law, torn, path):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _coulomb_slopes(o, more, law, torn, path):
-    """By what it slides now, and whether it is torn."""
+    """Return the slopes of Coulomb's law from the present slip and whether the point is torn."""
     dilates = law[TAN_DILATION] > 0.0 and path < law[DILATES_UP_TO]
     sigma = law[K_N] * (o - law[TAN_DILATION] * min(path, law[DILATES_UP_TO]))
     if sigma > (0.0 if torn > 0.0 else law[TEARS]):
@@ -542,7 +542,8 @@ def _slid(o, s, law, beyond, opened, path, n, far):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _barton_bandis_slopes(o, s, law, beyond, opened, path):
-    """From what it remembered before; where it slides by differences, with the same parts."""
+    """Return the slopes of Barton-Bandis from the previous history; where the joint slides, by differences with the
+    same parts."""
     pressure, slope = _pressure(opened - o, law, beyond)
     if pressure <= 0.0:
         return LEAST * LEAST * law[K_N], 0.0, 0.0, 0.0

@@ -1,5 +1,5 @@
-"""What joints are at their points of evaluation, of an edge in the plane and a triangle in space alike: their tangent
-stiffness, and what they store. (Loops over forces have passes of their own: elements.py, softening.py, joints_space.py,
+"""Compute tangent stiffness and stored energy of joints at their points of evaluation, for edges in the plane and
+triangles in space. (Loops over forces have passes of their own: elements.py, softening.py, joints_space.py,
 joints_hexes.py. Stiffness of elements: elements/tangent.py.)
 
 A point has an opening o along the normal n and a slip s along m; in the plane s is signed and m the tangent, in space s
@@ -146,7 +146,7 @@ def _stored(o, s, h, law, beyond, history, g):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def stored(slots, own, over, per_h, kind, state, history, x, table, beyond, out):
-    """What joints, see `stiffness`, give back when they are unloaded (n,) [J], in the plane [J/m]."""
+    """Return the energy that joints (see `stiffness`) release when they are unloaded (n,) [J], in the plane [J/m]."""
     dim = own.shape[1]
     n, o, s, m = np.empty(dim), np.empty(POINTS), np.empty(POINTS), np.empty((POINTS, dim))
     for i in range(len(slots)):

@@ -63,7 +63,7 @@ def points_now(ax, ay, bx, by, px, py, qx, qy, law, beyond, history):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def points_slide(ax, ay, bx, by, px, py, qx, qy, law, beyond, history, keep):
-    """The same of a joint that slides; keep: what it remembers moves on."""
+    """Return the stresses of a joint that slides; keep: its history is updated."""
     tx, ty, h2, oa, sa, ob, sb = openings(ax, ay, bx, by, px, py, qx, qy)
     inverse = 1.0 / math.sqrt(h2)
     oa, sa, ob, sb = oa * inverse, sa * inverse, ob * inverse, sb * inverse

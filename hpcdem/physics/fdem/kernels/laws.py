@@ -60,8 +60,8 @@ def damped(f, v, alpha):
 
 @njit(cache=True, error_model="numpy")
 def outside(s11, s22, s12, s33, n_phi, strength, tensile):
-    """By how much [Pa] a stress is outside the yield surface of plasticity.py, below zero: inside; the larger of shear
-    and tension."""
+    """Return by how much [Pa] a stress is outside the yield surface of plasticity.py, below zero: inside; the larger of
+    shear and tension."""
     mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
     radius = math.sqrt(half * half + s12 * s12)
     high, low = mean + radius, mean - radius

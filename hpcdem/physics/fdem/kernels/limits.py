@@ -58,7 +58,7 @@ def _omega_triangle(c):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def omegas2(c):
-    """The same of triangles (n,)."""
+    """Return the bound of omega^2 [1/s2] of triangles (n,)."""
     out = np.empty(len(c))
     for i in range(len(c)):
         out[i] = _omega_triangle(c[i])
@@ -67,7 +67,8 @@ def omegas2(c):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _omega_quad(c):
-    """The same: the largest of the four triangles (the mean volume strain of an overlay stores less energy)."""
+    """Return the bound of omega^2 of a quad: the largest of its four triangles (the mean volume strain of an overlay
+    stores less energy)."""
     area = mass = worst = 0.0
     for p in range(4):
         area += 0.5 * c[Q_AREA + p]

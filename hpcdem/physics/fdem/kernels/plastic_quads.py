@@ -303,7 +303,7 @@ def _none_outside(n, lanes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _how_many(n, lanes):
-    """Of the first n quads flow."""
+    """Return how many of the first n quads flow."""
     found = 0
     for e in range(U(n)):
         how = lanes[HOW + e] + lanes[HOW + U(BLOCK) + e] + lanes[HOW + U(2 * BLOCK) + e] + lanes[HOW + U(3 * BLOCK) + e]

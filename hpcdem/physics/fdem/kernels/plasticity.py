@@ -81,7 +81,8 @@ LANES = 44
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def principal_return(s1, s2, s3, n, m, k, t, a, b):
-    """Where the principal stresses s1 <= s2 <= s3 [Pa] return to, in this order, and SHEAR_NOW | TENSION_NOW, a float.
+    """Return where the principal stresses s1 <= s2 <= s3 [Pa] return to, in this order, and SHEAR_NOW | TENSION_NOW, a
+    float.
 
     n, m: N_phi, N_psi; k = 2 c sqrt(N_phi); t: tensile strength, at most k / (n - 1); a = K + 4 G / 3, b = K - 2 G / 3
     [Pa]. Without jumps, so that loops over lanes become vector loops: every end is computed, and one is chosen.
@@ -149,8 +150,8 @@ low one (with the corner of equal stresses), and the corners between them."""
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def plane_stress_return(low, high, n, m, k, t, a, b):
-    """Where the principal stresses of the plane low <= high [Pa] return to in plane stress, low and high, and to which
-    part (0: they are inside); t: at most k / n; a = lambda' + 2 G, b = lambda'; others see `principal_return`."""
+    """Return where the principal stresses of the plane low <= high [Pa] return to in plane stress, low and high, and to
+    which part (0: they are inside); t: at most k / n; a = lambda' + 2 G, b = lambda'; others see `principal_return`."""
     shear, p = n * high - low - k, a - b * m - b * n + a * n * m
     one, end = shear / p, n * t - k
     r_low, r_high = low + one * (a - b * m), high - one * (a * m - b)
@@ -195,7 +196,7 @@ def plane_stress_strain(s11, s22, s12, s33, n, m, k, t, lame, two_mu):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def most_outside(s11, s22, s12, s33, s13, s23, n_phi, k, tensile):
-    """By how much [Pa] a stress is outside the yield surface at most; not above zero: it is inside."""
+    """Return by how much [Pa] a stress is outside the yield surface at most; not above zero: it is inside."""
     p = (s11 + (s22 + s33)) / 3.0
     d11, d22, d33 = s11 - p, s22 - p, s33 - p
     squares = 0.5 * (d11 * d11 + (d22 * d22 + d33 * d33)) + (s12 * s12 + (s13 * s13 + s23 * s23))

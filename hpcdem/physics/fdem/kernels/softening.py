@@ -53,7 +53,7 @@ def _gather(n, slot, edge, x, partner, kind, table, beyond, history, lanes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _put_histories(n, slot, history, lanes):
-    """What joints remember goes back; four columns at a time, the last ones as they came."""
+    """Write the histories of joints back; four columns at a time, the last ones as they came."""
     for e in range(U(0), U(n), _FOUR):
         i0, i1, i2, i3 = U(slot[e]), U(slot[e + _1]), U(slot[e + _2]), U(slot[e + _3])
         at = (i0 * _HISTORY, i1 * _HISTORY, i2 * _HISTORY, i3 * _HISTORY)

@@ -127,7 +127,7 @@ def survey(x, v, origin, first, n_own, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def volume(x):
-    """Of a tetrahedron by its row of x [m3]."""
+    """Return the volume of a tetrahedron from its row of x [m3]."""
     ux, uy, uz = x[4] - x[0], x[5] - x[1], x[6] - x[2]
     wx, wy, wz = x[8] - x[0], x[9] - x[1], x[10] - x[2]
     tx, ty, tz = x[12] - x[0], x[13] - x[1], x[14] - x[2]
@@ -324,7 +324,7 @@ def _omega2(c):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def omegas2(c):
-    """Of tetrahedra (n,)."""
+    """Return the bound of omega^2 [1/s2] of tetrahedra (n,)."""
     out = np.empty(len(c))
     for i in range(len(c)):
         out[i] = _omega2(c[i])

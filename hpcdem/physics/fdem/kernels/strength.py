@@ -30,10 +30,10 @@ DEGREE = math.pi / 180.0
 
 
 class Strength(NamedTuple):
-    """What kernels need: first own row of the table of yield surfaces; of (own rows,): the row of the model; values
-    (own rows, 4): cohesion, friction, dilation [degrees], tensile strength before any flow; number (rows, 4): of their
-    tables, from 1 on, 0: none; begin (tables + 1,), points (m, 2): the tables, one behind the other; history (n_own, 2
-    or 8), see `HISTORY`."""
+    """Tables of strengths for kernels: first own row of the table of yield surfaces; of (own rows,): the row of the
+    model; values (own rows, 4): cohesion, friction, dilation [degrees], tensile strength before any flow; number (rows,
+    4): of their tables, from 1 on, 0: none; begin (tables + 1,), points (m, 2): the tables, one behind the other;
+    history (n_own, 2 or 8), see `HISTORY`."""
 
     first: int
     of: np.ndarray
@@ -92,8 +92,8 @@ def flowed(row, history, bits, e11, e22, e12, e33, shear, volume, strength, tabl
 
 @njit(cache=True, error_model="numpy")
 def grown(row, history, bits, shear, volume, shortened, strength, table):
-    """The same from `shear` and `volume` of the plastic strain and, where it flowed in both ways, what its negative
-    principal values sum up to, without sign."""
+    """Return the strength after flow by a plastic strain from its `shear` and `volume` and, where it flowed in both
+    ways, what its negative principal values sum up to, without sign."""
     if bits == SHEAR_NOW:
         tension = 0.0
     elif bits == TENSION_NOW:

@@ -73,7 +73,7 @@ class Loops(NamedTuple):
     quad: OnThreads | None = None
 
     def with_forces(self, kind: Kind) -> Any:
-        """In the place of the loop over the forces of elements of a kind of the plane."""
+        """Make the loop that replaces the one over the forces of elements of a kind in the plane."""
         return getattr(self, kind.name)
 
 
@@ -129,7 +129,7 @@ def _strain_of_triangles(n, small, lanes):
 
 @njit(error_model="numpy")
 def _strain_of_tetrahedra(n, small, lanes):
-    """The same in space."""
+    """Compute the strain of tetrahedra whose corners and constants are in the lanes, and its trace."""
     for e in range(U(n)):
         c, at = _AT_C + e, _AT_E + e
         e11, e22, e12, e33, e13, e23, _ = tets.strain(
@@ -202,8 +202,8 @@ def _finding(one: _Law) -> OnThreads:
 
     @njit(error_model="numpy")
     def take(g, i, first, base, own, row, table, memory, per_part, lanes):
-        """Of element i, owned element `own`: all that its parts need, into lanes from place `first` on. (Rows are
-        indexed: views of them are counted, which takes longer.)"""
+        """Load the data of element i, owned element `own`, into lanes from place `first` on. (Rows are indexed: views
+        of them are counted, which takes longer.)"""
         for p in range(parts.count(g)):
             e = first + p
             for k in range(corners):
@@ -393,7 +393,7 @@ def _quads(one: _Law) -> OnThreads:
     def pair(of_first: Any, of_second: Any) -> Any:
         @njit(error_model="numpy")
         def chosen(e, a11, a22, a12, b11, b22, b12, mean, one, two, dt, lanes):
-            """The same of the two triangles of an overlay, which share their pressure in the plane: `parts.share`."""
+            """Choose the two triangles of an overlay, which share their pressure in the plane: `parts.share`."""
             s11, s22, s12, s33, t11, t22, t12, t33 = elements.elastic_pair(
                 e, a11, a22, a12, b11, b22, b12, mean, one, two, dt, lanes
             )
