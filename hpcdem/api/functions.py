@@ -112,14 +112,14 @@ class Function:
 
     order: arguments that may be given by their place, if it is not that of the function; ``name?`` may be left out
     though the function needs it, ``name!`` may not; the others are keywords. file: how a file is taken; alone: not for
-    particles that touch blocks; looks: it changes nothing.
+    particles that touch blocks; reads_only: it changes nothing.
     """
 
     name: str
     order: str = ""
     file: Taken = READ
     alone: bool = False
-    looks: bool = False
+    reads_only: bool = False
 
     @functools.cached_property
     def node(self) -> ast.FunctionDef:
@@ -236,7 +236,7 @@ def commands(cls: Kind) -> Kind:
     """Rows become methods, whose errors leave with file and line of the program."""
     for name, found in list(vars(cls).items()):
         if isinstance(found, Function):
-            setattr(cls, name, command(found.method(cls, name), edits=not found.looks))
+            setattr(cls, name, command(found.method(cls, name), edits=not found.reads_only))
     return cls
 
 

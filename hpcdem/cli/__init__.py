@@ -60,7 +60,7 @@ def main() -> NoReturn:
             click.echo((in_chinese and known("help", FIRST)) or FIRST, err=True)
         sys.exit(EXIT_USAGE)
     program = BY_NAME.get(words[0]) if words else None
-    if program is not None and program.looks:
+    if program is not None and program.reads_only:
         start(program.name, words[1:])
     if program is not None and program.module:
         more = (cores_before,) if program.name == "doctor" else ()

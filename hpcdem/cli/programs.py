@@ -9,14 +9,14 @@ from hpcdem.core.nearest import hint, nearest
 
 
 class Program(NamedTuple):
-    """module: in hpcdem.cli, with a function `start(words)`, or, where `looks` is set, a command of its name and `work`
-    (see cli.start); use: its arguments; line: what it does."""
+    """module: in hpcdem.cli, with a function `start(words)`, or, where `reads_only` is set, a command of its name and
+    `work` (see cli.start); use: its arguments; line: what it does."""
 
     name: str
     use: str
     line: str
     module: str = ""
-    looks: bool = False
+    reads_only: bool = False
 
 
 GROUPS: dict[str, tuple[Program, ...]] = {
@@ -28,20 +28,26 @@ GROUPS: dict[str, tuple[Program, ...]] = {
     ),
     "Look": (
         Program("view", "DIR", "open a run or a script in the browser", "view"),
-        Program("draw", "DIR", "draw frames as in the window", "draw", looks=True),
-        Program("movie", "DIR", "make a film of a run", "movie", looks=True),
-        Program("info", "FILE", "show the contents of a frame or a checkpoint", "info", looks=True),
+        Program("draw", "DIR", "draw frames as in the window", "draw", reads_only=True),
+        Program("movie", "DIR", "make a film of a run", "movie", reads_only=True),
+        Program("info", "FILE", "show the contents of a frame or a checkpoint", "info", reads_only=True),
     ),
     "Measure": (
         Program(
-            "measure", "DIR [WHAT]", "measure a finished run: wedge, cracks, fluid, faults, ...", "measure", looks=True
+            "measure",
+            "DIR [WHAT]",
+            "measure a finished run: wedge, cracks, fluid, faults, ...",
+            "measure",
+            reads_only=True,
         ),
         Program("-s", "DIR", "stress and strain of the frames of a finished run"),
     ),
     "Make": (
         Program("case", "[NAME]", "write the script of a ready-made model", "case"),
         Program("examples", "[NAME]", "list the examples, or copy one to this folder", "examples"),
-        Program("section", "FILE", "inspect or convert a geological section, extract horizons", "section", looks=True),
+        Program(
+            "section", "FILE", "inspect or convert a geological section, extract horizons", "section", reads_only=True
+        ),
         Program("grade", "FILE", "generate grains from a grading curve", "grade_page"),
     ),
     "Manage": (

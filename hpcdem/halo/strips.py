@@ -153,6 +153,6 @@ def cut(weights: np.ndarray, first: int, ranks: int, least: int = 1) -> np.ndarr
     at = np.where(goals - total[below] < total[np.minimum(at, columns)] - goals, below, at)
     borders = separate(np.concatenate(([0], at, [max(columns, ranks * least)])).astype(np.int64), least)
     # Push back from the right end, so that the last ranks keep theirs.
-    room = borders[-1] if columns < ranks * least else columns
-    borders = np.minimum(borders, room - least * np.arange(ranks, -1, -1))
+    available = borders[-1] if columns < ranks * least else columns
+    borders = np.minimum(borders, available - least * np.arange(ranks, -1, -1))
     return borders + first

@@ -15,7 +15,7 @@ from typing import Protocol
 from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
 
-ROOM = 256 << 20
+BUFFER = 256 << 20
 """Most bytes that wait to be written; who has more waits."""
 
 
@@ -35,8 +35,8 @@ class Deliveries:
     All ranks know which files are in progress (`expect`); `look` and `settle` raise their errors on all ranks.
     """
 
-    def __init__(self, room: int = ROOM) -> None:
-        self._room, self._waiting = room, 0
+    def __init__(self, limit: int = BUFFER) -> None:
+        self._limit, self._waiting = limit, 0
         self._held: list[tuple[Callable[[], None], int]] = []
         self._tasks: deque[tuple[Callable[[], None], int]] = deque()
         self._change = threading.Condition()
@@ -50,7 +50,7 @@ class Deliveries:
     def put(self, task: Callable[[], None], size: int = 0) -> None:
         """Add a task that holds `size` bytes until it is done; wait while the tasks would hold more than the limit."""
         with self._change:
-            while self._waiting and self._waiting + size > self._room:
+            while self._waiting and self._waiting + size > self._limit:
                 self._go()
                 self._change.wait()
             self._held.append((task, size))

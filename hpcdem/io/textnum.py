@@ -91,8 +91,8 @@ class TextTable:
             for target, source in ((floats, self._floats), (ints, self._ints)):
                 for k, values in enumerate(source):
                     target[k, :n] = values[a : a + n]
-            room = out[(a - first) * self.width : (a - first + n) * self.width]
-            kernels.fill(self._plan, floats, ints, self._letters, self._lengths, n, room)
+            field = out[(a - first) * self.width : (a - first + n) * self.width]
+            kernels.fill(self._plan, floats, ints, self._letters, self._lengths, n, field)
 
     def blocks(self, size: int = 4 * _BLOCK) -> Iterator[np.ndarray]:
         """The text in uint8 arrays of about `size` bytes; each is valid until the next is requested."""

@@ -77,11 +77,11 @@ def text_in_blocks(sections: Sequence[Section]) -> Iterator[Block]:
                 yield block, n
                 block, n = _buffers.take(), 0
                 continue
-            room = block[n : n + part * width]
+            part_of_block = block[n : n + part * width]
             if isinstance(section, bytes):
-                room[:] = np.frombuffer(section, dtype=np.uint8)[done : done + part]
+                part_of_block[:] = np.frombuffer(section, dtype=np.uint8)[done : done + part]
             else:
-                section.write_rows(done, part, room)
+                section.write_rows(done, part, part_of_block)
             done, n = done + part, n + part * width
     yield block, n
 

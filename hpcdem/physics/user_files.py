@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from hpcdem.core.comm import Comm
     from hpcdem.engine.model import Model
 
-TOLD = 0.1
+REPORT_SECONDS = 0.1
 """Seconds of compiling that the log tells."""
 MARK = "#"
 """Between the name of a law and the digest of its text."""
@@ -134,21 +134,21 @@ def in_turn(comm: Comm, act: Callable[[], None]) -> float:
                 act()
             patient_barrier(comm)
     spent = time.perf_counter() - began
-    return spent if compiling.buffer and spent > TOLD else 0.0
+    return spent if compiling.buffer and spent > REPORT_SECONDS else 0.0
 
 
 def made_of(function: Callable[..., Any], path: str) -> str | None:
     """Return the sources of a function of the file `path` when it is compiled, besides the text of the file: values of
     the global names that it and the functions that it calls use. None if there is something among them of another file,
     or for which this is unknown: then compiled code must not be kept."""
-    told: list[str] = []
+    parts: list[str] = []
     seen: set[FunctionType] = set()
 
-    def tell(name: str, thing: Any) -> bool:
+    def describe(name: str, thing: Any) -> bool:
         options = getattr(thing, "targetoptions", None)
         thing = getattr(thing, "py_func", thing)
         if isinstance(thing, FunctionType):
-            told.append(f"{name}: {thing.__qualname__} {options and sorted(options.items())}")
+            parts.append(f"{name}: {thing.__qualname__} {options and sorted(options.items())}")
             if thing in seen:
                 return True
             seen.add(thing)
@@ -156,16 +156,16 @@ def made_of(function: Callable[..., Any], path: str) -> str | None:
             used = [(f"{name}.{free}", cell.cell_contents) for free, cell in cells]
             used += [(f"{name} {k}", value) for k, value in enumerate(thing.__defaults__ or ())]
             used += [(one, thing.__globals__[one]) for one in _names(thing.__code__) if one in thing.__globals__]
-            return thing.__code__.co_filename == path and all(tell(*one) for one in used)
+            return thing.__code__.co_filename == path and all(describe(*one) for one in used)
         if any(thing is one for one in (math, np, *vars(builtins).values(), *vars(math).values())):
-            told.append(f"{name}: {thing!r}")
+            parts.append(f"{name}: {thing!r}")
             return True
         if type(thing) is tuple:
-            return all(tell(f"{name}[{k}]", value) for k, value in enumerate(thing))
-        told.append(f"{name}: {thing!r}")
+            return all(describe(f"{name}[{k}]", value) for k, value in enumerate(thing))
+        parts.append(f"{name}: {thing!r}")
         return type(thing) in (bool, int, float)
 
-    return "\n".join(told) if tell("", function) else None
+    return "\n".join(parts) if describe("", function) else None
 
 
 def _names(code: CodeType) -> list[str]:
@@ -324,5 +324,5 @@ def _numba_line(error: Any, path: str) -> int:
 def numba_message(error: Any) -> str:
     """Without colours, its first lines in one."""
     lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]
-    told = [line for line in lines if line and not line.startswith(("File ", "Failed in nopython", "During:", "^"))]
-    return "numba: " + " ".join(told[:2]).partition(" def ")[0].replace(">>> ", "")
+    parts = [line for line in lines if line and not line.startswith(("File ", "Failed in nopython", "During:", "^"))]
+    return "numba: " + " ".join(parts[:2]).partition(" def ")[0].replace(">>> ", "")

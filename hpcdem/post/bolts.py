@@ -23,8 +23,8 @@ def areas(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
     at = np.column_stack([nodes["position_x"], nodes["position_y"]])
     first, force = elements["first_node"], elements["axial_force"]
     a, b = at[first], at[first + 1]
-    way = b - a
-    across = np.column_stack([-way[:, 1], way[:, 0]]) / np.hypot(way[:, 0], way[:, 1])[:, None]
+    along = b - a
+    across = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(along[:, 0], along[:, 1])[:, None]
     out = (
         HEIGHT
         * float(nodes["distance"].max())

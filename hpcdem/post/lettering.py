@@ -17,7 +17,7 @@ PREFERRED = (
 WIDE = "\u2e80"
 """From here on letters are those of Chinese, Japanese and Korean."""
 PACKAGES = "fonts-noto-cjk or fonts-wqy-zenhei (Debian, Ubuntu), google-noto-sans-cjk-fonts (Fedora)"
-_told: set[str] = set()
+_warned: set[str] = set()
 
 
 def lettered(figure: Any, kind: str = "png") -> str:
@@ -48,8 +48,8 @@ def lettered(figure: Any, kind: str = "png") -> str:
         return ""
     advice = f": install {PACKAGES}" if max(lost) >= WIDE else ""
     line = f"no installed font has the letters {''.join(sorted(lost)[:8])}{advice}"
-    if advice not in _told:
-        _told.add(advice)
+    if advice not in _warned:
+        _warned.add(advice)
         sys.stderr.write(f"warning: {line}\n")
     if kind != "svg":  # in letters that can be read
         figure.text(

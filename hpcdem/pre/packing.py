@@ -85,10 +85,10 @@ def insert_randomly(
     area = max(x1 - x0, 0.0) * max(y1 - y0, 0.0)
     endless = np.iinfo(np.int64).max
     attempts, in_a_row = (endless if n is None else n for n in (attempts, in_a_row))
-    room = int(min(number, attempts, area / (np.pi * float(radii.min()) ** 2) + 1.0))
+    capacity = int(min(number, attempts, area / (np.pi * float(radii.min()) ** 2) + 1.0))
     cell = reach
     shape = (int((x1 - x0) / cell) + 3, int((y1 - y0) / cell) + 3)
-    total = len(old) + room
+    total = len(old) + capacity
     px, py, pr = np.empty(total), np.empty(total), np.empty(total)
     px[: len(old)], py[: len(old)], pr[: len(old)] = old.T
     head, nxt = np.full(shape, -1, np.int64), np.full(total, -1, np.int64)
@@ -99,9 +99,9 @@ def insert_randomly(
     for k in range(len(old)):
         nxt[k] = head[ox[k], oy[k]]
         head[ox[k], oy[k]] = k
-    out = np.empty(room, np.int64)
+    out = np.empty(capacity, np.int64)
     placed, tried = _insert(
-        attempts, in_a_row, room, radii, x0, x1, y0, y1, seed, stream, cell, head, nxt, px, py, pr, len(old), out
+        attempts, in_a_row, capacity, radii, x0, x1, y0, y1, seed, stream, cell, head, nxt, px, py, pr, len(old), out
     )
     new = out[:placed]
     return np.column_stack([px[new], py[new], pr[new]]), int(tried)

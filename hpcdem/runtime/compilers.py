@@ -86,7 +86,7 @@ def compile_in_processes(
     environment = {name: value for name, value in os.environ.items() if not name.startswith(LAUNCHER)}
     with tempfile.TemporaryFile() as turn, tempfile.TemporaryFile() as errors, contextlib.ExitStack() as processes:
         job = pickle.dumps(Job(warm_ups, cores, turn.fileno(), PATIENCE))
-        told = _Count(turn.fileno())
+        counts = _Count(turn.fileno())
         started = []
         for _ in range(count):
             process = subprocess.Popen(
@@ -101,7 +101,7 @@ def compile_in_processes(
                 process.stdin.write(job)
         while any(process.poll() is None for process in started):
             time.sleep(0.05)
-            meanwhile(*told.read()[1:])
+            meanwhile(*counts.read()[1:])
         if not any(process.returncode for process in started):
             return ""
         errors.seek(0)

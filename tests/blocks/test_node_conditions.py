@@ -225,7 +225,7 @@ def test_what_each_condition_makes_of_a_velocity():
     table[1, [nodes.DOES_X, nodes.AT_X]] = V, 7.0
     table[2, [nodes.DOES_Y, nodes.AT_Y, nodes.DAMP]] = A, 4.0, 0.0
     table[3, nodes.CONSTRAINT] = FIXED
-    table[4, [nodes.CONSTRAINT, nodes.WAY_X, nodes.WAY_Y, nodes.FORCE_X]] = ALONG, 0.6, 0.8, 10.0
+    table[4, [nodes.CONSTRAINT, nodes.DIRECTION_X, nodes.DIRECTION_Y, nodes.FORCE_X]] = ALONG, 0.6, 0.8, 10.0
     outside, felt = np.zeros((5, 2)), np.zeros((5, 4))
     nodes.move(
         1, begin, corner, place, again, kick, np.arange(5), share, table, True, force, applied, v, alpha, outside, felt

@@ -84,7 +84,10 @@ def test_traction_by_place_and_time():
 WRONG = {
     "syntax": ("def f(x:\n    return x\n", "f.py:1: '(' was never closed"),
     "no such function": ("def g(x):\n    return x\n", "f.py: there is no function 'f' in it"),
-    "other arguments": ("def f(x, w):\n    return x\n", "f.py:1: a boundary condition must be a function of x, y, z, t"),
+    "other arguments": (
+        "def f(x, w):\n    return x\n",
+        "f.py:1: a boundary condition must be a function of x, y, z, t",
+    ),
     "two numbers": ("def f(x):\n    return x, x\n", "f.py:1: 'f' must return one float"),
     "a whole number": ("def f(x):\n    return 1\n", "f.py:1: 'f' must return one float (0.0, not 0)"),
     "a missing name": ("def f(x):\n    a = 1.0\n    return a * z\n", "f.py:3: numba: NameError: name 'z'"),

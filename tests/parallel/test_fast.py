@@ -23,9 +23,9 @@ from hpcdem.physics.dem.kernels.fast import Fast
 from hpcdem.physics.dem.kernels.walls import closest
 from hpcdem.physics.dem.simulation import Simulation
 from tests.property.workers import Resident
+from tests.rank_layouts import LAYOUTS, layouts
 from tests.short_push import assert_same_files, contents
 from tests.support import model, only, value
-from tests.ways import WAYS, ways
 
 STRAYS = """\
 START
@@ -102,9 +102,9 @@ def test_the_model_has_what_it_takes(reference: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", ways({"3 ranks"}))
+@pytest.mark.parametrize("case", layouts({"3 ranks"}))
 def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
-    ranks, options = WAYS[case]
+    ranks, options = LAYOUTS[case]
     run(resident, tmp_path / "other", ranks, *options)
     assert_same_files(reference, tmp_path / "other")
 

@@ -17,8 +17,8 @@ import pytest
 
 from hpcdem.io.frames import list_frames, read_frame
 from tests.property.workers import Resident
+from tests.rank_layouts import LAYOUTS, layouts
 from tests.short_push import assert_same_files, contents
-from tests.ways import WAYS, ways
 
 CHAINS: dict[str, dict[str, str | None]] = {
     "push": {
@@ -99,11 +99,11 @@ def test_same_files_on_more_ranks(
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", ways(()))
+@pytest.mark.parametrize("case", layouts(()))
 def test_same_push_however_it_is_run(
     on_one_rank: Callable[[str], Path], manual_scripts: Path, resident: Resident, tmp_path: Path, case: str
 ) -> None:
-    ranks, options = WAYS[case]
+    ranks, options = LAYOUTS[case]
     run_script(resident, manual_scripts / "short" / "push.py", tmp_path / "push", None, ranks, *options)
     assert_same_files(on_one_rank("push") / "push", tmp_path / "push")
     shutil.rmtree(tmp_path / "push")

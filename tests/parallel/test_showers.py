@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.property.workers import Resident
+from tests.rank_layouts import LAYOUTS, layouts
 from tests.short_push import assert_same_files, contents
-from tests.ways import WAYS, ways
 
 SHOWER = """\
 START
@@ -54,11 +54,11 @@ def alone(
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("way", ways(quick=("2 ranks",)))
+@pytest.mark.parametrize("layout", layouts(quick=("2 ranks",)))
 def test_ranks_and_threads_do_not_change_a_bit(
-    resident: Resident, alone: tuple[str, Path], tmp_path: Path, way: str
+    resident: Resident, alone: tuple[str, Path], tmp_path: Path, layout: str
 ) -> None:
-    (what, folder), (ranks, options) = alone, WAYS[way]
+    (what, folder), (ranks, options) = alone, LAYOUTS[layout]
     run(resident, tmp_path, what, ranks, *options)
     assert_same_files(folder / "data", tmp_path / "data")
 

@@ -108,7 +108,7 @@ def _choose_fast(sim: Any, first_class: int | None, limit: float) -> None:
     fast.nearest(p.hot, slow, rows[asked, :2], gaps)
     sim.comm.min_into(gaps)
     walls = np.hstack([sim.walls.p1, sim.walls.p2])
-    free = fast.free_way(asked, gaps, rows[:, :3], clump, walls, half)
+    free = fast.free_path(asked, gaps, rows[:, :3], clump, walls, half)
     reach = np.clip(wanted, half, max(half, most))
     alone = free >= reach
     widest = float(reach[~alone].max(initial=half))

@@ -147,28 +147,30 @@ class PairLaw:
         stiff = stiffness_of(self.declared, self.place, mixed, "N/m")
         if stiff is not None:
             bounds[:] = stiff[:, None]
-        self._look(mixed, bounds)
+        self._check_slopes(mixed, bounds)
         return np.array([mixed[name] for name in self.kernel.columns]).T, bounds
 
-    def _look(self, mixed: Mapping[str, np.ndarray], bounds: np.ndarray) -> None:
+    def _check_slopes(self, mixed: Mapping[str, np.ndarray], bounds: np.ndarray) -> None:
         """CommandError unless the law is finite where discs begin to touch, and no stiffer than it says."""
         states = {state.name: state.initial for state in self.declared.state}
         names = self.kernel.arguments
         for q in range(len(bounds)):
             values = {name: float(value[q]) for name, value in mixed.items()} | states
             values |= {"fs": 0.0, "two_rt": 1.0, "sliding": 0.0, "approach": 0.0, "dt": 0.0}
-            told = ", ".join(f"{name} {values[name]:g}" for name in names if name in mixed) or "no properties"
+            described = ", ".join(f"{name} {values[name]:g}" for name in names if name in mixed) or "no properties"
             found = [
                 self.kernel.law(*(overlap if name == "u" else values[name] for name in names))
                 for overlap in (0.0, OVERLAP)
             ]
             for name, value in zip((*FORCES, *states), found[0]):
                 if not math.isfinite(value):
-                    raise CommandError(f"{self.place} gives {name} {value:g} where discs begin to touch, with {told}")
+                    raise CommandError(
+                        f"{self.place} gives {name} {value:g} where discs begin to touch, with {described}"
+                    )
             slope = (found[1][0] - found[0][0]) / OVERLAP
             if not slope <= bounds[q, 0] * (1.0 + 1e-6) + 1e-12 * abs(found[0][0]) / OVERLAP:
                 raise CommandError(
-                    f"{self.place}: dFn/du is {slope:g} N/m where discs begin to touch, with {told}, above its "
+                    f"{self.place}: dFn/du is {slope:g} N/m where discs begin to touch, with {described}, above its "
                     f"stiffness {bounds[q, 0]:g} N/m, which sets the time step: give pair_law a larger stiffness="
                 )
 

@@ -290,8 +290,8 @@ def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 def nearest_point(points: np.ndarray, at: tuple[float, ...], among: np.ndarray | None = None) -> int:
     """Number of the point nearest to `at`, the lowest of equals; `among` restricts it to these numbers."""
     among = np.arange(len(points)) if among is None else np.sort(among)
-    way = points[among] - np.asarray(at, np.float64)
-    return int(among[np.argmin((way * way).sum(axis=1))])
+    offset = points[among] - np.asarray(at, np.float64)
+    return int(among[np.argmin((offset * offset).sum(axis=1))])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -331,7 +331,7 @@ def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[np.ndarray, np.n
     movement per unit of time. point: one to which they apply, for messages."""
     if sim.dim == 2:
         does, at, kind = one[[moving.DOES_X, moving.DOES_Y]], one[[moving.AT_X, moving.AT_Y]], one[moving.CONSTRAINT]
-        along = one[[moving.WAY_X, moving.WAY_Y]]
+        along = one[[moving.DIRECTION_X, moving.DIRECTION_Y]]
     else:
         does, at, along = (one[first : first + 3] for first in (space.DOES, space.AT, space.WAY))
         kind = one[space.CONSTRAINT]

@@ -308,8 +308,8 @@ class Mesh:
                 one, other = self.cells[:, a], self.cells[:, b]
                 key[:] = np.minimum(one, other) * n + np.maximum(one, other)
             ends = np.column_stack(np.divmod(np.unique(keys), n))
-        way = self.points[ends[:, 1]] - self.points[ends[:, 0]]
-        return float(np.sqrt((way * way).sum(axis=1)).mean())
+        along = self.points[ends[:, 1]] - self.points[ends[:, 0]]
+        return float(np.sqrt((along * along).sum(axis=1)).mean())
 
 
 def pieces(n: int) -> Iterator[slice]:

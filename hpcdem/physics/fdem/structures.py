@@ -147,7 +147,7 @@ class Structure(Prescribed):
         self._account: Any = None
         self._dynamic = blocks.options.dynamic
         self._prepared_for: tuple[float, bool, float] | None = None
-        self._told = 0.0
+        self._reported = 0.0
         self._arrange()
 
     def __len__(self) -> int:
@@ -398,7 +398,7 @@ class Structure(Prescribed):
         mass, more = self._weigh(0.5 * (dt / o.safety) ** 2, 1.0)
         if was is not None and self._account is not None:
             self.commands += self._moving(dt) - before
-        self._tell_of_mass(mass, more)
+        self._report_mass(mass, more)
 
     def follow(self) -> None:
         """The rock has moved: move the nodes over the same step, and find the new forces."""
@@ -433,18 +433,18 @@ class Structure(Prescribed):
     def mesh_replaced(self) -> None:
         """Handle a replaced mesh: `of_mesh` says that these are gone with the one before."""
 
-    def _tell_of_mass(self, mass: np.ndarray, more: str) -> None:
+    def _report_mass(self, mass: np.ndarray, more: str) -> None:
         """Say once in a while how much mass the time step adds to the nodes."""
         log, dt, true = self.blocks.log, self.blocks.clock.dt, self._true_mass
         if log is None or not true.any():
             return
         added = float((mass - true).sum() / true.sum())
-        if abs(added - self._told) > 0.1 * self._told:
+        if abs(added - self._reported) > 0.1 * self._reported:
             log.info(
                 f"{self.name}: the time step {dt:.4g} s would be too large for {int((mass > true).sum())} of "
                 f"{len(mass)} nodes; mass scaling adds {added:.3g} times the mass of the {self.name}{more}"
             )
-            self._told = added
+            self._reported = added
 
     # ---- state on disk -----------------------------------------------------------------------------------------------
 

@@ -193,7 +193,7 @@ def nearest_element(points: np.ndarray, cells: np.ndarray, at: tuple[float, ...]
     outside least."""
     among = np.sort(among)
     u = np.swapaxes(sides(points, cells[among]), 1, 2)
-    way = np.asarray(at, np.float64) - points[cells[among, 0]]
-    part = np.linalg.solve(u, way[:, :, None])[:, :, 0]
+    offset = np.asarray(at, np.float64) - points[cells[among, 0]]
+    part = np.linalg.solve(u, offset[:, :, None])[:, :, 0]
     least = np.minimum(part.min(axis=1), 1.0 - part.sum(axis=1))
     return int(among[np.argmax(np.minimum(least, 0.0))])

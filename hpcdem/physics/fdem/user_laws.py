@@ -231,11 +231,11 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
     wrong = ~np.isfinite(rest)
     if wrong.any():
         i, k = np.argwhere(wrong)[0]
-        told = ", ".join(f"{name} {full[name][i]:g}" for name in columns if name != OWN)
-        raise CommandError(f"{law}: {what[k]} is {rest[i, k]:g} at zero strain with {told}")
+        described = ", ".join(f"{name} {full[name][i]:g}" for name in columns if name != OWN)
+        raise CommandError(f"{law}: {what[k]} is {rest[i, k]:g} at zero strain with {described}")
     for k in NORMAL[declared.dim]:
-        for way in (STEP_OF_STRAIN, -STEP_OF_STRAIN):
-            slope = (at(k, way)[:, k] - rest[:, k]) / way
+        for small in (STEP_OF_STRAIN, -STEP_OF_STRAIN):
+            slope = (at(k, small)[:, k] - rest[:, k]) / small
             steep = ~(slope <= bound * (1.0 + 1e-6) + 1e-12 * np.abs(rest[:, k]) / STEP_OF_STRAIN)
             if steep.any():
                 i = int(np.flatnonzero(steep)[0])

@@ -93,9 +93,9 @@ def _seen(one, two, near, deep, polygon, other, onto):
             x, y, z = ux, uy, uz
         else:
             x, y, z = wx, wy, wz
-        way = (x * mx + (y * my + z * mz)) / against  # times -n
-        onto[2, column] = -way * double
-        x, y, z = x - way * nx, y - way * ny, z - way * nz
+        slip = (x * mx + (y * my + z * mz)) / against  # times -n
+        onto[2, column] = -slip * double
+        x, y, z = x - slip * nx, y - slip * ny, z - slip * nz
         # u' = (r x Q) . m / m^2 and v' = (P x r) . m / m^2.
         m2 = mx * mx + (my * my + mz * mz)
         onto[0, column] = ((y * qz - z * qy) * mx + ((z * qx - x * qz) * my + (x * qy - y * qx) * mz)) / m2

@@ -46,11 +46,11 @@ def largest_moment(force, tension, compression, plastic):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def apart(one, other, way):
+def apart(one, other, direction):
     """(one - other) . way, of vectors (d,)."""
     found = 0.0
-    for c in range(len(way)):
-        found += (one[c] - other[c]) * way[c]
+    for c in range(len(direction)):
+        found += (one[c] - other[c]) * direction[c]
     return found
 
 

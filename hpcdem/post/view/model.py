@@ -161,8 +161,8 @@ def _wrong(errors: Sequence[Mapping[str, Any]], given: Mapping[str, Any]) -> str
         return f"{where}{len(read)}, {validation.expected(first)}"
     any_of = [error for error in errors if _place(error) == _place(first)]
     forms = [_FORMS.get(word, "a list") if e["type"] == "tuple_type" else validation.expected(e) for e in any_of]
-    told = validation.kind_of(read) if isinstance(read, (dict, list, tuple)) else repr(read)[:40]
-    return f"{where}expected {' or '.join(forms)}" + ("" if first["type"] == "missing" else f", read {told}")
+    shown_as = validation.kind_of(read) if isinstance(read, (dict, list, tuple)) else repr(read)[:40]
+    return f"{where}expected {' or '.join(forms)}" + ("" if first["type"] == "missing" else f", read {shown_as}")
 
 
 def _place(error: Mapping[str, Any]) -> list[str | int]:

@@ -124,14 +124,14 @@ def _layer(painted: Painted, number: int, place: tuple, colours: np.ndarray, lay
            fine: int) -> None:  # fmt: skip
     shades = np.clip(np.rint(255.0 * painted.shades), 0, 255).astype(np.uint8)
     kind, rows = (np.ascontiguousarray(one, np.int64) for one in (painted.kind, painted.rows))
-    look = painted.layer
-    target, which, opacity = (colours, layer, row), np.int8(number), float(look.opacity)
+    shown_layer = painted.layer
+    target, which, opacity = (colours, layer, row), np.int8(number), float(shown_layer.opacity)
     if painted.kind_of_shape == DISCS:
         centres, radius = map(np.ascontiguousarray, painted.shape)
-        discs(centres, radius, kind, rows, shades, place, look.edges, target, which, opacity)
+        discs(centres, radius, kind, rows, shades, place, shown_layer.edges, target, which, opacity)
     elif painted.kind_of_shape == POLYGONS:
         points, cells = map(np.ascontiguousarray, painted.shape)
-        polygons(points, cells, kind, rows, shades, place, look.edges, target, which, opacity)
+        polygons(points, cells, kind, rows, shades, place, shown_layer.edges, target, which, opacity)
     else:
         ends = np.ascontiguousarray(painted.shape[0])
         lines(ends, kind, rows, shades, place, max(1, round(painted.width * DOT * fine)), target, which, opacity)
@@ -267,8 +267,8 @@ def _facet(x, y, z, p, q, r, red, green, blue, which, tri, near, face, colours, 
             ):
                 depth = z0 + along * (px - x0) + down * (py - y0)
                 if depth > near[i, j]:
-                    told = which if opacity >= 1.0 or layer[i, j] < 0 else NOTHING
-                    _put(colours, layer, row, i, j, red, green, blue, opacity, number, told)
+                    chosen = which if opacity >= 1.0 or layer[i, j] < 0 else NOTHING
+                    _put(colours, layer, row, i, j, red, green, blue, opacity, number, chosen)
                     if opacity >= 1.0:
                         near[i, j], face[i, j] = depth, tri
 
@@ -300,8 +300,8 @@ def edges(colours, near, face, normals, outlined, pen):
         for j in range(w):
             f = face[i, j]
             dark = 0.0
-            for way in range(2):
-                m, n = (i, j + pen) if way == 0 else (i + pen, j)
+            for shift in range(2):
+                m, n = (i, j + pen) if shift == 0 else (i + pen, j)
                 if m >= h or n >= w:
                     continue
                 g = face[m, n]
@@ -370,14 +370,14 @@ def _line(x0, y0, x1, y1, width, red, green, blue, which, colours, layer, row, n
     # The part of it that may be on the picture (Liang and Barsky 1984).
     begin, end = 0.0, 1.0
     dx, dy = x1 - x0, y1 - y0
-    for way, room in ((-dx, x0 + width), (dx, w + width - x0), (-dy, y0 + width), (dy, h + width - y0)):
-        if way == 0.0:
-            if room < 0.0:
+    for shift, extent in ((-dx, x0 + width), (dx, w + width - x0), (-dy, y0 + width), (dy, h + width - y0)):
+        if shift == 0.0:
+            if extent < 0.0:
                 return
-        elif way < 0.0:
-            begin = max(begin, room / way)
+        elif shift < 0.0:
+            begin = max(begin, extent / shift)
         else:
-            end = min(end, room / way)
+            end = min(end, extent / shift)
     if not begin <= end:
         return
     x0, y0, x1, y1 = x0 + begin * dx, y0 + begin * dy, x0 + end * dx, y0 + end * dy

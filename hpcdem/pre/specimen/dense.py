@@ -112,8 +112,8 @@ def _pairs(x, y, reach, level, skin):
         cell = begin[q] + _cell(x[k], left, side[q], columns[q]) * rows[q] + _cell(y[k], bottom, side[q], rows[q])
         following[k] = head[cell]
         head[cell] = k
-    room = 4 * n + 64
-    first, second = np.empty(room, np.int64), np.empty(room, np.int64)
+    capacity = 4 * n + 64
+    first, second = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
     found = 0
     for i in range(n):
         for q in range(level[i], _LEVELS):
@@ -131,9 +131,12 @@ def _pairs(x, y, reach, level, skin):
                         if q > level[i] or j > i:
                             dx, dy, near = x[j] - x[i], y[j] - y[i], reach[i] + reach[j] + skin
                             if dx * dx + dy * dy < near * near:
-                                if found == room:
-                                    room *= 2
-                                    wider_first, wider_second = np.empty(room, np.int64), np.empty(room, np.int64)
+                                if found == capacity:
+                                    capacity *= 2
+                                    wider_first, wider_second = (
+                                        np.empty(capacity, np.int64),
+                                        np.empty(capacity, np.int64),
+                                    )
                                     wider_first[:found], wider_second[:found] = first, second
                                     first, second = wider_first, wider_second
                                 first[found], second[found] = i, j
@@ -261,11 +264,11 @@ def _relax(fan, reach, area, x, y, angle, level, width, height, is_round):
             for wall in range(4):
                 nx, ny = (1.0, -1.0, 0.0, 0.0)[wall], (0.0, 0.0, 1.0, -1.0)[wall]
                 base = (0.0, -width, 0.0, -height)[wall]
-                room = nx * x[i] + ny * y[i] - base
-                if room - reach[i] >= apart:
+                capacity = nx * x[i] + ny * y[i] - base
+                if capacity - reach[i] >= apart:
                     continue
                 ax, ay = farthest(fan, i, angle[i], -nx, -ny)
-                g = room + nx * ax + ny * ay
+                g = capacity + nx * ax + ny * ay
                 if g >= apart:
                     continue
                 low, high = _face(fan, i, angle[i], -nx, -ny)

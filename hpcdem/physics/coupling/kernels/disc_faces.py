@@ -302,7 +302,7 @@ def add_to_discs(sign, disc_row, disc_force, cut, lo, foff, force):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def near(hot, rows, sorted_keys, side, places, room, pairs):
+def near(hot, rows, sorted_keys, side, places, capacity, pairs):
     """Discs nearer to faces than R + room: pairs (m, 2) of disc row and face; returns how many there are, also if they
     are more than fit in.
 
@@ -321,7 +321,7 @@ def near(hot, rows, sorted_keys, side, places, room, pairs):
                 i = rows[k]
                 x, y = hot[i, X], hot[i, Y]
                 _, _, _, qx, qy = closest(x1, y1, x2, y2, x, y)
-                reach = hot[i, RADIUS] + room
+                reach = hot[i, RADIUS] + capacity
                 if (x - qx) * (x - qx) + (y - qy) * (y - qy) < reach * reach:
                     if n < len(pairs):
                         pairs[n, 0], pairs[n, 1] = i, f

@@ -211,19 +211,19 @@ def wall_work(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_ta
 
 
 @njit(cache=True, error_model="numpy")
-def _jump(where, u, way, law, two_r, was, u_before, way_before):
+def _jump(where, u, advance, law, two_r, was, u_before, advance_before):
     """Normal energy that is lost because a wall contact is another one than before the step: on a face, at an end, or
     dropped there in favour of another wall's, and not because it began or opened. way, way_before: what the motion of
     the step adds to the overlaps now and before."""
-    if was == where or (was == NONE and u <= way) or (where == NONE and u_before + way_before <= 0.0):
+    if was == where or (was == NONE and u <= advance) or (where == NONE and u_before + advance_before <= 0.0):
         return 0.0
     loss = 0.0
     if was != NONE:
         fn, _, _, energy = laws.contact_state(law[MODEL], law[A], law[B], two_r, u_before)
-        loss += energy + 0.5 * fn * way_before
+        loss += energy + 0.5 * fn * advance_before
     if where != NONE:
         fn, _, _, energy = laws.contact_state(law[MODEL], law[A], law[B], two_r, u)
-        loss -= energy - 0.5 * fn * way
+        loss -= energy - 0.5 * fn * advance
     return loss
 
 
@@ -270,8 +270,8 @@ def wall_losses(
             where, _, nx, ny, u = meeting(k, first, last, x, y, r, walls, slot_wall, side_before)
             if was == NONE and where == NONE:
                 continue
-            way, way_before = (nx * vx + ny * vy) * dt, (mx * vx + my * vy) * dt
-            book(bins, OPENED, _jump(where, u, way, law, 2.0 * r, was, u_before, way_before))
+            advance, advance_before = (nx * vx + ny * vy) * dt, (mx * vx + my * vy) * dt
+            book(bins, OPENED, _jump(where, u, advance, law, 2.0 * r, was, u_before, advance_before))
             if before == 0.0 and now == 0.0:
                 continue
             if where == NONE:

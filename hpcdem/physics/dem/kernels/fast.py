@@ -144,7 +144,7 @@ def nearest(hot, slow, places, out):
         out[k] = least
 
 
-def free_way(
+def free_path(
     asked: np.ndarray, gaps: np.ndarray, places: np.ndarray, clump: np.ndarray, walls: np.ndarray, half: float
 ) -> np.ndarray:
     """Compute the distance that fast particles can move without contact (m,) [m]; negative: not at all, or not asked.
@@ -176,14 +176,14 @@ def wanted_reach(way: np.ndarray, gravity: float, dt: float) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def wait(room, stride, fall):
+def wait(margin, stride, fall):
     """Steps (as a float) that may pass unseen with so much room [m] left at this stride [m] per step: half of it, in
     case things speed up. fall [m]: what gravity adds to the stride in a step, counted twice."""
     steps = np.inf
     if stride > 0.0:
-        steps = 0.5 * room / stride
+        steps = 0.5 * margin / stride
     if fall > 0.0:
-        steps = min(steps, math.sqrt(0.5 * room / fall))
+        steps = min(steps, math.sqrt(0.5 * margin / fall))
     return steps
 
 
@@ -201,15 +201,15 @@ def survey(hot, n_left, origin, rows, reach, alone, dt, fall, box, out):
         if not (path < np.inf and stride < np.inf):
             out[FAST_BROKEN] = 1.0
             continue
-        room = reach[k] - path
+        margin = reach[k] - path
         if not alone[k]:
             out[FAST_STRIDE] = max(out[FAST_STRIDE], stride / hot[i, RADIUS])
-        if room < 0.0:
+        if margin < 0.0:
             out[DUE] = LATE
-        elif room < stride or not (left <= x <= right and bottom <= y <= top):
+        elif margin < stride or not (left <= x <= right and bottom <= y <= top):
             out[DUE] = max(out[DUE], STALE)
         else:
-            out[HURRY] = max(out[HURRY], 1.0 / wait(room, stride, fall))
+            out[HURRY] = max(out[HURRY], 1.0 / wait(margin, stride, fall))
 
 
 # ---- their pairs -------------------------------------------------------------------------------------------------

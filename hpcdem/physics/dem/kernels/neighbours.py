@@ -254,8 +254,7 @@ class ContactLists:
     n_pairs: int
 
     def pieces(self) -> Iterator[tuple[np.ndarray, np.ndarray, int, int]]:
-        """Return for each block the row and partner of its pair slots, its first owned storage row and the one after
-        its last.
+        """Of each block: row and partner of its pair slots, its first owned storage row and the one after its last.
 
         All pairs of a particle are in the piece that owns it, in one order for any ranks and threads."""
         b = self.blocks
@@ -272,7 +271,7 @@ class ContactLists:
         self.bonds_placed = 0
 
     def histories(self, ihot: np.ndarray, stamp: float = 0.0) -> Histories:
-        """Return the present histories of the contacts of the owned particles; stamp: see `histories.taken_out`."""
+        """What the contacts of the owned particles remember now; stamp: see `histories.taken_out`."""
         return histories.taken_out(self, ihot, stamp)
 
     def force_rows(self) -> np.ndarray:

@@ -38,7 +38,7 @@ def neighbours_in_rows(gid: np.ndarray, xy: np.ndarray, origin: np.ndarray, rows
 
 
 def found(
-    lists: Any, hot: np.ndarray, origin: np.ndarray, chain: np.ndarray | None, ends: np.ndarray, ways: np.ndarray
+    lists: Any, hot: np.ndarray, origin: np.ndarray, chain: np.ndarray | None, ends: np.ndarray, paths: np.ndarray
 ) -> np.ndarray:
     """NOT, ROW or WALL for each owned particle (n_own,) i8.
 
@@ -51,7 +51,7 @@ def found(
         for row, partner, _, _ in lists.pieces():
             _through_rows(row, partner, hot, origin, chain, lists.n_left, out)
     if len(lists.slot_row):
-        _through_walls(lists.slot_row, lists.slot_wall, hot, origin, ends, ways, lists.n_left, out)
+        _through_walls(lists.slot_row, lists.slot_wall, hot, origin, ends, paths, lists.n_left, out)
     return out
 
 
@@ -95,11 +95,11 @@ def _through_rows(row, partner, hot, origin, chain, n_left, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _through_walls(slot_row, slot_wall, hot, origin, ends, ways, n_left, out):
+def _through_walls(slot_row, slot_wall, hot, origin, ends, paths, n_left, out):
     for k in range(len(slot_row)):
         d, w = slot_row[k], slot_wall[k]
-        way = ways[w, 0], ways[w, 1]
+        path = paths[w, 0], paths[w, 1]
         if _crosses(
-            ends[w, 0], ends[w, 1], ends[w, 2], ends[w, 3], hot[d, X], hot[d, Y], way, way, _gone(hot, origin, d)
+            ends[w, 0], ends[w, 1], ends[w, 2], ends[w, 3], hot[d, X], hot[d, Y], path, path, _gone(hot, origin, d)
         ):
             out[d - n_left] = WALL

@@ -26,11 +26,11 @@ def place(
     # columns of what is remembered; of few rows they are contiguous, of many they are not: one type for the kernels
     partner, remembered, extra = (np.ascontiguousarray(one) for one in (hist.partner, hist.fs, hist.extra))
     memory = _who_remembers(where, hist.ptr, partner)
-    n = room = lists.n_own // 16 + 64
-    while n >= room:
-        room = n + 64
-        rows, which, source = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
-        fs, at_side = np.empty(room), np.empty(room)
+    n = capacity = lists.n_own // 16 + 64
+    while n >= capacity:
+        capacity = n + 64
+        rows, which, source = np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty(capacity, np.int64)
+        fs, at_side = np.empty(capacity), np.empty(capacity)
         n = _find(
             hot, cell, lists.n_left, lists.n_own, walls, side, largest, skin, memory, where,
             hist.ptr, partner, remembered, extra, fast_rows, reach, rows, which, fs, at_side, source,

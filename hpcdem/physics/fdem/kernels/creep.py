@@ -138,12 +138,12 @@ def _creep_part(size, i, p, j, o, e, base, moduli, unit, per_kelvin, dt, keep, m
         before, stress, old = memory[j, o + IN_KELVIN[k]], memory[j, o + BEFORE[k]], memory[j, o + CREPT[k]]
         ends = stress + stress_then(now, start, old, before, stress, two_mu, back, both, div)
         then = ratio * before + ends * kelvin
-        way = then - before
-        crept = old + (way + ends * maxwell)
+        change = then - before
+        crept = old + (change + ends * maxwell)
         s0[i, p, PLACES[k]] = crept
         if keep:
             memory[j, o + CREPT[k]], memory[j, o + IN_KELVIN[k]] = crept, then
-            of_stress, of_kelvin = _added(k, ends, of_stress), _added(k, way, of_kelvin)
+            of_stress, of_kelvin = _added(k, ends, of_stress), _added(k, change, of_kelvin)
     _relieve(size, i, p, moduli, base, s0)
     if not keep:
         return 0.0

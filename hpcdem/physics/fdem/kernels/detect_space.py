@@ -115,8 +115,8 @@ def _separated(corner, target, x, buffer, points):
                 low, high = min(low, d), max(high, d)
             else:
                 far_low, far_high = min(far_low, d), max(far_high, d)
-        room = buffer * math.sqrt(nx * nx + (ny * ny + nz * nz))
-        if low - far_high > room or far_low - high > room:
+        reach = buffer * math.sqrt(nx * nx + (ny * ny + nz * nz))
+        if low - far_high > reach or far_low - high > reach:
             return True
     return False
 

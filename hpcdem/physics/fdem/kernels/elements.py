@@ -494,9 +494,9 @@ def elastic_pair(e, a11, a22, a12, b11, b22, b12, mean, one, two, dt, lanes):
     )  # fmt: skip
 
 
-def overlay_loop(overlay, law=elastic_pair, looks=False):
+def overlay_loop(overlay, law=elastic_pair, reports_yield=False):
     """The loop that adds the forces of an overlay (0, 1) of quads, the triangles i, j, k and i, k, l. law: a kernel
-    like `elastic_pair`; looks: it also says by how much the stress without the viscous part is outside.
+    like `elastic_pair`; reports_yield: it also reports by how much the stress without the viscous part is outside.
 
     Mixed discretisation: strain per triangle, its volumetric part the mean of the overlay (Marti & Cundall 1982).
     """
@@ -530,7 +530,7 @@ def overlay_loop(overlay, law=elastic_pair, looks=False):
             s11, s22, s12 = lanes[z1 + e] + s11, lanes[z1 + _NEXT + e] + s22, lanes[z1 + _B + e] + s12
             t11, t22, t12 = lanes[z2 + e] + t11, lanes[z2 + _NEXT + e] + t22, lanes[z2 + _B + e] + t12
             s33, t33 = lanes[z1 + _B + _NEXT + e] + s33, lanes[z2 + _B + _NEXT + e] + t33
-            if looks:
+            if reports_yield:
                 far = laws.outside(
                     s11, s22, s12, s33, lanes[l1 + e], lanes[l1 + _B + e], lanes[l1 + _B + _NEXT + e]
                 )  # fmt: skip

@@ -472,15 +472,15 @@ def _pressure(v, law, beyond):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _mobilised(path, pressure, law, beyond):
     """Friction angle that is mobilised, and the part of it that is roughness, m i [degrees]."""
-    way = path / max(beyond[PEAK], TINY)
-    if way < 0.3:
-        return law[RESIDUAL] * way / 0.3, 0.0
+    mobilised = path / max(beyond[PEAK], TINY)
+    if mobilised < 0.3:
+        return law[RESIDUAL] * mobilised / 0.3, 0.0
     rough = max(law[JRC] * math.log10(law[JCS] / max(pressure, TINY)), 0.0)
     share = 0.0
     for k in range(len(MOBILISED) - 1):
         low, high = MOBILISED[k], MOBILISED[k + 1]
-        if low[0] <= way < high[0]:
-            share = low[1] + (high[1] - low[1]) * (way - low[0]) / (high[0] - low[0])
+        if low[0] <= mobilised < high[0]:
+            share = low[1] + (high[1] - low[1]) * (mobilised - low[0]) / (high[0] - low[0])
     rough = min(share * rough, max(STEEPEST - law[RESIDUAL], 0.0))
     return law[RESIDUAL] + rough, rough
 

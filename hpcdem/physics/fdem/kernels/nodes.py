@@ -21,7 +21,7 @@ UNBOUND, FIXED, ALONG = 0, 1, 2
 
 # Columns of the table of conditions at the present moment (rows, 10): what x and y do and at which value, the nodal
 # force, the constraint and its unit vector, local damping (negative: that of the model).
-DOES_X, AT_X, DOES_Y, AT_Y, FORCE_X, FORCE_Y, CONSTRAINT, WAY_X, WAY_Y, DAMP = range(10)
+DOES_X, AT_X, DOES_Y, AT_Y, FORCE_X, FORCE_Y, CONSTRAINT, DIRECTION_X, DIRECTION_Y, DAMP = range(10)
 CONDITION = 10
 # Columns of the table of tractions at the present moment (rows, 7): stresses [Pa], velocity of the incoming wave [m/s],
 # stress along the face, counter-clockwise [Pa].
@@ -111,17 +111,17 @@ def _move(
             if table[q, CONSTRAINT] == FIXED:
                 wx = wy = 0.0
             elif table[q, CONSTRAINT] == ALONG:
-                along = wx * table[q, WAY_X] + wy * table[q, WAY_Y]
+                along = wx * table[q, DIRECTION_X] + wy * table[q, DIRECTION_Y]
                 if drag > 0.0 and table[q, DOES_X] == FREE and table[q, DOES_Y] == FREE:
                     # Damping sees the force along the line alone: that across it is carried, and would act as friction.
-                    along = vx * table[q, WAY_X] + vy * table[q, WAY_Y]
-                    along += k * laws.damped(fx * table[q, WAY_X] + fy * table[q, WAY_Y], along, drag)
-                wx, wy = along * table[q, WAY_X], along * table[q, WAY_Y]
+                    along = vx * table[q, DIRECTION_X] + vy * table[q, DIRECTION_Y]
+                    along += k * laws.damped(fx * table[q, DIRECTION_X] + fy * table[q, DIRECTION_Y], along, drag)
+                wx, wy = along * table[q, DIRECTION_X], along * table[q, DIRECTION_Y]
             # What the conditions had to add so that the node does this.
             outside[i, 0] = outside[i, 1] = 0.0
             if table[q, CONSTRAINT] == ALONG:
-                across = fy * table[q, WAY_X] - fx * table[q, WAY_Y]
-                outside[i, 0], outside[i, 1] = across * table[q, WAY_Y], -across * table[q, WAY_X]
+                across = fy * table[q, DIRECTION_X] - fx * table[q, DIRECTION_Y]
+                outside[i, 0], outside[i, 1] = across * table[q, DIRECTION_Y], -across * table[q, DIRECTION_X]
             else:
                 fixed = table[q, CONSTRAINT] == FIXED
                 if fixed or table[q, DOES_X] != FREE:

@@ -362,7 +362,7 @@ def flow(g, t, threads, count, who, base, law, soft, small, step, memory, s0, ta
         )  # fmt: skip
 
 
-_look_0, _look_1 = elements.overlay_loop(0, looks=True), elements.overlay_loop(1, looks=True)
+_look_0, _look_1 = elements.overlay_loop(0, reports_yield=True), elements.overlay_loop(1, reports_yield=True)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -1,4 +1,4 @@
-"""Ways to run the same script, all of which give the same bits."""
+"""Layouts of ranks and threads, all of which give the same bits."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import pytest
 
-WAYS: dict[str, tuple[int, list[str]]] = {
+LAYOUTS: dict[str, tuple[int, list[str]]] = {
     "2 ranks": (2, []),
     "3 ranks": (3, []),
     "4 ranks": (4, []),
@@ -18,6 +18,6 @@ WAYS: dict[str, tuple[int, list[str]]] = {
 """Number of ranks, and options, by name."""
 
 
-def ways(quick: Collection[str]) -> list:
-    """Parameters of a test: the names of all ways; those that are not in `quick` are slow."""
-    return [pytest.param(name, marks=() if name in quick else pytest.mark.slow) for name in WAYS]
+def layouts(quick: Collection[str]) -> list:
+    """Parameters of a test: the names of all layouts; those that are not in `quick` are slow."""
+    return [pytest.param(name, marks=() if name in quick else pytest.mark.slow) for name in LAYOUTS]
