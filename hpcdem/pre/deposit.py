@@ -33,7 +33,7 @@ def top(at: np.ndarray, radius: float, discs: np.ndarray, walls: np.ndarray) -> 
 
 
 def is_steep(x1: float, y1: float, x2: float, y2: float) -> bool:
-    """Whether a wall rises at more than 45 degrees."""
+    """Return whether a wall rises at more than 45 degrees."""
     return bool(abs(y2 - y1) > abs(x2 - x1))
 
 

@@ -170,7 +170,7 @@ def warming() -> Iterator[None]:
 
 
 def install() -> None:
-    """Take kernels of hpcdem from the store from now on, or go into it, also those that are imported already."""
+    """Take kernels of hpcdem from the store from now on and put new ones into it, also those imported already."""
     global _usual
     from numba.core.caching import FunctionCache
     from numba.core.dispatcher import Dispatcher
@@ -432,6 +432,6 @@ def knows(place: Path, name: str) -> bool:
 
 
 def keep(kernel: Any, place: Path, name: str) -> None:
-    """Take a kernel that has not been compiled yet from this folder from now on, or goes into it."""
+    """Take a kernel that has not been compiled yet from this folder from now on, or store it there."""
     name_kernels_apart()
     kernel._cache = Files(place, name)

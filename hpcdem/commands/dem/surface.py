@@ -268,8 +268,8 @@ def _barriers(sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _range(land: Land, ground: np.ndarray, barriers: np.ndarray) -> tuple[float, float] | None:
-    """Where the process acts [m]: as far as the ground (n, 3) reaches without an empty column, or the range given
-    between the steep walls around it."""
+    """Return where the process acts [m]: as far as the ground (n, 3) reaches without an empty column, or the range
+    given between the steep walls around it."""
     ends = None
     if len(ground):
         inside = ground if land.x is None else ground[(ground[:, 0] >= land.x[0]) & (ground[:, 0] <= land.x[1])]

@@ -70,7 +70,7 @@ class Land:
 
     @property
     def deposits(self) -> bool:
-        """Whether it can make discs."""
+        """Return whether it can make discs."""
         return bool(self.rad)
 
     def units(self, area: float) -> int:

@@ -175,7 +175,7 @@ class Walls:
 
     @property
     def moves(self) -> bool:
-        """Whether a wall has a velocity."""
+        """Return whether a wall has a velocity."""
         return bool(self.v.any() or self.bend.any())
 
     def ways(self) -> np.ndarray:

@@ -88,7 +88,7 @@ def face_partners(cells: np.ndarray, n_points: int = 0) -> np.ndarray:
 
 
 def edges_of(cells: np.ndarray, n_points: int, partner: np.ndarray | None = None) -> Edges:
-    """All faces, each once, ascending by number."""
+    """Return all faces, each once, ascending by number."""
     partner = face_partners(cells, n_points) if partner is None else partner
     face = np.arange(len(partner))
     lower = face[(partner < 0) | (partner > face)]

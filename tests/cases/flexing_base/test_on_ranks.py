@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from tests.property.workers import Resident
+from tests.rank_layouts import LAYOUTS, layouts
 from tests.short_push import assert_same_files
-from tests.ways import WAYS, ways
 
 SCRIPT = """\
 START
@@ -55,9 +55,9 @@ def test_both_bases_bend(reference: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", ways({"2 ranks", "4 ranks"}))
+@pytest.mark.parametrize("case", layouts({"2 ranks", "4 ranks"}))
 def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
-    ranks, options = WAYS[case]
+    ranks, options = LAYOUTS[case]
     bend(resident, tmp_path / "other", ranks, *options)
     assert_same_files(reference, tmp_path / "other")
 

@@ -137,8 +137,8 @@ def _take(order, ptr, rows, new_ptr, new_rows):
 
 
 def taken_out(lists: Any, ihot: np.ndarray, stamp: float) -> Histories:
-    """What the contacts of the owned particles remember. lists: neighbours.ContactLists; ihot (n, 8): their storage;
-    stamp: what the memory of contacts that touch is not below of (user_pairs.py)."""
+    """Collect the histories of the contacts of the owned particles. lists: neighbours.ContactLists; ihot (n, 8): their
+    storage; stamp: what the memory of contacts that touch is not below of (user_pairs.py)."""
     b, n_blocks = lists.blocks, lists.n_blocks
     totals, found = np.zeros(n_blocks, np.int64), np.zeros(n_blocks, np.int64)
     alive, count = np.empty(len(lists.partner), np.int32), np.empty(lists.n_own, np.int64)

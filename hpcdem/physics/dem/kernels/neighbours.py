@@ -271,7 +271,7 @@ class ContactLists:
         self.bonds_placed = 0
 
     def histories(self, ihot: np.ndarray, stamp: float = 0.0) -> Histories:
-        """What the contacts of the owned particles remember now; stamp: see `histories.taken_out`."""
+        """Return what the contacts of the owned particles remember now; stamp: see `histories.taken_out`."""
         return histories.taken_out(self, ihot, stamp)
 
     def force_rows(self) -> np.ndarray:
