@@ -25,7 +25,6 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.core.memory import aligned, take_rows
 from hpcdem.core.timers import Timers
 from hpcdem.engine.rebuild import AT_A_GLANCE, RebuildState
-from hpcdem.halo import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
@@ -187,7 +186,7 @@ class Model(ABC):
             cell = self._choose_reach(frozen)
         cell, number = self._share_out(cell)
         with self.timers("neighbour"):
-            order = strips.global_order(cell, number)
+            order = self.ownership.order(cell, number)
             cell = cell[order]
         with self.timers("halo"):
             self._store(order, cell)

@@ -12,8 +12,8 @@ import numpy as np
 from hpcdem.core.cells import COLUMN, columns, keys
 from hpcdem.core.comm import Comm
 from hpcdem.core.errors import UsageError
-from hpcdem.halo import balance, strips
-from hpcdem.halo.curve import Grid, overlapping
+from hpcdem.decomp import balance, strips
+from hpcdem.decomp.curve import Grid, overlapping
 from hpcdem.halo.exchange import Sends
 
 MOST_COLUMNS = 1 << 24
@@ -43,6 +43,10 @@ class Ownership:
         """Return the places of cells (n,) i8."""
         found: np.ndarray = columns(cell)
         return found
+
+    def order(self, cell: np.ndarray, number: np.ndarray) -> np.ndarray:
+        """Return the indices that sort rows by cell and number (n,) i8: the one order of the whole model."""
+        return strips.global_order(cell, number)
 
     def owner_of(self, place: np.ndarray) -> np.ndarray:
         """Return the rank that owns each place."""
@@ -159,7 +163,7 @@ class Ownership:
 
 
 class Curve(Ownership):
-    """Boundaries (ranks + 1,) i8 on Hilbert's curve through the cells of space (halo/curve.py).
+    """Boundaries (ranks + 1,) i8 on Hilbert's curve through the cells of space (decomp/curve.py).
 
     The place of a cell is its key. A rank may own nothing.
 
@@ -226,3 +230,11 @@ class Curve(Ownership):
             )
         at = strips.cut(np.bincount(of, weights, len(cells)), 0, self.comm.size)
         return np.append(cells, cells[-1:] + 1)[np.minimum(at, len(cells))] if len(cells) else np.zeros_like(at)
+
+
+def warm_up(cell: np.ndarray, ids: np.ndarray) -> None:
+    """Call each kernel of the decomposition once, with these cells (n,) i8 and ids (n,) i8."""
+    strips.global_order(cell, ids)
+    strips.strays(columns(cell), np.array([-1, 0, 1]), 0)
+    boxes, place = np.zeros((1, 6)), np.zeros(1, np.int64)
+    overlapping(place, boxes, Grid(1.0, (0, 0, 0), 1).beside(place), boxes)

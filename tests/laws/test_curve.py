@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.halo.curve import MOST_LEVELS, Grid, cube_of, key_of, overlapping
+from hpcdem.decomp.curve import MOST_LEVELS, Grid, cube_of, key_of, overlapping
 
 
 @pytest.mark.parametrize("levels", [1, 2, 3, 4])

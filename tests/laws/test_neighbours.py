@@ -8,7 +8,7 @@ import pytest
 from hpcdem.core import cells
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.fields import GID, RADIUS, WIDTH, X, Y
-from hpcdem.halo import strips
+from hpcdem.decomp import strips
 from hpcdem.halo.migrate import Migration
 from hpcdem.physics.dem.kernels import neighbours, walls
 from hpcdem.physics.dem.kernels.fast import Fast

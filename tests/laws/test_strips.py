@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as hnp
 
 from hpcdem.core import cells
 from hpcdem.core.cells import COLUMN
-from hpcdem.halo import balance, strips
+from hpcdem.decomp import balance, strips
 
 quick = settings(max_examples=150, deadline=None, derandomize=True)
 weights = hnp.arrays(np.float64, st.integers(1, 80), elements=st.floats(0.0, 1e6))

@@ -9,7 +9,7 @@ import pytest
 
 from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import UsageError
-from hpcdem.halo import balance, strips
+from hpcdem.decomp import balance, strips
 from hpcdem.halo.copies import Copies, moved
 from hpcdem.halo.migrate import Trail
 from hpcdem.halo.ownership import Ownership

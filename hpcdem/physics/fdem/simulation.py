@@ -21,9 +21,9 @@ import numpy as np
 from hpcdem.core.errors import PhysicsError
 from hpcdem.core.heap import give_back
 from hpcdem.core.memory import aligned
+from hpcdem.decomp.curve import Grid
 from hpcdem.engine.model import FRESH, LISTS, STORAGE
 from hpcdem.engine.rebuild import LONGEST_WAIT
-from hpcdem.halo.curve import Grid
 from hpcdem.halo.ownership import Curve, Ownership
 from hpcdem.physics.fdem import (
     apart,

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from hpcdem.core.comm import SerialComm
-from hpcdem.halo import curve
 from hpcdem.physics.fdem import changes, connectivity, convergence, creep, diagnostics, equilibrium, overlaps
 from hpcdem.physics.fdem.elements.kind import SIX_NODE_TRIANGLE
 from hpcdem.physics.fdem.mesh import Mesh
@@ -291,8 +290,6 @@ def in_space(threads: int = 1) -> None:
     changes.null(sim, [1], relax=2)
     convergence.advance(sim, 2)
     diagnostics.unbalanced_ratio(sim)
-    boxes, cell = np.zeros((1, 6)), np.zeros(1, np.int64)  # with several ranks only
-    curve.overlapping(cell, boxes, curve.Grid(1.0, (0, 0, 0), 1).beside(cell), boxes)
 
 
 def _rest(mesh: Mesh, threads: int) -> None:

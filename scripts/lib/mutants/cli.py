@@ -18,7 +18,7 @@ from mutants.seeds import choose
 from mutants.trial import PLAIN, Copy, judge
 
 ROOT = Path(__file__).resolve().parents[3]
-PLACES = ("hpcdem/physics", "hpcdem/lang", "hpcdem/halo", "hpcdem/io", "hpcdem/numerics")
+PLACES = ("hpcdem/physics", "hpcdem/lang", "hpcdem/halo", "hpcdem/io", "hpcdem/decomp", "hpcdem/numerics")
 
 
 REACH = ROOT / ".pytest_cache" / "mutants"
@@ -61,7 +61,7 @@ def main(
     """Change the sources in small ways, one at a time, and see which tests notice.
 
     PLACES restrict what is tried to files or folders of the package; the mutants are chosen from physics, lang, halo,
-    io and numerics. Tests run in one process in a copy of the tree, with compiled kernels for what Python calls
+    io, decomp and numerics. Tests run in one process in a copy of the tree, with compiled kernels for what Python calls
     and then with kernels as plain functions: which functions each of them calls is measured first, and a mutant meets
     those that call its function, the most specific ones first. Results are appended to a file as they come: the same
     command resumes.
