@@ -67,8 +67,8 @@ class Geometry(Words):
         centre : centre [m].
         radius : radius [m].
         as_layer : name of the layer; a layer may hold several shapes.
-        segment_length : of its sides, about [m] (in the plane; default: a true circle).
-        normal : of the disc, of any length (in three dimensions; default: (0,0,1)).
+        segment_length : approximate length of the sides of a polygon [m] (in the plane; default: a true circle).
+        normal : normal of the disc, of any length (in three dimensions; default: (0,0,1)).
         """
     def arc(self, centre: Point, radius: float, begin: float, end: float, as_layer: str) -> None:
         """In the plane: a part of a circle, counter-clockwise.
@@ -113,7 +113,7 @@ class Geometry(Words):
         Parameters
         ----------
         first : middle of one end [m].
-        second : of the other [m].
+        second : middle of the other end [m].
         radius : radius [m].
         as_layer : name of the layer; a layer may hold several shapes.
         """
@@ -123,9 +123,9 @@ class Geometry(Words):
         Parameters
         ----------
         first : middle of one end [m].
-        second : of the other [m].
+        second : middle of the other end [m].
         radius : radius at the first end [m].
-        other : radius at the other [m].
+        other : radius at the other end [m].
         as_layer : name of the layer; a layer may hold several shapes.
         """
     def disc(self, centre: Point, normal: Point, radius: float, as_layer: str) -> None:
@@ -152,7 +152,7 @@ class Geometry(Words):
 
         Parameters
         ----------
-        layer : of polygons.
+        layer : layer of the polygons.
         along : the vector of extrusion [m].
         as_layer : name of the layer; a layer may hold several shapes.
         """
@@ -168,11 +168,11 @@ class Geometry(Words):
 
         Parameters
         ----------
-        layer : of polygons.
+        layer : layer of the polygons.
         axis : direction of the axis.
         as_layer : name of the layer; a layer may hold several shapes.
         about : a point of it [m] (default: (0,0,0)).
-        angle : right-handed, up to 360 [degrees] (default: 360).
+        angle : angle of revolution, right-handed, up to 360 [degrees] (default: 360).
         """
     def fractures(
         self,
@@ -270,7 +270,7 @@ class Geometry(Words):
         to : position of the origin in the model [m] (in the plane; default: (0,0)).
         line : two points of a map with heights, in its units: x is the distance along their line, y the height (in
             the plane).
-        legend : of an image: file with lines colour, name (in the plane).
+        legend : legend of an image: a file with lines of colour and name (in the plane).
         attribute : attribute whose value is the name (GeoJSON, shapefiles) (in the plane; default: name, layer,
             unit, formation, label or id).
         simplify : omits points of boundaries where triangles of less than half the square of this length disappear
@@ -303,7 +303,7 @@ class Geometry(Words):
 
         Parameters
         ----------
-        factors : along the axes, not 0.
+        factors : factors along the axes, not 0.
         layer : names of layers (default: all).
         """
     def translate(self, way: Point, layer: Sequence[str] | None = None) -> None:
@@ -311,7 +311,7 @@ class Geometry(Words):
 
         Parameters
         ----------
-        way : where to [m].
+        way : displacement of all points [m].
         layer : names of layers (default: all).
         """
     def export(
@@ -368,15 +368,15 @@ class Mesh(Words):
 
         Parameters
         ----------
-        from_layer : its outline.
+        from_layer : layer with the outline of the mesh.
         size : length of edges [m].
         type : triangles or quads (in the plane; default: tri).
         refine_layer : smaller elements near this layer; each is (refine_layer, size, distance); size: length of
             edges there [m]; distance: distance over which the size grows to that of the rest [m] (default: ten times
             the size).
         hole : the inside of this layer stays empty.
-        region : the elements inside this layer become a group; each is (region, group); group: its name (default:
-            the name of the layer).
+        region : the elements inside this layer become a group; each is (region, group); group: name of the group
+            (default: the name of the layer).
         embed : lines that become edges of the mesh; in three dimensions surfaces, which become faces.
         crack : lines that become edges with an initial crack; in three dimensions surfaces.
         bodies : each body of the layer becomes a group, named as in its file, else by the layer and its number (in
@@ -406,12 +406,13 @@ class Mesh(Words):
         ----------
         first : a corner [m].
         second : the corner across [m].
-        cells : along x and y, in three dimensions z.
+        cells : number of cells along x and y, in three dimensions also z.
         type : triangles or quads, in three dimensions tetrahedra or hexahedra (default: tri, tet).
-        diagonal : of the triangles; alternating, or both of each rectangle (in the plane; default: alternate).
+        diagonal : direction of the diagonals; alternate: it changes from rectangle to rectangle; both: two in each
+            rectangle (in the plane; default: alternate).
         split : tetrahedra of each box: 5, mirrored from box to box, 6 about a diagonal, or 12 about a point in the
             middle (in three dimensions; default: 6).
-        ratio : along x and y (and z): ratio of the size of each rectangle or box to the one before (default: 1 1).
+        ratio : ratio of the size of each rectangle or box to the previous one, along x and y (and z) (default: 1 1).
         group : the group that the new elements are in.
         set : the set of the group.
         """
@@ -433,12 +434,12 @@ class Mesh(Words):
 
         Parameters
         ----------
-        p0 : the corner [m].
-        p1 : end of its first edge [m].
-        p2 : of the second [m].
-        p3 : of the third [m] (in three dimensions).
+        p0 : corner at which the edges begin [m].
+        p1 : end of the first edge [m].
+        p2 : end of the second edge [m].
+        p3 : end of the third edge [m] (in three dimensions).
         n : elements along each edge.
-        ratio : along each edge: ratio of the size of an element to the one before (default: 1 1).
+        ratio : ratio of the size of an element to the previous one, along each edge (default: 1 1).
         triangle : triangles, or tetrahedra; False: quads, or hexahedra (default: True).
         group : the group that the new elements are in.
         set : the set of the group.
@@ -460,13 +461,13 @@ class Mesh(Words):
         layer : layers of geometry; each is (layer, mesh_size, is_boundary); mesh_size: length of edges there [m]
             (default: the largest of the others); is_boundary: it bounds the mesh: the outside is removed (default:
             the first piece does).
-        circle : a circle; each is (center, radius, mesh_size, is_boundary); center: its centre [m]; radius: its
-            radius [m]; mesh_size: length of edges there [m] (default: the largest of the others); is_boundary: it
-            bounds the mesh: the outside is removed (default: the first piece does).
+        circle : a circle; each is (center, radius, mesh_size, is_boundary); center: centre [m]; radius: radius [m];
+            mesh_size: length of edges there [m] (default: the largest of the others); is_boundary: it bounds the
+            mesh: the outside is removed (default: the first piece does).
         arc : an arc, counter-clockwise; each is (center, start_point, end_point, mesh_size, is_boundary); center:
-            its centre [m]; start_point: where it begins [m]; end_point: where it ends [m]; mesh_size: length of
-            edges there [m] (default: the largest of the others); is_boundary: it bounds the mesh: the outside is
-            removed (default: the first piece does).
+            centre [m]; start_point: where it begins [m]; end_point: where it ends [m]; mesh_size: length of edges
+            there [m] (default: the largest of the others); is_boundary: it bounds the mesh: the outside is removed
+            (default: the first piece does).
         group : the group that the new elements are in.
         set : the set of the group.
         """
@@ -492,7 +493,8 @@ class Mesh(Words):
             others).
         point : points of the mesh; each is (array, layer, mesh_size); array: points; or a list of vectors [m];
             layer: layers of geometry; mesh_size: length of edges there [m] (default: the largest of the others).
-        global_mesh_size : of pieces without one, and away from them [m] (default: the largest of the pieces).
+        global_mesh_size : mesh size away from the lines and points, and for those without a size [m] (default: the
+            largest of the pieces).
         tolerance : points nearer than this are merged [m] (default: 1e-4).
         group : the group that the new elements are in.
         set : the set of the group.
@@ -584,7 +586,7 @@ class Mesh(Words):
 
         Parameters
         ----------
-        layer : its lines are edges of the mesh, its surfaces faces.
+        layer : layer whose lines are edges of the mesh, or whose surfaces are faces.
         follow : for lines that are not edges: uses the edges that follow them best, or the faces between elements on
             either side.
         """
@@ -619,7 +621,7 @@ class Mesh(Words):
 
         Parameters
         ----------
-        maximum_length : of sides along x and y; one number for both [m].
+        maximum_length : greatest length of sides along x and y; one number applies to both [m].
         pattern : 1: halved along x, along y; 0: not (default: 1 1).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -651,14 +653,14 @@ class Mesh(Words):
 
         Parameters
         ----------
-        factors : along the axes, above 0.
+        factors : factors along the axes, above 0.
         """
     def translate(self, way: Point) -> None:
         """Moves all points of the mesh, before the first model or condition is assigned.
 
         Parameters
         ----------
-        way : where to [m].
+        way : displacement of all points [m].
         """
     def quadratic(self) -> None:
         """In the plane: turns each triangle of the mesh into an elastic six-node triangle with quadratic displacements:
@@ -891,9 +893,9 @@ class Elements(Stressed):
             conductivity).
         conductivity_angle : direction of conductivity from x, counter-clockwise, in space the strike of its planes;
             it rotates with the element [degrees] (default: 0).
-        friction_heat : part of its half of the friction work that an element absorbs as heat when its faces slide
-            (default: 0).
-        conductivity_dip : dip of these planes [degrees] (in three dimensions; default: 90).
+        friction_heat : part of the friction work that becomes heat when faces slide: each of the two elements
+            absorbs this part of half of the work (default: 0).
+        conductivity_dip : dip of the planes of conductivity [degrees] (in three dimensions; default: 90).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     @overload
@@ -1191,8 +1193,9 @@ class Elements(Stressed):
         conductivity_across : conductivity across the direction of conductivity_angle [W/(m K)].
         conductivity_angle : direction of conductivity from x, counter-clockwise, in space the strike of its planes;
             it rotates with the element [degrees].
-        friction_heat : part of its half of the friction work that an element absorbs as heat when its faces slide.
-        conductivity_dip : dip of these planes [degrees] (in three dimensions).
+        friction_heat : part of the friction work that becomes heat when faces slide: each of the two elements
+            absorbs this part of half of the work.
+        conductivity_dip : dip of the planes of conductivity [degrees] (in three dimensions).
         diffusivity : diffusivity of moisture [m2/s].
         shrinkage : linear shrinkage, strain over loss of moisture.
         evaporation : mass flow through faces over the difference of moisture to a prescribed environment without its
@@ -1254,7 +1257,7 @@ class Elements(Stressed):
         Parameters
         ----------
         surface : layer of the water line, in three dimensions of planes and polygons.
-        density : of the water; 0: removes the water [kg/m3].
+        density : density of the water; 0: removes the water [kg/m3].
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def reset_state(self, *, where: Where | None = None) -> None:
@@ -1400,7 +1403,7 @@ class Faces(Fluxed):
         Parameters
         ----------
         heat_flux : heat inflow per area [W/m2].
-        transfer_coeficient : heat transfer to the environment [W/(m2 K)] (default: that of the elements).
+        transfer_coeficient : heat transfer to the environment [W/(m2 K)] (default: the coefficient of the elements).
         environment_temperature : temperature of the environment [K].
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -1457,10 +1460,10 @@ class Joints(Objects):
         tensile_strength : tensile strength; 0: none [Pa].
         gf1 : fracture energy, mode I [N/m].
         gf2 : fracture energy, mode II [N/m].
-        penalty_overlay : penalty of a closed joint [Pa] (default: that of opening).
+        penalty_overlay : penalty of a closed joint [Pa] (default: the penalty of opening).
         penalty_overlap : as penalty-overlay.
         penalty_normal : penalty of opening [Pa] (default: 10 E).
-        penalty_shear : penalty of shear [Pa] (default: that of opening).
+        penalty_shear : penalty of shear [Pa] (default: the penalty of opening).
         np : integration points (default: 3).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -1484,7 +1487,7 @@ class Joints(Objects):
 
         Parameters
         ----------
-        normal_stiffness : normal stiffness; of Barton and Bandis at zero stress [Pa/m].
+        normal_stiffness : normal stiffness; for Barton–Bandis joints at zero stress [Pa/m].
         shear_stiffness : shear stiffness [Pa/m].
         friction : friction angle [degrees] (default: 0).
         cohesion : cohesion; 0 at a point that has failed in tension [Pa] (default: 0).
@@ -1515,7 +1518,7 @@ class Joints(Objects):
 
         Parameters
         ----------
-        normal_stiffness : normal stiffness; of Barton and Bandis at zero stress [Pa/m].
+        normal_stiffness : normal stiffness; for Barton–Bandis joints at zero stress [Pa/m].
         shear_stiffness : shear stiffness [Pa/m].
         closure_maximum : largest closure V_m [m].
         residual_friction : residual friction angle [degrees].
@@ -1771,7 +1774,7 @@ class Joints(Objects):
 
         Parameters
         ----------
-        normal_stiffness : normal stiffness; of Barton and Bandis at zero stress [Pa/m].
+        normal_stiffness : normal stiffness; for Barton–Bandis joints at zero stress [Pa/m].
         shear_stiffness : shear stiffness [Pa/m].
         closure_maximum : largest closure V_m [m].
         residual_friction : residual friction angle [degrees].
@@ -2037,7 +2040,7 @@ class Bolts(Objects):
         ----------
         points : the points, from the head on; or a list of vectors [m].
         segments : elements of each straight part.
-        length : of an element, at most [m] (default: to the edges of the elements of the mesh).
+        length : greatest length of an element [m] (default: to the edges of the elements of the mesh).
         grout : start and end of the grout along the bolt; the rest is free [m] (default: all of it).
         plate : fixes the first node to the rock by a face plate.
         group : the group of its elements and nodes (default: none).
@@ -2060,7 +2063,7 @@ class Bolts(Objects):
         ----------
         first : head [m].
         second : end [m].
-        mesh_size : length of its elements, at most [m] (default: 0.2).
+        mesh_size : greatest length of its elements [m] (default: 0.2).
         group : the group of its elements and nodes (default: none).
         set : the set of the group.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
@@ -2099,7 +2102,8 @@ class Bolts(Objects):
         young : Young's modulus E [Pa].
         diameter : diameter of the bar [m].
         tensile_yield_force : axial yield force in tension [N] (default: never).
-        compressive_yield_force : axial yield force in compression, without sign [N] (default: that in tension).
+        compressive_yield_force : axial yield force in compression, without sign [N] (default: the yield force in
+            tension).
         tension_failure_strain : elongation of an element since its installation, over its length, at which it breaks
             (default: never).
         shear_stiffness_rock_bolt : force of the grout per length of bolt and displacement [N/m/m].
@@ -2201,7 +2205,7 @@ class FlowNodes(GroupedElsewhere):
         ----------
         pressure : filled, at this pressure [Pa].
         saturation : filled part of the volume.
-        concentration : of proppant in the present fluid.
+        concentration : concentration of proppant in the present fluid.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def initial_temperature(self, temperature: float, *, where: Where | None = None) -> None:
@@ -2209,7 +2213,7 @@ class FlowNodes(GroupedElsewhere):
 
         Parameters
         ----------
-        temperature : of the fluid alone [K].
+        temperature : temperature of the fluid alone [K].
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
 
@@ -2315,14 +2319,15 @@ class Liners(Objects):
         density : density [kg/m3].
         young : Young's modulus E [Pa].
         poisson_ratio : Poisson's ratio: plane strain uses E / (1 - nu^2); 0 for steel sets (default: 0).
-        thickness : thickness of the shell; defines area and inertia if they are omitted [m] (default: that of a
+        thickness : thickness of the shell; defines area and inertia if they are omitted [m] (default: thickness of a
             rectangle of this area and inertia).
         area : area of the section over the spacing of steel sets [m2/m] (in the plane; default: the thickness).
         inertia : second moment of the section over the spacing of steel sets [m4/m] (in the plane; default:
             thickness^3 / 12).
-        tensile_strength : strength in tension; with compressive_strength [Pa] (default: never).
-        compressive_strength : strength in compression; with tensile_strength [Pa] (default: never).
-        plastic_moment : largest moment at the axial force that allows most [N m/m] (default: that of a rectangle).
+        tensile_strength : strength in tension; requires compressive_strength [Pa] (default: never).
+        compressive_strength : strength in compression; requires tensile_strength [Pa] (default: never).
+        plastic_moment : largest moment at the axial force that allows most [N m/m] (default: plastic moment of a
+            rectangle).
         normal_stiffness : stiffness of the bond across the face [Pa/m].
         shear_stiffness : stiffness of the bond along the face; 0: it slips freely [Pa/m].
         bond_tensile_strength : tension at which the bond breaks [Pa] (default: never).
@@ -2494,9 +2499,9 @@ class Charts(Words):
         Parameters
         ----------
         name : name.
-        title : over the diagram.
-        x_label : of the axis.
-        y_label : of the axis.
+        title : title of the diagram.
+        x_label : label of the x axis.
+        y_label : label of the y axis.
         """
     def add(
         self,
@@ -2524,7 +2529,7 @@ class Charts(Words):
         values : points (x,y).
         profile : present values of the fluid along the line of the joints of the range, over the distance [m] from
             its left end (in the plane).
-        label : in the legend.
+        label : name of the curve in the legend.
         style : how it is drawn (default: line).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
@@ -2596,12 +2601,12 @@ class Output(Words):
         limits : values of the first and the last colour (default: the 1 % and 99 % quantiles of the shown values).
         full : instead of limits: minimum and maximum of the shown values.
         log : logarithmic colours.
-        colours : of the field (default: viridis).
+        colours : colour map of the field (default: viridis).
         opacity : from 0 to 1 (default: 1).
         edges : outlines of elements.
         size : factor on widths of lines (default: 1).
         vectors : arrows: displacement or velocity.
-        arrows : factor on their length (default: 1).
+        arrows : factor on the length of the arrows (default: 1).
         filter : only objects that satisfy this condition, for example 'stress_yy < -1e6 and x > 2'.
         deformed : factor on displacements (default: 1).
         camera : lower left and upper right corner of the picture, in space along it and up it [m] (default: the
@@ -2611,7 +2616,7 @@ class Output(Words):
         section : a cutting plane: 'x=1.5' removes the part towards the eye, 'x<1.5' and 'x>1.5' keep one side,
             'px,py,pz,nx,ny,nz' gives a point and the normal into the removed part (in three dimensions; default:
             whole).
-        title : over the picture; {step} and {time} are filled in.
+        title : title of the picture; {step} and {time} are filled in.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
 
@@ -2752,7 +2757,7 @@ class BlockCommands(Clocks):
         flows : False: values and the stress that they cause are frozen (default: True).
         time_step : sub-step of the field, which then has its own clock; 0: the sub_steps of a cycle cover the time
             of the steps of the blocks or, without motion, are 0.9 of the stable sub-step [s] (default: 0).
-        sub_steps : in a cycle; 0: as many as stability requires (default: 0).
+        sub_steps : sub_steps in a cycle; 0: as many as stability requires (default: 0).
         current_time : present time of its clock [s].
         """
     def run_time(self, time: float) -> None:

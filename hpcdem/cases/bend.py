@@ -48,7 +48,7 @@ class ThreePointBend(Rock):
 
     span: float = quantity(0.200, "m", "distance of the supports", gt=0)
     height: float = quantity(0.050, "m", "height of the beam", gt=0)
-    overhang: float = quantity(0.020, "m", "of the beam beyond each support", gt=0)
+    overhang: float = quantity(0.020, "m", "length of the beam beyond each support", gt=0)
     notch: float = quantity(0.020, "m", "depth of the notch at mid-span, a closed cut; 0: none", ge=0)
     path: Literal["line", "free"] = choice(
         "line", "line: edges of the mesh form a straight line from the notch to the load; free: an irregular mesh"

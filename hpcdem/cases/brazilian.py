@@ -39,7 +39,7 @@ class Brazilian(Rock):
     result: ClassVar[type] = Splitting
 
     dim: Dimensions = choice(2, "dimensions of space: a flat disc, or one of this thickness along z")
-    thickness: float = quantity(0.025, "m", "of the disc in three dimensions, and of the platens", gt=0)
+    thickness: float = quantity(0.025, "m", "thickness of the disc in three dimensions, and of the platens", gt=0)
     size: float = quantity(0.001, "m", "edges of the elements", gt=0)
     cohesion: float = quantity(20e6, "Pa", "cohesion of the joints", gt=0)
     tensile_strength: float = quantity(5e6, "Pa", "tensile strength of the joints", gt=0)

@@ -44,7 +44,7 @@ class Creep(Case):
     kelvin_shear: float = quantity(5e9, "Pa", "shear modulus of the Kelvin unit", gt=0)
     kelvin_viscosity: float = quantity(1e14, "Pa s", "viscosity of the Kelvin unit", gt=0)
     pressure: float = quantity(10e6, "Pa", "on the ends", gt=0)
-    time: float = quantity(1e5, "s", "for so long", gt=0)
+    time: float = quantity(1e5, "s", "duration of the load", gt=0)
     change: float = quantity(0.05, "1", "creep steps follow this change of stress, over the largest", gt=0, lt=1)
 
     @model_validator(mode="after")

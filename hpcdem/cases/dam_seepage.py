@@ -34,7 +34,7 @@ class DamSeepage(Water):
     title: ClassVar[str] = "Seepage through a dam with vertical faces"
     result: ClassVar[type] = Seepage
 
-    length: float = quantity(16.0, "m", "from side to side of the dam", gt=0)
+    length: float = quantity(16.0, "m", "width of the dam from side to side", gt=0)
     height: float = quantity(9.0, "m", "height of the dam", gt=0)
     left: float = quantity(8.0, "m", "level of the water on the left", gt=0)
     right: float = quantity(4.0, "m", "level of the water on the right", ge=0)

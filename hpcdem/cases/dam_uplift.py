@@ -44,7 +44,7 @@ class DamUplift(Water):
     head: float = quantity(40.0, "m", "level of the water over the base, and height of the dam", gt=0)
     base: float = quantity(32.0, "m", "width of the base", gt=0)
     depth: float = quantity(32.0, "m", "depth of the jointed rock", gt=0)
-    aside: float = quantity(48.0, "m", "from the dam to the sides of the model", gt=0)
+    aside: float = quantity(48.0, "m", "distance from the dam to the sides of the model", gt=0)
     size: float = quantity(2.0, "m", "edges of the elements", gt=0)
     curtain: float = quantity(0.0, "m", "depth of a grout curtain, 0: none", ge=0)
     curtain_at: float = quantity(0.1, "1", "where it is, from the heel on, over base", ge=0, le=1)

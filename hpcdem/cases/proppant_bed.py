@@ -37,12 +37,12 @@ class ProppantBed(Case):
     title: ClassVar[str] = "Proppant bed in a slot"
     result: ClassVar[type] = Bed
 
-    length: float = quantity(1.2192, "m", "of the slot, 4 ft", gt=0)
-    height: float = quantity(0.3048, "m", "of the slot, 1 ft", gt=0)
+    length: float = quantity(1.2192, "m", "length of the slot, 4 ft", gt=0)
+    height: float = quantity(0.3048, "m", "height of the slot, 1 ft", gt=0)
     size: float = quantity(0.0254, "m", "length of the rectangles of two triangles that it is divided into", gt=0)
     layer: float = quantity(7.62e-3, "m", "their height", gt=0)
-    aperture: float = quantity(7.62e-3, "m", "of the slot, 0.3 in", gt=0)
-    rate: float = quantity(3.785e-4, "m3/s", "of slurry, 6 gal/min", gt=0)
+    aperture: float = quantity(7.62e-3, "m", "aperture of the slot, 0.3 in", gt=0)
+    rate: float = quantity(3.785e-4, "m3/s", "injection rate of slurry, 6 gal/min", gt=0)
     concentration: float = quantity(0.07, "1", "volume of grains over that of the slurry", gt=0)
     limit: float = quantity(0.62, "1", "volume fraction of grains in a pack", gt=0, le=0.74)
     grain_size: float = quantity(0.45e-3, "m", "diameter of the grains, 30/50 mesh", gt=0)

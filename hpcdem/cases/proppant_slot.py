@@ -36,9 +36,9 @@ class ProppantSlot(Case):
     title: ClassVar[str] = "Proppant settles in a vertical fracture"
     result: ClassVar[type] = Settled
 
-    height: float = quantity(1.0, "m", "of the fracture", gt=0)
+    height: float = quantity(1.0, "m", "height of the fracture", gt=0)
     size: float = quantity(0.005, "m", "length of its channels", gt=0)
-    aperture: float = quantity(5e-3, "m", "of the fracture", gt=0)
+    aperture: float = quantity(5e-3, "m", "aperture of the fracture", gt=0)
     concentration: float = quantity(0.2, "1", "volume of grains over that of the slurry at the beginning", gt=0)
     limit: float = quantity(0.6, "1", "volume fraction of grains in a pack", gt=0, le=0.74)
     grain_size: float = quantity(0.5e-3, "m", "diameter of the grains", gt=0)

@@ -43,7 +43,7 @@ class DirectTension(Rock):
         "dog-bone", "dog-bone: narrowed by two arcs; bar: straight, regular mesh"
     )
     path: Literal["free", "line"] = choice(
-        "free", "of the dog-bone; free: an irregular mesh; line: with edges straight across the neck"
+        "free", "crack path of the dog-bone; free: an irregular mesh; line: straight edges across the neck"
     )
     width: float = quantity(0.050, "m", "width of the ends of the dog-bone", gt=0)
     neck: float = quantity(0.030, "m", "width of the neck, or of the bar", gt=0)

@@ -39,8 +39,8 @@ class ThermalShock(Rock):
     tensile_strength: float = quantity(8e6, "Pa", "tensile strength of the joints", gt=0)
     cohesion: float = quantity(40e6, "Pa", "cohesion of the joints", gt=0)
     size: float = quantity(0.003, "m", "edges of the elements", gt=0)
-    width: float = quantity(0.24, "m", "of the slab", gt=0)
-    depth: float = quantity(0.12, "m", "of the slab", gt=0)
+    width: float = quantity(0.24, "m", "width of the slab", gt=0)
+    depth: float = quantity(0.12, "m", "depth of the slab", gt=0)
     drop: float = quantity(60.0, "K", "cooling of the surface", gt=0)
     expansion: float = quantity(1e-5, "1/K", "linear thermal expansion", gt=0)
     conductivity: float = quantity(

@@ -41,11 +41,15 @@ class Wedge(Case):
     height: float = quantity(10.0, "m", "from the point where the joints meet in the face up to the top", gt=0)
     face: float = quantity(65.0, "degrees", "dip of the face, which dips towards y", gt=0, lt=90)
     dip_a: float = quantity(40.0, "degrees", "dip of joint A", gt=0, lt=90)
-    towards_a: float = quantity(-45.0, "degrees", "its dip direction, clockwise from that of the face", gt=-180, lt=180)
-    friction_a: float = quantity(35.0, "degrees", "its friction angle", gt=0, lt=80)
+    towards_a: float = quantity(
+        -45.0, "degrees", "dip direction of joint a, clockwise from that of the face", gt=-180, lt=180
+    )
+    friction_a: float = quantity(35.0, "degrees", "friction angle of joint a", gt=0, lt=80)
     dip_b: float = quantity(70.0, "degrees", "dip of joint B", gt=0, lt=90)
-    towards_b: float = quantity(75.0, "degrees", "its dip direction, clockwise from that of the face", gt=-180, lt=180)
-    friction_b: float = quantity(20.0, "degrees", "its friction angle", gt=0, lt=80)
+    towards_b: float = quantity(
+        75.0, "degrees", "dip direction of joint b, clockwise from that of the face", gt=-180, lt=180
+    )
+    friction_b: float = quantity(20.0, "degrees", "friction angle of joint b", gt=0, lt=80)
     margin: float = quantity(0.4, "1", "rock around the wedge, over height", gt=0, le=5)
     size: float = quantity(1.5, "m", "edges of the elements at the wedge", gt=0)
     coarse: float = quantity(4.0, "m", "edges of the elements far from it", gt=0)

@@ -365,7 +365,7 @@ FIELDS_AT_FACES = {
         "tables are those of the field.",
         (Option("flux", (TABLED,), "inflow per area", one.flux),
          Option("transfer", (NOT_NEGATIVE,), "flow to the environment per difference in value", one.transfer,
-                "that of the elements"),
+                "the coefficient of the elements"),
          Option("environment", (TABLED,), "value of the environment", one.unit)), any_of=True, dims=BOTH,
                  does="fields.face_condition", of_field=one.name, by_time=True)
     for one in kinds().values()
@@ -473,7 +473,7 @@ CONST_HEAT = Model(
     "are those of heat.",
     (Option("h{eat}-f{lux}", (TABLED,), "heat inflow per area", "W/m2"),
      Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer to the environment", "W/(m2 K)",
-            "that of the elements",
+            "the coefficient of the elements",
             also=(*_COEFFICIENTS["transfer-coeficient"], "h{eat}-t{ransfer}-c{oefficent}")),
      Option("e{nvironment}-t{emperature}", (TABLED,), "temperature of the environment", "K")), any_of=True, dims=BOTH,
      does="heat.face_condition", by_time=True,
@@ -672,7 +672,7 @@ RANGE_TERMS = (
     Option("geom{etry}-l{ocation}", (STRING,), "a ray from its centre crosses the lines of the layer count times, or "
            "an even number of times more; count 1 selects what is inside; positions in the mesh",
            only=("element", *_FACES), dims=PLANE,
-           more=(Option("ray-dir{ection}", (VECTOR,), "of the ray", "", "(1,0)"),
+           more=(Option("ray-dir{ection}", (VECTOR,), "direction of the ray", "", "(1,0)"),
                  Option("count", (ZERO_OR_MORE,), "crossings", "1", "1"))),
     Option("pres{ent}", (), "x, y and geometry (of elements) use present positions"),
     Option("use-hidden", (BOOL,), "also selects hidden elements and their nodes, faces and joints", default="off"),
@@ -752,7 +752,7 @@ _OF_SOLIDS = (
 
 _PARTS = (
     ("m{echanical}", "the blocks"), ("t{hermal}", "heat"), ("h{ydraulic}", "fluid"),
-    ("p{roppant}-t{ransport}", "proppant, which has the clock of the fluid"),
+    ("p{roppant}-t{ransport}", "proppant, which follows that of the fluid"),
 )  # fmt: skip
 _STEPS = (
     Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "time step", "s"),
@@ -897,16 +897,18 @@ _MODEL = (
             "calculation: those of the blocks as model time-step value and model sub-step mechanical, those of fluid "
             "and heat as model time-step and model sub-step with these words. Proppant moves with the fluid, in its "
             "steps.", ("pcdc model cycle-option mechanical cycle-number 20 hydraulic time-step 0.5 cycle-number 4",),
-            options=tuple(Option(word, (), f"of {what}", more=_STEPS) for word, what in _PARTS),
+            options=tuple(Option(word, (), f"time step and steps per cycle of {what}", more=_STEPS)
+                          for word, what in _PARTS),
             needs_option=True, dims=BOTH, does="clocks.cycle_option"),
     Command("mod{el} reset", "Sets the clocks of the parts. Tables of conditions, stages of wells and leak-off use "
             "them.", ("pcdc model reset mechanical current-time 0", "pcdc model reset hydraulic current-time 0 "
                       "time-step 0.5"),
-            options=tuple(Option(word, (), f"of {what}", more=_CLOCKS) for word, what in _PARTS),
+            options=tuple(Option(word, (), f"clock of {what}", more=_CLOCKS) for word, what in _PARTS),
             needs_option=True, dims=BOTH, does="clocks.reset"),
     Command("mod{el} query", "Reports the present time and the time step of a part in the log.",
             ("pcdc model query mechanical time",),
-            options=tuple(Option(word, (), f"of {what}", more=(Option("t{ime}", (), "its clock", required=True),))
+            options=tuple(Option(word, (), f"clock of {what}",
+                                 more=(Option("t{ime}", (), "the present time", required=True),))
                           for word, what in _PARTS),
             needs_option=True, dims=BOTH, does="clocks.query"),
     Command("mod{el} pl{ane}-strain", "Plane strain: no strain across the plane. This is the default of models in two "
@@ -952,7 +954,7 @@ _MODEL = (
                      Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "sub-step of the field, which then has its own clock; 0: "
                             "the sub-steps of a cycle cover the time of the steps of the blocks or, without motion, "
                             "are 0.9 of the stable sub-step", "s", "0"),
-                     Option("s{ub}-s{teps}", (ZERO_OR_MORE,), "in a cycle; 0: as many as stability requires",
+                     Option("s{ub}-s{teps}", (ZERO_OR_MORE,), "sub-steps in a cycle; 0: as many as stability requires",
                             default="0"),
                      Option("c{urrent}-t{ime}", (FLOAT,), "present time of its clock", "s")),
             needs_option=True, dims=BOTH, does="fields.clock"),
@@ -1014,9 +1016,9 @@ _GEOMETRY = (
              "pcdc geometry create circle center (0,0) radius 1 segment-length 0.1 as-layer 'hole'"),
             (_leading("centre", VECTOR, "centre", "m", False), _leading("radius", POSITIVE, "radius", "m", False)),
             (Option("c{enter}", (VECTOR,), "centre", "m"), Option("r{adius}", (POSITIVE,), "radius", "m"),
-             Option("s{egment}-l{ength}", (POSITIVE,), "of its sides, about", "m", "a true circle",
-                    dims=PLANE),
-             Option("n{ormal}", (VECTOR,), "of the disc, of any length", "", "(0,0,1)", dims=SPACE), _LAYER),
+             Option("s{egment}-l{ength}", (POSITIVE,), "approximate length of the sides of a polygon", "m",
+                    "a true circle", dims=PLANE),
+             Option("n{ormal}", (VECTOR,), "normal of the disc, of any length", "", "(0,0,1)", dims=SPACE), _LAYER),
             dims=BOTH, does="shape"),
     Command("geom{etry} c{reate} arc", "A part of a circle, counter-clockwise.",
             ("pcdc geometry create arc (0,0) 1 0 90 as-layer 'arch'",),
@@ -1071,13 +1073,15 @@ _GEOMETRY = (
             (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} cyl{inder}", "A round cylinder.",
             ("pcdc geometry create cylinder (0,0,0) (0,0,0.1) 0.025 as-layer 'core'",),
-            (_leading("first", VECTOR, "middle of one end", "m"), _leading("second", VECTOR, "of the other", "m"),
+            (_leading("first", VECTOR, "middle of one end", "m"),
+             _leading("second", VECTOR, "middle of the other end", "m"),
              _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} con{e}", "A round cone, or a part of one.",
             ("pcdc geometry create cone (0,0,0) (0,0,1) 0.5 0.2 as-layer 'tip'",),
-            (_leading("first", VECTOR, "middle of one end", "m"), _leading("second", VECTOR, "of the other", "m"),
+            (_leading("first", VECTOR, "middle of one end", "m"),
+             _leading("second", VECTOR, "middle of the other end", "m"),
              _leading("radius", NOT_NEGATIVE, "radius at the first end", "m"),
-             _leading("other", NOT_NEGATIVE, "radius at the other", "m")), (_LAYER,), dims=SPACE, does="shape"),
+             _leading("other", NOT_NEGATIVE, "radius at the other end", "m")), (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} disc", "The surface of a round disc: meshes are cut along it.",
             ("pcdc geometry create disc (0,0,0) (0,0,1) 2 as-layer 'crack'",),
             (_leading("centre", VECTOR, "centre", "m"), _leading("normal", VECTOR, "normal of any length"),
@@ -1088,16 +1092,16 @@ _GEOMETRY = (
             (_LAYER,), dims=SPACE, does="shape"),
     Command("geom{etry} c{reate} ext{rude}", "Bodies made by extruding the polygons of a layer along a vector.",
             ("pcdc geometry create extrude layer 'profile' along (0,10,0) as-layer 'slope'",),
-            options=(Option("layer", (STRING,), "of polygons", required=True),
+            options=(Option("layer", (STRING,), "layer of the polygons", required=True),
                      Option("along", (VECTOR,), "the vector of extrusion", "m", required=True), _LAYER), dims=SPACE,
             does="geometry.extrude"),
     Command("geom{etry} c{reate} rev{olve}", "Bodies made by revolving the polygons of a layer about an axis in their "
             "plane.", ("pcdc geometry create revolve layer 'profile' axis (0,0,1) as-layer 'ring'",),
-            options=(Option("layer", (STRING,), "of polygons", required=True),
+            options=(Option("layer", (STRING,), "layer of the polygons", required=True),
                      Option("axis", (VECTOR,), "direction of the axis", required=True),
                      Option("about", (VECTOR,), "a point of it", "m", "(0,0,0)"),
-                     Option("angle", (POSITIVE,), "right-handed, up to 360", "degrees", "360"), _LAYER), dims=SPACE,
-            does="geometry.revolve"),
+                     Option("angle", (POSITIVE,), "angle of revolution, right-handed, up to 360", "degrees", "360"),
+                     _LAYER), dims=SPACE, does="geometry.revolve"),
     Command("geom{etry} imp{ort}", "Lines of a DXF file, or polygons and lines of a section: GeoJSON, shapefile, SVG, "
             "DXF, or an image with a legend (docs/sections.md); in three dimensions the solids of a STEP or BREP file, "
             "or what the triangles of an STL or DXF file (3DFACE) enclose.",
@@ -1111,7 +1115,7 @@ _GEOMETRY = (
              Option("named", (), "each name in the section becomes a layer, and as-layer the outline of all its "
                                  "polygons", dims=PLANE),
              *_PLACEMENT,
-             Option("legend", (FILE,), "of an image: file with lines colour, name", dims=PLANE),
+             Option("legend", (FILE,), "legend of an image: a file with lines of colour and name", dims=PLANE),
              Option("attribute", (STRING,), "attribute whose value is the name (GeoJSON, shapefiles)", "",
                     "name, layer, unit, formation, label or id", dims=PLANE),
              Option("simplify", (POSITIVE,), "omits points of boundaries where triangles of less than half the square "
@@ -1129,10 +1133,12 @@ _GEOMETRY = (
     Command("geom{etry} s{cale}", "Multiplies the coordinates of layers, of all without layer; a negative factor "
             "mirrors. Round shapes need factors of equal size.",
             ("pcdc geometry scale (2,1) layer 'hole' 'slope'",),
-            (_leading("factors", VECTOR, "along the axes, not 0"),), (_SOME_LAYERS,), dims=BOTH, does="geometry.scale"),
+            (_leading("factors", VECTOR, "factors along the axes, not 0"),), (_SOME_LAYERS,), dims=BOTH,
+            does="geometry.scale"),
     Command("geom{etry} t{ranslate}", "Moves layers; without layer all of them.",
             ("pcdc geometry translate (10,0) layer 'hole' 'slope'",),
-            (_leading("way", VECTOR, "where to", "m"),), (_SOME_LAYERS,), dims=BOTH, does="geometry.translate"),
+            (_leading("way", VECTOR, "displacement of all points", "m"),), (_SOME_LAYERS,), dims=BOTH,
+            does="geometry.translate"),
     Command("geom{etry} exp{ort}", "Writes layers to a DXF, GeoJSON or CSV file under their names: in metres, or in "
             "the coordinates from which geometry import with these options makes those of the model.",
             ("pcdc geometry export 'hole' 'slope' file 'plan.dxf'",
@@ -1150,7 +1156,7 @@ _MESH = (
             "which may touch each other.",
             ("pcdc mesh create from-layer 'out' size 0.5 refine-layer 'hole' size 0.05 hole 'hole' group 'rock'",),
             options=(
-                Option("from-l{ayer}", (STRING,), "its outline", required=True),
+                Option("from-l{ayer}", (STRING,), "layer with the outline of the mesh", required=True),
                 Option("size", (POSITIVE,), "length of edges", "m", required=True),
                 Option("ref{ine}-l{ayer}", (STRING,), "smaller elements near this layer",
                        repeated=True,
@@ -1160,7 +1166,7 @@ _MESH = (
                                     "ten times the size"))),
                 Option("hole", (STRING,), "the inside of this layer stays empty", repeated=True),
                 Option("reg{ion}", (STRING,), "the elements inside this layer become a group", repeated=True,
-                       more=(Option("group", (STRING,), "its name", default="the name of the layer"),)),
+                       more=(Option("group", (STRING,), "name of the group", default="the name of the layer"),)),
                 Option("emb{ed}", (STRING,), "lines that become edges of the mesh; in three dimensions surfaces, which "
                        "become faces", repeated=True),
                 Option("crack", (STRING,), "lines that become edges with an initial crack; in three dimensions "
@@ -1177,15 +1183,17 @@ _MESH = (
             ("pcdc mesh structured (0,0) (10,5) cells 40 20 type tri diagonal both group 'base'",
              "pcdc mesh structured (0,0,0) (10,5,5) cells 20 10 10 type hex"),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
-            (Option("cells", (COUNT, COUNT, THIRD_COUNT), "along x and y, in three dimensions z", required=True),
+            (Option("cells", (COUNT, COUNT, THIRD_COUNT), "number of cells along x and y, in three dimensions "
+                    "also z", required=True),
              Option("split", (SPLIT,), "tetrahedra of each box: 5, mirrored from box to box, 6 about "
                     "a diagonal, or 12 about a point in the middle", default="6", dims=SPACE),
              Option("type", (choice("tri", "quad", "tet", "hex"),), "triangles or quads, in three dimensions "
                     "tetrahedra or hexahedra", default="tri, tet"),
-             Option("diag{onal}", (choice("right", "left", "alternate", "both"),), "of the triangles; alternating, or "
-                    "both of each rectangle", default="alternate", dims=PLANE),
-             Option("ratio", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along x and y (and z): ratio of the size of each "
-                    "rectangle or box to the one before", "1", "1 1"), _GROUP), dims=BOTH,
+             Option("diag{onal}", (choice("right", "left", "alternate", "both"),), "direction of the diagonals; "
+                    "alternate: it changes from rectangle to rectangle; both: two in each rectangle",
+                    default="alternate", dims=PLANE),
+             Option("ratio", (POSITIVE, POSITIVE, THIRD_POSITIVE), "ratio of the size of each rectangle or box to "
+                    "the previous one, along x and y (and z)", "1", "1 1"), _GROUP), dims=BOTH,
             does="meshes.grid"),
     Command("mesh equi{lateral}", "Nearly equilateral triangles in a rectangle.",
             ("pcdc mesh equilateral (0,0) (10,5) size 0.25 group 'base'",),
@@ -1199,11 +1207,11 @@ _MESH = (
                     "dimensions four", required=True),), dims=BOTH, does="meshes.add_element"),
     Command("mod{el} scale", "Multiplies the coordinates of all points of the mesh, before the first model or "
             "condition is assigned.", ("pcdc model scale (1,2)",),
-            (_leading("factors", VECTOR, "along the axes, above 0"),),
+            (_leading("factors", VECTOR, "factors along the axes, above 0"),),
             dims=BOTH, does="meshes.scale"),
     Command("mod{el} tran{slate}", "Moves all points of the mesh, before the first model or condition is "
-            "assigned.", ("pcdc model translate (10,0)",), (_leading("way", VECTOR, "where to", "m"),), dims=BOTH,
-            does="meshes.translate"),
+            "assigned.", ("pcdc model translate (10,0)",),
+            (_leading("way", VECTOR, "displacement of all points", "m"),), dims=BOTH, does="meshes.translate"),
     Command("mesh imp{ort}", "A mesh of another program, for example .msh or .inp; its physical groups and sets of "
             "elements, nodes and faces become groups.",
             ("pcdc mesh import 'rock.msh'",), (_leading("file", FILE, "name of the file"),),
@@ -1214,7 +1222,8 @@ _MESH = (
             also=("mod{el} imp{ort} gmsh", "mod{el} imp{ort} abaqus"), does="meshes.import_file"),
     Command("mesh int{ersect}", "Turns the joints on a layer into cracks: the edges of the mesh that lie on it.",
             ("pcdc mesh intersect layer 'fault'",),
-            options=(Option("layer", (STRING,), "its lines are edges of the mesh, its surfaces faces", required=True),
+            options=(Option("layer", (STRING,), "layer whose lines are edges of the mesh, or whose surfaces "
+                            "are faces", required=True),
                      Option("follow", (), "for lines that are not edges: uses the edges that follow them "
                             "best, or the faces between elements on either side")), dims=BOTH, does="meshes.intersect"),
     Command("mesh glue", "Connects separately meshed bodies where their faces coincide; the faces become joints like "
@@ -1244,13 +1253,13 @@ _ELEMENT_CREATE = (
             "by a corner and the ends of its edges there.",
             ("pcdc element create brick p0 (0,0) p1 (30,0) p2 (4,12) n 30 12 ratio 1 1.1 triangle off",
              "pcdc element create brick p0 (0,0,0) p1 (6,0,0) p2 (0,4,0) p3 (0,0,5) n 6 4 5 triangle off"),
-            options=(Option("p0", (VECTOR,), "the corner", "m", required=True),
-                     Option("p1", (VECTOR,), "end of its first edge", "m", required=True),
-                     Option("p2", (VECTOR,), "of the second", "m", required=True),
-                     Option("p3", (VECTOR,), "of the third", "m", required=True, dims=SPACE),
+            options=(Option("p0", (VECTOR,), "corner at which the edges begin", "m", required=True),
+                     Option("p1", (VECTOR,), "end of the first edge", "m", required=True),
+                     Option("p2", (VECTOR,), "end of the second edge", "m", required=True),
+                     Option("p3", (VECTOR,), "end of the third edge", "m", required=True, dims=SPACE),
                      Option("n", (COUNT, COUNT, THIRD_COUNT), "elements along each edge", required=True),
-                     Option("r{atio}", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along each edge: ratio of the size of an "
-                            "element to the one before", "1", "1 1"),
+                     Option("r{atio}", (POSITIVE, POSITIVE, THIRD_POSITIVE), "ratio of the size of an element to the "
+                            "previous one, along each edge", "1", "1 1"),
                      Option("tri{angle}", (BOOL,), "triangles, or tetrahedra; off: quads, or hexahedra", default="on",
                             also=("tet{ra}",)), _GROUP), dims=BOTH, does="meshes.brick"),
     Command("e{lement} create geo{metry}", "Triangles inside closed lines, by Gmsh, with a mesh size for each piece. "
@@ -1260,10 +1269,10 @@ _ELEMENT_CREATE = (
             options=(
                 Option("layer", (STRINGS,), "layers of geometry", repeated=True, more=(_SIZE, _BOUNDARY)),
                 Option("cir{cle}", (), "a circle", repeated=True,
-                       more=(Option("c{enter}", (VECTOR,), "its centre", "m", required=True),
-                             Option("r{adius}", (POSITIVE,), "its radius", "m", required=True), _SIZE, _BOUNDARY)),
+                       more=(Option("c{enter}", (VECTOR,), "centre", "m", required=True),
+                             Option("r{adius}", (POSITIVE,), "radius", "m", required=True), _SIZE, _BOUNDARY)),
                 Option("arc", (), "an arc, counter-clockwise", repeated=True,
-                       more=(Option("c{enter}", (VECTOR,), "its centre", "m", required=True),
+                       more=(Option("c{enter}", (VECTOR,), "centre", "m", required=True),
                              Option("s{tart}-p{oint}", (VECTOR,), "where it begins", "m", required=True),
                              Option("e{nd}-p{oint}", (VECTOR,), "where it ends", "m", required=True), _SIZE,
                              _BOUNDARY)), _GROUP), needs_option=True, does="patch"),
@@ -1277,7 +1286,8 @@ _ELEMENT_CREATE = (
                 Option("c{onstrain}-poly{line}", (), "lines that become edges", repeated=True,
                        more=(_ARRAY, _LAYERS, _SIZE)),
                 Option("c{onstrain}-p{oint}", (), "points of the mesh", repeated=True, more=(_ARRAY, _LAYERS, _SIZE)),
-                Option("g{lobal}-m{esh}-s{ize}", (POSITIVE,), "of pieces without one, and away from them", "m",
+                Option("g{lobal}-m{esh}-s{ize}", (POSITIVE,), "mesh size away from the lines and points, and for "
+                       "those without a size", "m",
                        "the largest of the pieces"),
                 Option("t{olerance}", (NOT_NEGATIVE,), "points nearer than this are merged", "m", "1e-4"), _GROUP),
             does="patch"),
@@ -1313,8 +1323,9 @@ _OBJECTS = (
             "hanging node become triangles.",
             ("pcdc element densify pattern 1 1 maximum-length 0.5 0.5 range x 2 4 y 0 1",),
             options=(Option("p{attern}", (CHOSEN, CHOSEN), "1: halved along x, along y; 0: not", "", "1 1"),
-                     Option("m{aximum}-l{ength}", (POSITIVE, SECOND_POSITIVE), "of sides along x and y; one number for "
-                            "both", "m", required=True)), ranged="element", does="meshes.densify"),
+                     Option("m{aximum}-l{ength}", (POSITIVE, SECOND_POSITIVE), "greatest length of sides along x and "
+                            "y; one number applies to both", "m", required=True)), ranged="element",
+            does="meshes.densify"),
     Command("e{lement} hide", "Hides elements from pictures and, without use-hidden, from ranges; off: shows them. "
             "They are still computed.",
             ("pcdc element hide range group 'cover'", "pcdc element hide off"),
@@ -1332,7 +1343,7 @@ _OBJECTS = (
             ("pcdc element water surface 'lake' density 1000", "pcdc element water surface 'lake' density 0"),
             options=(Option("s{urface}", (STRING,), "layer of the water line, in three dimensions of planes and "
                             "polygons", required=True),
-                     Option("d{ensity}", (NOT_NEGATIVE,), "of the water; 0: removes the water", "kg/m3",
+                     Option("d{ensity}", (NOT_NEGATIVE,), "density of the water; 0: removes the water", "kg/m3",
                             required=True)), ranged="element", dims=BOTH, does="assignments.water"),
     Command("e{lement} c-m{odel}", "Assigns a constitutive model and its properties to elements. Fluid models apply to "
             "the joints around the elements.",
@@ -1462,12 +1473,12 @@ _OBJECTS = (
             ("pcdc node hydraulic-initialize flow-node-saturation 0.5",),
             options=(Option("f{low}-n{ode}-s{aturation}", (limited(0.0, 1.0, True),), "filled part of the "
                             "volume", "1", also=("f{luid}-c{avity}-s{aturation}",)),
-                     Option("f{low}-n{ode}-t{emperature}", (FLOAT,), "of the fluid alone", "K",
+                     Option("f{low}-n{ode}-t{emperature}", (FLOAT,), "temperature of the fluid alone", "K",
                             also=("f{luid}-c{avity}-t{emperature}",))),
             ranged="node", needs_option=True, dims=BOTH, does="initial_fluid"),
     Command("n{ode} hist{ory}", "A history of the temperature of a node, or of the mean of several nodes.",
             ("pcdc node history 'gauge' thermal temperature range id 3",), (_NAME,),
-            options=(Option("therm{al}", (), "of heat", required=True,
+            options=(Option("therm{al}", (), "a quantity of heat", required=True,
                             more=(Option("temp{erature}", (), "temperature", required=True),)), _EVERY),
             ranged="node", dims=BOTH, does="node_history"),
     Command("n{ode} re{set} vel{ocity}", "Sets all velocities to 0.", ("pcdc node reset velocity",), manual=True,
@@ -1479,7 +1490,7 @@ _OBJECTS = (
                                                "pcdc flow-node initial pressure 1e6 range x 0 1"),
             options=(Option("p{ressure}", (NOT_NEGATIVE,), "filled, at this pressure", "Pa"),
                      Option("sat{uration}", (limited(0.0, 1.0, True),), "filled part of the volume", "1"),
-                     Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the present fluid", "1")),
+                     Option("conc{entration}", (NOT_NEGATIVE,), "concentration of proppant in the present fluid", "1")),
             ranged="node", needs_option=True, dims=BOTH, does="flow.initial"),
     Command("well cr{eate}", "Makes a well of the flow nodes of a range: one connected volume, whose pressure is that "
             "at its highest node. Stages control it; without a stage it is shut in. Its water loads the free faces "
@@ -1506,7 +1517,8 @@ _OBJECTS = (
              "pcdc bolt create polyline [points]"),
             (_leading("points", PLACES, "the points, from the head on; or a list of vectors", "m"),),
             (Option("seg{ments}", (COUNT,), "elements of each straight part"),
-             Option("len{gth}", (POSITIVE,), "of an element, at most", "m", "to the edges of the elements of the mesh"),
+             Option("len{gth}", (POSITIVE,), "greatest length of an element", "m",
+                    "to the edges of the elements of the mesh"),
              Option("grout", (NOT_NEGATIVE, POSITIVE), "start and end of the grout along the bolt; the rest is "
                     "free", "m", "all of it"),
              Option("plate", (), "fixes the first node to the rock by a face plate"),
@@ -1522,7 +1534,7 @@ _OBJECTS = (
             "of the line inside the rock becomes a bolt. With a range only in these elements.",
             ("pcdc bolt-element create (0,2) (0,5) mesh-size 0.25",),
             (_leading("first", VECTOR, "head", "m"), _leading("second", VECTOR, "end", "m")),
-            (Option("m{esh}-s{ize}", (POSITIVE,), "length of its elements, at most", "m", "0.2"),
+            (Option("m{esh}-s{ize}", (POSITIVE,), "greatest length of its elements", "m", "0.2"),
              Option("group", (STRING,), "the group of its elements and nodes", "", "none",
                     more=(SET,))), ranged="element", dims=BOTH, also=("s{upport}-e{lement} c{reate}",),
             does="bolts.between"),
@@ -1621,9 +1633,10 @@ _RECORDS = (
              Option("near{est}", (VECTOR,), "the object nearest to this point", "m"),
              Option("val{ue}", (_RECORDED,), "the recorded value, see below", required=True), _EVERY,
              Option("var{iable}", (STRING,), "with law-state: the state variable of user laws"),
-             Option("well", (STRING,), "with object well: its name"),
-             *(Option(how, (), "of the objects of range, or of all")
-               for how in ("sum", "mean", "min{imum}", "max{imum}"))),
+             Option("well", (STRING,), "name of the well, with object well"),
+             *(Option(how, (), f"{what} of the values of the objects in range, or of all objects")
+               for how, what in (("sum", "sum"), ("mean", "mean"), ("min{imum}", "minimum"),
+                                 ("max{imum}", "maximum")))),
             ranged="any", dims=BOTH, does="history"),
     Command("his{tory} del{ete}", "Stops a history; its file stays.", ("pcdc history delete 'load'",), (_NAME,),
     dims=BOTH, does="histories.delete"),
@@ -1631,8 +1644,9 @@ _RECORDS = (
             ("pcdc history export 'curves.csv'",), (_leading("file", FILE, "name of the file"),),
             (Option("name{s}", (STRINGS,), "only these", default="all"),), dims=BOTH, does="histories.export"),
     Command("chart cr{eate}", "A diagram.", ("pcdc chart create 'ucs' x-label 'strain' y-label 'stress [[MPa]]'",),
-            (_NAME,), (Option("tit{le}", (STRING,), "over the diagram"), Option("x-l{abel}", (STRING,), "of the axis"),
-                       Option("y-l{abel}", (STRING,), "of the axis")), dims=BOTH, does="charts.create"),
+            (_NAME,), (Option("tit{le}", (STRING,), "title of the diagram"),
+                       Option("x-l{abel}", (STRING,), "label of the x axis"),
+                       Option("y-l{abel}", (STRING,), "label of the y axis")), dims=BOTH, does="charts.create"),
     Command("chart add", "A curve of two histories, or of points.",
             ("pcdc chart add 'ucs' x 'shortening' scale-x -0.01 y 'load' scale-y 2e-8 label 'sample'",
              "pcdc chart add 'ucs' values [curve] label 'exact' style points",
@@ -1646,7 +1660,7 @@ _RECORDS = (
                             "concentration"),),
                     "present values of the fluid along the line of the joints of the range, over the distance [m] from "
                     "its left end", dims=PLANE),
-             Option("lab{el}", (STRING,), "in the legend"),
+             Option("lab{el}", (STRING,), "name of the curve in the legend"),
              Option("style", (choice("line", "points"),), "how it is drawn", default="line")), ranged="face-joint",
                     dims=BOTH, does="charts.add"),
     Command("chart exp{ort}", "Writes a diagram as CSV and as a figure of the same name.",
@@ -1680,11 +1694,11 @@ _RECORDS = (
                     "the 1 % and 99 % quantiles of the shown values"),
              Option("full", (), "instead of limits: minimum and maximum of the shown values"),
              Option("log", (), "logarithmic colours"),
-             Option("colours", (choice(*COLOURS),), "of the field", default="viridis"),
+             Option("colours", (choice(*COLOURS),), "colour map of the field", default="viridis"),
              Option("opacity", (FLOAT,), "from 0 to 1", default="1"), Option("edges", (), "outlines of elements"),
              Option("size", (POSITIVE,), "factor on widths of lines", default="1"),
              Option("vectors", (STRING,), "arrows: displacement or velocity"),
-             Option("arrows", (POSITIVE,), "factor on their length", default="1"),
+             Option("arrows", (POSITIVE,), "factor on the length of the arrows", default="1"),
              Option("filter", (STRING,), "only objects that satisfy this condition, for example 'stress_yy < -1e6 and "
                                          "x > 2'"),
              Option("deformed", (FLOAT,), "factor on displacements", default="1"),
@@ -1695,7 +1709,8 @@ _RECORDS = (
              Option("section", (SECTION,), "a cutting plane: 'x=1.5' removes the part towards the eye, 'x<1.5' and "
                     "'x>1.5' keep one side, 'px,py,pz,nx,ny,nz' gives a point and the normal into the removed "
                     "part", "", "whole", dims=SPACE),
-             Option("title", (STRING,), "over the picture; {step} and {time} are filled in")), ranged="any", dims=BOTH,
+             Option("title", (STRING,), "title of the picture; {step} and {time} are filled in")),
+            ranged="any", dims=BOTH,
             does="pictures.image"),
 )  # fmt: skip
 
@@ -1706,7 +1721,7 @@ _ONLINE = (
             (_leading("name", STRING, "its name"),), dims=BOTH,
             idle="a run uses the ranks and threads given at its start (mpirun -n, -j)"),
     Command("v{iew}", "Selects what is shown.", ("pcdc view 'stress' target element name 'stress-yy'",), (_NAME,),
-            options=(Option("t{arget}", (), "of what", more=tuple(
+            options=(Option("t{arget}", (), "kind of the objects", more=tuple(
                 Option(word, (), doc, more=(Option("n{ame}", (STRING,), "the field"),)) for word, doc in (
                     ("e{lement}", "elements"), ("f{ace}-j{oint}", "joints"), ("geo{metry}", "layers"),
                     ("b{olt}", "bolts"), ("f{low}-c{hannel}", "channels")))),

@@ -28,7 +28,8 @@ BOLT = Model(
         Property("tensile_yield_force", "N", "axial yield force in tension", math.inf, low_itself=False,
                  otherwise="never"),
         Property("compressive_yield_force", "N", "axial yield force in compression, without sign",
-                 optional=True, follows="tensile_yield_force", otherwise="that in tension", low_itself=False),
+                 optional=True, follows="tensile_yield_force", otherwise="the yield force in tension",
+                 low_itself=False),
         Property("tension_failure_strain", "1", "elongation of an element since its installation, over its length, at "
                  "which it breaks", math.inf, low_itself=False, otherwise="never"),
         Property("shear_stiffness_rock_bolt", "N/m/m", "force of the grout per length of bolt and displacement"),

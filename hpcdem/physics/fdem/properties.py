@@ -401,9 +401,9 @@ COHESIVE = Model(
         *_JOINT_BY_TEMPERATURE,
         Property("penalty_normal", "Pa", "penalty of opening", otherwise="10 E", low_itself=False),
         Property("penalty_overlay", "Pa", "penalty of a closed joint", optional=True, follows="penalty_normal",
-                 otherwise="that of opening", low_itself=False),
+                 otherwise="the penalty of opening", low_itself=False),
         Property("penalty_shear", "Pa", "penalty of shear", optional=True, follows="penalty_normal",
-                 otherwise="that of opening", low_itself=False),
+                 otherwise="the penalty of opening", low_itself=False),
         *_temperature_tables(*_JOINT_BY_TEMPERATURE),
     ),
     lambda values: _cohesive(values),
@@ -419,7 +419,7 @@ def _cohesive(values: dict[str, Any]) -> None:
 
 
 _STIFFNESS = (
-    Property("normal_stiffness", "Pa/m", "normal stiffness; of Barton and Bandis at zero stress", low_itself=False),
+    Property("normal_stiffness", "Pa/m", "normal stiffness; for Barton–Bandis joints at zero stress", low_itself=False),
     Property("shear_stiffness", "Pa/m", "shear stiffness", low_itself=False),
 )
 COULOMB_JOINT = Model(

@@ -21,9 +21,9 @@ ISO_HEAT = Model(
                  optional=True, follows="conductivity", otherwise="conductivity", low_itself=False),
         Property("conductivity_angle", "degrees", "direction of conductivity from x, counter-clockwise, in space the "
                  "strike of its planes; it rotates with the element", 0.0, low=-math.inf),
-        Property("friction_heat", "1", "part of its half of the friction work that an element absorbs as heat when its "
-                 "faces slide", 0.0, high=1.0),
-        Property("conductivity_dip", "degrees", "dip of these planes", 90.0, low=-math.inf, dims=(3,)),
+        Property("friction_heat", "1", "part of the friction work that becomes heat when faces slide: each of the two "
+                 "elements absorbs this part of half of the work", 0.0, high=1.0),
+        Property("conductivity_dip", "degrees", "dip of the planes of conductivity", 90.0, low=-math.inf, dims=(3,)),
     ),
 )  # fmt: skip
 FLUID_HEAT = Model(
