@@ -280,7 +280,7 @@ def test_the_time_step_follows_its_stiffness(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("def soft(u, fs):\n    return u, fs\n", r"law.py:3: 'soft' is not declared as a law: @pair_law\(\)"),
+        ("def soft(u, fs):\n    return u, fs\n", r"law.py:3: 'soft' is not declared as a law: write @pair_law\(\)"),
         ("@pair_law()\ndef soft(u):\n    return u, 0.0\n", "law.py:3: the law does not accept fs"),
         ("@pair_law()\ndef soft(u, fs, e11):\n    return u, fs\n", "law.py:3: 'e11' is not an argument of a law"),
         ("@pair_law()\ndef soft(u, fs):\n    return u\n", r"law.py:3: the law must return 2 numbers \(fn, fs\)"),
