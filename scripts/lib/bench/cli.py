@@ -288,7 +288,7 @@ def scaling(
         where = Path(page) if page else report.PAGE
         for check in report.report(file, where, where.parent / "figures"):
             runs.say(
-                f"{check.name:>12} {check.ranks} rank(s) {check.what:>14}: measured {check.measured:.4g}, foretold "
+                f"{check.name:>12} {check.ranks} rank(s) {check.what:>14}: measured {check.measured:.4g}, predicted "
                 f"{check.predicted:.4g}, {100 * check.error:+.0f} %"
             )
         runs.say(f"written: {where}")

@@ -129,10 +129,10 @@ def measured_parts(parts: Parts, rows: list[Row]) -> str:
     disturbed = [r for r in rows if r["kind"] == "bed" and r["ranks"] <= 2 and r["median_s"] > 1.2 * r["step_s"]]
     busy = [r["busy"] for r in rows if r["kind"] == "bed" and r["ranks"] == 2]
     lines = [
-        ["own particles, per particle-step", own],
-        ["the same with tall columns, times", tall],
-        ["beside a second busy rank, times", f"{parts.company:.2f}"],
-        ["forces, share of it", f"{100 * parts.force:.0f} %"],
+        ["own particles, per particle and step", own],
+        ["slowdown in tall columns (factor)", tall],
+        ["slowdown beside a second busy rank (factor)", f"{parts.company:.2f}"],
+        ["share of the forces in it", f"{100 * parts.force:.0f} %"],
         ["pairs in the list, per particle and per left ghost", f"{parts.slots:.2f}, {parts.ghost_slots:.2f}"],
         ["fixed, per step", took(parts.fixed)],
         ["exchange with a neighbour", f"{took(start)} + {took(message)} per message + {1e-9 / byte:.1f} GB/s"
@@ -143,7 +143,7 @@ def measured_parts(parts: Parts, rows: list[Row]) -> str:
         ["rebuild", f"{took(parts.rebuild[0])} + {took(parts.rebuild[1])} per particle, waits {parts.waits:.1f} times"
          + (f"; every {three(1 / parts.rebuilds_pushed)} steps pushed" if parts.rebuilds_pushed else "; none pushed")],
         ["rebuild, per rank of the job", took(parts.per_rank)],
-        ["rows packed from all over, each", took(parts.pack)],
+        ["packing of scattered rows, each", took(parts.pack)],
         ["busiest rank over the mean, two ranks", f"{median(busy):.2f} ({min(busy):.2f}..{max(busy):.2f})"],
         ["a frame, both files", f"{took(parts.frame)} and {parts.frame_b:.0f} B per particle"],
         ["arrays, per particle", f"{parts.arrays_b:.0f} B"],
@@ -157,12 +157,12 @@ def measured_parts(parts: Parts, rows: list[Row]) -> str:
             "window was more than 20 % slower than the best: the machine was not quiet."
         )
     if parts.sizes[-1] < 5e5:
-        note += " A trial without the large beds (`--small`): the forecast is not to be relied on."
+        note += " A trial without the large beds (`--small`): do not rely on the forecast."
     return f"### Parts\n\n{table(['part', 'measured'], lines)}\n\n{note}"
 
 
 def check_table(found: list[Check]) -> str:
-    """Foretold against measured, and how far off by kind."""
+    """Tables of predicted and measured values, and of errors by kind."""
     lines = []
     for c in found:
         if c.what in ("step", "rebuild", "processor time"):
@@ -178,9 +178,9 @@ def check_table(found: list[Check]) -> str:
             worst = max(errors, key=abs)
             middle = median(abs(e) for e in errors)
             kinds.append([what, where, str(len(errors)), f"{100 * middle:.0f} %", f"{100 * worst:+.0f} %"])
-    head = "### Checks\n\nRuns that the model was not made from; foretold over measured, less one.\n\n"
-    head += table(["what", "ranks", "runs", "error in the middle", "largest"], kinds) + "\n\n"
-    return head + table(["bed", "ranks", "what", "measured", "foretold", "error"], lines)
+    head = "### Checks\n\nRuns that were not used for the fit; predicted over measured, minus one.\n\n"
+    head += table(["what", "ranks", "runs", "median error", "largest"], kinds) + "\n\n"
+    return head + table(["bed", "ranks", "what", "measured", "predicted", "error"], lines)
 
 
 def _percent(check: Check) -> str:
@@ -228,8 +228,8 @@ def limits(parts: Parts) -> str:
         "fastest (million/s)", "blocks 10 % faster from", f"blocks over strips on {MOST} or all columns",
     ]  # fmt: skip
     text = "### Where strips end\n\nThe same nodes and pushed beds, ranks in powers of two. Columns are the most ranks "
-    text += "that are accepted. At work: share of the step that an even share of the particles takes, full nodes or "
-    return text + "not.\n\n" + table(names, lines)
+    text += "that are accepted. At work: part of the step in which an even share of the particles is computed, full "
+    return text + "nodes or not.\n\n" + table(names, lines)
 
 
 def crossover(parts: Parts, model: Model) -> str:
