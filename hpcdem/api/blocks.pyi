@@ -459,15 +459,15 @@ class Mesh(Words):
         Parameters
         ----------
         layer : layers of geometry; each is (layer, mesh_size, is_boundary); mesh_size: length of edges there [m]
-            (default: the largest of the others); is_boundary: it bounds the mesh: the outside is removed (default:
-            the first piece does).
+            (default: the largest of the others); is_boundary: the piece bounds the mesh: elements outside it are
+            removed (default: the first piece).
         circle : a circle; each is (center, radius, mesh_size, is_boundary); center: centre [m]; radius: radius [m];
-            mesh_size: length of edges there [m] (default: the largest of the others); is_boundary: it bounds the
-            mesh: the outside is removed (default: the first piece does).
+            mesh_size: length of edges there [m] (default: the largest of the others); is_boundary: the piece bounds
+            the mesh: elements outside it are removed (default: the first piece).
         arc : an arc, counter-clockwise; each is (center, start_point, end_point, mesh_size, is_boundary); center:
             centre [m]; start_point: where it begins [m]; end_point: where it ends [m]; mesh_size: length of edges
-            there [m] (default: the largest of the others); is_boundary: it bounds the mesh: the outside is removed
-            (default: the first piece does).
+            there [m] (default: the largest of the others); is_boundary: the piece bounds the mesh: elements outside
+            it are removed (default: the first piece).
         group : the group that the new elements are in.
         set : the set of the group.
         """
@@ -2753,7 +2753,7 @@ class BlockCommands(Clocks):
 
         Parameters
         ----------
-        field : its name.
+        field : name of the field.
         flows : False: values and the stress that they cause are frozen (default: True).
         time_step : sub-step of the field, which then has its own clock; 0: the sub_steps of a cycle cover the time
             of the steps of the blocks or, without motion, are 0.9 of the stable sub-step [s] (default: 0).

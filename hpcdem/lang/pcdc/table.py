@@ -487,8 +487,9 @@ CONTACT = Model(
     declared(properties.CONTACT_MOHR_COULOMB, "f{riction}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}", "d{amping}-t",
              "d{amping}-b", "d{amping}-r{atio}", also={"penalty-normal": ("n{ormal}-s{tiffness}",),
                                                        "penalty-shear": ("s{hear}-s{tiffness}",)})
-    + (Option("c{ohesion}", (NOT_NEGATIVE,), "contacts have none", "Pa", "0", refused="contacts have "
-              "friction but no cohesion; joints have cohesion until they break: face-joint c-model c-i-c-i cohesion"),),
+    + (Option("c{ohesion}", (NOT_NEGATIVE,), "no effect: contacts have no cohesion", "Pa", "0", refused=
+              "contacts have friction but no cohesion; "
+              "joints have cohesion until they break: face-joint c-model c-i-c-i cohesion"),),
     of=properties.CONTACT_MOHR_COULOMB, dims=BOTH, does="assignments.face_model",
 )  # fmt: skip
 COHESIVE = Model(
@@ -948,7 +949,7 @@ _MODEL = (
             needs_option=True, dims=BOTH, does="flow.sub_step"),
     Command("mod{el} fi{eld}", "The clock of a field that diffuses in elements, as of moisture.",
             ("pcdc model field moisture time-step 3600", "pcdc model field moisture flows off"),
-            (_leading("field", choice(*kinds()), "its name"),),
+            (_leading("field", choice(*kinds()), "name of the field"),),
             options=(Option("fl{ows}", (BOOL,), "off: values and the stress that they cause are frozen",
                             default="on"),
                      Option("t{ime}-s{tep}", (NOT_NEGATIVE,), "sub-step of the field, which then has its own clock; 0: "
@@ -1245,7 +1246,9 @@ _MESH = (
 # ---- meshes in the words of the online commands -------------------------------------------------------------------
 
 _SIZE = Option("m{esh}-s{ize}", (POSITIVE,), "length of edges there", "m", "the largest of the others")
-_BOUNDARY = Option("is-b{oundary}", (), "it bounds the mesh: the outside is removed", "", "the first piece does")
+_BOUNDARY = Option(
+    "is-b{oundary}", (), "the piece bounds the mesh: elements outside it are removed", "", "the first piece"
+)
 _ARRAY = Option("a{rray}", (VECTORS,), "points; or a list of vectors", "m")
 _LAYERS = Option("l{ayer}", (STRINGS,), "layers of geometry")
 _ELEMENT_CREATE = (
@@ -1718,7 +1721,7 @@ _ONLINE = (
     Command("dev{ice} l{ist}", "Reports the ranks, threads and cores of the run in the log.",
             ("pcdc device list",), dims=BOTH, does="clocks.devices"),
     Command("dev{ice} s{witch}-t{o}", "Another device.", ("pcdc device switch-to 'GPU 0'",),
-            (_leading("name", STRING, "its name"),), dims=BOTH,
+            (_leading("name", STRING, "name of the device"),), dims=BOTH,
             idle="a run uses the ranks and threads given at its start (mpirun -n, -j)"),
     Command("v{iew}", "Selects what is shown.", ("pcdc view 'stress' target element name 'stress-yy'",), (_NAME,),
             options=(Option("t{arget}", (), "kind of the objects", more=tuple(

@@ -423,7 +423,9 @@ class Conditions(InitialStress):
         does = (moving.DOES_X, moving.DOES_Y) if plane else range(space.DOES, space.DOES + 3)
         at = (moving.AT_X, moving.AT_Y) if plane else range(space.AT, space.AT + 3)
         force, constraint, way = (
-            (moving.FORCE_X, moving.CONSTRAINT, moving.DIRECTION_X) if plane else (space.FORCE, space.CONSTRAINT, space.WAY)
+            (moving.FORCE_X, moving.CONSTRAINT, moving.DIRECTION_X)
+            if plane
+            else (space.FORCE, space.CONSTRAINT, space.WAY)
         )
         for row, one in enumerate(self.acting()):
             for k, axis in enumerate("xyz"[: self.dim]):
