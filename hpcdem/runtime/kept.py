@@ -57,7 +57,7 @@ class Files:
         data = self._read(signature)
         try:
             return None if data is None else CompileResult._rebuild(target, *pickle.loads(data))
-        except ImportError:  # of a version in which the module had another name
+        except (ImportError, AttributeError):  # of a version in which a module or a class had another name or place
             return None
 
     def _read(self, signature: Any) -> bytes | None:
@@ -208,7 +208,7 @@ def has(kernel: Any, types: tuple[Any, ...]) -> bool:
     return path is not None and path.is_file()
 
 
-_WORDS = re.compile(r'\n[ \t]*(?:r?"""(?s:.*?)"""|#[^\n]*)(?=\n)|  #[^"\'\n]*(?=\n)|\n(?=\n)')
+_WORDS = re.compile(r'\n[ \t]*(?:r?"""(?:[^"]|"(?!""))*"""|#[^\n]*)(?=\n)|  #[^"\'\n]*(?=\n)|\n(?=\n)')
 """Docstrings, comments and blank lines, which change no kernel. A test compares the rest with what Python parses."""
 
 

@@ -123,6 +123,10 @@ def test_kernels_are_known_by_what_they_are_made_of(base, tmp_path, monkeypatch,
     assert digest() == third
     (package / "inner.py").write_text('B = "2"\n')
     assert digest() != third
+    (package / "inner.py").write_text('def f():\n    """A."""  # why\n    return 1\n"""Words."""\n')
+    fourth = digest()
+    (package / "inner.py").write_text('def f():\n    """A."""  # why\n    return 2\n"""Words."""\n')
+    assert digest() != fourth, "code between two docstrings counts, whatever follows the first"
     for known in (kept._digest, kept._reached, kept._sources, kept._files, kept._code):
         known.cache_clear()
 
