@@ -105,6 +105,8 @@ def check_row(p1: Point, p2: Point, rad: float, cratio: float) -> None:
 STEEPEST = 80.0
 """Largest angle [deg] to which a slope can be limited."""
 PROCESSES = ("diffuse", "slope", "erode", "above", "deposit", "below")
+OF_EROSION = ("id", "interval", "x", "spacing", "erode", "above", "rise", "years", "only", "porosity")
+"""Options of SURFACE that a process without a deposit accepts."""
 
 
 def check_surface(given: Mapping[str, Any]) -> None:
@@ -153,7 +155,7 @@ def _level(level: float) -> str:
 def _check_deposit(given: Mapping[str, Any], makers: Sequence[str]) -> None:
     """CommandError unless the discs that these processes make are described, and nothing else is."""
     if not makers:
-        strange = [name for name in ("rad", "density", "episode", "colors", "group", "compact") if name in given]
+        strange = [name for name in given if name not in OF_EROSION]
         if strange:
             raise CommandError(f"{strange[0]} describes the deposit, and erosion alone makes none")
         return

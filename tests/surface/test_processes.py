@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import math
+import re
 
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import checkpoints, clumps, cycles, particles, properties, settings, surface
+from hpcdem.commands.dem import checkpoints, clumps, cycles, particles, properties, settings, surface, walls
 from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.core.selection import Group
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.numerics import landscape
+from hpcdem.runtime.progress import Log
 from tests.clumped import write_lattice
 from tests.support import model
 from tests.surface.support import SAND, assert_adds_up, basin, heights
@@ -76,15 +79,17 @@ def test_a_scarp_of_particles_diffuses(scarp: str, tmp_path) -> None:
 
 
 def test_a_slope_limit_gives_that_slope(scarp: str, tmp_path) -> None:
-    """The step of 10 m becomes a slope of 10 degrees, 57 m wide; grains make it gentler by up to 1.5 degrees."""
+    """The step of 10 m becomes a slope of 10 degrees, 57 m wide. With what columns still owe, less than a disc each,
+    it is gentler by up to 1.5 degrees, as its upper half owes erosion and the lower one deposition."""
     sim = restored(scarp, tmp_path)
     surface.surface(sim, 1, 50, slope=10.0, x=(0.0, WIDTH), **SAND)
     cycles.cycle(sim, 600)
     sides, h, owed = heights(sim, 1, WIDTH)
     x = 0.5 * (sides[:-1] + sides[1:])
     middle = np.abs(x - STEP) < 22.0
-    angle = math.degrees(math.atan(-np.polyfit(x[middle], owed[middle], 1)[0]))
-    assert angle == pytest.approx(9.25, abs=0.75)
+    of_discs, angle = (math.degrees(math.atan(-np.polyfit(x[middle], v[middle], 1)[0])) for v in (h, owed))
+    assert of_discs == pytest.approx(10.0, abs=1.0)
+    assert angle == pytest.approx(9.25, abs=0.75) and angle < of_discs
     assert_adds_up(sim, 1)
 
 
@@ -165,6 +170,9 @@ def test_what_is_buried_is_compacted(tmp_path) -> None:
         ({"interval": 5, "diffuse": 1.0, "rad": [1.0]}, "diffuse deposits discs: give their density"),
         ({"interval": 5, "diffuse": 1.0, "rad": [1.0], "density": 1.0}, "give their kn, or shear, poiss and hertz"),
         ({"interval": 5, "above": 5.0, "density": 1.0}, "density describes the deposit, and erosion alone makes none"),
+        ({"interval": 5, "erode": 1.0, "fric": 0.0}, "fric describes the deposit, and erosion alone makes none"),
+        ({"interval": 5, "erode": 1.0, "hertz": True}, "hertz describes the deposit"),
+        ({"interval": 5, "diffuse": 0.0, "slope": 20.0, **SAND}, "diffuse must be above 0, got 0"),
         ({"interval": 5, "above": -3.0}, "above -3 m is not above the base of the model, -0.0"),
         (
             {"interval": 5, "above": 3.0, "only": ["hihg"]},
@@ -187,6 +195,22 @@ def test_what_cannot_act_is_refused(scarp: str, tmp_path, words, message) -> Non
     assert list(sim.lands) == [1]
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"x": (200.0, 300.0), "deposit": 1.0}, "SURFACE 1: there is no ground between x = 200 and 300 m"),
+        ({"spacing": 200.0, "slope": 5.0}, "one column .spacing 200 m. covers everything"),
+    ],
+)
+def test_a_process_that_finds_nothing_to_do_tells(scarp: str, tmp_path, words, message) -> None:
+    sim = restored(scarp, tmp_path)
+    said = io.StringIO()
+    sim.log = Log(stream=said)
+    surface.surface(sim, 1, 5, **SAND, **words)
+    cycles.cycle(sim, 10)
+    assert len(re.findall(message, said.getvalue())) == 1
+
+
 def test_models_in_which_it_cannot_act_are_refused_before_the_run(scarp: str, tmp_path) -> None:
     sim = restored(scarp, tmp_path)
     surface.surface(sim, 1, 50, above=18.0)
@@ -199,6 +223,17 @@ def test_models_in_which_it_cannot_act_are_refused_before_the_run(scarp: str, tm
     properties.prop(sim, density=1.0, kn=1e5, ks=1e5)
     with pytest.raises(CommandError, match="SURFACE 1 does not support clumps"):
         cycles.cycle(sim, 1)
+
+
+def test_a_level_may_be_at_zero(tmp_path) -> None:
+    sim = basin(tmp_path, WIDTH)
+    walls.wall(sim, 0, ((0.0, -9.0), (WIDTH, -9.0)))
+    particles.ball(sim, 0, 5.0, -8.0, 1.0)
+    surface.surface(sim, 1, 5, above=0.0)
+    surface.surface(sim, 2, 5, erode=1.0, above=5.0, deposit=1.0, below=0.0, **SAND)
+    assert sim.lands[1].above == 0.0 and sim.lands[2].below == 0.0
+    with pytest.raises(CommandError, match=r"erosion .above -1 m. and deposition .below 0 m. would act"):
+        surface.surface(sim, 3, 5, erode=1.0, above=-1.0, deposit=1.0, below=0.0, **SAND)
 
 
 def test_lines_of_a_script() -> None:

@@ -68,28 +68,26 @@ def flexure(
     off : the base stays where it is.
     """
     if (wall is None) == (where is None):
-        raise CommandError("FLEXURE: give either a wall or the particles of a row")
+        raise CommandError("give either a wall or the particles of a row")
     if off:
         _off(sim, wall, where)
         return
     stiffness = _rigidity(rigidity, young, poisson, te)
     if contrast is None or not contrast > 0.0:
-        raise CommandError(f"FLEXURE: contrast must be above 0, got {contrast}: without it nothing restores the plate")
+        raise CommandError(f"contrast must be above 0, got {contrast}: without it nothing restores the plate")
     gravity = -sim.settings.gy
     if not gravity > 0.0:
-        raise CommandError("FLEXURE needs gravity that points down; SET gravity must precede it")
+        raise CommandError("the plate needs gravity that points down; SET gravity must precede it")
     _check_coupling(interval, relax, speed)
     for name, end in (("left", left), ("right", right)):
         if end not in ENDS:
-            raise CommandError(f"FLEXURE: {name} must be {', '.join(ENDS)}, got {end}")
+            raise CommandError(f"{name} must be {', '.join(ENDS)}, got {end}")
     row, first, last, level = _wall_extent(sim, wall) if wall is not None else _row_extent(sim, where)
     alpha = parameter(stiffness, contrast * gravity)
     number = _segments(last - first, alpha, segments)
     nodes = _nodes(first, last, number, x, alpha)
     if load is not None and not nodes[0] <= load[0] <= nodes[-1]:
-        raise CommandError(
-            f"FLEXURE: the load at {load[0]:g} m lies outside the plate, {nodes[0]:g} to {nodes[-1]:g} m"
-        )
+        raise CommandError(f"the load at {load[0]:g} m lies outside the plate, {nodes[0]:g} to {nodes[-1]:g} m")
     base = Base(
         -1 if wall is None else wall, row, level, first, last, nodes, stiffness, contrast, ENDS[left], ENDS[right],
         (first, 0.0) if load is None else (float(load[0]), float(load[1])), compensated, int(interval), sim.clock.step,
@@ -109,26 +107,26 @@ def flexure(
 
 def _check_coupling(interval: int, relax: float, speed: float | None) -> None:
     if not interval >= SHORTEST:
-        raise CommandError(f"FLEXURE: interval must be at least {SHORTEST} steps, got {interval}")
+        raise CommandError(f"interval must be at least {SHORTEST} steps, got {interval}")
     for name, value, most in (("relax", relax, 1.0), ("speed", speed, math.inf)):
         if value is not None and not 0.0 < value <= most:
             upto = " and at most 1" if most == 1.0 else ""
-            raise CommandError(f"FLEXURE: {name} must be above 0{upto}, got {value:g}")
+            raise CommandError(f"{name} must be above 0{upto}, got {value:g}")
 
 
 def _rigidity(rigidity: float | None, young: float | None, poisson: float, te: float | None) -> float:
     if (rigidity is None) == (young is None and te is None):
-        raise CommandError("FLEXURE: give either rigidity, or young and te")
+        raise CommandError("give either rigidity, or young and te")
     if rigidity is None:
         for name, value in (("young", young), ("te", te)):
             if value is None or not value > 0.0:
-                raise CommandError(f"FLEXURE: {name} must be above 0, got {value}")
+                raise CommandError(f"{name} must be above 0, got {value}")
         if not -1.0 < poisson < 0.5:
-            raise CommandError(f"FLEXURE: poisson must be above -1 and below 0.5, got {poisson:g}")
+            raise CommandError(f"poisson must be above -1 and below 0.5, got {poisson:g}")
         assert young is not None and te is not None
         rigidity = rigidity_of(young, poisson, te)
     if not (rigidity > 0.0 and math.isfinite(rigidity)):
-        raise CommandError(f"FLEXURE: rigidity must be above 0, got {rigidity:g}")
+        raise CommandError(f"rigidity must be above 0, got {rigidity:g}")
     return rigidity
 
 
@@ -137,15 +135,15 @@ def _wall_extent(sim: Simulation, wall: int) -> tuple[np.ndarray, float, float, 
     w, row = sim.walls, sim.walls.row(wall)
     if w.side[row]:
         raise CommandError(
-            f"FLEXURE: wall {wall} is a side of BOX, which cannot bend; create a WALL above it, as high as it may sink"
+            f"wall {wall} is a side of BOX, which cannot bend; create a WALL above it, as high as it may sink"
         )
     _refuse_twice(sim, wall, np.empty(0, np.int64))
     if len(w.parts(wall)) > 1:
-        raise CommandError(f"FLEXURE: wall {wall} was bent already and is not straight any more; create a new wall")
+        raise CommandError(f"wall {wall} was bent already and is not straight any more; create a new wall")
     (x1, y1), (x2, y2) = w.p1[row], w.p2[row]
     if abs(y1 - y2) > STRAIGHT * abs(x1 - x2):
         raise CommandError(
-            f"FLEXURE: wall {wall} from ({x1:g}, {y1:g}) to ({x2:g}, {y2:g}) is not horizontal, as the plate must be"
+            f"wall {wall} from ({x1:g}, {y1:g}) to ({x2:g}, {y2:g}) is not horizontal, as the plate must be"
         )
     return np.empty(0, np.int64), float(min(x1, x2)), float(max(x1, x2)), float(y1)
 
@@ -157,24 +155,22 @@ def _row_extent(sim: Simulation, where: Selection | None) -> tuple[np.ndarray, f
     parts = sim.comm.allgather(tuple(columns))
     gid, x, y, radius, fix, vx, vy = (np.concatenate([part[k] for part in parts]) for k in range(7))
     if len(gid) < 2:
-        raise CommandError(f"FLEXURE: a row needs at least two particles; the selection contains {len(gid)}")
+        raise CommandError(f"a row needs at least two particles; the selection contains {len(gid)}")
     order = np.argsort(gid)
     gid, x, y, radius, fix, vx, vy = (column[order] for column in (gid, x, y, radius, fix, vx, vy))
     free = gid[(fix & (FIX_X | FIX_Y)) != (FIX_X | FIX_Y)]
     if len(free):
-        raise CommandError(
-            f"FLEXURE: {len(free)} particles of the row are not fixed in x and y, the first has id {free[0]}"
-        )
+        raise CommandError(f"{len(free)} particles of the row are not fixed in x and y, the first has id {free[0]}")
     moving = gid[(vx != 0.0) | (vy != 0.0)]
     if len(moving):
         raise CommandError(
-            f"FLEXURE: {len(moving)} particles of the row move already, the first has id {moving[0]}; the plate alone "
+            f"{len(moving)} particles of the row move already, the first has id {moving[0]}; the plate alone "
             "can move a row"
         )
     if np.ptp(y) > STRAIGHT * np.ptp(x):
-        raise CommandError(f"FLEXURE: the row is not horizontal: heights from {y.min():g} to {y.max():g} m")
+        raise CommandError(f"the row is not horizontal: heights from {y.min():g} to {y.max():g} m")
     if sim.clumps and sim.comm.any(bool((p.clump[which] >= 0).any())):
-        raise CommandError("FLEXURE: the row contains members of clumps, which cannot move separately")
+        raise CommandError("the row contains members of clumps, which cannot move separately")
     _refuse_twice(sim, -1, gid)
     return gid, float((x - radius).min()), float((x + radius).max()), float(y[0])
 
@@ -182,14 +178,14 @@ def _row_extent(sim: Simulation, where: Selection | None) -> tuple[np.ndarray, f
 def _refuse_twice(sim: Simulation, wall: int, row: np.ndarray) -> None:
     for base in sim.bases:
         if (wall >= 0 and base.wall == wall) or len(np.intersect1d(base.row, row)):
-            raise CommandError(f"FLEXURE: {base.name} bends already; end it by off first")
+            raise CommandError(f"{base.name} bends already; end it by off first")
 
 
 def _segments(length: float, alpha: float, wanted: int | None) -> int:
     number = max(FEWEST, math.ceil(FINE * length / alpha)) if wanted is None else wanted
     if not COARSE * length / alpha <= number <= MOST:
         raise CommandError(
-            f"FLEXURE: {number} segments of a base of {length:g} m; the flexural parameter of {alpha:g} m needs at "
+            f"{number} segments of a base of {length:g} m; the flexural parameter of {alpha:g} m needs at "
             f"least {math.ceil(COARSE * length / alpha)}, and at most {MOST} are possible"
         )
     return number
@@ -200,11 +196,11 @@ def _nodes(first: float, last: float, number: int, x: tuple[float, float] | None
     start, end = (first, last) if x is None else (float(x[0]), float(x[1]))
     if not (start <= first and last <= end):
         raise CommandError(
-            f"FLEXURE: the plate from {start:g} to {end:g} m does not contain the base from {first:g} to {last:g} m"
+            f"the plate from {start:g} to {end:g} m does not contain the base from {first:g} to {last:g} m"
         )
     size = max((last - first) / number, alpha / FINE)
     if end - start > MOST * size:
-        raise CommandError(f"FLEXURE: the plate of {end - start:g} m is too long for {MOST} nodes; use infinite ends")
+        raise CommandError(f"the plate of {end - start:g} m is too long for {MOST} nodes; use infinite ends")
     sides = (np.linspace(a, b, math.ceil((b - a) / size) + 1) for a, b in ((start, first), (last, end)))
     before, after = sides
     return np.concatenate([before[:-1], np.linspace(first, last, number + 1), after[1:]])
@@ -232,12 +228,13 @@ def _off(sim: Simulation, wall: int | None, where: Selection | None) -> None:
         chosen_ones = [base for base in sim.bases if base.wall == wall]
     else:
         gids = np.concatenate(sim.comm.allgather(sim.particles["gid"][chosen(sim, where)].copy()))
-        chosen_ones = [base for base in sim.bases if len(np.intersect1d(base.row, gids))]
+        rows = [base for base in sim.bases if base.wall < 0]
+        chosen_ones = [base for base in rows if len(np.intersect1d(base.row, gids)) or not base.exists(sim)]
     if not chosen_ones:
-        raise CommandError(f"FLEXURE off: {f'wall {wall}' if wall is not None else 'the selected row'} does not bend")
+        raise CommandError(f"off: {f'wall {wall}' if wall is not None else 'the selected row'} does not bend")
     for base in chosen_ones:
         sim.bases.remove(base)
-        base.halt(sim)
+        base.halt(sim, ends=True)
 
 
 def _check(sim: Simulation, base: Base) -> None:
@@ -247,13 +244,15 @@ def _check(sim: Simulation, base: Base) -> None:
     if base.wall >= 0:
         if sim.settings.energy > 0 or sim.energy is not None:
             raise CommandError(
-                "FLEXURE: the energy budget (SET energy) does not support a wall that bends; use a row of fixed "
+                "the energy budget (SET energy) does not support a wall that bends by FLEXURE; use a row of fixed "
                 "particles"
             )
         if sim.walls.v[sim.walls.parts(base.wall)].any():
-            raise CommandError(f"FLEXURE: wall {base.wall} has a velocity (WALL xv, yv); the plate alone can move it")
+            raise CommandError(f"wall {base.wall} has a velocity (WALL xv, yv); the plate of FLEXURE alone can move it")
     elif sim.own_laws:
-        raise CommandError("FLEXURE: a row does not support user laws, whose forces are not known; use a wall")
+        raise CommandError(
+            "a row that FLEXURE bends does not support user laws, whose forces are not known; use a wall"
+        )
 
 
 # ---- while the particles step ----------------------------------------------------------------------------------------

@@ -189,6 +189,11 @@ def unbalanced(sim: Simulation) -> float:
     return diagnostics.survey(sim).unbalanced
 
 
+def deflection(sim: Simulation) -> float:
+    """Largest deflection of the bases of FLEXURE [m]; NaN after the last one has ended."""
+    return max((float(base.now(sim.clock.step)[base.nodes, 0].max()) for base in sim.bases), default=math.nan)
+
+
 HISTORIES = {
     "kinetic": ("J", diagnostics.kinetic_energy),
     "step": ("1", lambda sim: float(sim.clock.step)),
@@ -197,7 +202,7 @@ HISTORIES = {
     "contacts": ("1", lambda sim: float(diagnostics.survey(sim).contacts)),
     "bonds": ("1", lambda sim: float(sim.bonds_left())),
     "energy": ("J", budget.stored_energy),
-    "deflection": ("m", lambda sim: max(float(base.now(sim.clock.step)[base.nodes, 0].max()) for base in sim.bases)),
+    "deflection": ("m", deflection),
 }
 """Quantities that HIST can record: unit and function of the simulation."""
 

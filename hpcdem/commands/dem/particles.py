@@ -289,7 +289,7 @@ def twin(sim: Simulation, number: int, where: Selection | None = None) -> int:
         which &= sim.particles.clump < 0
     drawn = np.concatenate(sim.comm.allgather(sim.particles["gid"][which]))
     if not len(drawn):
-        raise CommandError("TWIN: none of the selected particles is free to move")
+        raise CommandError("none of the selected particles is free to move")
     if number == 0:
         return -1
     gid = int(drawn[uniforms(number, STREAM, drawn).argmin()])

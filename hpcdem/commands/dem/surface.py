@@ -111,7 +111,7 @@ def surface(
         "hertz": hertz,
     }  # fmt: skip
     material = checked(properties)
-    given = {name: value for name, value in optional.items() if value not in (None, (), "", False)} | material
+    given = {name: value for name, value in optional.items() if _is_given(value)} | material
     check_surface({"id": id, **given})
     if id < 0:
         raise CommandError(f"id must not be negative, got {id}")
@@ -158,6 +158,11 @@ def surface(
     sim.lands[id] = land
     sim.lands = dict(sorted(sim.lands.items()))
     sim.tables_changed()
+
+
+def _is_given(value: object) -> bool:
+    """Return whether an option has a value; 0 is one."""
+    return not (value is None or value is False or (isinstance(value, (str, Sequence)) and not len(value)))
 
 
 def _refuse_deep(sim: Simulation, name: str, level: float | None) -> None:
@@ -319,14 +324,17 @@ def act(sim: Simulation, ident: int) -> None:
     near = _near(sim, np.array([gid for gid, _, _ in land.settling], np.int64))
     walls, barriers = _barriers(sim)
     ends = _range(land, near.circle[near.ground], barriers)
-    if ends is not None:
-        _apply(sim, land, near, walls, ends, elapsed)
+    idle = "there is no ground" if ends is None else _apply(sim, land, near, walls, ends, elapsed)
+    if idle and sim.log is not None:
+        between = "" if land.x is None else f" between x = {land.x[0]:g} and {land.x[1]:g} m"
+        sim.log.warn_once(f"surface {ident} {idle}", f"step {sim.clock.step}: SURFACE {ident}: {idle}{between}")
     _write(sim, ident)
 
 
 def _apply(
     sim: Simulation, land: Land, near: _Near, walls: np.ndarray, ends: tuple[float, float], elapsed: float
-) -> None:
+) -> str:
+    """Return what keeps the process from acting, "" for nothing."""
     first, sides = landscape.edges(*ends, land.spacing)
     width, n = np.diff(sides), len(sides) - 1
     largest = float(max(near.circle[:, 2].max(initial=0.0), *land.rad, 0.0))
@@ -348,7 +356,7 @@ def _apply(
     owed += demanded
     land.asked += int(demanded.sum())
     gone = _eroded(land, near, area, owed, stacks)
-    rows = _deposited(sim, land, near, walls, owed, sides, gone)
+    rows, full = _deposited(sim, land, near, walls, owed, sides, gone)
     land.owed = {first + k: int(v) for k, v in enumerate(owed.tolist()) if v}
     if gone:
         density = sim.materials.rows["density"][near.ids[gone, 2]]
@@ -365,6 +373,13 @@ def _apply(
         add(sim, np.array(rows), sim.group_number(land.group_at(step)), land.color_at(step), material=land.material)
     if land.compact is not None:
         _compacted(sim, land, measured, sides)
+    if np.isnan(measured).all():
+        return "there is no ground"
+    if full:
+        return "no disc of the deposit finds a place in some columns; what they lack is carried"
+    if n == 1 and (land.diffuse or land.slope):
+        return f"one column (spacing {land.spacing:g} m) covers everything, so diffuse and slope move nothing"
+    return ""
 
 
 def _book(entry: list[float], area: int, mass: float) -> None:
@@ -444,11 +459,12 @@ def _deposited(
     owed: np.ndarray,
     sides: np.ndarray,
     gone: list[int],
-) -> list[tuple[float, float, float]]:
-    """x, y, r of new discs in hollows of the surface; `owed` follows."""
+) -> tuple[list[tuple[float, float, float]], bool]:
+    """x, y, r of new discs in hollows of the surface, and whether a column lacks one that finds no place; `owed`
+    follows."""
     rows: list[tuple[float, float, float]] = []
     if not land.deposits:
-        return rows
+        return rows, False
     discs = np.delete(near.circle, gone, axis=0)
     total, blocked = int(owed.sum()), np.zeros(len(owed), bool)
     while True:
@@ -457,7 +473,7 @@ def _deposited(
         area = land.of_disc(r)
         due = ~blocked & (owed > 0) & ((owed >= area) | (total >= area))
         if not due.any():
-            return rows
+            return rows, bool(blocked.any())
         c = int(np.argmax(np.where(due, owed, -1)))
         place = resting(float(sides[c]), float(sides[c + 1]), r, discs, walls)
         if place is None:

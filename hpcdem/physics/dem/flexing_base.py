@@ -160,13 +160,13 @@ class Base:
         (self._move_wall if self.wall >= 0 else self._move_row)(sim, plate, span)
         sim.check_soon()
 
-    def halt(self, sim: Any) -> None:
-        """Bring the base to rest. Collective."""
+    def halt(self, sim: Any, ends: bool = False) -> None:
+        """Bring the base to rest, for good if it ends: particles of a row may then be gone. Collective."""
         if self.wall >= 0:
             sim.walls.bend[sim.walls.parts(self.wall)] = 0.0
             sim.tables_changed()
         else:
-            sim.particles["vy"][self._members(sim)] = 0.0
+            sim.particles["vy"][self._held(sim) if ends else self._members(sim)] = 0.0
         sim.check_soon()
 
     def _check_space(self, sim: Any) -> None:
@@ -190,11 +190,20 @@ class Base:
         p, mine = sim.particles, self._members(sim)
         p["vy"][mine] = (self.level - plate.deflection(self.shape, p["x"][mine]) - p["y"][mine]) / span
 
+    def exists(self, sim: Any) -> bool:
+        """Return whether any particle of the row is left. Collective."""
+        return bool(sim.comm.any(bool(np.isin(sim.particles["gid"], self.row).any())))
+
+    def _held(self, sim: Any) -> np.ndarray:
+        """Flags (n_own,) of the particles of the row that are fixed in y."""
+        p = sim.particles
+        held: np.ndarray = np.isin(p["gid"], self.row) & (p["fix"] & FIX_Y != 0)
+        return held
+
     def _members(self, sim: Any) -> np.ndarray:
         """Flags (n_own,) of the particles of the row. CommandError if some are gone or free. Collective."""
-        p = sim.particles
-        mine = np.isin(p["gid"], self.row)
-        fixed = sim.count(int((mine & (p["fix"] & FIX_Y != 0)).sum()))
+        mine = self._held(sim)
+        fixed = sim.count(int(mine.sum()))
         if fixed < len(self.row):
             raise CommandError(
                 f"step {sim.clock.step}: {len(self.row) - fixed} particles of {self.name}, which FLEXURE moves, were "

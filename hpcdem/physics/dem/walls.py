@@ -59,7 +59,11 @@ class Walls:
         """Rows of the segments of a wall from its P1 to its P2, usually one; CommandError if missing."""
         first = self.row(wall_id)
         if self.whole[first] != wall_id:
-            raise CommandError(f"wall {wall_id} is a segment of wall {self.whole[first]}, which FLEXURE bends")
+            others = self.id[(self.whole == self.whole[first]) & (self.whole != self.id)]
+            raise CommandError(
+                f"wall {wall_id} is a segment of wall {self.whole[first]}, which FLEXURE divided: its segments have "
+                f"the ids {others.min()} to {others.max()}; choose another id for a new wall"
+            )
         return np.flatnonzero(self.whole == wall_id)
 
     def polylines(self) -> dict[int, np.ndarray]:

@@ -268,6 +268,7 @@ def test_what_cannot_act_is_refused(tmp_path, text):
     with pytest.raises(CommandError) as refused:
         flexure.flexure(sim, **{"wall": 1, **PLATE, **REFUSED[text]})
     assert text in str(refused.value)
+    assert "FLEXURE: " not in str(refused.value)  # the command is named by the language
     assert not sim.bases and len(sim.walls) == 7
 
 
@@ -288,6 +289,36 @@ def test_a_row_that_cannot_bend_is_refused(tmp_path):
     properties.free(sim, ("y",), where=only(8))
     with pytest.raises(CommandError, match=r"step 100: 1 particles of the row .* were deleted or freed in y"):
         cycles.cycle(sim, 500)
+    flexure.flexure(sim, None, ROW, off=True)
+    held = (sim.particles["gid"] < 100) & (sim.particles["gid"] != 8)
+    assert not sim.bases and (sim.particles["vy"][held] == 0.0).all()
+    cycles.cycle(sim, 10)
+
+
+@pytest.mark.parametrize("gone", [only(8), ROW], ids=["one", "all"])
+def test_a_row_of_which_particles_were_deleted_can_be_ended(tmp_path, gone):
+    sim = empty(tmp_path, row=True)
+    load(sim, np.array([0.0]))
+    flexure.flexure(sim, None, ROW, **PLATE)
+    cycles.cycle(sim, 250)
+    particles.delete(sim, gone)
+    with pytest.raises(CommandError, match="FLEXURE off ends it"):
+        cycles.cycle(sim, 500)
+    flexure.flexure(sim, None, ROW, off=True)
+    assert not sim.bases
+    cycles.cycle(sim, 10)
+
+
+def test_a_history_of_deflection_continues_after_the_last_base_has_ended(tmp_path):
+    sim = empty(tmp_path)
+    load(sim, np.array([0.0]))
+    flexure.flexure(sim, 1, **PLATE)
+    history.hist(sim, 1, 100, "deflection")
+    cycles.cycle(sim, 400)
+    flexure.flexure(sim, 1, off=True)
+    cycles.cycle(sim, 200)
+    values = [float(line.split(",")[-1]) for line in (tmp_path / "hist_1.csv").read_text().splitlines()[1:]]
+    assert len(values) == 6 and values[3] > 0.0 and np.isnan(values[4:]).all()
 
 
 def test_commands_on_a_base_that_bends(tmp_path):
@@ -299,7 +330,7 @@ def test_commands_on_a_base_that_bends(tmp_path):
     for change in ({"yv": 1.0}, {"nodes": ((0.0, 0.0), (1.0, 0.0))}, {"delete": True}):
         with pytest.raises(CommandError, match="wall 1 bends on an elastic plate"):
             walls.wall(sim, 1, **change)
-    with pytest.raises(CommandError, match="wall 105 is a segment of wall 1"):
+    with pytest.raises(CommandError, match=r"wall 105 is a segment of wall 1, .* ids 104 to \d+; choose another"):
         walls.wall(sim, 105, fric=0.2)
     with pytest.raises(CommandError, match="wall 1 bends already"):
         flexure.flexure(sim, 1, **PLATE)
