@@ -22,7 +22,6 @@ from hpcdem.core.comm import Comm
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import doctor, launch, run_folder, shutdown, speed
-from hpcdem.runtime.checkpoints import newest_first
 from hpcdem.runtime.pace import Pace
 
 if TYPE_CHECKING:
@@ -112,6 +111,8 @@ class Session:
 
     def newest(self, folder: Path, before: float = math.inf) -> str | None:
         """The newest checkpoint of a folder, or the last one at or before this time [s]; searched for by rank 0."""
+        from hpcdem.runtime.checkpoints import newest_first  # brings h5py
+
         found = newest_first([folder], before)[0] if self.comm.rank == 0 else []
         return self.comm.bcast(str(found[0]) if found else None)
 

@@ -89,7 +89,7 @@ def test_literals_of_python_are_parameters():
         ("import a\nx = 1\nx += 1\nprint(x)", "x", "more than once"),
         ("import a\nx = 1\ndef f():\n  global x\n  x = 2\nprint(x)", "x", "more than once"),
         ("import a\nx = 2 * 3\nprint(x)", "x", "push.py:2 does not set it to a number, a word, True or False"),
-        ("START\nSET dt 1\n", "seed", "there are: none. Add a line seed = NUMBER to create one"),
+        ("START\nSET dt 1\n", "seed", "available: none. Add a line seed = NUMBER to create one"),
         ("START\nSET seed 1\nSET seed 2\n", "seed", "no such parameter"),
     ],
 )

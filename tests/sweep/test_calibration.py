@@ -64,7 +64,7 @@ def test_a_target_out_of_reach_and_failed_runs():
     target = [Target("E", float(np.log(1e13)), 0.03)]
     one = lambda points: np.log(0.6e9 * 100.0**points)[:, None, :]  # noqa: E731
     told = " ".join(calibrate(one, {"ebmod": RANGES["ebmod"]}, target, first=6, rounds=1, batch=2).cautions())
-    assert "target E is out of reach" in told and "ebmod lies at the upper end" in told
+    assert "target E cannot be reached" in told and "ebmod lies at the upper end" in told
     with pytest.raises(UsageError, match="first = 3: 1 parameters need at least 4 points"):
         calibrate(one, {"ebmod": RANGES["ebmod"]}, target, first=3)
     with pytest.raises(HpcdemError, match="target E: 0 of 6 runs gave a number"):

@@ -131,7 +131,7 @@ def test_help_lists_every_command_by_group_and_in_chinese():
 def test_every_command_of_the_table_starts():
     for one in (one for one in BY_NAME.values() if one.module):
         module = importlib.import_module(f"hpcdem.cli.{one.module}")
-        assert hasattr(module, "work") and hasattr(module, one.name) if one.looks else hasattr(module, "start")
+        assert hasattr(module, "work") and hasattr(module, one.name) if one.reads_only else hasattr(module, "start")
 
 
 def test_examples_are_listed_and_copied(tmp_path):

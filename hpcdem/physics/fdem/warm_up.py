@@ -137,8 +137,8 @@ def _weak(mesh: Mesh, threads: int) -> Blocks:
     changes.element_model(sim, None, "mech_mohr_coulomb", weak)
     sim.initial_stress(None, yy=1e3)
     sim.option(collision=False)
-    sim.close_model()
     diagnostics.account_energy(sim)
+    sim.close_model()
     return sim
 
 
