@@ -105,8 +105,8 @@ SAME: list[tuple[str, str]] = [
     ("pcdc element-face boundary mech-abs-b-c normal -1e5 dip 2e5 range boundary",
      "sim.faces.stress(quiet=True, normal=-1e5, dip=2e5, where='boundary')"),
     ("pcdc element-face boundary m-s-b-c dip table 'v'", "sim.faces.stress(dip='v')"),
-    ("pcdc element-face list summary", "sim.faces.tell()"),
-    ("pcdc face-joint list summary range id 1 5", "sim.joints.tell(where='id 1 5')"),
+    ("pcdc element-face list summary", "sim.faces.report()"),
+    ("pcdc face-joint list summary range id 1 5", "sim.joints.report(where='id 1 5')"),
     ("pcdc model solve elastic time 1e6", "sim.solve(elastic=True, time=1e6)"),
     ("pcdc model solve elastic solver direct", "sim.solve(elastic=True, solver='direct')"),
     ("pcdc model solve elastic steps 4", "sim.solve(elastic=True, steps=4)"),
@@ -193,7 +193,7 @@ SAME: list[tuple[str, str]] = [
     ("pcdc element hide off range x 0 1 use-hidden on", "sim.elements.hide(False, where='x 0 1 use-hidden on')"),
     ("pcdc element collision off range x 0 1", "sim.elements.collision(False, where='x 0 1')"),
     ("pcdc element water surface 'l' density 1000 range x 0 1", "sim.elements.water('l', 1000, where='x 0 1')"),
-    ("pcdc element list summary range x 0 1", "sim.elements.tell(where='x 0 1')"),
+    ("pcdc element list summary range x 0 1", "sim.elements.report(where='x 0 1')"),
     ("pcdc element create brick p0 (0,0) p1 (2,0) p2 (1,1) n 4 2 ratio 1 2 triangle off group 'a' set 'd'",
      "sim.mesh.brick((0, 0), (2, 0), (1, 1), n=(4, 2), ratio=(1, 2), triangle=False, group='a', set='d')"),
     ("pcdc element create geometry layer 'a' 'b' m-s 1 is-b circle c (0,0) r 1 m-s 0.5 arc c (0,0) s-p (1,0) e-p (0,1) "
@@ -1065,3 +1065,13 @@ def test_a_script_keeps_its_own_blocks(resident: Resident, tmp_path: Path) -> No
     (tmp_path / "a.sc").write_text("import hpcdem\nsim = hpcdem.Simulation('b')\npcdc model new\nsim.mesh.quality()\n")
     done = resident(1, "a.sc", "--no-figure", cwd=tmp_path)
     assert done.returncode == 2 and "a.sc:4: mesh.quality: in a PCDC script create the blocks" in done.stderr
+
+
+def test_the_earlier_name_of_report_still_works_with_a_warning() -> None:
+    from hpcdem.api.blocks import Elements, Nodes
+
+    elements = Elements(lambda *_: None)
+    with pytest.deprecated_call(match="report"):
+        assert elements.tell.__func__ is Elements.report
+    with pytest.raises(AttributeError, match="'Nodes' object has no attribute 'tell'"):
+        Nodes(lambda *_: None).tell  # noqa: B018

@@ -249,7 +249,7 @@ def test_what_laws_cannot_do_in_space_is_refused(tmp_path: Path) -> None:
     for text, wrong in (
         ("@element_law(dim=4)\ndef odd(e11):", "dim of a law is 2 or 3, got 4"),
         ("@element_law(dim=3)\ndef odd(e11, e22, e12):", "does not accept e33, e13, e23"),
-        ("@element_law()\ndef odd(e11, e22, e12, e33):", "'e33' is no argument"),
+        ("@element_law()\ndef odd(e11, e22, e12, e33):", "'e33' is not an argument of a law"),
     ):
         (tmp_path / "odd.py").write_text(f"from hpcdem import element_law\n{text}\n    return e11\n")
         with pytest.raises(CommandError, match=wrong):

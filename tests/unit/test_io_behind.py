@@ -106,10 +106,10 @@ def test_a_mistake_of_ours_is_not_swallowed() -> None:
         later.settle(COMM)
 
 
-def test_no_more_waits_than_there_is_room_for() -> None:
-    later = Deliveries(room=100)
+def test_no_more_waits_than_the_limit() -> None:
+    later = Deliveries(limit=100)
     gate, done = Gate(later), []
-    later.put(lambda: done.append(1), 1000)  # larger than the room: goes when nothing else waits
+    later.put(lambda: done.append(1), 1000)  # larger than the limit: goes when nothing else waits
     blocked = threading.Thread(target=lambda: later.put(lambda: done.append(2), 1))
     blocked.start()
     blocked.join(0.2)

@@ -52,7 +52,7 @@ def no_fonts(monkeypatch: pytest.MonkeyPatch):
     own = [one for one in font_manager.fontManager.ttflist if "mpl-data" in one.fname]
     monkeypatch.setattr(font_manager.fontManager, "ttflist", own)
     monkeypatch.setattr(font_manager, "findSystemFonts", lambda: [])
-    monkeypatch.setattr(lettering, "_told", set())
+    monkeypatch.setattr(lettering, "_warned", set())
     lettering.font_of.cache_clear()
     yield
     lettering.font_of.cache_clear()

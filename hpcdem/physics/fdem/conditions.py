@@ -422,11 +422,8 @@ class Conditions(InitialStress):
         out = np.zeros((len(self.acting()), moving.CONDITION if plane else space.CONDITION))
         does = (moving.DOES_X, moving.DOES_Y) if plane else range(space.DOES, space.DOES + 3)
         at = (moving.AT_X, moving.AT_Y) if plane else range(space.AT, space.AT + 3)
-        force, constraint, way = (
-            (moving.FORCE_X, moving.CONSTRAINT, moving.DIRECTION_X)
-            if plane
-            else (space.FORCE, space.CONSTRAINT, space.WAY)
-        )
+        force, constraint = (moving.FORCE_X, moving.CONSTRAINT) if plane else (space.FORCE, space.CONSTRAINT)
+        way = moving.DIRECTION_X if plane else space.WAY
         for row, one in enumerate(self.acting()):
             for k, axis in enumerate("xyz"[: self.dim]):
                 kind, value = getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")
