@@ -15,6 +15,7 @@ class ParticleCommands:
 
     box = Function("walls.box")
     wall = Function("walls.wall", "id nodes")
+    periodic = Function("walls.periodic", "x")
     ball = Function("particles.ball", "x y rad id? color group")
     gen = Function("particles.gen")
     gen_grid = Function("particles.gen_grid")
@@ -39,6 +40,7 @@ class ParticleCommands:
     extents = Function("queries.extents", reads_only=True)
     wall_force = Function("queries.wall_force", reads_only=True)
     wall_forces = Function("queries.wall_forces", reads_only=True)
+    stress = Function("queries.stress", reads_only=True)
     kinetic_energy = Function("queries.kinetic_energy", reads_only=True)
     unbalanced = Function("queries.unbalanced", reads_only=True)
     surface_balance = Function("surface.balance", reads_only=True)

@@ -53,6 +53,16 @@ class ParticleCommands:
         xv, yv : velocity, until it is changed [m/s].
         delete : remove the wall with its contacts; accepts only id.
         """
+    def periodic(self, x: tuple[float, float]) -> None:
+        """PERIODIC: the sides x = left and x = right become one: particles that leave through one enter through the
+        other,
+        and touch across them. Horizontal walls that span both continue without an end; BOX loses its left and right
+        wall.
+
+        Parameters
+        ----------
+        x : the sides, (left, right) [m]; those of BOX, if there is one.
+        """
     def ball(
         self,
         x: float,
@@ -80,7 +90,7 @@ class ParticleCommands:
         color: str | int = 0,
         group: str = '***',
     ) -> int:
-        """GEN num: random insertion without overlap.
+        """GEN num: random insertion without overlap; also across periodic sides, if x are these.
 
         Scripts ask for far more than fit: it gives up after FAILURES attempts in a row that found no room, or after
         SET
@@ -476,9 +486,9 @@ class ParticleCommands:
         [J]; HIST follows heat and heat_given [J], which are columns of energy.csv.
         """
     def hist(self, id: int, interval: int, what: str) -> None:
-        """HIST: record kinetic, step, time, unbalanced, contacts, bonds, energy or deflection, or "gstress group a",
-        "gstrain group a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and
-        hist_<id>.csv; strains begin at 0 here.
+        """HIST: record kinetic, step, time, unbalanced, contacts, bonds, energy, deflection, sxx, syy or sxy, or
+        "gstress group a", "gstrain group a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in
+        hist_id_<id>.dat and hist_<id>.csv; strains begin at 0 here.
         """
     def plot(self, y: int, x: int) -> None:
         """PLOT: at `finish`, write history y against history x."""
@@ -488,6 +498,15 @@ class ParticleCommands:
         """Force on a wall (x, y) [N], exactly summed."""
     def wall_forces(self) -> dict[int, tuple[float, float]]:
         """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
+    def stress(self, y: tuple[float, float] | None = None) -> dict[str, float]:
+        """Mean stress between periodic sides: {sxx, syy, sxy} [Pa], positive in compression; sxy is the force in x
+        across
+        horizontal lines.
+
+        Parameters
+        ----------
+        y : heights, (lower, upper) [m]; left out, those of BOX.
+        """
     def kinetic_energy(self) -> float:
         """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
     def unbalanced(self) -> float:

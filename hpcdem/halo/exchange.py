@@ -21,9 +21,12 @@ ROWS = 11
 """Tag of messages."""
 BACK = 1
 """Added to the tag for a second table of rows."""
+ONWARDS = 2
+"""Added to the tag of what goes to a later neighbour: of two periodic ranks each is both neighbours of the other."""
 
 Sends = dict[int, slice | np.ndarray]
-"""Owned rows by the rank that gets them: a range, or ascending indices."""
+"""Owned rows by the rank that gets them: a range, or ascending indices. Periodic models have one more neighbour at
+either end of the line: -1 is the last rank, the number of ranks is the first one."""
 
 
 class Halo:
@@ -31,45 +34,75 @@ class Halo:
 
     n_left, n_right: number of ghosts before and after the owned rows. border: rows that are sent, as ranges of owned
     rows; inside: the other rows. If the border moves before `start`, the messages travel while the inside moves.
+    images: owned rows (ranges) that are sent past an end of a periodic model.
     """
 
-    def __init__(self, comm: Comm, n_own: int, sends: Sends) -> None:
+    def __init__(self, comm: Comm, n_own: int, sends: Sends, period: float = 0.0) -> None:
         """sends: rows for each rank with which this one exchanges ghosts, by ascending rank. Both ranks list each
-        other; either may send nothing. Collective among them."""
-        self.comm, self.n_own = comm, n_own
+        other; either may send nothing. period [m]: length of a periodic model; ghosts from past its ends are images,
+        moved by it in the first column of rows that hold positions. Collective among them."""
+        self.comm, self.n_own, self.period = comm, n_own, period
         self.requests: list = []
         self.more: list = []
         self._packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._more_packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self._copied: list[tuple[np.ndarray, slice, slice | np.ndarray]] = []
+        self._places: list[np.ndarray] = []
         self.border, self.inside = _border(n_own, sends)
         counts = np.array([_length(rows) for rows in sends.values()], np.int64)
-        arriving = np.zeros_like(counts)
-        if comm.mpi is not None:
-            self._swap((rank, arriving[k : k + 1], counts[k : k + 1]) for k, rank in enumerate(sends))
+        if comm.size == 1:  # its own neighbour on both sides
+            arriving, sends = counts[::-1], dict(zip(sends, reversed(sends.values())))
+        else:
+            arriving = np.zeros_like(counts)
+            self._swap((number, arriving[k : k + 1], counts[k : k + 1]) for k, number in enumerate(sends))
         before = np.array(list(sends), np.int64) < comm.rank
         self.n_left, self.n_right = int(arriving[before].sum()), int(arriving[~before].sum())
         ends = np.cumsum(arriving) + np.where(before, 0, n_own)
         self._pieces = [
-            (rank, slice(int(end - count), int(end)), _shifted(rows, self.n_left))
-            for (rank, rows), end, count in zip(sends.items(), ends, arriving)
+            (number, slice(int(end - count), int(end)), _shifted(rows, self.n_left))
+            for (number, rows), end, count in zip(sends.items(), ends, arriving)
             if count or _length(rows)
         ]
+        past = [(to, sent, number // comm.size) for number, to, sent in self._pieces if number // comm.size]
+        self._images = [(to, by) for to, _, by in past]
+        self.images = [_shifted(sent, -self.n_left) for _, sent, _ in past]
 
-    def fill(self, rows: np.ndarray) -> None:
-        """Set the ghost rows of any array in storage order (n, ...) from their owners. Collective."""
-        if self._pieces:
-            self._swap((rank, _bytes(rows[to]), _bytes(rows[sent])) for rank, to, sent in self._pieces)
+    def fill(self, rows: np.ndarray, places: bool = False) -> None:
+        """Set the ghost rows of any array in storage order (n, ...) from their owners; places: it begins with x [m].
+        Collective."""
+        if self.comm.size == 1:
+            for _, to, sent in self._pieces:
+                rows[to] = rows[sent]
+        elif self._pieces:
+            self._swap((number, _bytes(rows[to]), _bytes(rows[sent])) for number, to, sent in self._pieces)
+        if places:
+            self.move_images(rows)
+
+    def move_images(self, rows: np.ndarray) -> None:
+        """Move the images among rows (n, ...) in storage order, which begin with x [m], by the period."""
+        for to, by in self._images:
+            rows[to, 0] += by * self.period
 
     def _swap(self, parts: Iterable[tuple[int, np.ndarray, np.ndarray]]) -> None:
-        """Exchange messages with ranks; parts: (rank, received, sent)."""
+        """Exchange messages with neighbours; parts: (number of the neighbour, received, sent)."""
         mpi, requests = self.comm.mpi, []
-        for rank, comes, goes in parts:
-            requests += [mpi.Irecv(comes, rank, ROWS), mpi.Isend(goes, rank, ROWS)]
+        for number, comes, goes in parts:
+            rank, of_theirs, of_ours = self._line(number, ROWS)
+            requests += [mpi.Irecv(comes, rank, of_theirs), mpi.Isend(goes, rank, of_ours)]
         self.comm.wait_all(requests)
 
-    def add_ghost_field(self, rows: np.ndarray) -> None:
-        """Include this array in `refresh`; its memory must not move."""
+    def _line(self, number: int, tag: int) -> tuple[int, int, int]:
+        """Rank of a neighbour, tags of what comes from it and of what goes to it."""
+        tags = (tag, tag + ONWARDS) if number > self.comm.rank else (tag + ONWARDS, tag)
+        return number % self.comm.size, *tags
+
+    def add_ghost_field(self, rows: np.ndarray, places: bool = False) -> None:
+        """Include this array in `refresh`; its memory must not move. places: it begins with x [m]."""
         self._persistent(rows, ROWS, self.requests, self._packed)
+        if self.comm.size == 1:
+            self._copied += [(rows, to, sent) for _, to, sent in self._pieces]
+        if places and self._images:
+            self._places.append(rows)
 
     def add_late_ghost_field(self, rows: np.ndarray) -> None:
         """Include this array in `refresh_more`."""
@@ -85,24 +118,29 @@ class Halo:
 
     def _persistent(self, rows: np.ndarray, tag: int, requests: list, packed: list) -> None:
         mpi = self.comm.mpi
-        for rank, to, sent in self._pieces:
+        for number, to, sent in self._pieces if self.comm.size > 1 else ():
             parcel = rows[sent]
             if not isinstance(sent, slice):
                 packed.append((rows, sent, parcel))
-            for piece, start in ((rows[to], mpi.Recv_init), (parcel, mpi.Send_init)):
+            rank, of_theirs, of_ours = self._line(number, tag)
+            for piece, start, label in ((rows[to], mpi.Recv_init, of_theirs), (parcel, mpi.Send_init, of_ours)):
                 if len(piece):
-                    requests.append(start(_bytes(piece), rank, tag))
+                    requests.append(start(_bytes(piece), rank, label))
 
     def start(self) -> None:
         """Begin to renew the ghosts. Until `finish`, rows of `border` must not change and ghosts must not be read."""
         if self.requests:
             _pack(self._packed)
             self.comm.start_all(self.requests)
+        for rows, to, sent in self._copied:
+            rows[to] = rows[sent]
 
     def finish(self) -> None:
         """Wait until ghosts have the state that the owners had at `start`."""
         if self.requests:
             self.comm.wait_all(self.requests)
+        for rows in self._places:
+            self.move_images(rows)
 
     def refresh(self) -> None:
         """Renew the ghosts: `start` and `finish` in one."""
@@ -121,7 +159,7 @@ class Halo:
         for request in self.requests + self.more:
             request.Free()
         self.requests, self.more = [], []
-        self._packed, self._more_packed = [], []
+        self._packed, self._more_packed, self._copied, self._places = [], [], [], []
 
 
 def _bytes(rows: np.ndarray) -> np.ndarray:
@@ -156,12 +194,14 @@ def _border(n: int, sends: Sends) -> tuple[list[tuple[int, int]], tuple[int, int
     return [piece for piece in ((0, first), (last, n)) if piece[0] < piece[1]], (first, last)
 
 
-def connect(comm: Comm, hot: np.ndarray, order: np.ndarray, sends: Sends, threads: int) -> tuple[np.ndarray, Halo]:
+def connect(
+    comm: Comm, hot: np.ndarray, order: np.ndarray, sends: Sends, threads: int, period: float = 0.0
+) -> tuple[np.ndarray, Halo]:
     """Make the storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it current; sends: of
-    these rows, see `Halo`."""
-    halo = Halo(comm, len(order), sends)
+    these rows, period: see `Halo`. The rows begin with x [m]."""
+    halo = Halo(comm, len(order), sends, period)
     storage = aligned((halo.n_left + len(order) + halo.n_right, hot.shape[1]))
     take_rows(hot, order, storage[halo.n_left : halo.n_left + len(order)], threads)
-    halo.fill(storage)
-    halo.add_ghost_field(storage)
+    halo.fill(storage, places=True)
+    halo.add_ghost_field(storage, places=True)
     return storage, halo

@@ -32,6 +32,10 @@ class Ownership:
         self.side = 1.0
         self.wanted = True
         """Particles came or went: cut again at the next chance, whatever was measured."""
+        self.around = 0
+        """Number of columns of a periodic model, 0 to around - 1; 0 for others."""
+        self.period = 0.0
+        """Its length [m]."""
         self._busy, self._step = 0.0, 0
 
     def cells(self, points: np.ndarray, side: float) -> np.ndarray:
@@ -60,15 +64,18 @@ class Ownership:
         """Return the owned rows that other ranks need, see `exchange.Halo`. Collective.
 
         cell (n,) i8: of the owned rows, ascending; depth: how many columns of each neighbour are copied. Every rank
-        except the first and the last has at least as many columns.
+        except the first and the last has at least as many columns; of a periodic model all have.
         """
         rank, out, n = self.comm.rank, dict[int, slice | np.ndarray](), len(cell)
+        begins, ends = 0, self.around
         if rank > 0:
-            end = (int(self.borders[rank]) + depth) * COLUMN - COLUMN // 2
-            out[rank - 1] = slice(0, int(np.searchsorted(cell, end)))
+            begins = int(self.borders[rank])
         if rank + 1 < self.comm.size:
-            first = (int(self.borders[rank + 1]) - depth) * COLUMN - COLUMN // 2
-            out[rank + 1] = slice(int(np.searchsorted(cell, first)), n)
+            ends = int(self.borders[rank + 1])
+        if rank > 0 or self.around:
+            out[rank - 1] = slice(0, int(np.searchsorted(cell, (begins + depth) * COLUMN - COLUMN // 2)))
+        if rank + 1 < self.comm.size or self.around:
+            out[rank + 1] = slice(int(np.searchsorted(cell, (ends - depth) * COLUMN - COLUMN // 2)), n)
         return out
 
     def renew(
@@ -107,6 +114,9 @@ class Ownership:
 
     def _follow_side(self, side: float, least: int) -> None:
         """Keep the boundaries at their positions in space when the side of cells changes."""
+        if self.around:  # every rank needs one of the columns
+            self.wanted |= self.side != side
+            return
         if self.side != side:
             self.borders = strips.separate(np.rint(self.borders * (self.side / side)).astype(np.int64))
         if least > 1:
@@ -119,7 +129,7 @@ class Ownership:
         first, columns = self._span(place)
         if columns == 0:
             first, columns = 0, 1
-        elif starts:
+        elif starts or self.around:
             self._refuse_too_many_ranks(columns, room)
         total = np.zeros(min(columns, MOST_COLUMNS))
         np.add.at(total, np.minimum(place - first, len(total) - 1), weight)
@@ -143,7 +153,9 @@ class Ownership:
 
     def _span(self, cx: np.ndarray) -> tuple[int, int]:
         """Return the first occupied column and the number of columns up to the last, over all ranks; (0, 0) without
-        particles."""
+        particles. Of a periodic model these are all of its columns."""
+        if self.around:
+            return 0, self.around
         ends = np.array([-cx.min(), cx.max()] if len(cx) else [-strips.FARTHEST, -strips.FARTHEST])
         self.comm.max_into(ends)
         first, columns = -int(ends[0]), int(ends[1] + ends[0]) + 1
@@ -151,7 +163,7 @@ class Ownership:
 
     def _refuse_too_many_ranks(self, columns: int, room: tuple[float, float] | None) -> None:
         """Raise UsageError if a rank would never have a column: the job was started with too many ranks."""
-        if room is not None:
+        if room is not None and not self.around:
             ends, _ = strips.cells(np.array(room), np.zeros(2), self.side)
             columns = max(columns, int(ends[1] - ends[0]) + 1)
         if columns < self.comm.size:

@@ -44,6 +44,7 @@ BALL_DATA_HEAD = "     index         id            m"
 LINK_HEAD = "       id1        id2"
 
 _SETTINGS = ("left", "right", "bottom", "height", "gx", "gy", "disk", "frac", "lsm")
+_SELDOM = {"lsm": "damp LSM", "period": "period"}
 _TABLES = ("particles", "contacts", "bonds", "wall_contacts")
 
 # --- writing ---------------------------------------------------------------------------------------------------
@@ -225,6 +226,8 @@ def _parameters(frame: Frame, file: str) -> bytes:
     lines = [*head, *(f"{key:>18} : {value}" for key, value in values.items())]
     # Not in ZDEM's; a public reader takes the number of particles from the second.
     lines += [f"current_time: {words(float(frame.time)).strip()}", f"ball_num: {frame.tables['particles'].total}"]
+    if "period" in frame.settings:
+        lines.append(f"period: {words(frame.settings['period']).strip()}")
     return ("\n".join(lines) + "\n\n").encode()
 
 
@@ -360,8 +363,7 @@ def _frame(
         settings[name] = parameters[name].split("=")[0] if name == "disk" and name in parameters else number(name)
     if gravity:
         settings["gx"], settings["gy"] = ([0.0, *map(float, gravity)])[-2:]
-    if "damp LSM" in parameters:
-        settings["lsm"] = number("damp LSM")
+    settings |= {name: number(word) for name, word in _SELDOM.items() if word in parameters}
     if not isinstance(settings["disk"], str):
         settings["disk"] = "off"
     step, dt, time = int(number("current_step")), number("dt"), number("current_time")

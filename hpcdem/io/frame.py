@@ -78,9 +78,8 @@ class Frame:
     """Everything that is written at one output time.
 
     tables: "particles", "contacts", "bonds", "wall_contacts"; walls: columns of the wall table (BOX walls first,
-    ids fields.BOX_IDS, in this order); settings: left, right, bottom, height, gx, gy, disk, frac, lsm, and units where
-    the model declared others than SI. SI units
-    throughout.
+    ids fields.BOX_IDS, in this order); settings: left, right, bottom, height, gx, gy, disk, frac, lsm, units where the
+    model declared others than SI, and period [m], the length of a periodic model. SI units throughout.
     """
 
     step: int
@@ -90,6 +89,11 @@ class Frame:
     walls: dict[str, np.ndarray]
     tables: dict[str, Table]
     group_names: list[str] = field(default_factory=list)
+
+    def shortest(self, x: np.ndarray) -> np.ndarray:
+        """Return differences of x [m] between neighbours: across periodic sides the distance is the short one."""
+        period = float(self.settings.get("period", 0.0))
+        return x - period * np.rint(x / period) if period else x
 
 
 def whole(frame: Frame, comm: Comm) -> Frame | None:

@@ -127,15 +127,23 @@ def _names(folder: str | os.PathLike) -> tuple[list[str], list[str]]:
     return [name for name in names if name not in gone], earlier
 
 
-def read_frame(path: str | os.PathLike, tables: Collection[str] | None = None) -> Frame:
-    """The frame in a file, by its suffix; see `read_vtkhdf` and `read_dat`. Serial. Raises HpcdemError."""
+def read_frame(path: str | os.PathLike, tables: Collection[str] | None = None, periodic: bool = True) -> Frame:
+    """The frame in a file, by its suffix; see `read_vtkhdf` and `read_dat`. Serial. Raises HpcdemError; also for a
+    frame of a model with periodic sides if these are not supported."""
     suffix = Path(path).suffix
     if suffix == ".vtkhdf":
         from hpcdem.io.vtkhdf import read_vtkhdf
 
-        return read_vtkhdf(path, tables)
-    if suffix == ".dat":
+        frame = read_vtkhdf(path, tables)
+    elif suffix == ".dat":
         from hpcdem.io.dat import read_dat
 
-        return read_dat(path, tables)
-    raise HpcdemError(f"cannot read {os.fspath(path)}: frames end in .vtkhdf or .dat")
+        frame = read_dat(path, tables)
+    else:
+        raise HpcdemError(f"cannot read {os.fspath(path)}: frames end in .vtkhdf or .dat")
+    if "period" in frame.settings and not periodic:
+        raise HpcdemError(
+            f"{os.fspath(path)}: the sides of this model are periodic (PERIODIC). Measures and sections of frames do "
+            "not support them; use the command stress, HIST, or the columns x and laps of the frames"
+        )
+    return frame

@@ -128,7 +128,7 @@ class _Output(NamedTuple):
 def _spacing(first: FrameFile, options: Options, log: Any) -> float:
     """SIZE, or the largest whole part of it that is no longer than the mean diameter of the bed in the first frame, so
     that each particle has a node of its own. Reports the particles that are ignored."""
-    p = read_frame(first.path, ["particles"]).tables["particles"].columns
+    p = read_frame(first.path, ["particles"], periodic=False).tables["particles"].columns
     known = np.isfinite(p["x"] + p["y"] + p["radius"])
     x, y, radius = (p[name][known] for name in ("x", "y", "radius"))
     if not len(radius) or not np.mean(radius) > 0.0:
@@ -209,7 +209,7 @@ class Snapshot:
 
 def look(path: Path, options: Options) -> Snapshot:
     """Read a frame. Raises HpcdemError."""
-    frame = read_frame(path)
+    frame = read_frame(path, periodic=False)
     p = frame.tables["particles"].columns
     if not len(frame.tables["particles"]):
         raise HpcdemError(f"{path} has no particles: remove it from the folder")

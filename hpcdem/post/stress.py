@@ -32,7 +32,7 @@ def moments(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     result, held = np.zeros((n, 4)), np.zeros(n, dtype=bool)
 
     def add(at: np.ndarray, place: tuple[np.ndarray, np.ndarray], force: tuple[np.ndarray, np.ndarray]) -> None:
-        arm = place[0] - x[at], place[1] - y[at]
+        arm = frame.shortest(place[0] - x[at]), place[1] - y[at]
         for k, (i, j) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
             result[:, k] -= np.bincount(at, arm[i] * force[j], n)
         held[at] = True
@@ -49,7 +49,7 @@ def moments(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
             a, b, t = a[alone], b[alone], {key: t[key][alone] for key in ("x", "y", "fx", "fy") if key in t}
         seen = pair
         fx, fy = _force(t, name)
-        place = _pair_place(t, p, a, b)
+        place = _pair_place(frame, t, p, a, b)
         add(a, place, (fx, fy))
         add(b, place, (-fx, -fy))
     t = frame.tables["wall_contacts"].columns
@@ -107,11 +107,11 @@ def _among(keys: np.ndarray, others: np.ndarray) -> np.ndarray:
     return others[np.minimum(np.searchsorted(others, keys), len(others) - 1)] == keys
 
 
-def _pair_place(table: dict, p: dict, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pair_place(frame: Frame, table: dict, p: dict, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Contact points x, y; where the file has none (ZDEM), R - U/2 from the centre of the first particle."""
     if "x" in table and "y" in table:
         return table["x"], table["y"]
-    dx, dy = p["x"][b] - p["x"][a], p["y"][b] - p["y"][a]
+    dx, dy = frame.shortest(p["x"][b] - p["x"][a]), p["y"][b] - p["y"][a]
     distance = np.hypot(dx, dy)
     arm = p["radius"][a] - 0.5 * (p["radius"][a] + p["radius"][b] - distance)
     with np.errstate(invalid="ignore", divide="ignore"):

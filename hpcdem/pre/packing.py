@@ -12,8 +12,11 @@ from hpcdem.numerics.rng import uniform
 
 
 @njit(cache=True)
-def _insert(attempts, in_a_row, wanted, radii, x0, x1, y0, y1, seed, stream, cell, head, nxt, px, py, pr, n_old, out):
-    """Place discs one by one; returns (placed, attempts used). head (nx, ny) i8, nxt (m,) i8: linked cells."""
+def _insert(
+    attempts, in_a_row, wanted, radii, x0, x1, y0, y1, around, seed, stream, cell, head, nxt, px, py, pr, n_old, out
+):  # fmt: skip
+    """Place discs one by one; returns (placed, attempts used). head (nx, ny) i8, nxt (m,) i8: linked cells, which hold
+    images too if the sides of the rectangle are periodic (around)."""
     nx, ny = head.shape
     n = n_old
     placed = 0
@@ -26,7 +29,7 @@ def _insert(attempts, in_a_row, wanted, radii, x0, x1, y0, y1, seed, stream, cel
         tried += 1
         if x1 - x0 < 2.0 * r or y1 - y0 < 2.0 * r:
             continue
-        x = x0 + r + u * (x1 - x0 - 2.0 * r)
+        x = x0 + u * (x1 - x0) if around else x0 + r + u * (x1 - x0 - 2.0 * r)
         y = y0 + r + v * (y1 - y0 - 2.0 * r)
         cx = min(max(int((x - x0) / cell) + 1, 0), nx - 1)
         cy = min(max(int((y - y0) / cell) + 1, 0), ny - 1)
@@ -52,6 +55,14 @@ def _insert(attempts, in_a_row, wanted, radii, x0, x1, y0, y1, seed, stream, cel
             n += 1
             placed += 1
             last = tried
+            for side in range(2 if around else 0):
+                image = x + (x1 - x0) if side == 0 else x - (x1 - x0)
+                if x0 - cell < image < x1 + cell:
+                    px[n], py[n], pr[n] = image, y, r
+                    cx = min(max(int(np.floor((image - x0) / cell)) + 1, 0), nx - 1)
+                    nxt[n] = head[cx, cy]
+                    head[cx, cy] = n
+                    n += 1
     return placed, tried
 
 
@@ -65,12 +76,14 @@ def insert_randomly(
     stream: int,
     attempts: int | None = None,
     in_a_row: int | None = None,
+    around: bool = False,
 ) -> tuple[np.ndarray, int]:
     """Discs placed at random in a rectangle, whole, without overlap with each other or with `existing` (m, 3) [x, y,
     r].
 
     Each attempt draws a radius from the list (repeats weight it) and a place. Ends with `number` discs, after so many
-    attempts, or after so many failures in a row (None: no such end). Returns ((n, 3) f8 rows x, y, r [m] with
+    attempts, or after so many failures in a row (None: no such end). around: the left and right side are periodic.
+    Returns ((n, 3) f8 rows x, y, r [m] with
     n <= number, attempts used).
     """
     (x0, x1), (y0, y1) = x, y
@@ -88,7 +101,7 @@ def insert_randomly(
     capacity = int(min(number, attempts, area / (np.pi * float(radii.min()) ** 2) + 1.0))
     cell = reach
     shape = (int((x1 - x0) / cell) + 3, int((y1 - y0) / cell) + 3)
-    total = len(old) + capacity
+    total = len(old) + (3 if around else 1) * capacity
     px, py, pr = np.empty(total), np.empty(total), np.empty(total)
     px[: len(old)], py[: len(old)], pr[: len(old)] = old.T
     head, nxt = np.full(shape, -1, np.int64), np.full(total, -1, np.int64)
@@ -101,8 +114,9 @@ def insert_randomly(
         head[ox[k], oy[k]] = k
     out = np.empty(capacity, np.int64)
     placed, tried = _insert(
-        attempts, in_a_row, capacity, radii, x0, x1, y0, y1, seed, stream, cell, head, nxt, px, py, pr, len(old), out
-    )
+        attempts, in_a_row, capacity, radii, x0, x1, y0, y1, around, seed, stream, cell, head, nxt, px, py, pr,
+        len(old), out,
+    )  # fmt: skip
     new = out[:placed]
     return np.column_stack([px[new], py[new], pr[new]]), int(tried)
 

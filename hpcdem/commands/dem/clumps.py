@@ -201,6 +201,8 @@ def _joined(
 
 
 def _need_discs(sim: Simulation) -> None:
+    if sim.settings.period:
+        raise CommandError("clumps do not support periodic sides (PERIODIC)")
     if sim.settings.disk != "on":
         raise CommandError(
             f"the mass of a clump is density times area, so clumps need SET disk on; it is {sim.settings.disk}"

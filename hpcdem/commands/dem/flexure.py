@@ -239,6 +239,8 @@ def _off(sim: Simulation, wall: int | None, where: Selection | None) -> None:
 
 def _check(sim: Simulation, base: Base) -> None:
     """CommandError for a model that the coupling does not support."""
+    if sim.settings.period:
+        raise CommandError("FLEXURE does not support periodic sides (PERIODIC)")
     if sim.coupled:
         raise CommandError("FLEXURE does not support models with blocks: their weight would not reach the plate")
     if base.wall >= 0:

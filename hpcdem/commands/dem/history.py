@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from hpcdem.commands.dem.output import followed
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.dem import mean_stress
 from hpcdem.physics.dem.platens import OF_PARTS
 from hpcdem.physics.dem.simulation import Simulation
 
@@ -14,9 +15,9 @@ DRAW_INTERVAL = 1000
 
 
 def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
-    """HIST: record kinetic, step, time, unbalanced, contacts, bonds, energy or deflection, or "gstress group a",
-    "gstrain group a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and
-    hist_<id>.csv; strains begin at 0 here."""
+    """HIST: record kinetic, step, time, unbalanced, contacts, bonds, energy, deflection, sxx, syy or sxy, or
+    "gstress group a", "gstrain group a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in
+    hist_id_<id>.dat and hist_<id>.csv; strains begin at 0 here."""
     if interval <= 0:
         raise CommandError(f"HIST INTERVAL must be positive, got {interval}")
     if what == "energy" and (law := sim.own_laws.unaccounted()):
@@ -25,6 +26,8 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
         )
     if what == "deflection" and not sim.bases:
         raise CommandError("HIST deflection: no base bends; FLEXURE must precede it")
+    if what in mean_stress.COMPONENTS:
+        mean_stress.heights(sim)
     sim.history_origins.pop(id, None)
     name = what.split()[0] if what.split() else ""
     if name in OF_PARTS:

@@ -33,7 +33,7 @@ from hpcdem.io.frames import frame_name, read_frame
 from hpcdem.io.ps import write_ps
 from hpcdem.io.vtk import write_vtk
 from hpcdem.io.vtkhdf import write_vtkhdf
-from hpcdem.physics.dem import budget, diagnostics, saved_state
+from hpcdem.physics.dem import budget, diagnostics, mean_stress, saved_state
 from hpcdem.physics.dem.platens import OF_PARTS
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.dem.walls import total
@@ -194,7 +194,7 @@ def deflection(sim: Simulation) -> float:
     return max((float(base.now(sim.clock.step)[base.nodes, 0].max()) for base in sim.bases), default=math.nan)
 
 
-HISTORIES = {
+HISTORIES: dict[str, tuple[str, Callable[[Simulation], float]]] = {
     "kinetic": ("J", diagnostics.kinetic_energy),
     "step": ("1", lambda sim: float(sim.clock.step)),
     "time": ("s", lambda sim: sim.clock.time),
@@ -203,6 +203,7 @@ HISTORIES = {
     "bonds": ("1", lambda sim: float(sim.bonds_left())),
     "energy": ("J", budget.stored_energy),
     "deflection": ("m", deflection),
+    **{name: ("Pa", partial(mean_stress.mean, name=name)) for name in mean_stress.COMPONENTS},
 }
 """Quantities that HIST can record: unit and function of the simulation."""
 

@@ -19,6 +19,7 @@ from hpcdem.io.dat import is_frame
 from hpcdem.io.files import write_sections
 from hpcdem.io.parts import read_lines, share
 from hpcdem.numerics.rng import uniforms
+from hpcdem.physics.dem import periodic
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.pre import packing
 from hpcdem.pre.rows import row
@@ -161,7 +162,7 @@ def gen(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """GEN num: random insertion without overlap.
+    """GEN num: random insertion without overlap; also across periodic sides, if x are these.
 
     Scripts ask for far more than fit: it gives up after FAILURES attempts in a row that found no room, or after SET
     gentry attempts per particle requested, if that is set.
@@ -182,7 +183,10 @@ def gen(
     existing = _near(sim, rad, x, y)
     factor = sim.settings.gentry
     ends = {"attempts": max(int(factor * num), num)} if factor > 0.0 else {"in_a_row": FAILURES}
-    rows, tried = packing.insert_randomly(num, np.array(rad), x, y, existing, sim.settings.seed, sim.streams, **ends)
+    around = periodic.spans(sim, x)
+    rows, tried = packing.insert_randomly(
+        num, np.array(rad), x, y, existing, sim.settings.seed, sim.streams, **ends, around=around
+    )
     sim.streams += 1
     made = add(sim, rows, sim.group_number(group), color)
     if sim.log is not None:
@@ -349,9 +353,13 @@ def _near(sim: Simulation, radii: list[float], x: tuple[float, float], y: tuple[
     p = sim.particles
     largest = float(sim.comm.max_into(np.array([p["radius"].max(initial=0.0)]))[0])
     reach = max(largest, *radii) + max(radii)
-    near = (p["x"] > x[0] - reach) & (p["x"] < x[1] + reach) & (p["y"] > y[0] - reach) & (p["y"] < y[1] + reach)
-    mine = np.column_stack([p["x"][near], p["y"][near], p["radius"][near]])
-    return np.concatenate(sim.comm.allgather(mine))
+    period = sim.settings.period
+    places = periodic.places(sim)
+    mine = []
+    for at in (places - period, places, places + period) if period else (places,):
+        near = (at > x[0] - reach) & (at < x[1] + reach) & (p["y"] > y[0] - reach) & (p["y"] < y[1] + reach)
+        mine.append(np.column_stack([at[near], p["y"][near], p["radius"][near]]))
+    return np.concatenate(sim.comm.allgather(np.concatenate(mine)))
 
 
 def add(
@@ -381,6 +389,8 @@ def add_part(
     """Add rows of which each rank has its own part: the `before`-th to the last of them, of `total`;
     group: of all or (n,) i8 of each of these rows."""
     sim.open_model()
+    if sim.settings.period:
+        periodic.refuse_outside(sim, rows[:, 0], sim.settings.side, sim.settings.side + sim.settings.period)
     first = sim.next_gid if first_gid is None else first_gid
     sim.next_gid = max(sim.next_gid, first + total)
     sim.note_maker(first)

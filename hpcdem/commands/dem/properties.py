@@ -12,7 +12,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import FIX_BITS
 from hpcdem.core.material import Material, checked
 from hpcdem.core.selection import Chain, Group, Selection, has_expressions
-from hpcdem.physics.dem import rolling, user_laws
+from hpcdem.physics.dem import periodic, rolling, user_laws
 from hpcdem.physics.dem.materials import OWN
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.dem.user_laws import LINEAR, PairLaw
@@ -30,7 +30,7 @@ def chosen(sim: Simulation, where: Selection | None) -> np.ndarray:
     for name in _group_names(where):
         if name not in known and sim.log is not None:
             sim.log.warn_once(f"group {name}", f"no particle has ever been in group {name}")
-    x, y = sim.clumps.centres(p)
+    x, y = sim.clumps.centres(p) if sim.clumps else (periodic.places(sim), p["y"])
     which = where.mask({"x": x, "y": y, "gid": p["gid"], "group": p["group"], "group_names": sim.groups})
     return sim.clumps.whole(p, which, sim.comm) if sim.clumps else which
 

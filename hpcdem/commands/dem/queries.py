@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hpcdem.commands.dem import output
-from hpcdem.physics.dem import diagnostics
+from hpcdem.physics.dem import diagnostics, mean_stress
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.dem.walls import total
 
@@ -41,6 +41,18 @@ def unbalanced(sim: Simulation) -> float:
     """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
     sim.close_model()
     return output.unbalanced(sim)
+
+
+def stress(sim: Simulation, y: tuple[float, float] | None = None) -> dict[str, float]:
+    """Mean stress between periodic sides: {sxx, syy, sxy} [Pa], positive in compression; sxy is the force in x across
+    horizontal lines.
+
+    Parameters
+    ----------
+    y : heights, (lower, upper) [m]; left out, those of BOX.
+    """
+    sim.close_model()
+    return {name: mean_stress.mean(sim, name, y) for name in mean_stress.COMPONENTS}
 
 
 def clumps(sim: Simulation) -> dict[str, np.ndarray]:

@@ -209,8 +209,9 @@ def check(sim: Simulation) -> None:
     if not sim.lands:
         return
     first = min(sim.lands)
-    if sim.clumps:
-        raise CommandError(f"SURFACE {first} does not support clumps")
+    if sim.clumps or sim.settings.period:
+        what = "clumps" if sim.clumps else "periodic sides (PERIODIC)"
+        raise CommandError(f"SURFACE {first} does not support {what}")
     if sim.coupled:
         raise CommandError(f"SURFACE {first} does not support particles that are coupled to blocks")
     if not sim.settings.gy < 0.0:

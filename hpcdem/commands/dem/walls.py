@@ -6,6 +6,7 @@ import numpy as np
 
 from hpcdem.core import limits
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.dem import periodic as periodic_sides
 from hpcdem.physics.dem.simulation import Simulation
 
 
@@ -43,6 +44,7 @@ def wall(
         return
     if nodes is not None:
         _place(sim, id, nodes)
+        _continue_around(sim)
     at = sim.walls.parts(id)
     for name, value in (("kn", kn), ("ks", ks), ("fric", fric)):
         if value is not None and value < 0.0:
@@ -75,6 +77,8 @@ def box(
     """
     if right <= left or height <= 0.0:
         raise CommandError(f"BOX is empty: left {left:g}, right {right:g}, height {height:g}")
+    if sim.settings.period:
+        raise CommandError("BOX has walls at its left and right side: it must precede PERIODIC, which removes them")
     top = bottom + height
     corners = {
         "left": ((left, top), (left, bottom)),
@@ -110,11 +114,62 @@ def _place(sim: Simulation, id: int, nodes: tuple[tuple[float, float], tuple[flo
     sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")
 
 
+def periodic(sim: Simulation, x: tuple[float, float]) -> None:
+    """PERIODIC: the sides x = left and x = right become one: particles that leave through one enter through the other,
+    and touch across them. Horizontal walls that span both continue without an end; BOX loses its left and right wall.
+
+    Parameters
+    ----------
+    x : the sides, (left, right) [m]; those of BOX, if there is one.
+    """
+    left, right = x
+    limits.check_nodes((left, 0.0), (right, 0.0), name="PERIODIC")
+    if not left < right:
+        raise CommandError(f"PERIODIC: left must be below right, got {left:g} and {right:g}")
+    if sim.settings.period:
+        raise CommandError("PERIODIC: the sides of this model are periodic already")
+    if sim.clumps:
+        raise CommandError(f"PERIODIC does not support clumps, and there are {sim.clumps.number}")
+    if sim.bases:
+        raise CommandError(f"PERIODIC does not support FLEXURE, and {sim.bases[0].name} bends; end it by off first")
+    if sim.coupled:
+        raise CommandError("PERIODIC does not support particles that are coupled to blocks")
+    box = sim.walls.box()
+    if box is not None and box[:2] != (left, right):
+        raise CommandError(
+            f"PERIODIC: x must be the sides of BOX, {box[0]:g} and {box[1]:g} m, got {left:g} and {right:g}"
+        )
+    sim.open_model()
+    periodic_sides.refuse_outside(sim, sim.particles["x"], left, right)
+    for side in ("left", "right") if box is not None else ():
+        row = sim.walls.of_side(side)
+        assert row is not None
+        _remove_whole(sim, int(sim.walls.id[row]))
+    sim.settings.side, sim.settings.period = periodic_sides.rounded_sides(left, right)
+    periodic_sides.begin(sim)
+    _continue_around(sim)
+    sim.check_soon()
+
+
+def _continue_around(sim: Simulation) -> None:
+    """Horizontal walls that span both periodic sides have no end."""
+    if not sim.settings.period:
+        return
+    w, left = sim.walls, sim.settings.side
+    low, high = np.minimum(w.p1[:, 0], w.p2[:, 0]), np.maximum(w.p1[:, 0], w.p2[:, 0])
+    w.around |= (w.p1[:, 1] == w.p2[:, 1]) & (low <= left) & (high >= left + sim.settings.period)
+
+
 def _delete(sim: Simulation, id: int) -> None:
     """Remove a wall. CommandError for a side of BOX and for a wall that a HIST follows."""
     row = sim.walls.row(id)
     if sim.walls.side[row]:
         raise CommandError(f"wall {id} is a side of BOX, which cannot be deleted")
+    _remove_whole(sim, id)
+
+
+def _remove_whole(sim: Simulation, id: int) -> None:
+    """Remove a wall with all of its segments. CommandError for one that a HIST follows."""
     for number, (_, what) in sim.history_requests.items():
         name, *of = what.split()
         if of[:1] == ["wall"] and str(id) in of[1].split("|"):

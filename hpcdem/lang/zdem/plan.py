@@ -7,7 +7,7 @@ time step, the walls and the histories of the file are not known here; they coun
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
@@ -16,6 +16,8 @@ from hpcdem.core.outputs import OUTPUTS
 from hpcdem.io.dat import is_frame
 from hpcdem.lang.zdem.lexer import LARGEST_WHOLE
 from hpcdem.lang.zdem.statement import Statement, find
+
+BENDING = "bases that bend (FLEXURE)"
 
 Velocity = tuple[float | None, float | None]
 
@@ -66,6 +68,8 @@ class _Known:
     has_step_rule: bool = False
     walls: dict[int, Velocity] = field(default_factory=dict)
     boxed: bool = False
+    periodic: bool = False
+    not_periodic: str = ""
     energy: bool = False
     pressure: bool = False
     histories: set[int] = field(default_factory=set)
@@ -87,25 +91,17 @@ def follow(
                 known.every = dict.fromkeys(OUTPUTS)
             case "LOAD" if _names_a_frame(statement):
                 known = _Known(False, None, None, True, every=dict.fromkeys(OUTPUTS, 0))
-            case "SET":
-                _set(statement, known)
-            case "BOX":
-                _box(statement, known)
-            case "WALL":
-                _wall(statement, known)
-            case "FLEXURE":
-                _flexure(statement, known)
             case "PROP" if statement.get("xp") or statement.get("yp"):
                 known.pressure = True
                 _no_energy_with_pressure(statement, known)
             case "HIST":
                 known.histories.add(statement.get("id"))
-            case "PLOT":
-                _plot(statement, known)
             case "CYC" | "IMPLE":
                 runs.append(_run(index, statement, known))
                 steps = runs[-1].steps
                 known.step = None if known.step is None or steps is None else known.step + steps
+            case name if name in _FOLLOWED:
+                _FOLLOWED[name](statement, known)
     return runs
 
 
@@ -115,6 +111,27 @@ def expected_steps(
     """Steps of the whole script, None if that depends on something the script does not say (frac, a restored state)."""
     steps = [run.steps for run in follow(statements, dt, walls)]
     return None if any(n is None for n in steps) else sum(n for n in steps if n is not None)
+
+
+def _periodic(statement: Statement, known: _Known) -> None:
+    if known.periodic:
+        raise statement.error("the sides of this model are periodic already")
+    if known.not_periodic:
+        raise statement.error(f"{known.not_periodic} do not support periodic sides (PERIODIC)")
+    known.periodic = True
+    for side in ("left", "right"):
+        known.walls.pop(BOX_IDS[side], None)
+
+
+def _clump(statement: Statement, known: _Known) -> None:
+    _not_periodic(statement, known, "clumps")
+
+
+def _not_periodic(statement: Statement, known: _Known, what: str) -> None:
+    """Note what excludes PERIODIC, or refuse it after PERIODIC."""
+    if known.periodic:
+        raise statement.error(f"{what} do not support periodic sides (PERIODIC)")
+    known.not_periodic = known.not_periodic or what
 
 
 def _names_a_frame(statement: Statement) -> bool:
@@ -149,6 +166,8 @@ def _box(statement: Statement, known: _Known) -> None:
     taken = [] if known.boxed else [i for i in BOX_IDS.values() if i in known.walls]
     if taken:
         raise statement.error(f"the sides of BOX are walls 100 to 103, and wall {taken[0]} exists already; renumber it")
+    if known.periodic:
+        raise statement.error("BOX has walls at its left and right side: it must precede PERIODIC, which removes them")
     known.boxed = True
     known.walls.update(dict.fromkeys(BOX_IDS.values(), (0.0, 0.0)))
 
@@ -178,12 +197,21 @@ def _flexure(statement: Statement, known: _Known) -> None:
         raise statement.error(f"there is no wall {wall} ({_walls(known)})")
     if wall is not None and "off" not in statement.arguments and any(known.walls.get(wall, ())):
         raise statement.error(f"wall {wall} has a velocity; the plate alone can move it")
+    if "off" not in statement.arguments:
+        _not_periodic(statement, known, BENDING)
+    elif known.not_periodic == BENDING:
+        known.not_periodic = ""  # perhaps; the command itself knows
 
 
 def _plot(statement: Statement, known: _Known) -> None:
     for axis in ("x", "y"):
         if known.complete and statement.get(axis) not in known.histories:
             raise statement.error(f"no history {statement.get(axis)} yet; create it with HIST")
+
+
+_FOLLOWED: dict[str, Callable[[Statement, _Known], None]] = {
+    "SET": _set, "BOX": _box, "PERIODIC": _periodic, "CLUMP": _clump, "WALL": _wall, "FLEXURE": _flexure, "PLOT": _plot,
+}  # fmt: skip
 
 
 def _run(index: int, statement: Statement, known: _Known) -> Run:

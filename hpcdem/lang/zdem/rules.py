@@ -64,6 +64,14 @@ def _box(s: Statement) -> None:
     _within(s, limits.check_nodes, (left, bottom), (left, bottom + s.get("height")), "the BOX")
 
 
+def _periodic(s: Statement) -> None:
+    if not has_expressions(s.get("x")):
+        left, right = s.get("x")
+        if not left < right:
+            raise s.error(f"the left side, {left}, must be below the right side, {right}")
+        _within(s, limits.check_nodes, (left, 0.0), (right, 0.0), "PERIODIC")
+
+
 def _ball(s: Statement) -> None:
     _within(s, limits.check_circle, s.get("x"), s.get("y"), s.get("rad"))
 
@@ -219,6 +227,7 @@ _SET = next(command for command in t.COMMANDS if command.name == "SET")
 _RULES: dict[str, Callable[[Statement], None]] = {
     "WALL": _wall,
     "BOX": _box,
+    "PERIODIC": _periodic,
     "BALL": _ball,
     "EXP": _output,
     "SAV": _output,

@@ -528,6 +528,17 @@ COMMANDS = (
             "FLEXURE wall id 5 off",
         ),
     ),
+    Command(
+        "PERIODIC",
+        "Periodic sides: particles that leave through the left side enter through the right one and touch across them. "
+        "BOX must precede it and loses its left and right wall. Horizontal walls that span both sides continue without "
+        "an end; other walls must keep their distance from the sides. Frames contain positions between the sides and "
+        "the crossings (laps). Not with clumps, FLEXURE, SURFACE or coupled blocks.",
+        source="X",
+        options=(Option("x", "left and right side", kind=INTERVAL, unit="m", required=True, source="X"),),
+        example=("PERIODIC x (0.0, 20.0)",),
+        does="walls.periodic",
+    ),
     # ---- particles
     Command(
         "BALL",
@@ -813,6 +824,9 @@ COMMANDS = (
             Option("deflection", "record the largest deflection of the bases of FLEXURE", source="X"),
             Option("contacts", "record the number of closed contacts", source="X"),
             Option("bonds", "record the number of bonds", source="X"),
+            *(Option(name, f"record the mean stress {text} between periodic sides and the floor and lid of BOX [Pa]",
+                     source="X")
+              for name, text in (("sxx", "in x"), ("syy", "in y"), ("sxy", "in x across horizontal lines"))),
             Option("gstress", "record the axial stress [Pa] on an end wall made of the particles of a group: force of "
                    "all others on it, over its width and SET thickness; the axis is across the row", kind=OF_GROUP,
                    source="P"),

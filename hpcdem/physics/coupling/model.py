@@ -55,6 +55,8 @@ class Coupled(SurfaceLoad):
             raise CommandError(f"friction must be a number that is not negative, got {friction}")
         if self.name in blocks.surface_loads or particles.coupled:
             raise CommandError("these blocks or particles are coupled already")
+        if particles.settings.period:
+            raise CommandError("particles with periodic sides (PERIODIC) cannot be coupled to blocks")
         if particles.settings.restitution < 1.0:
             raise CommandError("SET restitution does not support contacts with blocks, which have their own law")
         self.particles, self.blocks = particles, blocks

@@ -274,9 +274,8 @@ def _kicks(sim: Simulation, whole: bool, bins: np.ndarray) -> None:
 def _wall_slots(sim: Simulation) -> Any:
     """Particles, walls where they are now, and slots."""
     lists, p = sim.lists, sim.particles
-    table = sim._wall_table
-    table[:, 0:2], table[:, 2:4] = sim.walls.p1, sim.walls.p2
-    return p.hot, p.ihot, table, lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side
+    sim.walls.put_ends(sim._wall_table)
+    return p.hot, p.ihot, sim._wall_table, lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side
 
 
 def _copied(values: np.ndarray, into: np.ndarray) -> np.ndarray:

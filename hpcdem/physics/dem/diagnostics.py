@@ -18,7 +18,7 @@ from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.numerics.exact_sum import BINS_SHAPE, exact_sum, rounded_sums
 from hpcdem.numerics.fingerprint import as_text, of_rows
-from hpcdem.physics.dem import loops
+from hpcdem.physics.dem import loops, periodic
 from hpcdem.physics.dem.kernels import contacts, laws, mass, modes, rigid, totals
 from hpcdem.physics.dem.kernels import walls as wall_kernels
 from hpcdem.physics.dem.kernels.motion import CLUMPED, INERTIA, MASS
@@ -45,7 +45,7 @@ def wall_rows(sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
     """Wall contacts of the owned particles: (m, 8) f8 and (m, 2) i8 [gid, wall row]; forces are those on the
     particle."""
     lists, p = sim.lists, sim.particles
-    sim._wall_table[:, 0:2], sim._wall_table[:, 2:4] = sim.walls.p1, sim.walls.p2
+    sim.walls.put_ends(sim._wall_table)
     m = len(lists.slot_row)
     out, iout = np.empty((m, 8)), np.empty((m, 2), np.int64)
     n = wall_kernels.report(
@@ -346,7 +346,7 @@ def _stiffness_times(sim: Simulation, u: np.ndarray, motion: np.ndarray, force: 
         )  # fmt: skip
         first, last = b.foff[t] + b.cut[t] - b.lo[t], b.foff[t] + b.cut[t + 1] - b.lo[t]
         out[b.cut[t] - p.n_left : b.cut[t + 1] - p.n_left] = force[first:last]
-    sim._wall_table[:, 0:2], sim._wall_table[:, 2:4] = sim.walls.p1, sim.walls.p2
+    sim.walls.put_ends(sim._wall_table)
     modes.walls(
         p.hot, p.ihot, sim._wall_table, lists.slot_row, lists.slot_wall, lists.slot_side, sim.wall_laws,
         len(sim.materials), p.n_left, turning_at_walls, motion, out,
@@ -383,7 +383,7 @@ def fingerprint(sim: Simulation) -> dict[str, str]:
     return {"particles": as_text(sums[0]), "contacts": as_text(sums[1]), "walls": as_text(walls)}
 
 
-def _storage_rows(sim: Simulation, gid: np.ndarray) -> np.ndarray:
+def storage_rows(sim: Simulation, gid: np.ndarray) -> np.ndarray:
     """Rows of the hot table, ghosts among them, of particles with these ids."""
     known = sim.particles.ihot[:, GID]
     order = np.argsort(known)
@@ -413,7 +413,7 @@ def _pair_laws(
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Laws of pairs, and the forces at which their bonds break in tension and in shear [N]; types: of bonds."""
     p, rows, n = sim.particles, sim.materials.rows, len(sim.materials)
-    a, b = (_storage_rows(sim, iout[:, k]) for k in (0, 1))
+    a, b = (storage_rows(sim, iout[:, k]) for k in (0, 1))
     first, second = p.ihot[a, MATERIAL], p.ihot[b, MATERIAL]
     bonded, opened = iout[:, 2] > 0, (iout[:, 2] > 0) & (out[:, OVERLAP] < 0.0)
     law = sim.pair_laws[first * n + second]
@@ -436,7 +436,7 @@ def _pair_laws(
 
 def _wall_laws(sim: Simulation, out: np.ndarray, iout: np.ndarray) -> dict[str, np.ndarray]:
     """Laws of wall contacts."""
-    material = sim.particles.ihot[_storage_rows(sim, iout[:, 0]), MATERIAL]
+    material = sim.particles.ihot[storage_rows(sim, iout[:, 0]), MATERIAL]
     law = sim.wall_laws[iout[:, 1] * len(sim.materials) + material]
     return _law_columns(law, sim.materials.rows["poiss"][material], out, np.zeros(len(out), bool))
 
@@ -461,6 +461,9 @@ def frame(sim: Simulation) -> Frame:
         columns["clump"] = p.clump
         columns["clump_x"], columns["clump_y"] = sim.clumps.centres(p)
     columns.update({name: p[name].copy() for name in p.extra})
+    if s.period:
+        columns["x"], crossed = periodic.inside(sim, p["x"])
+        columns[periodic.LAPS] += crossed
     columns["color"], columns["group"] = p["color"].astype(np.int32), p["group"].astype(np.int32)
 
     out, iout = contact_rows(sim)
@@ -488,6 +491,8 @@ def frame(sim: Simulation) -> Frame:
         "fy": wout[:, FORCE_Y], "x": wout[:, AT_X], "y": wout[:, AT_Y], "overlap": wout[:, OVERLAP],
         **_wall_laws(sim, wout, wiout),
     }  # fmt: skip
+    for table in (pair_columns, bond_columns, wall_contacts) if s.period else ():
+        table["x"] = periodic.inside(sim, table["x"])[0]
     tables: dict[str, Table] = {
         "particles": to_slabs(comm, ("gid",), columns),
         "contacts": to_slabs(comm, ("id1", "id2"), pair_columns, touching),
@@ -499,10 +504,14 @@ def frame(sim: Simulation) -> Frame:
     walls = {name: getattr(w, name)[output_order] for name in names}
     walls["force"] = _sum_by_wall(sim, wout, wiout)[output_order]
     box = w.box() or (math.nan,) * 4
+    if s.period:
+        box = s.side, s.side + s.period, *box[2:]
     settings: dict[str, float | str] = {
         "left": box[0], "right": box[1], "bottom": box[2], "height": box[3] - box[2],
         "gx": s.gx, "gy": s.gy, "disk": s.disk, "frac": s.frac, "lsm": s.lsm,
     }  # fmt: skip
+    if s.period:
+        settings["period"] = s.period
     if units := declared(s.units):
         settings["units"] = units
     return Frame(sim.clock.step, sim.clock.time, sim.clock.dt, settings, walls, tables, list(sim.groups))

@@ -82,11 +82,13 @@ def name_slipped(sim: Any) -> None:
     origin[p.owned] = sim.origin
     chain = None
     if sim.rows:
-        sim.halo.fill(origin)
+        sim.halo.fill(origin, places=True)
         chain = slips.neighbours_in_rows(p.ihot[:, GID], p.hot[:, [X, Y]], origin, sim.rows, sim.rebuild_state.side)
         sim.halo.fill(chain)
+        for k in range(0, chain.shape[1], 2):
+            sim.halo.move_images(chain[:, k:])
     paths = np.where(mine[:, None], walls.ways(), np.nan)
-    kinds = slips.found(sim.lists, p.hot, origin, chain, np.hstack([walls.p1, walls.p2]), paths)
+    kinds = slips.found(sim.lists, p.hot, origin, chain, walls.table()[:, :4].copy(), paths)
     if not sim.comm.any(bool(kinds.any())):
         return
     for kind, what in ((slips.ROW, "a row of GLINE"), (slips.WALL, "a wall")):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.memory import aligned
-from hpcdem.physics.dem import rolling
+from hpcdem.physics.dem import periodic, rolling
 from hpcdem.physics.dem.kernels import contacts, mass, motion, pair_forces
 from hpcdem.physics.dem.kernels import walls as wall_kernels
 
@@ -32,7 +32,7 @@ def refresh(sim: Any) -> None:
     sim._pushed, sim._push = _pressures(sim)
     sim._wall_table = sim.walls.table()
     sim._walls_move = sim.walls.moves
-    sim._mover = motion.move.on(lists.n_blocks)
+    sim._mover = periodic.snapping(sim, motion.move.on(lists.n_blocks))
     sim._pair_forces = (sim.own_laws.loops or pair_forces).forces.on(lists.n_blocks)
     sim._wall_forces = wall_kernels.forces.on(lists.n_blocks)
     sim._move_args = (

@@ -29,6 +29,9 @@ def stop_on_missed(sim: Any) -> None:
     far = np.flatnonzero(travelled + sim.walls.longest_travel() > reach)
     parts = sim.comm.allgather((gid[far].copy(), p.clump[far].copy(), hot[far][:, [X, Y, RADIUS]]))
     theirs, clumps, places = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    if period := sim.settings.period:  # those past the sides as well
+        theirs, clumps = np.tile(theirs, 3), np.tile(clumps, 3)
+        places = np.concatenate([places + [shift, 0.0, 0.0] for shift in (0.0, period, -period)])
     one, other = _touching(hot[:, [X, Y, RADIUS]], places)
     real = (gid[one] != theirs[other]) & ((clumps[other] < 0) | (p.clump[one] != clumps[other]))
     pairs = _pairs(gid[one[real]], theirs[other[real]])

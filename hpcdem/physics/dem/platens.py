@@ -124,8 +124,11 @@ def _middle(sim: Simulation, name: str) -> np.ndarray:
 
 
 def _wall_width(sim: Simulation, what: str) -> float:
-    """Extent of the wall across the axis of ``xstress wall 3`` [m]."""
-    first, last = _ends(sim, _parts(what)[0])[:, 1 - AXES.index(what[0])]
+    """Extent of the wall across the axis of ``xstress wall 3`` [m]; that between periodic sides."""
+    name, across = _parts(what)[0], 1 - AXES.index(what[0])
+    if across == 0 and sim.walls.around[sim.walls.row(int(name))]:
+        return float(sim.settings.period)
+    first, last = _ends(sim, name)[:, across]
     return abs(float(first - last))
 
 

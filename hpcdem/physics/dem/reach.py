@@ -13,7 +13,7 @@ import numpy as np
 
 from hpcdem.core.fields import RADIUS, X, Y
 from hpcdem.engine.rebuild import LONGEST_WAIT, RebuildState
-from hpcdem.physics.dem import guards
+from hpcdem.physics.dem import guards, periodic
 from hpcdem.physics.dem.kernels import fast, neighbours
 from hpcdem.physics.dem.kernels.fast import Fast
 
@@ -39,6 +39,7 @@ def choose(sim: Any, frozen: bool, box: Box | None) -> bool:
 
     Returns whether a particle is outside the box (left, right, bottom, top) [m]: it rides on the same reduction.
     """
+    periodic.bring_in(sim)
     rebuild_state, p = sim.rebuild_state, sim.particles
     seen = np.array([0.0, sim._longest2, 0.0])
     seen[0], seen[2] = neighbours.gauge(p.hot, p.n_left, p.n_own, box if box is not None else EVERYWHERE)
@@ -61,6 +62,8 @@ def choose(sim: Any, frozen: bool, box: Box | None) -> bool:
     while 0.0 < side < max(rebuild_state.bond_reach + rebuild_state.skin, 1.000001 * sim.clumps.reach):
         side *= 1.05  # in steps, so that the rebuild_state seldom changes
     rebuild_state.side = side if side > 0.0 else 1.0
+    if sim.settings.period:
+        periodic.fit(sim)
     _choose_fast(sim, first_class, limit)
     return outside
 
@@ -68,7 +71,7 @@ def choose(sim: Any, frozen: bool, box: Box | None) -> bool:
 def _first_fast_class(sim: Any, limit: float) -> int | None:
     """The class of speed (fast.classes) from which on particles get a reach of their own; None: nobody does.
     limit [m]: way per step from which on one is faster than lists of usual skin can bear."""
-    if sim._drift is None:
+    if sim._drift is None or sim.settings.period:  # the search for free paths does not see images
         return None
     p, dt = sim.particles, sim.clock.dt
     before, _ = sim.fast.among(p["gid"])  # who was fast remains so till it is slow in both respects

@@ -37,7 +37,7 @@ from hpcdem.halo.migrate import Trail
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import ask, holders, order_of, to_slabs
-from hpcdem.physics.dem import user_laws
+from hpcdem.physics.dem import periodic, user_laws
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.clumps import Clumps
 from hpcdem.physics.dem.flexing_base import Base
@@ -225,6 +225,8 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Table
     sim.own_laws, sim.stamp = laws, state.get("stamp", 1)
     sim.clock = Clock(**state["clock"])
     sim.settings = Settings(**state["settings"])
+    if sim.settings.period:
+        periodic.begin(sim)
     sim.rebuild_state = ListState(**state["lattice"])
     sim.fast = Fast.restored(state.get("fast", []))
     sim.walls.take_columns(state["walls"])

@@ -10,7 +10,8 @@ class Settings:
     """SI units. Intervals are in steps, 0 is off. `dt` and `frac`: the one given last counts, the other is 0. gentry:
     attempts of GEN per particle requested, 0 while not set. thickness: of the model, for pressures and stresses.
     units: that the user says to work in (core.units.SYSTEMS), "" none. restitution: 1 without dashpots. rolling: type
-    of rolling resistance (rolling.py)."""
+    of rolling resistance (rolling.py). side: x of the left periodic side, period: length of a periodic model, 0 of
+    others (periodic.py)."""
 
     dt: float = 0.0
     frac: float = 0.0
@@ -31,3 +32,5 @@ class Settings:
     units: str = ""
     restitution: float = 1.0
     rolling: str = "c"
+    side: float = 0.0
+    period: float = 0.0

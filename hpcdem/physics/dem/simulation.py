@@ -13,7 +13,6 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from hpcdem.core.cells import keys
 from hpcdem.core.comm import Comm
 from hpcdem.core.deprecated import renamed
 from hpcdem.core.errors import CommandError, PhysicsError
@@ -21,7 +20,7 @@ from hpcdem.core.fields import CLUMP, FIELDS, FX, TORQUE, WIDTH
 from hpcdem.core.memory import aligned, take_rows
 from hpcdem.engine.model import FRESH, STORAGE, Model
 from hpcdem.halo.migrate import Trail
-from hpcdem.physics.dem import guards, loops, missed, reach, rolling
+from hpcdem.physics.dem import guards, loops, missed, periodic, reach, rolling
 from hpcdem.physics.dem.clumps import Clumps
 from hpcdem.physics.dem.kernels import contacts, fast, motion, neighbours
 from hpcdem.physics.dem.kernels.fast import Fast
@@ -224,7 +223,7 @@ class Simulation(Model):
             self.stamp += 1
             self._pair_forces(lists.n_blocks, *self._pair_args, float(self.stamp))
         if len(lists.slot_row):
-            self._wall_table[:, 0:2], self._wall_table[:, 2:4] = self.walls.p1, self.walls.p2
+            self.walls.put_ends(self._wall_table)
             self._wall_forces(lists.n_blocks, *self._wall_args)
         if self.dashpots is not None:
             self.dashpots.push(self)
@@ -357,7 +356,7 @@ class Simulation(Model):
         box = self.walls.box()
         if reach.choose(self, frozen, box) and box is not None:
             guards.drop_outside(self, box)
-        return keys(self.particles.hot, self.rebuild_state.side)
+        return periodic.cells(self, self.particles.hot)
 
     def _share_out(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         p, box = self.particles, self.walls.box()
@@ -383,14 +382,14 @@ class Simulation(Model):
         p, hist, rebuild_state = self.particles, self.hist, self.rebuild_state
         side, skin = rebuild_state.side, rebuild_state.skin
         clump = None if p.rigid is None else p.rigid.view(np.int64)[:, CLUMP].copy()
-        cell = np.concatenate([keys(p.hot[: p.n_left], side), cell, keys(p.hot[p.owned.stop :], side)])
+        cell = periodic.with_ghosts(self, cell)
         self.origin = p.positions()
         self.walls.list_built()
         self._wall_table = self.walls.table()
         bond_reach = min(side, rebuild_state.bond_reach + skin) if self.bonds else 0.0
         self._lists = neighbours.build(
             p.hot, cell, p.n_left, p.n_own, hist, order, self._wall_table, side, self.largest_radius, skin, bond_reach,
-            self.threads, clump, self.fast, rebuild_state.columns,
+            self.threads, clump, self.fast, rebuild_state.columns, self.settings.side,
         )  # fmt: skip
         self._fast_rows, self._fast_at = self.fast.among(p["gid"])
         self.clumps.close(p, self.halo, self._lists, self.clock.step, side)

@@ -18,7 +18,8 @@ _SIDES = f"{min(BOX_IDS.values())} to {max(BOX_IDS.values())}"
 class Walls:
     """Columns by name: id (n,) i8; p1, p2, v (n, 2) f8; kn, ks, fric (n,) f8; color (n,) i8; one_sided (n,) bool;
     side (n,) i8: 0, or 1 to 4 for the walls of BOX in the order of BOX_IDS; whole (n,) i8: the wall that a segment is a
-    part of, its own id for others; bend (n, 2) f8: velocities in y of P1 and P2 besides v [m/s].
+    part of, its own id for others; bend (n, 2) f8: velocities in y of P1 and P2 besides v [m/s]; around (n,) bool:
+    continues past the periodic sides, without an end.
 
     Contact histories refer to walls by their rows, which change only when an earlier wall is removed.
     """
@@ -30,6 +31,9 @@ class Walls:
         self.color = np.empty(0, np.int64)
         self.one_sided = np.empty(0, bool)
         self.side = np.empty(0, np.int64)
+        self.around = np.empty(0, bool)
+        self.far = (0.0, 0.0)
+        """x of the ends of walls without an end [m]: past those of all particles."""
         self.travel = np.empty((0, 2))
         """Way of each wall since the contact lists were built [m]."""
         self.whole = np.empty(0, np.int64)
@@ -37,7 +41,7 @@ class Walls:
         """bent: way of P1 and P2 in y besides `travel` [m]."""
 
     COLUMNS = ("id", "p1", "p2", "v", "kn", "ks", "fric", "color", "one_sided", "side", "travel", "whole", "bend",
-               "bent")  # fmt: skip
+               "bent", "around")  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.id)
@@ -160,10 +164,21 @@ class Walls:
     def table(self) -> np.ndarray:
         """(n, 8) f8 for the kernels, see physics.dem.walls."""
         out = np.zeros((len(self), 8))
-        out[:, 0:2], out[:, 2:4], out[:, 4:6], out[:, 6] = self.p1, self.p2, self.v, self.one_sided
+        out[:, 4:6], out[:, 6] = self.v, self.one_sided
+        self.put_ends(out)
         if self.bend.any():
             out[:, 5] += 0.5 * self.bend.sum(axis=1)  # the velocity of the middle
         return out
+
+    def put_ends(self, table: np.ndarray) -> None:
+        """Put the present end points into a table for the kernels."""
+        table[:, 0:2], table[:, 2:4] = self.p1, self.p2
+        if self.around.any():
+            onwards = self.p2[self.around, 0] > self.p1[self.around, 0]
+            table[self.around, 0], table[self.around, 2] = (
+                np.where(onwards, self.far[0], self.far[1]),
+                np.where(onwards, self.far[1], self.far[0]),
+            )
 
     def move(self, dt: float) -> None:
         """P += v dt."""
@@ -208,10 +223,13 @@ class Walls:
         return _longest(self.v, self.bend)
 
     def box(self) -> tuple[float, float, float, float] | None:
-        """(left, right, bottom, top) of the BOX, or None."""
+        """(left, right, bottom, top) of the BOX, or None. Where its left and right side are periodic it has none there:
+        they are infinite."""
         left, right, bottom, top = (self.of_side(side) for side in OLD_SIDES)
-        if left is None or right is None or bottom is None or top is None:
+        if bottom is None or top is None:
             return None
+        if left is None or right is None:
+            return -math.inf, math.inf, self.p1[bottom, 1], self.p1[top, 1]
         return self.p1[left, 0], self.p1[right, 0], self.p1[bottom, 1], self.p1[top, 1]
 
     def in_output_order(self) -> np.ndarray:

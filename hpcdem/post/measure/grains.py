@@ -76,7 +76,7 @@ def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grain
     """The grains of one frame file. tables: "bonds" and "contacts", where wanted. Raises HpcdemError."""
     if path.suffix == ".vtkhdf" and is_mesh_frame(path):
         return elements(path)
-    frame = read_frame(path, ["particles", *tables])
+    frame = read_frame(path, ["particles", *tables], periodic=False)
     p = frame.tables["particles"].columns
     none = np.zeros(0)
     gid = np.asarray(p.get("gid", none), dtype=np.int64)
@@ -123,7 +123,7 @@ def walls_of(path: Path) -> Walls:
     """The walls of a frame file alone. Raises HpcdemError."""
     if path.suffix == ".vtkhdf" and is_mesh_frame(path):
         return {}
-    return _walls(read_frame(path, ()))
+    return _walls(read_frame(path, (), periodic=False))
 
 
 def _pairs(frame: Frame, name: str) -> np.ndarray:

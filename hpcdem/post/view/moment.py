@@ -269,7 +269,8 @@ def _with_origin(moment: Moment, path: Path) -> Moment:
     discs = moment.objects["particles"]
 
     def displacement(rows: slice) -> np.ndarray:
-        table = read_frame(begun[-1], ("particles",)).tables["particles"].columns
+        begun_frame = read_frame(begun[-1], ("particles",))
+        table = begun_frame.tables["particles"].columns
         gid, known = part(discs.fields, "gid", rows), np.asarray(table["gid"])
         place = np.minimum(np.searchsorted(known, gid), max(len(known) - 1, 0))
         found = np.full((len(gid), 2), np.nan)
@@ -277,6 +278,9 @@ def _with_origin(moment: Moment, path: Path) -> Moment:
         for axis, name in enumerate("xy"):
             now = part(discs.fields, name, rows)
             found[there, axis] = now[there] - np.asarray(table[name])[place[there]]
+        if "laps" in table:  # periodic sides
+            laps = part(discs.fields, "laps", rows)[there] - np.asarray(table["laps"])[place[there]]
+            found[there, 0] += laps * float(begun_frame.settings["period"])
         return found
 
     readers: dict[str, _Reader] = {name: partial(part, discs.vectors, name) for name in discs.vectors}
@@ -328,7 +332,10 @@ class _Particles:
         """Centres of both particles of contacts or bonds (n, 2, 2)."""
         if name not in self._ends:
             ids, every = part(self.rows, "gid", slice(None)), self.pair(name, "id1", "id2")(slice(None))
-            self._ends[name] = self.centres[np.minimum(np.searchsorted(ids, every), len(ids) - 1)]
+            ends = self.centres[np.minimum(np.searchsorted(ids, every), len(ids) - 1)]
+            apart = ends[:, 1, 0] - ends[:, 0, 0]
+            ends[:, 1, 0] += self.frame.shortest(apart) - apart
+            self._ends[name] = ends
         return (self._ends[name],)
 
     def lines(self, name: str) -> Objects:

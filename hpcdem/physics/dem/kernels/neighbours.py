@@ -349,6 +349,7 @@ def build(
     clump: np.ndarray | None = None,
     fast_ones: fast.Fast | None = None,
     columns: int = 1,
+    left: float = 0.0,
 ) -> ContactLists:
     """Make the lists for particles stored in global order.
 
@@ -356,7 +357,7 @@ def build(
     of the owned particles, that of the c-th stands at where[c]; walls (w, 8) f8; largest radius [m]; skin [m];
     bond_reach [m]: bonded pairs are listed up to this distance, 0 without bonds; clump (n,) i8: number of the rigid
     clump of each row, -1 for none: members of one clump are no pairs (None: no clumps); fast_ones: particles
-    with a reach of their own, whose partners lie up to so many columns away.
+    with a reach of their own, whose partners lie up to so many columns away; left [m]: x where column 0 begins.
     """
     ihot = hot.view(np.int64)
     lists = ContactLists(n_left, n_own, make_blocks(cell, n_left, n_own, n_blocks, columns))
@@ -391,5 +392,5 @@ def build(
     lists.bonds_placed = int(placed.sum())
     lists.tally[:, LONGEST2] = longest2
     lists.n_pairs = int(need.sum())
-    wall_slots.place(lists, hot, cell, hist, where, walls, side, largest, skin, fast_rows, reach)
+    wall_slots.place(lists, hot, cell, hist, where, walls, side, largest, skin, fast_rows, reach, left)
     return lists

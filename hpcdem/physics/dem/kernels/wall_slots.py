@@ -19,7 +19,7 @@ from hpcdem.physics.dem.kernels.walls import P1X, P1Y, P2X, P2Y, closest
 
 def place(
     lists: Any, hot: np.ndarray, cell: np.ndarray, hist: Histories, where: np.ndarray, walls: np.ndarray,
-    side: float, largest: float, skin: float, fast_rows: np.ndarray, reach: np.ndarray,
+    side: float, largest: float, skin: float, fast_rows: np.ndarray, reach: np.ndarray, left: float,
 ) -> None:  # fmt: skip
     """Give the lists their wall slots, with histories; arguments as in neighbours.build. fast_rows (m,): storage rows
     of the fast particles, ascending, and their reach [m] (fast.py)."""
@@ -32,7 +32,7 @@ def place(
         rows, which, source = np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty(capacity, np.int64)
         fs, at_side = np.empty(capacity), np.empty(capacity)
         n = _find(
-            hot, cell, lists.n_left, lists.n_own, walls, side, largest, skin, memory, where,
+            hot, cell, lists.n_left, lists.n_own, walls, left, side, largest, skin, memory, where,
             hist.ptr, partner, remembered, extra, fast_rows, reach, rows, which, fs, at_side, source,
         )  # fmt: skip
     lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side = (
@@ -58,9 +58,9 @@ def _who_remembers(where, hptr, hpartner):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _rows_near(wall, at, side, reach):
+def _rows_near(wall, at, left, side, reach):
     """First and last row of column `at` in which something may lie within `reach` of a wall; none if first > last."""
-    x1, y1, x2, y2 = wall[P1X], wall[P1Y], wall[P2X], wall[P2Y]
+    x1, y1, x2, y2 = wall[P1X] - left, wall[P1Y], wall[P2X] - left, wall[P2Y]
     if at < index(min(x1, x2) - reach, side) or at > index(max(x1, x2) + reach, side):
         return 0, -1
     low, high = min(y1, y2), max(y1, y2)
@@ -89,7 +89,7 @@ def _is_near(wall, x, y, reach):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _find(
-    hot, cell, n_left, n_own, walls, side, largest, skin, memory, where, hptr, hpartner, hfs, hextra,
+    hot, cell, n_left, n_own, walls, left, side, largest, skin, memory, where, hptr, hpartner, hfs, hextra,
     fast_rows, fast_reach, slot_row, slot_wall, slot_fs, slot_side, source,
 ):  # fmt: skip
     """Owned particles within R + skin of a wall (of fast ones half the skin is their reach), or with a history there,
@@ -110,7 +110,7 @@ def _find(
             stride *= 2
         column_end = first_not_before(cell, beyond, i, min(i + stride, stop))
         for w in range(n_walls):
-            low, high = _rows_near(walls[w], at, side, 1.000001 * (largest + skin))  # rounding
+            low, high = _rows_near(walls[w], at, left, side, 1.000001 * (largest + skin))  # rounding
             begin[w] = first_not_before(cell, at * COLUMN + low, i, column_end) if low <= high else column_end
             end[w] = first_not_before(cell, at * COLUMN + high + 1, begin[w], column_end)
         while True:
