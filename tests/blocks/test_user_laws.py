@@ -291,7 +291,7 @@ WRONG = {
     "stiffness that ends it": (LAW.replace("()", "(stiffness=lambda young: exit())", 1) + "return e11, e22, e12, 0.0\n",
                                "its stiffness fails: sys.exit() would end the whole run"),
     "stiffness of nothing": (LAW.replace("()", "(stiffness=lambda limit: 1.0)", 1) + "return e11, e22, e12, 0.0\n",
-                             "clay.py:4: stiffness takes properties, 'limit' is none"),
+                             "clay.py:4: stiffness accepts properties only, and 'limit' is not a property"),
     "an idle property": (LAW.replace("()", "([Property('limit', 'Pa', '')])", 1) + "return e11, e22, e12, 0.0\n",
                          "clay.py:4: property 'limit' is declared, but neither the law nor its stiffness uses it"),
     "a name of all solids": (LAW.replace("()", "([Property('young', 'Pa', '')])", 1) + "return e11, e22, e12, 0.0\n",
