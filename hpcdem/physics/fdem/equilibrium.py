@@ -824,6 +824,7 @@ def tangent(
 ) -> tuple[list[Pieces], int]:
     """Stiffness of the owned elements and joints at the present positions, and how many joints are past their peak,
     see `of_joints`. flows: less what the flow of elements takes from it. Collective, as its parts are."""
+    sim.close_model()
     joints, past = of_joints(sim, softening)
     return ([*of_elements(sim, flows), *joints] if matrices else []), past
 
