@@ -173,7 +173,7 @@ class Walls:
     def put_ends(self, table: np.ndarray) -> None:
         """Put the present end points into a table for the kernels."""
         table[:, 0:2], table[:, 2:4] = self.p1, self.p2
-        if self.around.any():
+        if self.far[0] < self.far[1] and self.around.any():  # periodic sides
             onwards = self.p2[self.around, 0] > self.p1[self.around, 0]
             table[self.around, 0], table[self.around, 2] = (
                 np.where(onwards, self.far[0], self.far[1]),
