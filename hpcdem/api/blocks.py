@@ -26,6 +26,7 @@ from hpcdem.api.objects import (
     Tabled,
     Words,
 )
+from hpcdem.core.deprecated import renamed
 from hpcdem.physics.fdem import groups as g
 
 if TYPE_CHECKING:
@@ -375,3 +376,10 @@ GROUPS: tuple[type[Words], ...] = (
 )  # fmt: skip
 """Attributes of a simulation that hold the commands of blocks; what each is called is its `_word`."""
 refer((BlockCommands, *GROUPS))
+
+
+for _class, _old, _new in (
+    (Elements, "tell", "report"), (Faces, "tell", "report"), (Joints, "tell", "report"),
+    (BlockCommands, "tell_devices", "report_devices"),
+):  # fmt: skip
+    setattr(_class, _old, renamed(_old, _new))

@@ -4,7 +4,6 @@ more than pass arguments to a command.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
@@ -66,14 +65,6 @@ class Words:
 
     def __init__(self, do: Orders) -> None:
         self._do = do
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name):
-            if name != "tell" or not hasattr(type(self), "report"):
-                raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'", name=name, obj=self)
-            warnings.warn(f"sim.{self._word}.tell is now called report", DeprecationWarning, stacklevel=2)
-            return self.report
 
 
 @commands

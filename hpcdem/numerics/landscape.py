@@ -58,6 +58,8 @@ def diffused(height: np.ndarray, width: np.ndarray, spread: float) -> np.ndarray
 
     Implicit steps (backward Euler), stable for any spread; no flow through the outer sides.
     """
+    from scipy.linalg import solveh_banded  # slow to import, and seldom needed
+
     if len(height) < 2 or spread <= 0.0:
         return np.zeros(max(len(height) - 1, 0))
     distance = spacings(width)
@@ -65,24 +67,11 @@ def diffused(height: np.ndarray, width: np.ndarray, spread: float) -> np.ndarray
     parts = min(max(math.ceil(2.0 * spread / float(distance.min()) ** 2), LEAST_PARTS), MOST_PARTS)
     rate = np.where(closed, 0.0, spread / parts / distance)
     h, total = np.where(np.isnan(height), 0.0, height), np.zeros(len(rate))
-    diagonal = width + np.append(rate, 0.0) + np.insert(rate, 0, 0.0)
+    matrix = np.stack([np.insert(-rate, 0, 0.0), width + np.append(rate, 0.0) + np.insert(rate, 0, 0.0)])
     for _ in range(parts):
-        h = _solved(rate, diagonal, width * h)
+        h = solveh_banded(matrix, width * h, check_finite=False)
         total -= rate * np.diff(h)
     return total
-
-
-def _solved(rate: np.ndarray, diagonal: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solution of the symmetric tridiagonal system with -rate (n - 1,) beside the diagonal (n,)."""
-    off, d, b = rate.tolist(), diagonal.tolist(), right.tolist()
-    for k in range(1, len(d)):
-        factor = off[k - 1] / d[k - 1]
-        d[k] -= factor * off[k - 1]
-        b[k] += factor * b[k - 1]
-    b[-1] /= d[-1]
-    for k in range(len(d) - 2, -1, -1):
-        b[k] = (b[k] + off[k] * b[k + 1]) / d[k]
-    return np.array(b)
 
 
 def avalanches(height: np.ndarray, width: np.ndarray, slope: float) -> np.ndarray:

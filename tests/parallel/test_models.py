@@ -115,5 +115,7 @@ def test_it_comes_to_the_same_bits(runs: Runs, way: str, kind: str) -> None:
         for name in one.files:
             if name != "about":
                 assert np.array_equal(one[name], other[name], equal_nan=True), name
-        if WAYS[way].ranks > 2 and not WAYS[way].source and KINDS[kind].come:  # between two halves few go over
+        # Between two halves hardly any of these two models go over.
+        stay = WAYS[way].ranks == 2 and kind in ("flight", "hexahedra that shatter")
+        if WAYS[way].ranks > 1 and not WAYS[way].source and KINDS[kind].come and not stay:
             assert other["about"][3] > KINDS[kind].come  # elements that came from another rank, with their states

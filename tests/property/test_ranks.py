@@ -88,12 +88,13 @@ def assert_rich(seen: list[dict[str, Any]]) -> None:
     }
     print("of", len(seen), "models:", counts)
     assert counts["to the end"] > len(seen) / 2 and counts["on several ranks"] > len(seen) / 4, counts
-    assert counts["twenty particles"] >= len(seen) / 4, counts
+    assert counts["twenty particles"] > len(seen) / 4, counts
     assert all(n > 0 for n in counts.values()), counts
 
 
 def test_twenty_models(pair: Pair) -> None:
-    assert_rich(explore(pair, QUICK))
+    """Always the same sequence, in which enough happens."""
+    assert_rich(explore(pair, QUICK, 1))
 
 
 @pytest.mark.slow

@@ -1067,11 +1067,14 @@ def test_a_script_keeps_its_own_blocks(resident: Resident, tmp_path: Path) -> No
     assert done.returncode == 2 and "a.sc:4: mesh.quality: in a PCDC script create the blocks" in done.stderr
 
 
-def test_the_earlier_name_of_report_still_works_with_a_warning() -> None:
-    from hpcdem.api.blocks import Elements, Nodes
+@pytest.mark.parametrize("name, old, new", [
+    ("Elements", "tell", "report"), ("Faces", "tell", "report"), ("Joints", "tell", "report"),
+    ("BlockCommands", "tell_devices", "report_devices"),
+])  # fmt: skip
+def test_earlier_names_still_work_with_a_warning(monkeypatch, name, old, new) -> None:
+    from hpcdem.api import blocks
 
-    elements = Elements(lambda *_: None)
-    with pytest.deprecated_call(match="report"):
-        assert elements.tell.__func__ is Elements.report
-    with pytest.raises(AttributeError, match="'Nodes' object has no attribute 'tell'"):
-        Nodes(lambda *_: None).tell  # noqa: B018
+    of = getattr(blocks, name)
+    monkeypatch.setattr(of, new, lambda self, **options: options)
+    with pytest.deprecated_call(match=f"{old} of {name} is deprecated: use {new}"):
+        assert getattr(object.__new__(of), old)(where="id 1") == {"where": "id 1"}

@@ -469,7 +469,7 @@ def _run(sim: Simulation) -> None:
             sim.log.command_finished()
     if sim.energy is not None:
         sim.energy.pause(sim)
-    surface.tell(sim)
+    surface.report(sim)
     if progress["final_frame"]:
         output.Snapshot(sim).write_print()
     output.settle(sim)

@@ -120,7 +120,7 @@ def surface(
             raise CommandError(
                 f"there is no process {id} of SURFACE; active: {', '.join(map(str, sim.lands)) or 'none'}"
             )
-        tell_one(sim, id)
+        report_one(sim, id)
         del sim.lands[id]
         return
     p = sim.particles
@@ -592,14 +592,14 @@ def _write(sim: Simulation, ident: int) -> None:
     output.append(sim, "surface.csv", COLUMNS, [",".join([str(sim.clock.step), *(repr(v) for v in numbers)])])
 
 
-def tell(sim: Simulation) -> None:
-    """The balance of all processes, at the end of a CYC or IMPLE."""
+def report(sim: Simulation) -> None:
+    """Report the balance of all processes, at the end of a CYC or IMPLE."""
     for ident in sim.lands:
-        tell_one(sim, ident)
+        report_one(sim, ident)
 
 
-def tell_one(sim: Simulation, ident: int) -> None:
-    """The balance of one in the log."""
+def report_one(sim: Simulation, ident: int) -> None:
+    """Report the balance of one process in the log."""
     if sim.log is None:
         return
     seen = balance(sim, ident)

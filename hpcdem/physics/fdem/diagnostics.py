@@ -705,6 +705,7 @@ def contributing(sim: Blocks, seen: Evaluation) -> np.ndarray:
 
 def deep_overlaps(sim: Blocks) -> int:
     """Pairs of elements that overlap too deep now, if any ever did, see overlaps.py. Collective."""
+    sim.close_model()
     return overlaps.count(sim, sim.local) if sim.rebuild_state.deep else 0
 
 

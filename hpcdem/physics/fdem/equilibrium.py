@@ -484,15 +484,15 @@ def inverted(sim: Blocks) -> bool:
 
 
 @contextmanager
-def at_rest(sim: Blocks, nodes: Nodes, looks: bool = True) -> Iterator[None]:
-    """Velocities are zero and nothing dies down; afterwards everything is as it was. looks: whether surfaces touch,
-    which is refused."""
+def at_rest(sim: Blocks, nodes: Nodes, refuse_contact: bool = True) -> Iterator[None]:
+    """Velocities are zero and nothing dies down; afterwards everything is as it was. refuse_contact: surfaces must not
+    touch."""
     local = sim.local
     relaxations = local.loads.relaxing_corner
     v = sim.v.copy()
     try:
         hold_still(sim)
-        if looks:
+        if refuse_contact:
             refuse_touching(sim, touching(sim), "are in contact")
         yield
     finally:

@@ -136,7 +136,7 @@ class Coupled(System):
         self._stored = (0.0, 0.0)
         if not self.moves:
             return
-        self._rest = equilibrium.at_rest(sim, self.nodes, looks=not inside)
+        self._rest = equilibrium.at_rest(sim, self.nodes, refuse_contact=not inside)
         try:
             self._rest.__enter__()
         except CommandError:
