@@ -378,8 +378,12 @@ GROUPS: tuple[type[Words], ...] = (
 refer((BlockCommands, *GROUPS))
 
 
-for _class, _old, _new in (
-    (Elements, "tell", "report"), (Faces, "tell", "report"), (Joints, "tell", "report"),
-    (BlockCommands, "tell_devices", "report_devices"),
-):  # fmt: skip
-    setattr(_class, _old, renamed(_old, _new))
+def _keep_earlier_names() -> None:
+    for of, old, new in (
+        (Elements, "tell", "report"), (Faces, "tell", "report"), (Joints, "tell", "report"),
+        (BlockCommands, "tell_devices", "report_devices"),
+    ):  # fmt: skip
+        setattr(of, old, renamed(old, new, of))
+
+
+_keep_earlier_names()

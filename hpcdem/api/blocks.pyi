@@ -1275,6 +1275,15 @@ class Elements(Stressed):
         ----------
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
+    def tell(self, *, where: Where | None = None) -> None:
+        """Deprecated name of `report`.
+
+        Report their number by model and group in the log.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
 
 class Faces(Fluxed):
     """Faces of elements: contact, and stress on surfaces; see `Objects`."""
@@ -1412,6 +1421,15 @@ class Faces(Fluxed):
         model (velocity or quiet faces) moves next to each side, which gets its stress and dashpots on the difference
         of both motions. The present forces keep the nodes of the side in equilibrium, so remove the conditions of
         the static stage.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def tell(self, *, where: Where | None = None) -> None:
+        """Deprecated name of `report`.
+
+        Report their number by model and group in the log.
 
         Parameters
         ----------
@@ -1846,6 +1864,15 @@ class Joints(Objects):
     def reset_state(self, *, where: Where | None = None) -> None:
         """Resets the damage of joints that are not broken. Sliding joints regain their tensile strength and cohesion
         but keep their slip.
+
+        Parameters
+        ----------
+        where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
+        """
+    def tell(self, *, where: Where | None = None) -> None:
+        """Deprecated name of `report`.
+
+        Report their number by model and group in the log.
 
         Parameters
         ----------
@@ -2888,4 +2915,9 @@ class BlockCommands(Clocks):
             auto).
         steps : with elastic: number of equal load increments, in each of which elements yield once; an increment
             that does not converge is halved (default: 1).
+        """
+    def tell_devices(self) -> None:
+        """Deprecated name of `report_devices`.
+
+        Reports the ranks, threads and cores of the run in the log.
         """
