@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -86,10 +87,10 @@ def drop(parts: tuple[Simulation, Blocks], clumped: bool = False, yields: bool =
     particles.gen(sim, 60, [0.02, 0.03], (0.0, WIDTH), (0.56, 0.7))
     properties.prop(sim, density=2000.0, kn=2e6, ks=1e6, fric=0.4)
     if clumped:
-        if sim.comm.rank == 0:
-            write_lattice(Path(f"bodies{sim.comm.size}.txt"), 0.02, 4, 1)
-        sim.comm.allgather(0)
-        clumps.clump(sim, f"bodies{sim.comm.size}.txt", 0.7, 1.15, group="bodies")
+        with TemporaryDirectory() as folder:  # each rank has a copy of its own
+            file = Path(folder) / "bodies.clumps"
+            write_lattice(file, 0.02, 4, 1)
+            clumps.clump(sim, str(file), 0.7, 1.15, group="bodies")
         fallen = parse_text("RES model\nDEL RANGE group bodies", "bodies").statements[1].selection
         properties.prop(sim, fallen, density=2000.0, kn=2e6, ks=1e6, fric=0.4, yv=-12.0)
     cycles.prepare(sim)
