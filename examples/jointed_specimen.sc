@@ -30,7 +30,7 @@ for name, v in (('bottom', speed), ('top', -speed)):
     pcdc node boundary mech-vel-b-c velocity-y table '[name]' range group '[name]' set 'ends'
 
 pcdc history create 'load' node value reaction-y sum every 50 range group 'top' set 'ends'
-pcdc history create 'way' node value displacement-y mean every 50 range group 'top' set 'ends'
+pcdc history create 'displacement' node value displacement-y mean every 50 range group 'top' set 'ends'
 pcdc history create 'cracks' model value broken-joints every 50
 pcdc output vtk 'specimen' every 1000
 
@@ -43,5 +43,5 @@ while stress >= 0.5 * peak and pcdc.time < 3e-3:
 print('strength %.1f MPa, %d joints broken' % (peak / 1e6, pcdc.history('cracks')[-1, 2]))
 
 pcdc chart create 'curve' x-label 'shortening (%)' y-label 'axial stress (MPa)'
-pcdc chart add 'curve' x 'way' scale-x [-200/height] y 'load' scale-y [-1e-6/width] label 'specimen'
+pcdc chart add 'curve' x 'displacement' scale-x [-200/height] y 'load' scale-y [-1e-6/width] label 'specimen'
 pcdc chart export 'curve' 'curve.png'

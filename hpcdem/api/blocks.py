@@ -69,14 +69,14 @@ class Geometry(Words):
     import_file = Row("geometry import", "file as_layer dxf_layer? scale?")
     transform = Row("geometry transform", "layer")
     scale = Row("geometry scale", "factors layer?")
-    translate = Row("geometry translate", "way layer?")
+    translate = Row("geometry translate", "vector layer?", earlier={"way": "vector"})
     export = Row("geometry export", "layers file")
     delete = Row("geometry delete", "*layers", doc="Delete layers; meshes created from them keep their edges.")
 
 
 @commands
 class Mesh(Words):
-    """Meshes: each call makes one more body of the model. Its elements go into a group of a set."""
+    """Meshes: each call adds a body to the model. Its elements belong to a group of a set."""
 
     _word = "mesh"
 
@@ -105,7 +105,7 @@ class Mesh(Words):
     add_nodes = Row("model add node", "points")
     add_element = Row("model add element", "*corners")
     scale = Row("model scale", "factors")
-    translate = Row("model translate", "way")
+    translate = Row("model translate", "vector", earlier={"way": "vector"})
     quadratic = Row("mesh quadratic")
     quality = Row("mesh quality", doc="Report the quality of the mesh in the log: angles, sizes.")
 
@@ -191,7 +191,7 @@ class Nodes(Moved):
 
 @commands
 class Bolts(Objects):
-    """Rock bolts: `sim.bolts["axial-force"]` is that of their elements, see `Objects`."""
+    """Rock bolts: `sim.bolts["axial-force"]` returns that of their elements, see `Objects`."""
 
     _word, kind = "bolts", g.BOLT_ELEMENT
 
@@ -215,7 +215,7 @@ class BoltNodes(Conditioned):
 
 @commands
 class FlowNodes(GroupedElsewhere):
-    """Nodes at which a channel ends, with numbers and groups of nodes: `sim.flow_nodes["pressure"]`, see `Objects`."""
+    """Nodes at the ends of channels, with numbers and groups of nodes: `sim.flow_nodes["pressure"]`, see `Objects`."""
 
     _word, kind, grouped = "flow_nodes", g.FLOW_NODE, "nodes"
 
@@ -239,7 +239,9 @@ class Channels(GroupedElsewhere):
 
 @commands
 class Wells(Named):
-    """Wells: `sim.wells["injection"]` is what one has now: pressure [Pa], rate [m2/s], injected [m2], stage."""
+    """Wells: `sim.wells["injection"]` returns the present pressure [Pa], rate [m2/s], injected [m2] and stage
+    of one.
+    """
 
     create = Row("well create", "name", where=g.NODE)
     stage = Row("well stage", "name")
@@ -247,7 +249,7 @@ class Wells(Named):
 
 @commands
 class Liners(Objects):
-    """Liners: `sim.liners["axial-force"]` is that of their elements, see `Objects`."""
+    """Liners: `sim.liners["axial-force"]` returns that of their elements, see `Objects`."""
 
     _word, kind = "liners", g.LINER_ELEMENT
 
@@ -271,7 +273,7 @@ class LinerNodes(Objects):
 
 @commands
 class Tables(Tabled):
-    """Functions of time for conditions, or of a coordinate for properties; linear from point to point."""
+    """Functions of time for conditions, or of a coordinate for properties; piecewise linear."""
 
     delete = Row("table delete", "name")
 
@@ -286,7 +288,7 @@ class Fields(Random):
 
 @commands
 class Histories(Recorded):
-    """Numbers recorded during the run: `sim.histories["load"]` is (n, 3) step, time [s] and value so far."""
+    """Quantities recorded during the run: `sim.histories["load"]` is (n, 3): step, time [s] and value so far."""
 
     delete = Row("history delete", "name")
     export = Row("history export", "file names?")
@@ -381,7 +383,7 @@ refer((BlockCommands, *GROUPS))
 def _keep_earlier_names() -> None:
     for of, old, new in (
         (Elements, "tell", "report"), (Faces, "tell", "report"), (Joints, "tell", "report"),
-        (BlockCommands, "tell_devices", "report_devices"),
+        (BlockCommands, "tell_devices", "report_devices"), (BlockCommands, "tell_time", "report_time"),
     ):  # fmt: skip
         setattr(of, old, renamed(old, new, of))
 

@@ -306,12 +306,12 @@ class Geometry(Words):
         factors : factors along the axes, not 0.
         layer : names of layers (default: all).
         """
-    def translate(self, way: Point, layer: Sequence[str] | None = None) -> None:
+    def translate(self, vector: Point, layer: Sequence[str] | None = None) -> None:
         """Moves layers; without layer all of them.
 
         Parameters
         ----------
-        way : displacement of all points [m].
+        vector : translation of all points [m].
         layer : names of layers (default: all).
         """
     def export(
@@ -345,7 +345,7 @@ class Geometry(Words):
         """
 
 class Mesh(Words):
-    """Meshes: each call makes one more body of the model. Its elements go into a group of a set."""
+    """Meshes: each call adds a body to the model. Its elements belong to a group of a set."""
     def create(
         self,
         from_layer: str,
@@ -655,12 +655,12 @@ class Mesh(Words):
         ----------
         factors : factors along the axes, above 0.
         """
-    def translate(self, way: Point) -> None:
+    def translate(self, vector: Point) -> None:
         """Moves all points of the mesh, before the first model or condition is assigned.
 
         Parameters
         ----------
-        way : displacement of all points [m].
+        vector : translation of all points [m].
         """
     def quadratic(self) -> None:
         """In the plane: turns each triangle of the mesh into an elastic six-node triangle with quadratic displacements:
@@ -2033,7 +2033,7 @@ class Nodes(Moved):
         """Sets all displacements to 0."""
 
 class Bolts(Objects):
-    """Rock bolts: `sim.bolts["axial-force"]` is that of their elements, see `Objects`."""
+    """Rock bolts: `sim.bolts["axial-force"]` returns that of their elements, see `Objects`."""
     def __getitem__(
         self,
         name: Literal["axial-force", "axial-strain", "plastic-strain", "bolt-state"] | str,
@@ -2212,7 +2212,7 @@ class BoltNodes(Conditioned):
         """
 
 class FlowNodes(GroupedElsewhere):
-    """Nodes at which a channel ends, with numbers and groups of nodes: `sim.flow_nodes["pressure"]`, see `Objects`."""
+    """Nodes at the ends of channels, with numbers and groups of nodes: `sim.flow_nodes["pressure"]`, see `Objects`."""
     def __getitem__(
         self,
         name: Literal["pressure", "saturation", "fluid", "volume", "inflow", "temperature", "concentration", "proppant", "pack-pressure"] | str,
@@ -2252,7 +2252,9 @@ class Channels(GroupedElsewhere):
     ) -> np.ndarray: ...
 
 class Wells(Named):
-    """Wells: `sim.wells["injection"]` is what one has now: pressure [Pa], rate [m2/s], injected [m2], stage."""
+    """Wells: `sim.wells["injection"]` returns the present pressure [Pa], rate [m2/s], injected [m2] and stage
+    of one.
+    """
     def create(self, name: str, *, where: Where | None = None) -> None:
         """Makes a well of the flow nodes of a range: one connected volume, whose pressure is that at its highest node.
         Stages control it; without a stage it is shut in. Its water loads the free faces whose nodes all lie in the
@@ -2287,7 +2289,7 @@ class Wells(Named):
         """
 
 class Liners(Objects):
-    """Liners: `sim.liners["axial-force"]` is that of their elements, see `Objects`."""
+    """Liners: `sim.liners["axial-force"]` returns that of their elements, see `Objects`."""
     def __getitem__(
         self,
         name: Literal["axial-force", "shear-force", "moment-first", "moment-last", "membrane-largest", "membrane-smallest", "membrane-xx", "membrane-yy", "membrane-xy", "membrane-zz", "membrane-xz", "membrane-yz", "bending-largest", "bending-smallest", "bending-xx", "bending-yy", "bending-xy", "bending-zz", "bending-xz", "bending-yz", "transverse-shear", "axial-strain", "plastic-strain", "plastic-rotation", "plastic-curvature", "liner-state", "bond-pressure", "bond-shear", "gap", "slip", "bond-state", "host"] | str,
@@ -2444,7 +2446,7 @@ class LinerNodes(Objects):
         """
 
 class Tables(Tabled):
-    """Functions of time for conditions, or of a coordinate for properties; linear from point to point."""
+    """Functions of time for conditions, or of a coordinate for properties; piecewise linear."""
     def delete(self, name: str) -> None:
         """Deletes a table.
 
@@ -2494,7 +2496,7 @@ class Fields(Random):
         """
 
 class Histories(Recorded):
-    """Numbers recorded during the run: `sim.histories["load"]` is (n, 3) step, time [s] and value so far."""
+    """Quantities recorded during the run: `sim.histories["load"]` is (n, 3): step, time [s] and value so far."""
     def delete(self, name: str) -> None:
         """Stops a history; its file stays.
 
@@ -2920,4 +2922,9 @@ class BlockCommands(Clocks):
         """Deprecated name of `report_devices`.
 
         Reports the ranks, threads and cores of the run in the log.
+        """
+    def tell_time(self, part: str) -> None:
+        """Deprecated name of `report_time`.
+
+        Log the present time of a part; parts: see `cycle_option`.
         """

@@ -26,7 +26,7 @@ MAIN = ("particles", "elements")
 
 
 class Looks(TypedDict, total=False):
-    """Appearance of the objects of a picture: words of a layer of a view (docs/view.md)."""
+    """Appearance of the objects of a picture: keywords of a layer of a view (docs/view.md)."""
 
     limits: tuple[float, float]
     log: bool
@@ -41,9 +41,10 @@ class Looks(TypedDict, total=False):
 
 
 class Frame:
-    """A model at one moment: that of a file, or of a simulation (`sim.frame()`). In a notebook it shows a picture.
+    """The state of a model at one step, from a file or from a simulation (`sim.frame()`). In a notebook it shows a
+    picture.
 
-    step, time [s]; objects: how many there are of each kind; fields(object): their names.
+    step, time [s]; objects: number of objects by kind; fields(object): names of their quantities.
     """
 
     def __init__(self, moment: Moment, name: str = "") -> None:
@@ -56,12 +57,13 @@ class Frame:
         return {kind: objects.count for kind, objects in self._moment.objects.items()}
 
     def fields(self, object: str | None = None) -> list[str]:
-        """Names of fields and vectors that these objects have."""
+        """Return the names of fields and vectors of these objects."""
         return self._moment.of(object or self._main()).known()
 
     def table(self, object: str | None = None) -> dict[str, np.ndarray]:
-        """Columns (n,) of all fields of a kind of object (default: particles, else elements), x and y of the middle
-        first; vectors as velocity_x, velocity_y. HpcdemError that names the kinds there are."""
+        """Return the columns (n,) of all fields of a kind of object (default: particles, else elements); x and y of the
+        centre first, vectors as velocity_x, velocity_y. Raises HpcdemError that names the available kinds.
+        """
         objects = self._moment.of(object or self._main())
         columns = {axis: part for axis, part in zip("xyz", objects.centres().T)}
         for name in objects.known():
@@ -70,29 +72,31 @@ class Frame:
         return columns
 
     def pandas(self, object: str | None = None) -> Any:
-        """`table` as a pandas.DataFrame, whose index is the number of each object."""
+        """Return `table` as a pandas.DataFrame, with the number of each object as index."""
         objects = self._moment.of(object or self._main())
         data = _needed("pandas").DataFrame(self.table(object))
         return data.set_index(objects.number) if objects.number in data else data.rename_axis("number")
 
     def xarray(self, object: str | None = None) -> Any:
-        """`table` as an xarray.Dataset along the numbers of the objects; units are attributes of the variables."""
+        """Return `table` as an xarray.Dataset along the numbers of the objects; units are attributes of the
+        variables.
+        """
         return _with_units(self.pandas(object), self._moment, {"step": self.step, "time": self.time})
 
     def picture(
         self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Unpack[Looks]
     ) -> bytes:
-        """A picture of the frame.
+        """Draw the frame.
 
         Parameters
         ----------
-        field, object : what colours the objects that have it, or those of this kind.
-        width : of the picture [pixels].
-        looks : of the objects: limits=(low, high), colours="blue-red", log=True ... (docs/view.md).
+        field, object : quantity that colours the objects that have it, or kind of object to colour.
+        width : width of the picture [pixels].
+        looks : appearance of the objects: limits=(low, high), colours="blue-red", log=True ... (docs/view.md).
 
         Returns
         -------
-        bytes : of a PNG.
+        bytes : contents of a PNG file.
         """
         if isinstance(width, bool) or not isinstance(width, int) or width < NARROWEST:
             raise UsageError(f"width: expected a whole number of pixels from {NARROWEST} on, got {width!r}")
@@ -120,7 +124,7 @@ class Frame:
     def show(
         self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Unpack[Looks]
     ) -> Any:
-        """`picture` as an image of IPython, for a notebook."""
+        """Return `picture` as an image of IPython, for a notebook."""
         return _needed("IPython.display").Image(self.picture(field, object, width, **looks))
 
     def _main(self) -> str:
@@ -141,7 +145,7 @@ class Frame:
 
 
 class Frames(Sequence[Frame]):
-    """The frames of a run in the order of their steps, read when they are requested."""
+    """The frames of a run in the order of their steps; each is read on first use."""
 
     def __init__(self, files: Sequence[FrameFile]) -> None:
         self.files = list(files)
@@ -173,8 +177,7 @@ class Frames(Sequence[Frame]):
         return pandas.concat(parts, names=["step"])
 
     def xarray(self, object: str | None = None) -> Any:
-        """Combine all frames: dimensions step and number, coordinate `time` [s]; NaN where an object does not exist
-        yet, or no more."""
+        """Combine all frames: dimensions step and number, coordinate `time` [s]; NaN where an object does not exist."""
         data = self.pandas(object)
         times = data.pop("time").groupby("step").first()
         found = _with_units(data, self[0]._moment, {})
@@ -193,8 +196,9 @@ class Frames(Sequence[Frame]):
 
 
 def frames(path: str | Path = "data", name: str | None = None) -> Frames:
-    """The frames of a folder, or the one of a file. name: of blocks, frames NAME_<step>.vtkhdf; needed where a folder
-    has several kinds. HpcdemError if there are no such objects."""
+    """Return the frames of a folder, or the frame of a file. name: of blocks, frames NAME_<step>.vtkhdf; required if a
+    folder contains several kinds. Raises HpcdemError if there are no such frames.
+    """
     from hpcdem.io.frames import FrameFile, list_frames, mesh_frames_by_name
     from hpcdem.post.view.moment import read_moment
 
@@ -217,7 +221,7 @@ def frames(path: str | Path = "data", name: str | None = None) -> Frames:
 
 
 def shown(title: str, picture: bytes | None) -> str:
-    """HTML of a line of text and a picture."""
+    """Return HTML of a line of text and a picture."""
     image = base64.b64encode(picture).decode() if picture else ""
     tag = f'<br><img src="data:image/png;base64,{image}" style="max-width:100%">' if image else ""
     return f"<div>{html.escape(title)}{tag}</div>"

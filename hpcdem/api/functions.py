@@ -70,7 +70,7 @@ def _parsed(text: str) -> Selection | None:
 
 
 def selection(where: str | Selection | None) -> Selection | None:
-    """The particles that are meant; CommandError for what says none."""
+    """Return the selected particles. Raises CommandError for an invalid selection."""
     if where is None or isinstance(where, Selection):
         return where
     if not isinstance(where, str) or "\n" in where:
@@ -83,8 +83,9 @@ def selection(where: str | Selection | None) -> Selection | None:
 
 @dataclass(frozen=True)
 class Taken:
-    """Conversion of one argument of a method. type: in a signature, in the words of `hpcdem.api.types`; make: converts
-    the given value for the function, from the simulation and the value."""
+    """Conversion of an argument of a method. type: in a signature, a name of `hpcdem.api.types`; make: converts the
+    value for the function, from the simulation and the value.
+    """
 
     type: str
     make: Callable[[Any, Any], Any]
@@ -110,9 +111,9 @@ WRITTEN = Taken("File", lambda sim, file: sim.directory / file)
 class Function:
     """Method made from a function of `hpcdem.commands.dem`.
 
-    order: arguments that may be given by their place, if it is not that of the function; ``name?`` may be left out
-    though the function needs it, ``name!`` may not; the others are keywords. file: how a file is taken; alone: not for
-    particles that touch blocks; reads_only: it changes nothing.
+    order: positional arguments, if they differ from those of the function; ``name?`` is optional though the function
+    requires it, ``name!`` is required; the others are keywords. file: how a file name is converted; alone: not allowed
+    for particles coupled to blocks; reads_only: the method changes nothing.
     """
 
     name: str
@@ -123,7 +124,7 @@ class Function:
 
     @functools.cached_property
     def node(self) -> ast.FunctionDef:
-        """The function, as it is written."""
+        """Syntax tree of the function."""
         module, _, name = self.name.partition(".")
         return _functions(module)[0][name]
 
@@ -134,7 +135,7 @@ class Function:
 
     @functools.cached_property
     def taken(self) -> dict[str, Taken]:
-        """Conversions of arguments of the function that are not passed unchanged."""
+        """Conversions of arguments that are not passed unchanged."""
         known = {**TAKEN, "file": self.file}
         return {one.name: known[key] for one in self.own for key in (one.name, one.annotation) if key in known}
 
@@ -160,7 +161,7 @@ class Function:
         return ast.get_docstring(self.node) or ""
 
     def method(self, owner: type, name: str) -> Callable[..., Any]:
-        """The method of a class."""
+        """Make the method for a class."""
         parameters = self.parameters
         more = any(one.kind is Parameter.VAR_KEYWORD for one in parameters)
         known = [one for one in parameters if one.kind is not Parameter.VAR_KEYWORD]
@@ -187,7 +188,7 @@ def _optional(kind: str) -> str:
 
 
 def replaced(one: Parameter, taken: Taken | None) -> Parameter:
-    """An argument of a function as a method has it."""
+    """Return an argument of a function as it appears in a method."""
     kind = one.annotation if taken is None else taken.type
     if one.default is None and kind != "Selected":
         kind = _optional(kind)
@@ -233,7 +234,7 @@ def _value(node: ast.expr | None, module: str) -> Any:
 
 
 def commands(cls: Kind) -> Kind:
-    """Rows become methods, whose errors leave with file and line of the program."""
+    """Turn rows into methods, whose errors name file and line of the program."""
     for name, found in list(vars(cls).items()):
         if isinstance(found, Function):
             setattr(cls, name, command(found.method(cls, name), edits=not found.reads_only))
@@ -241,8 +242,9 @@ def commands(cls: Kind) -> Kind:
 
 
 def command(method: Method, edits: bool = True) -> Method:
-    """Errors of a command leave with file and line of the program; values of a wrong kind too. edits: it may change the
-    particles."""
+    """Wrap a command so that its errors, and those of invalid values, name file and line of the program. edits: it may
+    change the particles.
+    """
 
     signature = inspect.signature(method)
     names = [name for name, one in signature.parameters.items() if name != "self" and one.kind is not one.VAR_KEYWORD]
@@ -280,5 +282,5 @@ def command(method: Method, edits: bool = True) -> Method:
 
 
 def look(method: Method) -> Method:
-    """A command that changes nothing."""
+    """Wrap a command that changes nothing."""
     return command(method, edits=False)

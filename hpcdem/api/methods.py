@@ -18,6 +18,7 @@ from inspect import Parameter
 from typing import Any, TypeVar
 
 from hpcdem.api.program import HELP, carried_out, spelt
+from hpcdem.core.deprecated import renamed_arguments
 from hpcdem.core.place import place
 from hpcdem.lang.pcdc.table import PCDC, SHORT, Command, Model, Option
 from hpcdem.lang.pcdc.trial import python
@@ -37,8 +38,9 @@ Chosen = str | Callable[[Mapping[str, Any]], str]
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of a method. option: its row of the table; word: the row of a word that follows the values of the
-    option, which is an argument of its own; type: in the words of `hpcdem.api.types`."""
+    """An argument of a method. option: its row of the table; word: row of a word that follows the values of the option
+    and is a separate argument; type: a name of `hpcdem.api.types`.
+    """
 
     name: str
     type: str
@@ -62,7 +64,7 @@ WHERE_ARGUMENT = Argument("where", "Where", None, Parameter.KEYWORD_ONLY, None, 
 
 
 def type_of(option: Option) -> str:
-    """The type of what an option takes, of one that may be repeated of all its values."""
+    """Return the type of the values of an option; if it may be repeated, of all of them."""
     if option.repeated:
         return f"Iterable[{_item(option)}]" if option.more else f"Sequence[{_one(option)}]"
     return _one(option)
@@ -90,7 +92,7 @@ def _item(option: Option) -> str:
 
 
 def tokens(order: str) -> Iterator[tuple[str, str, str]]:
-    """Name, mark and default of each word of an order."""
+    """Return name, mark and default of each word of an order."""
     for token in order.split():
         found = re.fullmatch(r"(\*?)(\w+)([?!]?)(?:=(\w+))?", token)
         assert found, order
@@ -101,12 +103,12 @@ def tokens(order: str) -> Iterator[tuple[str, str, str]]:
 class Row:
     """Method made from a command of the table.
 
-    order: arguments that may be given by their place, in this order; ``name?`` may be left out, ``name=True`` is that
-    when it is, ``*names`` are all that follow. The others of the command are keywords. model: the constitutive model or
-    condition whose properties they are; where: the objects that `where` chooses, if it is not of the class; only,
-    without: options by their words; names: of arguments that are not those of the language, by the word, or by
-    ``option.word`` for one that follows its values; types: of arguments whose kinds say too little; doc: in place of
-    the text of the command; loose: other keywords continue to the table, which says what is wrong with them.
+    order: positional arguments; ``name?`` is optional, ``name=True`` is True by default, ``*names`` are all that
+    follow. The others of the command are keywords. model: the constitutive model or condition whose properties they
+    are; where: kind of object that `where` selects, if it is not that of the class; only, without: options by their
+    words; names: Python names of arguments, by the word of the language, or by ``option.word`` for one that follows its
+    values; types: of arguments whose kinds are not specific enough; doc: replaces the text of the command; loose: other
+    keywords are passed to the table, which reports errors; earlier: present name of an argument by its deprecated name.
     """
 
     command: str
@@ -119,6 +121,7 @@ class Row:
     types: Mapping[str, str] = field(default_factory=dict)
     doc: str = ""
     loose: bool = False
+    earlier: Mapping[str, str] = field(default_factory=dict)
 
     @functools.cached_property
     def row(self) -> Command:
@@ -211,7 +214,7 @@ class Row:
         return found
 
     def method(self, owner: type, name: str) -> Callable[..., None]:
-        """The method of a class."""
+        """Make the method for a class."""
         arguments = self.arguments
         parameters = [one.parameter for one in arguments]
         kind = self.where or getattr(owner, "kind", "")
@@ -234,7 +237,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Models:
-    """A method that names a constitutive model, or bolt or liner, and gives its properties."""
+    """A method that names a constitutive model, bolt or liner and gives its properties."""
 
     command: str
     doc: str
@@ -244,7 +247,7 @@ class Models:
         return PCDC.command(self.command)
 
     def rows(self) -> Iterator[tuple[Model, Row]]:
-        """A method for each of the models."""
+        """Return a method for each model."""
         for model in self.row.models:
             yield model, Row(self.command, model=model.keyword.name, loose=True)
 
@@ -330,8 +333,9 @@ _DRESSED: set[type] = {object}
 
 
 def commands(cls: Kind) -> Kind:
-    """Rows become methods. Errors in public methods of the class, and of those that it stands on and that are no such
-    class, leave with file and line of the program, and the name of the method."""
+    """Turn rows into methods. Errors in public methods of the class, and of its bases that are no such class, name file
+    and line of the program and the method.
+    """
     _DRESSED.add(cls)
     others = (of for of in cls.__mro__[:0:-1] if of not in _DRESSED)
     for name, found in [item for of in (*others, cls) for item in vars(of).items()]:
@@ -347,10 +351,12 @@ def commands(cls: Kind) -> Kind:
 def _documented(method: Callable[..., Any]) -> Callable[..., Any]:
     name = method.__name__
     names = [parameter for parameter in inspect.signature(method).parameters if parameter != "self"]
+    earlier = getattr(getattr(method, "made_by", None), "earlier", {})
 
     @functools.wraps(method)
     def call(self: Any, *values: Any, **options: Any) -> Any:
         word, options = self._word, spelt(options, names)
+        options = renamed_arguments(name, earlier, options)
         full = (f"{word}[...]" if name == "__getitem__" else f"{word}.{name}") if word else name
         advice = f"see help(sim.{word})" if word else HELP
         return carried_out(place(), full, lambda: method(self, *values, **options), advice, names)
@@ -383,7 +389,7 @@ def _docstring(summary: str, rows: list[tuple[str, str]]) -> str:
 
 
 def refer(classes: Iterable[type]) -> None:
-    """Docstrings of methods speak of others, and of arguments, by their names in Python; in lines of a width."""
+    """Rewrite docstrings so that they use the Python names of methods and arguments, with lines of limited width."""
     made = [(of, name, value) for of in classes for name, value in vars(of).items() if hasattr(value, "made_by")]
     names: dict[str, str] = {}
     for of, name, value in made:

@@ -34,8 +34,9 @@ HOW = ("sum", "mean", "minimum", "maximum")
 
 
 class Orders:
-    """The way from a method to the function of its command. project: gives the blocks, made on the first call; before:
-    called before their steps."""
+    """Path from a method to the function of its command. project: returns the blocks, made on the first call; before:
+    called before their steps.
+    """
 
     def __init__(self, project: Callable[[], Project], before: Callable[[], None] = lambda: None) -> None:
         self.project, self.before = project, before
@@ -59,7 +60,7 @@ class Orders:
 
 
 class Words:
-    """Methods of one kind. _word: what they are called in a program, ``sim.<word>``."""
+    """Methods for one kind of object. _word: name in a program, ``sim.<word>``."""
 
     _word = ""
 
@@ -69,10 +70,10 @@ class Words:
 
 @commands
 class Objects(Words):
-    """Elements, faces, joints or nodes: `sim.elements["stress-xx"]` is a quantity of all of them.
+    """Elements, faces, joints or nodes: `sim.elements["stress-xx"]` returns a quantity of all of them.
 
-    where: text of a RANGE (``"group 'platen' set 'bc'"``, ``"x 0 1 present"``) or terms of
-    `hpcdem.physics.fdem.groups`; left out, all.
+    where: text of a RANGE (``"group 'platen' set 'bc'"``, ``"x 0 1 present"``) or terms of `hpcdem.physics.fdem.groups`
+    (default: all).
     """
 
     kind: str
@@ -85,16 +86,16 @@ class Objects(Words):
         return quantities(self.kind)
 
     def numbers(self, where: Where = None) -> np.ndarray:
-        """Numbers of those that are there, ascending. Collective."""
+        """Return the ascending numbers of the existing objects. Collective."""
         return fdem.queries.numbers(self._do.project(), self.kind, chosen_by(where, self.kind))
 
     def values(self, name: str, where: Where = None) -> np.ndarray:
-        """A quantity by name, in the order of `numbers`; NaN where missing. Collective."""
+        """Return a quantity by name, in the order of `numbers`; NaN where undefined. Collective."""
         chosen = chosen_by(where, self.kind)
         return fdem.queries.values(self._do.project(), self.kind, _quantity(name), chosen)
 
     def total(self, name: str, where: Where = None) -> float:
-        """Exact sum of a quantity. Collective."""
+        """Return the exact sum of a quantity. Collective."""
         chosen = chosen_by(where, self.kind)
         return fdem.queries.total(self._do.project(), self.kind, _quantity(name), chosen)
 
@@ -111,8 +112,9 @@ class Conditioned(Objects):
     """Objects with conditions that can be removed."""
 
     def remove_boundary(self, *conditions: str, where: Where = None) -> None:
-        """Take boundary conditions back, all of them. conditions: only these, as the command ... boundary of PCDC calls
-        them."""
+        """Remove boundary conditions. conditions: only these, by the names of the command ... boundary of PCDC
+        (default: all).
+        """
         self._take_back(conditions, where)
 
 
@@ -132,9 +134,10 @@ class Stressed(Objects):
         gradient: Mapping[str, Point] | None = None,
         where: Where = None,
     ) -> None:
-        """Stress [Pa] from the beginning, tension positive, 0 where it is left out; in the plane zz is then that of
-        plane strain, Poisson's ratio times xx + yy, in plane stress 0. gradient: by component, per metre in x and y
-        (and z) [Pa/m], ``{"yy": (0.0, 25e3)}``."""
+        """Set the initial stress [Pa], tension positive. Omitted components are 0, but in the plane zz is then that of
+        plane strain, Poisson's ratio times xx + yy (in plane stress 0). gradient: by component, per metre in x and y
+        (and z) [Pa/m], ``{"yy": (0.0, 25e3)}``.
+        """
         stress = {"xx": xx, "yy": yy, "xy": xy, "zz": zz, "xz": xz, "yz": yz}
         slopes = dict(gradient or {})
         for name in slopes:
@@ -160,9 +163,11 @@ class Fluxed(Conditioned):
         environment: Number | None = None,
         where: Where = None,
     ) -> None:
-        """A field of elements, as "moisture": what comes in, or goes to an environment of this value, over the
-        difference to it; without a coefficient with that of the elements. Numbers or names of tables over the time of
-        the field. Without a range: the whole surface of the model."""
+        """Prescribe the inflow of a field of elements, for example "moisture", through faces, or exchange with an
+        environment of this value; transfer: inflow over the difference to the environment (default: coefficient of the
+        elements). Values are numbers or names of tables over the time of the field. Without a range: the whole surface
+        of the model.
+        """
         given = {"flux": flux, "transfer": transfer, "environment": environment}
         self._do("element-face boundary", given, where, self.kind, f"{name}-flux-boundary-condition")
 
@@ -172,24 +177,27 @@ class Moved(Conditioned):
     """Nodes."""
 
     def function(self, function: str) -> FunctionName:
-        """Read, check and compile a function of place and time in a Python file, "file.py:function"
-        (docs/user_laws.md): a value for conditions of nodes and faces. Before `sim.restore` it names the function."""
+        """Read, check and compile a user function of position and time in a Python file, "file.py:function"
+        (docs/user_laws.md), as a value for conditions of nodes and faces. Before `sim.restore` it names the function.
+        """
         self._do("node function", {"function": function})
         return FunctionName(function)
 
     def move(self, type: int, along: Point | None = None, *, where: Where = None) -> None:
-        """Freedom of nodes: 0 free, 1 held, 2 along a vector only, 3 (in three dimensions) across it only."""
+        """Constrain nodes: 0 free, 1 fixed, 2 free only along a vector, 3 (in three dimensions) free only across it."""
         given = {"type": (type,) if along is None else (type, along)}
         self._do("node boundary", given, where, self.kind, "mechanical-move-boundary-constraint")
 
     def field(self, name: str, value: Number, *, where: Where = None) -> None:
-        """The value of a field of elements, as "moisture", from now on: a number or the name of a table over its
-        time."""
+        """Prescribe the value of a field of elements, for example "moisture": a number or the name of a table over the
+        time of the field.
+        """
         self._do("node boundary", {name: value}, where, self.kind, f"{name}-boundary-condition")
 
     def initial_field(self, name: str, value: float, *, where: Where = None) -> None:
-        """The value of a field of elements, as "moisture", now; elements around the nodes are free of the stress that
-        it brings then."""
+        """Set the present value of a field of elements, for example "moisture"; the elements around the nodes are then
+        free of stress caused by it.
+        """
         self._do("node initial", {name: value}, where, self.kind)
 
 
@@ -226,8 +234,9 @@ class Tabled(Words):
     _word = "tables"
 
     def create(self, name: str, values: Sequence[Point], *, relative: bool | None = None) -> None:
-        """(time [s], coordinate [m] or plastic strain, value), the first ascending. relative: times count from the
-        moment at which a condition takes the table."""
+        """Create a table of (x, value), with x = time [s], coordinate [m] or plastic strain, ascending. relative: times
+        count from the moment at which a condition begins to use the table.
+        """
         if relative is None:
             self._do("table create", {"name": name, "values": values})
             return
@@ -236,8 +245,9 @@ class Tabled(Words):
         self._do("table", {"name": name, "data": numbers, "type": {"value": True, word: True}})
 
     def over(self, name: str, axis: str) -> Over:
-        """Make the value of a property from a table over "x", "y" or in space "z" in the mesh, over "plastic-strain"
-        (what softens or hardens), or over "temperature" (moduli and strengths)."""
+        """Return the value of a property that follows a table over "x", "y" or in space "z" in the mesh, over
+        "plastic-strain" (softening or hardening), or over "temperature" (moduli and strengths).
+        """
         if axis not in AXES:
             raise ValueError(f"axis: expected {', '.join(map(repr, AXES))}, got {axis!r}")
         return Over(name, AXES.index(axis))
@@ -250,7 +260,7 @@ class Random(Words):
     _word = "fields"
 
     def drawn(self, name: str) -> Drawn:
-        """Make the value of a property drawn from this field."""
+        """Return the value of a property that is drawn from this field."""
         return Drawn(name)
 
 
@@ -278,10 +288,11 @@ class Recorded(Words):
         well: str | None = None,
         where: Where = None,
     ) -> None:
-        """Follow a value of a "node", "element", "joint", a part of bolts or liners ("bolt-node", "liner-element"), a
-        "flow-node", a "flow-channel", a "well" (well: its name) or of the "model": of one (id, or nearest to a point),
-        or of those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many steps. variable:
-        with the value "law-state", which state variable of user laws."""
+        """Record a value of a "node", "element", "joint", a part of bolts or liners ("bolt-node", "liner-element"), a
+        "flow-node", a "flow-channel", a "well" (well: its name) or of the "model", at an interval of steps: of one
+        object (id, or nearest to a point), or of those of a range or of all by how: "sum", "mean", "minimum",
+        "maximum". variable: for the value "law-state", the state variable of user laws.
+        """
         words = value.replace("_", "-") if isinstance(value, str) else value
         given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,
                  "variable": variable, "well": well}  # fmt: skip
@@ -300,8 +311,9 @@ class Clocks(Words, Accounts):
         return ask(self._do.project())
 
     def cycle_option(self, part: str, *, time_step: float | None = None, cycle_number: int | None = None) -> None:
-        """Time step [s] and number of steps of a part ("mechanical", "thermal", "hydraulic", "proppant-transport") in a
-        cycle of a coupled calculation."""
+        """Set the time step [s] and the number of steps of a part ("mechanical", "thermal", "hydraulic",
+        "proppant-transport") in a cycle of a coupled calculation.
+        """
         self._of_part("model cycle-option", part, time_step=time_step, cycle_number=cycle_number)
 
     def reset_clock(
@@ -315,16 +327,17 @@ class Clocks(Words, Accounts):
         """Set the clock of a part, the origin of `run_time`, and its time step [s]; parts: see `cycle_option`."""
         self._of_part("model reset", part, current_time=current_time, start_time=start_time, time_step=time_step)
 
-    def tell_time(self, part: str) -> None:
-        """Say in the log what time a part has come to; parts: see `cycle_option`."""
+    def report_time(self, part: str) -> None:
+        """Log the present time of a part; parts: see `cycle_option`."""
         self._of_part("model query", part, time=True)
 
     def _of_part(self, command: str, part: str, **given: Any) -> None:
         self._do(command, {part: {"value": True, **{name: v for name, v in given.items() if v is not None}}})
 
     def field_account(self, name: str) -> dict[str, float]:
-        """The account of a field of elements, as "moisture": given, commands, stored, removed; what does not add up.
-        Collective."""
+        """Return the budget of a field of elements, for example "moisture": given, commands, stored, removed; closing
+        error. Collective.
+        """
         return fdem.fields.account(self._do.project(), name)
 
     @property
@@ -344,7 +357,7 @@ class Clocks(Words, Accounts):
 
 
 def quantities(kind: str) -> list[str]:
-    """Names of what objects of a kind have."""
+    """Return the names of the quantities of objects of a kind."""
     return list(RECORDED.get("joint" if kind == g.JOINT else kind, ()))
 
 

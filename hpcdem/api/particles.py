@@ -11,7 +11,7 @@ from hpcdem.api.functions import WRITTEN, Function, commands
 
 @commands
 class ParticleCommands:
-    """The methods of a `Simulation` for particles."""
+    """Methods of a `Simulation` for particles."""
 
     box = Function("walls.box")
     wall = Function("walls.wall", "id nodes")

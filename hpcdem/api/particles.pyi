@@ -11,7 +11,7 @@ from hpcdem.api.types import File, Selected
 from hpcdem.core.material import Material
 
 class ParticleCommands:
-    """The methods of a `Simulation` for particles."""
+    """Methods of a `Simulation` for particles."""
     def box(
         self,
         left: float,
@@ -22,11 +22,11 @@ class ParticleCommands:
         ks: float = 0.0,
         fric: float = 0.0,
     ) -> None:
-        """BOX: four walls around the space of the model; particles that leave it are deleted.
+        """BOX: make four walls around the model; particles that leave the box are deleted.
 
         Parameters
         ----------
-        left, right, bottom, height : its sides [m]; the height is measured from the bottom.
+        left, right, bottom, height : left, right and bottom coordinate and height above the bottom [m].
         kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient of the walls.
         """
     def wall(
@@ -42,26 +42,27 @@ class ParticleCommands:
         yv: float | None = None,
         delete: bool = False,
     ) -> None:
-        """WALL: make a wall from node to node, or change or delete the one with this id; what is left out stays.
+        """WALL: make a wall from node to node, or change or delete the wall with this id; omitted properties keep their
+        values.
 
         Parameters
         ----------
-        id : number of the wall.
-        nodes : its ends, ((x, y), (x, y)) [m]; both sides act, unless set(wallside="left").
+        id : id of the wall.
+        nodes : end points, ((x, y), (x, y)) [m]; both sides act, unless set(wallside="left").
         kn, ks, fric : normal and shear stiffness [N/m], for particles of the linear law, and friction coefficient.
-        color : name or number.
-        xv, yv : velocity, until it is changed [m/s].
-        delete : remove the wall with its contacts; accepts only id.
+        color : colour by name or number.
+        xv, yv : velocity [m/s]; it holds until it is changed.
+        delete : bool: remove the wall with its contacts; accepts only id.
         """
     def periodic(self, x: tuple[float, float]) -> None:
-        """PERIODIC: the sides x = left and x = right become one: particles that leave through one enter through the
-        other,
-        and touch across them. Horizontal walls that span both continue without an end; BOX loses its left and right
-        wall.
+        """PERIODIC: make x = left and x = right periodic boundaries: particles that leave through one enter through the
+        other, and are in contact across them. Horizontal walls that span both continue without an end; BOX loses its
+        left
+        and right walls.
 
         Parameters
         ----------
-        x : the sides, (left, right) [m]; those of BOX, if there is one.
+        x : coordinates of the boundaries, (left, right) [m] (default: those of BOX).
         """
     def ball(
         self,
@@ -72,14 +73,14 @@ class ParticleCommands:
         color: str | int = 0,
         group: str = '***',
     ) -> None:
-        """BALL: one particle.
+        """BALL: create one particle.
 
         Parameters
         ----------
-        x, y : place of its centre [m].
+        x, y : coordinates of the centre [m].
         rad : radius [m].
-        id : number; left out, the next free one.
-        color, group : name or number; name.
+        id : id of the particle (default: the next free one).
+        color, group : colour by name or number; name of the group.
         """
     def gen(
         self,
@@ -90,22 +91,23 @@ class ParticleCommands:
         color: str | int = 0,
         group: str = '***',
     ) -> int:
-        """GEN num: random insertion without overlap; also across periodic sides, if x are these.
+        """GEN num: insert particles at random positions without overlap; across periodic boundaries too, if these bound
+        x.
 
-        Scripts ask for far more than fit: it gives up after FAILURES attempts in a row that found no room, or after
-        SET
-        gentry attempts per particle requested, if that is set.
+        Scripts request far more particles than fit. The command stops after FAILURES consecutive attempts without
+        success
+        or, with SET gentry, after that many attempts per requested particle.
 
         Parameters
         ----------
-        num : number of particles to place.
-        rad : radii that are drawn from [m].
-        x, y : sides of the rectangle, (least, greatest) [m].
-        color, group : name or number; name.
+        num : number of particles requested.
+        rad : radii, of which each particle gets one at random; a repeated one is more likely [m].
+        x, y : bounds of the rectangle, (least, greatest) [m].
+        color, group : colour by name or number; name of the group.
 
         Returns
         -------
-        int : how many found room.
+        int : number of particles created.
         """
     def gen_grid(
         self,
@@ -116,18 +118,18 @@ class ParticleCommands:
         color: str | int = 0,
         group: str = '***',
     ) -> int:
-        """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad).
+        """GEN grid: create a particle at each node of a square lattice of spacing 2 max(rad).
 
         Parameters
         ----------
-        rad : radii that are drawn from [m].
-        x, y : sides of the rectangle, (least, greatest) [m].
-        idmin : first number; left out, the next free one.
-        color, group : name or number; name.
+        rad : radii, of which each particle gets one at random; a repeated one is more likely [m].
+        x, y : bounds of the rectangle, (least, greatest) [m].
+        idmin : id of the first particle (default: the next free one).
+        color, group : colour by name or number; name of the group.
 
         Returns
         -------
-        int : how many were made.
+        int : number of particles created.
         """
     def gline(
         self,
@@ -142,19 +144,19 @@ class ParticleCommands:
         color: str | int = 0,
         group: str = '***',
     ) -> int:
-        """GLINE: a row of particles from p1 towards p2, of spacing 2 rad cratio; overlaps are not checked.
+        """GLINE: create a row of particles from p1 towards p2 with spacing 2 rad cratio; overlaps are not checked.
 
         Parameters
         ----------
-        p1, p2 : ends, (x, y) [m].
+        p1, p2 : end points, (x, y) [m].
         rad : radius [m].
-        cratio : distance of neighbours over the sum of their radii.
+        cratio : distance of neighbouring centres over the sum of their radii.
         kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient.
-        color, group : name or number; name.
+        color, group : colour by name or number; name of the group.
 
         Returns
         -------
-        int : how many were made.
+        int : number of particles created.
         """
     def load(
         self,
@@ -163,19 +165,19 @@ class ParticleCommands:
         x: tuple[float, float] | None = None,
         y: tuple[float, float] | None = None,
     ) -> int:
-        """LOAD: a new model from rows "x y r [group]" [m], or from a frame all_<step>.dat of ZDEM or hpcdem with all
-        that
-        it holds (commands/dem/frame_state.py).
+        """LOAD: make a new model from rows "x y r [group]" [m], or from a frame all_<step>.dat of ZDEM or hpcdem with
+        its
+        complete state (commands/dem/frame_state.py).
 
         Parameters
         ----------
-        file : the file.
-        scale : factor on all lengths, of rows.
-        x, y : only centres in these ranges, (least, greatest), in the numbers of the file.
+        file : path of the file.
+        scale : factor on all lengths, if the file has rows.
+        x, y : load only centres in these ranges, (least, greatest), in the units of the file.
 
         Returns
         -------
-        int : how many there are.
+        int : number of particles.
         """
     def section(
         self,
@@ -199,34 +201,36 @@ class ParticleCommands:
         s_bond: float | None = None,
         where: Selected = None,
     ) -> int:
-        """SECTION: use the polygons or the lines of a file .geojson, .json, .shp, .svg, .dxf or of an image.
+        """SECTION: apply the polygons or lines of a file .geojson, .json, .shp, .svg, .dxf or of an image to the
+        particles.
 
-        Without further words, particles with their centres in a polygon get its name as group, and its attributes
-        that are
+        By default, particles whose centres lie in a polygon get its name as group, and those of its attributes that
+        are
         properties (density, fric, kn, ...) or color; later polygons of the file cover earlier ones. With rad, the
         polygons
-        are filled with new particles. With cut, bonds that cross a line are removed; with bond properties they get
-        these.
+        are filled with new particles. With cut, bonds that cross a line are removed; with bond properties, these are
+        assigned to them.
 
         Parameters
         ----------
-        file : the section.
-        scale : metres per unit of the file; left out, as the file says, else 1.
-        origin, to : point of the file, in its units, and where it is in the model [m].
+        file : path of the section.
+        scale : metres per unit of the file (default: as given in the file, else 1).
+        origin, to : point of the file, in its units, and the corresponding point of the model [m].
         line : two points of a map, in its units: x is the distance along the line through them, y the height (z).
-        legend : of an image: a file with lines colour, name.
-        attribute : whose value is the name, of GeoJSON and shapefiles; left out, name, layer, unit, ... or id.
-        only : names of the polygons and lines that are used; left out, all.
-        rad : radii of new particles that are drawn from [m].
-        porosity : of the filled polygons; 0.2.
-        cut : remove the bonds that cross a line.
-        ebmod, gbmod, tstrength, sstrength : of elastic bonds that cross a line [Pa].
-        n_bond, s_bond : of contact bonds that cross a line [N].
-        where : the particles, of new ones none; of a bond both.
+        legend : for an image: path of a file with rows colour, name.
+        attribute : attribute whose value is the name, for GeoJSON and shapefiles (default: name, layer, unit, ... or
+            id).
+        only : names of the polygons and lines to use (default: all).
+        rad : radii of new particles, drawn at random; a repeated one is more likely [m].
+        porosity : porosity of the filled polygons (default: 0.2).
+        cut : bool: remove the bonds that cross a line.
+        ebmod, gbmod, tstrength, sstrength : properties of elastic bonds that cross a line [Pa].
+        n_bond, s_bond : strengths of contact bonds that cross a line [N].
+        where : particles to change (default: all); of a bond both must be selected; not for new particles.
 
         Returns
         -------
-        int : how many particles got a group or are new, or how many bonds changed.
+        int : number of particles that got a group or were created, or number of bonds changed.
         """
     def surface(
         self,
@@ -258,30 +262,31 @@ class ParticleCommands:
 
         Parameters
         ----------
-        id : number of the process; a second command with it replaces the first.
+        id : id of the process; a second command with this id replaces the first.
         interval : steps between two applications.
-        x : range in which it acts, (least, greatest) [m]; left out, as far as the particles reach.
-        spacing : width of the columns [m]; left out, four times the largest radius.
+        x : range in which it acts, (least, greatest) [m] (default: the extent of the particles).
+        spacing : width of the columns [m] (default: four times the largest radius).
         diffuse : coefficient of diffusion of the heights [m2/s].
-        slope : largest angle of the surface [deg]; what is steeper slides down.
+        slope : largest stable angle of the surface [deg]; steeper parts slide down.
         erode, above : rate of erosion [m/s], and the level down to which it acts [m]; a level alone acts at once.
-        deposit, below : rate of deposition [m/s], and the level up to which it acts [m]; a level alone: a layer as
-            thick as
-            a column is wide at each application, until the level is met.
-        rise : velocity of the levels, upwards, from the command on [m/s].
+        deposit, below : rate of deposition [m/s], and the level up to which it acts [m]; a level alone: each
+            application
+            deposits a layer as thick as a column is wide, until the level is reached.
+        rise : upward velocity of the levels, from the command on [m/s].
         years : years that a second of the model stands for; diffuse, erode, deposit and rise are then per year.
-        only : groups of which discs may be eroded; others protect what is under them. Left out, all.
-        rad : radii of deposited discs that are drawn from [m].
-        porosity : of what is eroded and deposited: bulk area is area of discs / (1 - porosity); 0.15.
-        compact : of the deposit: porosity of the sediment at the surface, and depth at which it is smaller by e [m];
-            discs
-            shrink as they are buried and keep their mass.
-        group : of the deposit; growth.
-        episode : steps after which a new group begins, growth1, growth2, ...
-        colors : of these groups in turn, names.
-        off : end the process.
-        hertz : contacts of Hertz and Mindlin, by shear [Pa] and poiss.
-        properties : of the deposit, as in PROP.
+        only : groups whose discs may be eroded; other groups protect what lies below them (default: all).
+        rad : radii of deposited discs, drawn at random; a repeated one is more likely [m].
+        porosity : porosity of eroded and deposited material: bulk area = area of discs / (1 - porosity) (default:
+            0.15).
+        compact : compaction of the deposit: porosity at the surface, and depth at which it has decreased by a factor
+            e [m];
+            discs shrink during burial and keep their mass.
+        group : group of the deposited discs (default: growth).
+        episode : number of steps after which a new group begins: growth1, growth2, ...
+        colors : names of the colours of these groups, in turn.
+        off : bool: end the process.
+        hertz : bool: contacts of Hertz and Mindlin, defined by shear [Pa] and poiss.
+        properties : properties of the deposit, as in PROP.
         """
     def clump(
         self,
@@ -293,21 +298,23 @@ class ParticleCommands:
         color: str | int = 0,
         group: str = '***',
     ) -> int:
-        """CLUMP file: rigid bodies of discs from a clump file, scaled, turned about its origin, then moved.
+        """CLUMP file: create rigid bodies of discs from a clump file, scaled, rotated about the origin of the file,
+        then
+        translated.
 
         Mass and inertia are density times the area and polar second moment of area in the file.
 
         Parameters
         ----------
-        file : the file.
-        x, y : way [m].
-        angle : of the turn [rad].
+        file : path of the clump file.
+        x, y : translation [m].
+        angle : rotation angle, anticlockwise [rad].
         scale : factor on all lengths.
-        color, group : name or number; name.
+        color, group : colour by name or number; name of the group.
 
         Returns
         -------
-        int : how many bodies.
+        int : number of rigid bodies created.
         """
     def flexure(
         self,
@@ -336,57 +343,59 @@ class ParticleCommands:
 
         Parameters
         ----------
-        wall : id of the wall, which becomes a polyline; or where: the particles of the row.
-        rigidity : flexural rigidity [N m]; or young, poisson, te: Young's modulus [Pa], Poisson's ratio, elastic
-            thickness
-            [m].
-        contrast : density of the fluid below minus that of what fills the deflection, without the particles [kg/m3].
+        wall : id of the wall, which becomes a polyline; or instead where: the particles of the row.
+        rigidity : flexural rigidity [N m]; or instead young [Pa], poisson and te: Young's modulus, Poisson's ratio
+            and
+            elastic thickness [m].
+        contrast : density of the fluid below minus density of the infill of the deflection, particles excluded
+            [kg/m3].
         x : left and right end of the plate, if it is longer than the base [m].
         left, right : "infinite" (continues without load), "free" or "broken", "clamped" or "fixed".
-        load : a constant line load: x [m] and size, downwards [N/m].
-        compensated : the mean load of the first interval is in equilibrium with the undeformed base.
-        interval : steps between two solutions of the plate: the base moves in the first half and rests in the
-            second.
-        relax : share of the distance to equilibrium that the base moves in an interval.
-        speed : largest speed of the base [m/s]; otherwise 1e-3 of the largest radius in a step.
-        segments : of the base; otherwise 20 per flexural parameter, at least 50.
-        off : the base stays where it is.
+        load : constant line load: x [m] and size, positive downwards [N/m].
+        compensated : bool: the mean load of the first interval is in equilibrium with the undeformed base.
+        interval : steps between two solutions of the plate: the base moves in the first half and rests in the second
+            half.
+        relax : fraction of the distance to equilibrium by which the base moves in an interval, 0 to 1.
+        speed : largest speed of the base [m/s] (default: 1e-3 of the largest radius per step).
+        segments : number of segments of the base (default: 20 per flexural parameter, at least 50).
+        off : bool: end the flexure; the base keeps its present shape.
         """
     def join(self, where: Selected, group: str | None = None, color: str | int | None = None) -> int:
-        """CLUMP RANGE: make one clump of the chosen particles; returns how many they are.
+        """CLUMP RANGE: join the selected particles into one clump and return their number.
 
-        Area and polar second moment of area are the sums of those of the discs, overlaps counted twice; it moves on
-        with
-        their momentum and angular momentum. CommandError if the particles are bonded to each other, or differ in
-        density,
-        damping or fixed directions.
+        Area and polar second moment of area are the sums of those of the discs, overlaps counted twice; the clump
+        keeps the
+        momentum and angular momentum of the particles. Raises CommandError if the particles are bonded to each other
+        or
+        differ in density, damping or fixed directions.
         """
     def delete(self, where: Selected = None) -> int:
-        """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
+        """DEL: remove particles with their contacts and bonds, and return their number. Their ids are not reused."""
     def twin(self, number: int, *, where: Selected = None) -> int:
-        """TWIN: move one free particle by 1e-5 of its radius, for runs that differ by no more than that.
+        """TWIN: displace one free particle by 1e-5 of its radius, to compare runs that differ only by this
+        displacement.
 
         Parameters
         ----------
-        number : of the twin; it draws the particle and the direction. 0 is the model itself: nothing moves.
-        where : the particles of which one is drawn; members of clumps and particles fixed in x or y are not.
+        number : number of the twin; it determines the particle and the direction. 0 is the undisturbed model.
+        where : particles from which one is drawn; members of clumps and particles fixed in x or y are excluded.
 
         Returns
         -------
-        int : id of the particle, -1 for twin 0.
+        int : id of the particle; -1 for twin 0.
 
         Raises
         ------
-        CommandError : if no such particle is free.
+        CommandError : if the selection contains no free particle.
         """
     def export(self, file: File, group: bool = False, where: Selected = None) -> None:
-        """EXP: rows "x y r [group]" in the order of ids, 13 significant digits.
+        """EXP: write rows "x y r [group]" in the order of ids, with 13 significant digits.
 
         Parameters
         ----------
-        file : the file.
-        group : with the names of groups.
-        where : the particles.
+        file : path of the file.
+        group : bool: write the names of groups as a fourth column.
+        where : particles to write (default: all).
         """
     def prop(
         self,
@@ -403,27 +412,28 @@ class ParticleCommands:
         parameter: Mapping[str, float] | None = None,
         **properties: Unpack[Material],
     ) -> None:
-        """PROP: properties, velocities, colour and group of particles; what is left out stays.
+        """PROP: assign properties, velocities, colour and group to particles; omitted ones keep their values.
 
-        A density is per volume, or per area when SET disk makes disks. Properties of Hertz and Mindlin are taken
-        with
-        `hertz`; kn or ks without it give the linear law. Contacts use the new values from the next step. Velocities
-        of
-        a clump are those of its centre; its members follow.
+        A density is per volume, or per area when SET disk makes disks. With `hertz`, contacts follow Hertz and
+        Mindlin; kn
+        or ks without it select the linear law. Contacts use the new values from the next step. Velocities of a clump
+        are
+        those of its centre; its members follow.
 
         Parameters
         ----------
-        where : the particles.
-        hertz : contacts of Hertz and Mindlin, by shear [Pa] and poiss.
+        where : particles to change (default: all).
+        hertz : bool: contacts of Hertz and Mindlin, defined by shear [Pa] and poiss.
         xv, yv, spin : velocity [m/s] and angular velocity, anticlockwise [rad/s].
-        color, group : name or number; name.
+        color, group : colour by name or number; name of the group.
         law : 'file.py:function' beside the program (docs/user_laws.md), or "linear".
-        between : the law is that of pairs of discs with these two laws; nothing else is set.
-        parameter : properties that the law declares.
+        between : bool: assign the law to pairs of discs with these two laws; nothing else is changed.
+        parameter : values of the properties that the law declares.
         properties : density [kg/m3], of discs of unit thickness [kg/m2]; fric; shear [Pa]; poiss; damp; kn, ks
             [N/m];
-            rfric, rdamp: coefficient of rolling resistance, damping over the critical one;
-            xp, yp: pressures that push along x and y, on 2 R thickness of each particle [Pa].
+            rfric, rdamp: coefficient of rolling resistance, damping over the critical one; xp, yp: pressures along x
+        and y,
+            each acting on the area 2 R thickness of a particle [Pa].
         """
     def bond(
         self,
@@ -442,90 +452,94 @@ class ParticleCommands:
         conserving: bool = False,
         moment: bool = False,
     ) -> int:
-        """PROP with bond keys: bond the pairs that touch, renew the bonds that are there.
+        """PROP with bond keys: bond touching pairs and update existing bonds.
 
         Pairs are those with d - (Ra + Rb) rext <= tolerate. Either ebmod, gbmod, tstrength, sstrength (elastic
-        bonds)
-        or n_bond, s_bond (contact bonds). What is left out stays, or is 0 in a new bond.
+        bonds) or
+        n_bond, s_bond (contact bonds). Omitted properties keep their values; in new bonds they are 0.
 
         Parameters
         ----------
-        where : particles; both of a pair are among them.
+        where : particles whose pairs are bonded; both particles of a pair must be selected.
         ebmod, gbmod : Young's and shear modulus of elastic bonds [Pa].
         tstrength, sstrength : their tensile strength and cohesion [Pa].
         n_bond, s_bond : tensile and shear strength of contact bonds [N].
-        tolerate : largest gap that is bonded [m]; 1e-6.
-        rext : factor on the radii in the search for pairs; 1.
+        tolerate : largest gap across which a pair is bonded [m] (default: 1e-6).
+        rext : factor on the radii in the search for pairs (default: 1).
         fric : friction coefficient of the particles.
-        rubber : mark the bonds as those of a membrane, without any effect on the motion.
-        conserving : one shear stiffness, touching or open, so that opening and closing make no energy (of a contact
-            bond of
-            Hertz particles that at the moment of bonding).
-        moment : elastic bonds resist relative rotation, and break in tension by the stress at their outer fibre.
+        rubber : bool: mark the bonds as those of a membrane; the motion does not depend on it.
+        conserving : bool: use one shear stiffness for open and touching bonds, so that opening and closing conserve
+            energy;
+            for contact bonds of Hertz particles, the stiffness at the moment of bonding.
+        moment : bool: elastic bonds resist relative rotation and break in tension by the stress at their outer
+            fibre.
 
         Returns
         -------
-        int : how many are new.
+        int : number of new bonds.
         """
     def break_bonds(self, where: Selected = None, across: Sequence[np.ndarray] | None = None) -> int:
-        """BOND break: remove the bonds with both ends in `where`; how many. Shear forces stay, limited by friction from
-        then on.
+        """BOND break: remove the bonds between particles of a selection; friction limits their shear forces from then
+        on.
 
         Parameters
         ----------
-        where : particles; both of a pair are among them.
-        across : lines, of points (n, 2) [m]: only bonds that cross one of them; left out, all.
+        where : particles; a bond is removed if both of its particles are selected (default: all).
+        across : polylines, arrays of points (n, 2) [m]: remove only bonds that cross one of them (default: no
+            restriction).
         """
     def fix(self, *dofs: str, where: Selected = None) -> None:
-        """FIX: these of "x", "y", "spin" keep the velocity they have."""
+        """FIX: keep the present velocity of particles in these directions: "x", "y", "spin"."""
     def free(self, *dofs: str, where: Selected = None) -> None:
-        """FREE: undo `fix`."""
+        """FREE: undo `fix` for these directions."""
     def add_physics(self, name: str, **parameters: float) -> None:
-        """Physics on the particles beside their motion, from the next step on. There is "diffusion": heat through
-        contacts; conductance of each [W/K], capacity [J/(kg K)]; fields temperature [K], heat_source [W], heat_given
-        [J]; HIST follows heat and heat_given [J], which are columns of energy.csv.
+        """Add physics to the particles, effective from the next step. "diffusion": heat conduction through contacts,
+        with
+        conductance of each contact [W/K] and capacity [J/(kg K)]; fields temperature [K], heat_source [W],
+        heat_given [J];
+        HIST can record heat and heat_given [J], which are also columns of energy.csv.
         """
     def hist(self, id: int, interval: int, what: str) -> None:
-        """HIST: record kinetic, step, time, unbalanced, contacts, bonds, energy, deflection, sxx, syy or sxy, or
-        "gstress group a", "gstrain group a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in
-        hist_id_<id>.dat and hist_<id>.csv; strains begin at 0 here.
+        """HIST: record a quantity every `interval` steps in hist_id_<id>.dat and hist_<id>.csv: kinetic, step, time,
+        unbalanced, contacts, bonds, energy, deflection, sxx, syy or sxy, or "gstress group a", "gstrain group a|b",
+        "xstress wall 3", "ystrain wall 0|3". Strains are zero at this command.
         """
     def plot(self, y: int, x: int) -> None:
         """PLOT: at `finish`, write history y against history x."""
     def extents(self) -> dict[str, float]:
-        """{left, right, bottom, top} of the particles that are not fixed in both x and y [m]."""
+        """Return {left, right, bottom, top} of the particles that are not fixed in both x and y [m]."""
     def wall_force(self, id: int) -> tuple[float, float]:
-        """Force on a wall (x, y) [N], exactly summed."""
+        """Return the force on a wall (x, y) [N], summed exactly."""
     def wall_forces(self) -> dict[int, tuple[float, float]]:
-        """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
+        """Return the force on every wall (x, y) [N] by id, with one pass over the contacts."""
     def stress(self, y: tuple[float, float] | None = None) -> dict[str, float]:
-        """Mean stress between periodic sides: {sxx, syy, sxy} [Pa], positive in compression; sxy is the force in x
-        across
-        horizontal lines.
+        """Return the mean stress between periodic boundaries, {sxx, syy, sxy} [Pa], positive in compression; sxy is the
+        force in x across horizontal lines.
 
         Parameters
         ----------
-        y : heights, (lower, upper) [m]; left out, those of BOX.
+        y : heights, (lower, upper) [m] (default: those of BOX).
         """
     def kinetic_energy(self) -> float:
-        """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
+        """Return the kinetic energy, the sum of (m v^2 + I w^2) / 2 [J], summed exactly."""
     def unbalanced(self) -> float:
-        """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
+        """Return the largest unbalanced force of a free particle over the mean contact force; small at equilibrium."""
     def surface_balance(self, id: int) -> dict[str, float]:
-        """The balance of a process of SURFACE.
+        """Return the mass and area balance of a process of SURFACE.
 
         Returns
         -------
-        dict : bulk areas [m2] eroded, deposited (discs at rest), settling (not yet at rest), lost (deleted before
-            they were
-            at rest), carried (demanded, less than a disc, not yet met; negative: erosion), demanded (the sum that
+        dict : bulk areas [m2]: eroded; deposited (discs at rest); settling (discs not yet at rest); lost (deleted
+            before
+            they came to rest); carried (demand smaller than a disc, not yet met; negative: erosion); demanded (sum
+            requested by the processes: deposited + settling + lost - eroded + carried); compacted (lost as discs of
         the
-            processes wanted: deposited + settling + lost - eroded + carried), compacted (lost by discs of the
-        deposit as
-            they shrink, part of the deposited area); discs_eroded, discs_deposited,
-            discs_settling; mass_eroded, mass_deposited [kg].
+            deposit shrink, part of the deposited area). Numbers: discs_eroded, discs_deposited, discs_settling.
+        Masses
+            [kg]: mass_eroded, mass_deposited.
         """
     def clumps(self) -> dict[str, np.ndarray]:
-        """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
-        spin, angle, area, mass, inertia, members (how many).
+        """Return the clumps of the whole model on every rank, in the order of ids: id (that of the first member), x y
+        [m],
+        vx vy [m/s], spin [rad/s], angle [rad], area, mass, inertia, members (their number).
         """

@@ -20,7 +20,7 @@ _OWN_NAME = re.compile(r"^\w+(\.\w+)*\(\) ")
 
 
 def spelt(options: dict[str, Any], names: Collection[str]) -> dict[str, Any]:
-    """Arguments by the names that a method has: color is colour, and center is centre."""
+    """Return the arguments by the names of the method: color is colour, and center is centre."""
     twins = {name: TWINS[name] for name in options if name not in names and TWINS.get(name) in names}
     if any(twin in options for twin in twins.values()):
         return options  # both: the method says that one is too many
@@ -31,7 +31,8 @@ def carried_out(
     at: tuple[str, int], name: str, make: Callable[[], Any], advice: str = HELP, names: Collection[str] = ()
 ) -> Any:
     """Return the result of `make`. Errors of a command, and values of a wrong type, get file and line of the program.
-    names: arguments of the method, of which the nearest is suggested for a mistyped one."""
+    names: arguments of the method; the nearest is suggested for a mistyped one.
+    """
     session.refuse_after_stop()
     try:
         return make()

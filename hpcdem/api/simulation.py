@@ -43,7 +43,7 @@ Returned = TypeVar("Returned")
 
 @dataclass(frozen=True)
 class Wall:
-    """A wall as it is now: end points, velocity [m/s], stiffnesses [N/m] (linear particles), friction."""
+    """The present state of a wall: end points, velocity [m/s], stiffnesses [N/m] (linear particles), friction."""
 
     p1: Point
     p2: Point
@@ -54,13 +54,13 @@ class Wall:
 
 
 class Call:
-    """A function that is called every so many steps; `cancel` ends that."""
+    """A function that is called at an interval of steps; `cancel` ends the calls."""
 
     def __init__(self, sim: Simulation, watcher: Any) -> None:
         self._sim, self._watcher = sim, watcher
 
     def cancel(self) -> None:
-        """Do not call it any more."""
+        """End the calls of the function."""
 
         def remove() -> None:
             if self._watcher in self._sim.engine.watchers:
@@ -70,20 +70,19 @@ class Call:
 
 
 class Simulation(ParticleCommands, BlockCommands):
-    """A model and its run: particles, blocks, or both. Born empty, as after START.
+    """A model and its run: particles, blocks, or both. A new model is empty, as after START.
 
-    Particles are made by the methods of this class, blocks by those of `mesh`, `elements`, `faces`, `joints`, `nodes`,
-    `geometry`, `tables`, `fields`, `histories`, `charts` and `output`, and are stepped by `step` and `solve`. `couple`
-    lets the two touch. Whichever comes second writes into a folder of its own below that of the results, `particles` or
-    `blocks`.
+    The methods of this class make particles; those of `mesh`, `elements`, `faces`, `joints`, `nodes`, `geometry`,
+    `tables`, `fields`, `histories`, `charts` and `output` make blocks, which `step` and `solve` advance. `couple`
+    couples the two. The one made second writes into a subfolder of the output folder, `particles` or `blocks`.
 
-    outdir: folder of the results (default: ``data`` beside the program); threads: per rank (default: what ``-j`` or
-    ``srun -c`` gives, else 1); log: print progress and the table of stages. Relative file names, here and in all
-    methods, begin at `directory`: where the program lies, or the present folder in a conversation.
+    outdir: output folder (default: ``data`` in the folder of the program); threads: per rank (default: from ``-j`` or
+    ``srun -c``, else 1); log: print progress and the table of stages. Relative file names, here and in all methods, are
+    relative to `directory`: the folder of the program, or in an interactive session the working directory.
 
-    where: the particles that a method acts on, as the text of a RANGE (``"y 0 1000 and group rock"``,
-    ``"y {top}-500 {top}"``) or an object of `hpcdem.core.selection`; left out, all of them. color: a name or number of
-    the manual's table (lg green yellow red white black mg blue gb violet). Units are SI.
+    where: particles to which a method applies, as the text of a RANGE (``"y 0 1000 and group rock"``, ``"y {top}-500
+    {top}"``) or an object of `hpcdem.core.selection` (default: all). color: a name or number of the table of the manual
+    (lg green yellow red white black mg blue gb violet). Units are SI.
     """
 
     def __init__(self, outdir: str | Path | None = None, threads: int | None = None, log: bool = True) -> None:
@@ -102,7 +101,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @property
     def engine(self) -> Engine:
-        """The particles, of `hpcdem.physics.dem`; made when they are first used."""
+        """The particle model, of `hpcdem.physics.dem`; made on first use."""
         if self._engine is None:
             folder = self._folder if self._project is None else self._folder / "particles"
             self._engine = self._session.simulation(folder, self._log)
@@ -156,7 +155,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @_command
     def start(self, dim: int = 2) -> None:
-        """START, model new: forget everything and begin a new, empty model; dim 3: of blocks in three dimensions."""
+        """START, model new: discard the model and begin a new, empty one; dim 3: blocks in three dimensions."""
         self._refuse_coupled("start")
         if dim != 2:
             self._made_project()
@@ -193,22 +192,22 @@ class Simulation(ParticleCommands, BlockCommands):
         energy: int | None = None,
         **others: int,
     ) -> None:
-        """SET: choose settings of the model. What is left out stays as it is.
+        """SET: change settings of the model. Omitted settings keep their values.
 
         Parameters
         ----------
-        units, outdir : system of units of the input; folder of the results.
+        units, outdir : system of units of the input; output folder.
         disk : "on" (discs of unit thickness), "off" (spheres) or "hex".
-        dt, frac : time step [s]; or part of the critical time step.
+        dt, frac : time step [s]; or instead a fraction of the critical time step.
         gravity : (gx, gy) [m/s2].
-        lsm, restitution : damping of the old manual; coefficient of restitution of contacts, 0 to 1.
+        lsm, restitution : damping as in the old manual; coefficient of restitution of contacts, 0 to 1.
         rolling : type of rolling resistance: "a" constant torque, "c" elastic-plastic spring and dashpot.
-        seed, gentry : first number of random places; tries of GEN for each particle.
-        thickness : of the model across the plane [m], for stress.
-        wallside : "left" or "both": the sides of walls that push.
-        print, save, ps, vtk, stepbar, energy : steps between frames, checkpoints, vector pictures, .vtk files, lines of
-            progress and rows of the energy account; 0 turns one off.
-        others : outputs of a kind that was added.
+        seed, gentry : seed of the random positions; attempts of GEN per particle.
+        thickness : thickness of the model across the plane, for stresses [m].
+        wallside : "left" or "both": the active sides of walls.
+        print, save, ps, vtk, stepbar, energy : intervals in steps of frames, checkpoints, vector pictures, .vtk files,
+            progress lines and rows of the energy budget; 0 turns one off.
+        others : intervals of outputs of added kinds.
         """
         given = {name: value for name, value in locals().items() if name not in ("self", "others")} | others
         for name, value in given.items():
@@ -223,7 +222,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @_command
     def cycle(self, n: int) -> None:
-        """CYC: step, with output at the intervals of `set`.
+        """CYC: step the model; output is written at the intervals of `set`.
 
         Parameters
         ----------
@@ -246,15 +245,15 @@ class Simulation(ParticleCommands, BlockCommands):
         vtk: float | None = None,
         **others: float,
     ) -> None:
-        """IMPLE: step until the wall has gone this far.
+        """IMPLE: step until the wall has reached a displacement.
 
         Parameters
         ----------
-        wall : its id.
-        xmove, ymove : distance along x or y [m]; one of the two.
-        print, save, ps, vtk : distance that the wall goes between two frames, checkpoints, vector pictures, .vtk files
-            [m]; omitted: only at the end.
-        others : this distance for outputs of an added kind.
+        wall : id of the wall.
+        xmove, ymove : displacement along x or along y [m]; give one of the two.
+        print, save, ps, vtk : displacement of the wall between two frames, checkpoints, vector pictures, .vtk files [m]
+            (default: only at the end).
+        others : displacement between two outputs of an added kind [m].
         """
         self._refuse_only_blocks()
         engine = self.engine
@@ -263,10 +262,10 @@ class Simulation(ParticleCommands, BlockCommands):
         dem.cycles.imple(engine, wall, xmove, ymove, **every, **others)
 
     def every(self, steps: int, function: Callable[[Simulation], object]) -> Call:
-        """Call ``function(sim)`` after each step whose number is a multiple of `steps`, before anything is written.
+        """Call ``function(sim)`` after each step whose number is a multiple of `steps`, before output is written.
 
-        It may look at everything and use all methods but those that step. If it returns True (on any rank), the
-        running cycle ends with this step. A function that only looks changes nothing in the run.
+        The function may use all methods except those that step. If it returns True (on any rank), the present cycle
+        ends with this step. A function that only reads the model does not change the results.
         """
         engine = self.engine
         from hpcdem.physics.dem.simulation import Watcher
@@ -285,7 +284,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @_look
     def save(self, file: str | Path) -> None:
-        """SAV, model save: the whole state to a checkpoint, of particles, of blocks, or of both if they are coupled."""
+        """SAV, model save: write the complete state to a checkpoint: particles, blocks, or both if they are coupled."""
         if self._project is None:
             engine = self.engine
             dem.checkpoints.save(engine, self.directory / file)
@@ -298,8 +297,9 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @_command
     def restore(self, file: str | Path) -> None:
-        """RES, model restore: the whole state of a checkpoint, written on any number of ranks: of particles or of
-        blocks, which then replace those that are there; of both for particles and blocks that are coupled."""
+        """RES, model restore: load the state of a checkpoint, written on any number of ranks: particles or blocks,
+        which replace the present ones; both for coupled particles and blocks.
+        """
         path = self._existing(file)
         kind = self._kind(path)
         if not kind:
@@ -315,10 +315,13 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @_command
     def resume(self, before: float | None = None) -> bool:
-        """Take up the newest whole checkpoint of `outdir`, or the last one at or before this time of the model [s]
-        (UsageError if missing), and finish the command in which it was written, `cycle`,
-        `imple`, `step` or `solve`; False if missing. Functions of `every` must have been given before. Particles
-        that were coupled to blocks made before them come with these: `coupling` is there then."""
+        """Load the newest complete checkpoint of `outdir` and finish the command that it interrupted: `cycle`, `imple`,
+        `step` or `solve`. Return False without a checkpoint.
+
+        before: load the last checkpoint at or before this model time [s]; UsageError if missing. Functions of `every`
+        must be registered before. Particles that were coupled to blocks made before them are restored with these, and
+        `coupling` is then available.
+        """
         self._refuse_coupled("resume")
         latest = math.inf if before is None else before
         found = self._session.newest(self._folder, latest)
@@ -362,7 +365,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @_command
     def command(self, text: str) -> None:
-        """Carry out lines of the ZDEM language on this model."""
+        """Execute lines of the ZDEM language on this model."""
         name, line = _place()
         try:
             first = next(read_lines(text.encode("utf-8", errors="surrogatepass"), "command"), None)
@@ -379,8 +382,9 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @_look
     def finish(self) -> None:
-        """The end: histories closed, the table of stages printed, the last frame drawn. Without it, all this happens
-        when the program ends."""
+        """End the run: close histories, print the table of stages and draw the last frame. Without this call, the end
+        of the program does it.
+        """
         if self._project is not None and self._project in self._session.projects:
             self._session.leave(self._project)
         if self._engine is not None:
@@ -391,7 +395,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @_look
     def write_frame(self) -> None:
-        """Write ``all_<step>.vtkhdf`` and ``.dat`` now."""
+        """Write ``all_<step>.vtkhdf`` and ``.dat`` of the present state."""
         from hpcdem.commands.dem import output
 
         self._ready()
@@ -484,7 +488,7 @@ class Simulation(ParticleCommands, BlockCommands):
             engine.tables_changed()
 
     def gather(self, *names: str) -> Any:
-        """Fields of all particles, on every rank, in the order of ids: one array, or a tuple of them."""
+        """Return fields of all particles, on every rank, in the order of ids: one array, or a tuple of arrays."""
 
         def gathered() -> Any:
             columns = [np.concatenate(self.engine.comm.allgather(np.array(self._field(name)))) for name in names]
@@ -500,17 +504,17 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @property
     def steps(self) -> int:
-        """Number of the present step, of the particles; of the blocks where there are no particles."""
+        """Present step of the particles; without particles, of the blocks."""
         return self._asked(("steps",), lambda: int(self._clock.step))
 
     @property
     def time(self) -> float:
-        """Model time [s] of the same."""
+        """Model time of the particles [s]; without particles, of the blocks."""
         return self._asked(("time",), lambda: float(self._clock.time))
 
     @property
     def dt(self) -> float:
-        """Time step of the same [s]; 0 before the first step."""
+        """Time step of the particles [s]; without particles, of the blocks; 0 before the first step."""
         return self._asked(("dt",), lambda: float(self._clock.dt))
 
     @property
@@ -525,7 +529,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @property
     def outdir(self) -> Path:
-        """Folder of the results; of the blocks where there are no particles."""
+        """Output folder of the particles; without particles, of the blocks."""
         first = self._engine or self._project
         return self._folder if first is None else first.outdir
 
@@ -536,12 +540,12 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @property
     def walls(self) -> Walls:
-        """The walls by id, those of BOX with ids 100 to 103 (bottom, right, top, left), and their methods."""
+        """Walls by id, and their methods; those of BOX have the ids 100 to 103 (bottom, right, top, left)."""
         return Walls(self)
 
     @property
     def bonds(self) -> Bonds:
-        """Methods of bonds; ``sim.bonds()`` is the table of all of them."""
+        """Methods of bonds; ``sim.bonds()`` returns the table of all bonds."""
         return Bonds(self)
 
     def _walls(self) -> dict[int, Wall]:
@@ -558,7 +562,9 @@ class Simulation(ParticleCommands, BlockCommands):
 
     @_look
     def energy(self) -> dict[str, float]:
-        """The energy budget since the first cycle after ``set(energy=n)`` [J]: the columns of energy.csv by name."""
+        """Return the energy budget since the first cycle after ``set(energy=n)`` [J], by the names of the columns of
+        energy.csv.
+        """
         import dataclasses
 
         if self._only_blocks:
@@ -568,8 +574,9 @@ class Simulation(ParticleCommands, BlockCommands):
         return dataclasses.asdict(self.engine.energy.look(self.engine))
 
     def contacts(self) -> dict[str, np.ndarray]:
-        """Touching pairs of the whole model, on every rank, in the order of ids: id1 id2, normal force fn and shear
-        force fs [N], fx fy on id1, contact point x y, overlap [m]."""
+        """Return the pairs in contact of the whole model, on every rank, in the order of ids: id1 id2, normal force fn
+        and shear force fs [N], fx fy on id1 [N], contact point x y [m], overlap [m].
+        """
         return self._table("contacts")
 
     def _bonds(self) -> dict[str, np.ndarray]:
@@ -577,23 +584,25 @@ class Simulation(ParticleCommands, BlockCommands):
         return self._table("bonds")
 
     def wall_contacts(self) -> dict[str, np.ndarray]:
-        """Contacts with walls: id1, wall (its id), fn fs, fx fy on the particle, x y, overlap."""
+        """Return the contacts with walls: id1, wall (its id), fn fs [N], fx fy on the particle [N], x y [m], overlap
+        [m].
+        """
         return self._table("wall_contacts")
 
     @property
     def bonds_left(self) -> int:
-        """Bonds that hold."""
+        """Number of intact bonds."""
         return self._asked(("bonds_left",), lambda: int(self.engine.bonds_left()))
 
     @property
     def bonds_broken(self) -> tuple[int, int]:
-        """Bonds broken so far, in tension and in shear."""
+        """Number of bonds broken so far, in tension and in shear."""
         return self._asked(("bonds_broken",), self.engine.broken)
 
     # ---- with blocks -----------------------------------------------------------------------------------------------
 
     def couple(self, friction: float | None = None, dt: float = 0.0) -> Coupling:
-        """Let the particles touch the blocks, see `hpcdem.couple`: `step` and `solve` step both from here on."""
+        """Couple the particles to the blocks, see `hpcdem.couple`: `step` and `solve` then step both."""
 
         def coupled() -> Coupling:
             if self._project is None:
@@ -681,8 +690,9 @@ class Simulation(ParticleCommands, BlockCommands):
             raise CommandError("no particles: step blocks with step and solve")
 
     def frame(self, of: str | None = None) -> Frame:
-        """The model as it is now, on one rank: tables for pandas and xarray, pictures; in a notebook it shows itself.
-        of: "particles" or "blocks", left out what there is, particles if there are both."""
+        """Return the present state of the model, on one rank: tables for pandas and xarray, pictures; a notebook shows
+        it as a picture. of: "particles" or "blocks" (default: the existing kind; particles if both exist).
+        """
         place, running = _place(), self._session.interpreter
 
         def make() -> Frame:
@@ -774,7 +784,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
 
 class Shared(Generic[Given, Returned]):
-    """A method of the simulation under the name that it has in a group; the work is done there."""
+    """A method of the simulation under its name in a group."""
 
     def __init__(self, method: Callable[Concatenate[Simulation, Given], Returned]) -> None:
         self.method = method
@@ -786,7 +796,7 @@ class Shared(Generic[Given, Returned]):
 
 
 class Group:
-    """Methods of a simulation that belong together."""
+    """Methods of a simulation that form a group."""
 
     def __init__(self, sim: Simulation) -> None:
         self._sim = sim
@@ -796,7 +806,7 @@ class Group:
 
 
 class Particles(Group):
-    """Discs, by the names that the methods of blocks have; `sim.ball` is `sim.particles.ball`."""
+    """Discs, with methods named as those of blocks; `sim.ball` is `sim.particles.ball`."""
 
     ball = Shared(Simulation.ball)
     generate = Shared(Simulation.gen)
@@ -835,7 +845,7 @@ class Particles(Group):
 
 
 class Bonds(Group):
-    """Bonds between discs; called, `sim.bonds()`, it gives the table of them."""
+    """Bonds between discs; calling it, `sim.bonds()`, returns their table."""
 
     create = Shared(Simulation.bond)
     cut = Shared(Simulation.break_bonds)
@@ -854,7 +864,7 @@ class Bonds(Group):
 
 
 class Walls(Group, Mapping[int, Wall]):
-    """The walls as they are now, by id; those of BOX have the ids 100 to 103 (bottom, right, top, left)."""
+    """The present walls by id; those of BOX have the ids 100 to 103 (bottom, right, top, left)."""
 
     create = Shared(Simulation.wall)
     box = Shared(Simulation.box)
@@ -896,16 +906,19 @@ class Coupling:
         return self._asked("dt", lambda: float(self.engine.particles.clock.dt))
 
     def contacts(self) -> dict[str, np.ndarray]:
-        """Contacts of particles with faces of elements, on every rank, in the order of ids and faces: id, face (element
-        * 4 + edge), fn, fs [N], x, y [m], overlap [m], energy [J]."""
+        """Return the contacts of particles with faces of elements, on every rank, in the order of ids and faces: id,
+        face (element * 4 + edge), fn, fs [N], x, y [m], overlap [m], energy [J].
+        """
         return self._asked("contacts", self.engine.contacts)
 
     def force(self) -> tuple[float, float]:
-        """Sum of the forces of all particles on the blocks [N]."""
+        """Return the sum of the forces of all particles on the blocks [N]."""
         return self._asked("force", self.engine.force_on_blocks)
 
     def energies(self) -> dict[str, float]:
-        """Energy that went from one to the other [J], see docs/blocks.md; counts while either has an account."""
+        """Return the energy exchanged between particles and blocks [J], see docs/blocks.md; it accumulates while either
+        has an energy budget.
+        """
         return self._asked("energies", self.engine.energies)
 
     def end(self) -> None:
@@ -935,12 +948,12 @@ def _parted(what: str) -> UsageError:
 
 
 def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0) -> Coupling:
-    """In a PCDC script: let these particles touch the blocks. From here on `pcdc model step` and `pcdc model solve`
-    step both with one time step, `pcdc model save` writes both into one file, and `cycle` of the particles is refused.
+    """Couple these particles to the blocks of a PCDC script. `pcdc model step` and `pcdc model solve` then step both
+    with one time step, `pcdc model save` writes both into one file, and `cycle` of the particles is rejected.
 
-    The blocks must have their mesh and element models. friction: of the contacts between the two the smaller of this
-    and that of the particle counts. dt [s]: the time step; left out, that of `set(dt=...)` or `pcdc model time-step`,
-    else the smaller of the stable ones.
+    The blocks must have their mesh and element models. friction: upper limit of the friction coefficient of contacts
+    between the two; that of the particle applies if it is smaller. dt: time step [s] (default: that of `set(dt=...)` or
+    `pcdc model time-step`, else the smaller stable one).
     """
     place = _place()
     try:

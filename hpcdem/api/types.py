@@ -28,7 +28,7 @@ Selected = str | Selection | None
 
 
 class Piece(TypedDict, total=False):
-    """A line or points in a mesh: array, points [m], or layer, names of layers; mesh_size [m]."""
+    """A line or points in a mesh: array, points [m], or layer, names of layers; mesh_size: element size there [m]."""
 
     array: Sequence[Point]
     layer: Sequence[str]
@@ -36,8 +36,9 @@ class Piece(TypedDict, total=False):
 
 
 class Solved(TypedDict, total=False):
-    """Outcome of `solve`: reason, unbalanced over all forces (NaN if it was not computed), steps. Empty before the
-    first."""
+    """Outcome of `solve`: reason, ratio of unbalanced to total forces (NaN if not computed), steps. Empty before the
+    first call.
+    """
 
     reason: str
     ratio: float

@@ -36,7 +36,7 @@ __all__ = ["CASES", "find", *CASES.values()]
 
 
 def find(name: str) -> type[Case]:
-    """The class of a case by its name on the command line. KeyError for an unknown one."""
+    """Return the class of a case by its name on the command line. Raises KeyError for an unknown name."""
     return getattr(importlib.import_module(f"hpcdem.cases.{name.replace('-', '_')}"), CASES[name])
 
 

@@ -28,18 +28,19 @@ WIDTH = 100
 
 
 def quantity(default: float, unit: str, doc: str, **bounds: Any) -> Any:
-    """A parameter with a unit, which becomes a variable of the script. bounds: gt, ge, lt, le."""
+    """Declare a parameter with a unit, which becomes a variable of the script. bounds: gt, ge, lt, le."""
     return Field(default, description=doc, json_schema_extra={"unit": unit}, **bounds)
 
 
 def choice(default: Any, doc: str) -> Any:
-    """A parameter that chooses between pieces of the script; no variable of it. A truth value or one of several words
-    (Literal), never a free text: it stands in a comment of the script."""
+    """Declare a parameter that selects between pieces of the script: a truth value or one of several words (Literal),
+    never free text, as it is written in a comment of the script.
+    """
     return Field(default, description=doc, json_schema_extra={"chooses": True})
 
 
 def unit_of(field: FieldInfo) -> str:
-    """Unit of a parameter, "1" for a pure number."""
+    """Return the unit of a parameter, "1" for a pure number."""
     extra = field.json_schema_extra
     return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
@@ -51,9 +52,9 @@ def chooses(field: FieldInfo) -> bool:
 
 
 class Case(BaseModel):
-    """Parameters of a model. ScriptError, with the line that gave them, names the one that is wrong.
+    """Parameters of a model. An invalid one raises ScriptError with the line that gave it.
 
-    name: on the command line and of the files; title: one line; needs: extras of the package that the script wants;
+    name: on the command line and of the files; title: one line; needs: extras of the package that the script requires;
     result: a dataclass whose fields are variables of the script after `loading`.
     """
 
@@ -84,15 +85,15 @@ class Case(BaseModel):
     # ---- text ------------------------------------------------------------------------------------------------------
 
     def model(self) -> str:
-        """Lines that make the model: mesh, properties, conditions."""
+        """Return the lines that make the model: mesh, properties, conditions."""
         raise NotImplementedError
 
     def loading(self) -> str:
-        """Lines that load it, and say what came of it."""
+        """Return the lines that load the model and print the result."""
         raise NotImplementedError
 
     def script(self) -> str:
-        """The whole text of a script that runs by itself."""
+        """Return the text of a complete script."""
         return "".join(self._pieces())
 
     def _pieces(self) -> tuple[str, str]:
@@ -112,7 +113,7 @@ class Case(BaseModel):
         yield "SI units, tension is positive." + (f" Needs the extra [{self.needs}]." if self.needs else "")
 
     def command(self) -> str:
-        """The command line that writes this script."""
+        """Return the command line that writes this script."""
         return " ".join([f"hpcdem case {self.name}", *(_option(name, getattr(self, name)) for name in self._given())])
 
     def _given(self) -> list[str]:
@@ -130,11 +131,11 @@ class Case(BaseModel):
     # ---- in the running session ------------------------------------------------------------------------------------
 
     def build(self) -> None:
-        """Make the model in this run: a new one, carried out by the script or program that calls. Collective."""
+        """Make a new model in this run, executed by the calling script or program. Collective."""
         self._build(None)
 
     def load(self) -> Any:
-        """Load the model that `build` made; the results. Collective."""
+        """Load the model made by `build` and return the results. Collective."""
         if self._carrier is None:
             raise ScriptError(*place(), f"{type(self).__name__}.load: no model yet. Call build() first")
         model, loading = self._pieces()
@@ -144,10 +145,10 @@ class Case(BaseModel):
         return self.result(**{field.name: names[field.name] for field in dataclasses.fields(self.result)})
 
     def run(self, outdir: str | Path | None = None) -> Any:
-        """Make the model and load it; the results. Collective.
+        """Make the model, load it and return the results. Collective.
 
-        outdir: folder for all that is written, for programs that run several cases; without it the folder of the
-        session. In a PCDC script the option --outdir says it.
+        outdir: output folder, for programs that run several cases (default: the folder of the session). In a PCDC
+        script use the option --outdir.
         """
         self._build(outdir)
         result = self.load()
@@ -181,7 +182,7 @@ def explained(kind: type[Case], error: ValidationError) -> str:
 
 
 def number(value: Any) -> str:
-    """A value as a script has it: 0.052, 2700, 30e9, 5e-6. Reads back as the same number."""
+    """Return a value as text of a script: 0.052, 2700, 30e9, 5e-6. It reads back as the same number."""
     if isinstance(value, bool) or not isinstance(value, float):
         return repr(value)
     size = abs(value)
@@ -205,7 +206,7 @@ def _divider(title: str) -> str:
 
 
 def refuse_thin_ring(inner: float, outer: float, size: float) -> None:
-    """ValueError for a ring between two radii [m] that has no room for some elements of this size [m]."""
+    """Raise ValueError for a ring between two radii [m] that is too thin for elements of this size [m]."""
     if inner >= 0.9 * outer:
         raise ValueError(f"inner is {inner:g}, expected at most 0.9 of outer, {0.9 * outer:g} m")
     if size > 0.25 * (outer - inner):

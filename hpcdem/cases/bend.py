@@ -16,11 +16,11 @@ class Bending:
     """Loads are forces per metre of thickness [N/m], deflections those of the load [m].
 
     peak, peak_deflection: largest load; first: load at which the first joint has passed its strength; stiffness [Pa]:
-    load over deflection below a third of the peak; sagging [Pa]: load over the deflection of mid-span against the
-    supports, measured on the axis of the beam; work [J/m]: of the load until the end, without what is in motion then;
-    tail [J/m]: work that would be done after the end if the load went on falling with one over the deflection squared;
-    crack [m]: length of all broken joints; tension, mixed, shear: broken joints by mode; energy_error: closing error of
-    the energy budget over its largest flow; curve: (deflection, load) pairs.
+    load over deflection below a third of the peak; sagging [Pa]: load over the deflection of mid-span relative to the
+    supports, on the axis of the beam; work [J/m]: of the load until the end, minus the kinetic energy then; tail [J/m]:
+    further work if the load kept falling with one over the deflection squared; crack [m]: length of all broken joints;
+    tension, mixed, shear: broken joints by mode; energy_error: closing error of the energy budget over its largest
+    flow; curve: (deflection, load) pairs.
     """
 
     peak: float
@@ -39,7 +39,7 @@ class Bending:
 
 
 class ThreePointBend(Rock):
-    """Three-point bend: a beam on two supports, pressed down in the middle until it has broken in two."""
+    """Three-point bending: a beam on two supports is loaded in the middle until it breaks in two."""
 
     name: ClassVar[str] = "bend"
     title: ClassVar[str] = "Three-point bend of a beam of rock"
@@ -142,7 +142,7 @@ pcdc model option energy on
 pcdc model step 1                                # the time step is known from here on
 every = max(1, round(period / 100 / pcdc.time))
 pcdc history create 'load' node value reaction-y sum every [every] range group 'load' set 'held'
-pcdc history create 'way' node value displacement-y mean every [every] range group 'load' set 'held'
+pcdc history create 'displacement' node value displacement-y mean every [every] range group 'load' set 'held'
 for name, x in (('left', -0.5 * span), ('middle', 0.0), ('right', 0.5 * span)):
     pcdc history create 'axis [name]' node nearest ([x],[0.5*height]) value displacement-y every [every]
 pcdc history create 'yielded' model value yielded-joints every [every]
@@ -150,12 +150,12 @@ pcdc history create 'cracks' model value broken-joints every [every]
 pcdc output vtk 'bend'
 
 # Load slowly over the peak, then faster to the end: the halves turn evenly, which takes no force.
-load = peak = way = 0.0
+load = peak = deflection = 0.0
 falling = False
-while way < most * elastic and (not falling or load > stop * peak):
+while deflection < most * elastic and (not falling or load > stop * peak):
     pcdc model solve time [0.5*period]
     load = -pcdc.history('load')[-200 if falling else -25:, 2].mean()        # tail: over two periods
-    peak, way = max(peak, load), -pcdc.history('way')[-1, 2]
+    peak, deflection = max(peak, load), -pcdc.history('displacement')[-1, 2]
     if not falling and load < 0.7 * peak:
         falling, now = True, pcdc.time
         pcdc output vtk 'bend'
@@ -164,17 +164,17 @@ while way < most * elastic and (not falling or load > stop * peak):
 pcdc output vtk 'bend'
 
 import numpy as np
-loads, ways, left, middle, right = (-pcdc.history(name)[:, 2]
-                                    for name in ('load', 'way', 'axis left', 'axis middle', 'axis right'))
-curve = list(zip(ways.tolist(), loads.tolist()))
-peak, peak_deflection = float(loads.max()), float(ways[loads.argmax()])
-rising = (loads > 0.1 * peak) & (loads < peak / 3) & (ways < peak_deflection)
+loads, deflections, left, middle, right = (-pcdc.history(name)[:, 2]
+                                    for name in ('load', 'displacement', 'axis left', 'axis middle', 'axis right'))
+curve = list(zip(deflections.tolist(), loads.tolist()))
+peak, peak_deflection = float(loads.max()), float(deflections[loads.argmax()])
+rising = (loads > 0.1 * peak) & (loads < peak / 3) & (deflections < peak_deflection)
 stiffness, sagging = (float(np.polyfit(by[rising], loads[rising], 1)[0]) if rising.sum() > 1 else math.nan
-                      for by in (ways, middle - 0.5 * (left + right)))
+                      for by in (deflections, middle - 0.5 * (left + right)))
 yielded = np.flatnonzero(pcdc.history('yielded')[:, 2])
 first = float(loads[yielded[0]]) if len(yielded) else math.nan
-work = float((0.5 * (loads[1:] + loads[:-1]) * np.diff(ways)).sum()) - pcdc.energies['kinetic']
-tail = max(load, 0.0) * way                      # of a load as one over the deflection squared
+work = float((0.5 * (loads[1:] + loads[:-1]) * np.diff(deflections)).sum()) - pcdc.energies['kinetic']
+tail = max(load, 0.0) * deflection                      # of a load as one over the deflection squared
 crack = float(pcdc.values('joint', 'length')[pcdc.values('joint', 'state') == 3].sum())
 """
 REPORT = """

@@ -15,9 +15,10 @@ from hpcdem.cases.rock import CRACKS, ELASTIC, JOINTS, SURFACES, WAVES, Dimensio
 @dataclass(frozen=True)
 class Splitting:
     """strength: 2 P / (pi D) at the peak [Pa]; peak_force: P there [N/m]; centre_x, centre_y: mean stress in the
-    middle, across the load and along it, over 2 P / (pi D) while it rises: 1 and -3 in an elastic disc; curve:
-    (shortening over diameter, 2 P / (pi D) [Pa]) pairs; tension, mixed, shear: broken joints by mode; energy_error:
-    closing error of the energy budget over its largest flow. In three dimensions P is that of a metre of thickness."""
+    centre, across and along the load, over 2 P / (pi D) during loading: 1 and -3 in an elastic disc; curve: (shortening
+    over diameter, 2 P / (pi D) [Pa]) pairs; tension, mixed, shear: broken joints by mode; energy_error: closing error
+    of the energy budget over its largest flow. In three dimensions P is the load per metre of thickness.
+    """
 
     strength: float
     peak_force: float
@@ -160,7 +161,8 @@ pcdc model step 1                                # the time step is known from h
 every = max(1, round(0.1 * transit / pcdc.time))
 for name in ('below', 'above'):
     pcdc history create 'force [name]' node value reaction-y sum every [every] range group '[name]' set 'moved'
-    pcdc history create 'way [name]' node value displacement-y mean every [every] range group '[name]' set 'moved'
+    pcdc history create 'displacement [name]' node value displacement-y mean every [every] \\
+        range group '[name]' set 'moved'
 pcdc history create 'middle xx' element value stress-xx mean every [every] range group 'middle' set 'gauge'
 pcdc history create 'middle yy' element value stress-yy mean every [every] range group 'middle' set 'gauge'
 pcdc history create 'cracks' model value broken-joints every [every]
@@ -179,7 +181,7 @@ pcdc output vtk 'brazilian'
 
 # The curve of 2 P / (pi D): the tension that this force brings to the middle of an elastic disc.
 below, above, rise, fall, xx, yy = (pcdc.history(name)[:, 2] for name in (
-    'force below', 'force above', 'way below', 'way above', 'middle xx', 'middle yy'))
+    'force below', 'force above', 'displacement below', 'displacement above', 'middle xx', 'middle yy'))
 strain, stress = (rise - fall) / diameter, (below - above) / (math.pi * diameterDEEP)
 curve = list(zip(strain.tolist(), stress.tolist()))
 strength = float(stress.max())

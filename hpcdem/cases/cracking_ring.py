@@ -13,9 +13,12 @@ from hpcdem.cases.thermal_ring import MESH, ROCK, Ring
 
 @dataclass(frozen=True)
 class Cracked:
-    """first [K]: difference of temperature at which the first joints had broken; exact [K]: at which the closed form
-    reaches the strength at the outer circle; radius [m]: largest one of the middles of these joints; broken: joints at
-    the end; curve: (difference [K], broken joints) pairs."""
+    """Result of the case.
+
+    first: temperature difference at which the first joints broke [K]; exact: difference at which the closed form
+    reaches the strength at the outer circle [K]; radius: largest radius of the centres of these joints [m]; broken:
+    number of broken joints at the end; curve: (difference [K], broken joints) pairs.
+    """
 
     first: float
     exact: float
@@ -25,7 +28,7 @@ class Cracked:
 
 
 class CrackingRing(Ring):
-    """The hole of a jointed ring is heated slowly; tension at the outer rim grows until it cracks."""
+    """The hole of a jointed ring is heated slowly; the tension at the outer circle increases until the ring cracks."""
 
     name: ClassVar[str] = "cracking-ring"
     title: ClassVar[str] = "Thermal cracking of a ring"

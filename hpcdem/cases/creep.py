@@ -15,9 +15,12 @@ MOST = 1e6
 
 @dataclass(frozen=True)
 class CreepTest:
-    """at_once, strain: shortening over height when the load is put on, and at the end; exact: that of the closed form
-    at the end; error: largest difference from it on the way, over `exact`; steps: creep steps; curve: (time [s],
-    shortening over height) pairs."""
+    """Result of the case.
+
+    at_once, strain: shortening over height immediately after loading, and at the end; exact: closed form at the end;
+    error: largest deviation from the closed form, over `exact`; steps: number of creep steps; curve: (time [s],
+    shortening over height) pairs.
+    """
 
     at_once: float
     strain: float
@@ -28,7 +31,7 @@ class CreepTest:
 
 
 class Creep(Case):
-    """A specimen of Burgers rock under a constant load, in plane strain, its ends without friction."""
+    """A specimen of Burgers rock under a constant load, in plane strain, with frictionless ends."""
 
     name: ClassVar[str] = "creep"
     title: ClassVar[str] = "Creep of a rock specimen under constant load"
@@ -85,13 +88,13 @@ pcdc node group 'top' set 'ends' range y [height] [height]
 at_once = float(-pcdc.values('node', 'displacement-y', group='top', set='ends').mean() / height)
 
 # It stays: creep steps in balance, short while much changes.
-pcdc history create 'way' node value displacement-y mean range group 'top' set 'ends'
+pcdc history create 'displacement' node value displacement-y mean range group 'top' set 'ends'
 pcdc output vtk 'creep' every 20
 pcdc model creep on dt [1e-3*time] change [change] greatest [0.05*time]
 pcdc model solve elastic time [time]
 pcdc output vtk 'creep'
-way = pcdc.history('way')
-curve = [(0.0, at_once), *zip(way[:, 1].tolist(), (-way[:, 2] / height).tolist())]
+moved = pcdc.history('displacement')
+curve = [(0.0, at_once), *zip(moved[:, 1].tolist(), (-moved[:, 2] / height).tolist())]
 steps = len(curve) - 1
 
 # The closed form. Elastic: p (1 - nu^2) / E = p (1 / (4 G) + 3 / (4 (3 K + G))). The shear compliance of Burgers,

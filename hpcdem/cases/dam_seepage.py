@@ -13,10 +13,13 @@ from hpcdem.cases.water import CHANNELS, ROCK, STEADY, Water
 
 @dataclass(frozen=True)
 class Seepage:
-    """discharge [m2/s]: mean of what comes in and goes out; exact [m2/s]: that of Charny; imbalance: difference of both
-    over what comes in; levels: (x [m], level of the water [m], that of Dupuit [m]); seepage_face [m]: height over the
-    lower level of the highest node of the side where water comes out; level_error: largest difference of the levels
-    from Dupuit's up to three quarters of the way, over them; account: what of the volume of fluid does not add up."""
+    """Result of the case.
+
+    discharge: mean of inflow and outflow [m2/s]; exact: discharge after Charny [m2/s]; imbalance: difference of inflow
+    and outflow over inflow; levels: (x [m], level of the water [m], level after Dupuit [m]); seepage_face: height above
+    the lower level of the highest node with outflow [m]; level_error: largest relative deviation of the levels from
+    Dupuit up to three quarters of the distance; account: closing error of the fluid budget.
+    """
 
     discharge: float
     exact: float
@@ -28,7 +31,7 @@ class Seepage:
 
 
 class DamSeepage(Water):
-    """A rectangular dam between two levels of water: free surface, seepage face and discharge."""
+    """A rectangular dam between two water levels: free surface, seepage face and discharge."""
 
     name: ClassVar[str] = "dam-seepage"
     title: ClassVar[str] = "Seepage through a dam with vertical faces"
@@ -92,7 +95,7 @@ seeps = (x > length - near) & (leaving < 0.0) & (y > right)
 seepage_face = float((y[seeps] - right).max()) if seeps.any() else 0.0
 print('discharge %.5g m2/s; after Charny %.5g m2/s (%+.2f %%)'
       % (discharge, exact, 100 * (discharge / exact - 1)))
-print('levels up to three quarters of the way: at most %.3g %% from those of Dupuit; seepage face %.3g m'
+print('levels up to three quarters of the distance: at most %.3g %% from those of Dupuit; seepage face %.3g m'
       % (100 * level_error, seepage_face))
 line = [(k * length / 60, dupuit(k * length / 60)) for k in range(61)]
 points = [(place, found) for place, found, _ in levels]

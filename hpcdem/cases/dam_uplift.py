@@ -18,7 +18,7 @@ class Uplift:
     the dam, drained [m2/s]: in the drain; exact_discharge [m2/s]: of the closed form, with the permeability of a
     lattice; error: largest difference of the pressure on the base from the closed form, over that of the head;
     diagram: (x [m], pressure [Pa], closed form [Pa]) along the base; safety: against sliding of a triangular dam;
-    imbalance: inflow less outflow over the inflow; account: what of the volume of fluid does not add up."""
+    imbalance: inflow minus outflow, over inflow; account: closing error of the fluid budget."""
 
     uplift: float
     linear: float
@@ -34,7 +34,9 @@ class Uplift:
 
 
 class DamUplift(Water):
-    """A triangular dam on jointed rock, water behind it: its pressure along the base, and what it does to the dam."""
+    """A triangular dam on jointed rock with water behind it: pressure along the base, uplift, and safety
+    against sliding.
+    """
 
     name: ClassVar[str] = "dam-uplift"
     title: ClassVar[str] = "Uplift under a concrete dam on jointed rock"

@@ -13,11 +13,14 @@ from hpcdem.cases.water import WARM, Warm
 
 @dataclass(frozen=True)
 class Breakthrough:
-    """breakthrough [s]: of the front on the straight way, closed form; quarter, exact_quarter [s]: when a quarter of
-    the difference of temperature has come, found and closed form; error: largest difference of the temperature of the
-    water that comes up from the closed form, from 1.5 times the breakthrough on, over that between the wells; curve:
-    (time [s], part of the difference that has come, of the closed form); account: what of the heat does not add up;
-    elements."""
+    """Result of the case.
+
+    breakthrough: arrival of the front on the straight path, closed form [s]; quarter, exact_quarter: time at which a
+    quarter of the temperature difference has arrived, of the model and of the closed form [s]; error: largest deviation
+    of the temperature of the produced water from the closed form, from 1.5 times the breakthrough on, over the
+    difference between the wells; curve: (time [s], fraction of the difference that has arrived, that of the closed
+    form); account: closing error of the heat budget; elements: their number.
+    """
 
     breakthrough: float
     quarter: float
@@ -95,7 +98,7 @@ pcdc node boundary therm-f-b-c temperature [inflow_temperature] range id [int(no
 """
 OPERATION = """
 # Without conduction a front runs along each stream line, as much slower than the water as rock and water hold more heat
-# than the water. That of the angle f to the straight way arrives at 3 t_b (1 - f cot f) / sin(f)^2, with the part
+# than the water. That at the angle f to the straight path arrives at 3 t_b (1 - f cot f) / sin(f)^2, with the part
 # f / pi of the water (Gringarten & Sauty 1975, without caprock).
 cells = 2 / (math.sqrt(3) * size**2)             # nodes per area, three channels each
 whole = density * capacity + 3 * cells * size * aperture * fluid_density * fluid_capacity
@@ -115,7 +118,7 @@ error = max((abs(c - e) for t, c, e in curve if t > 1.5 * breakthrough), default
 quarter = float(np.interp(0.25, came, times)) if came[-1] > 0.25 else math.inf
 exact_quarter = float(np.interp(0.25, angle / math.pi, arrival))
 account, elements = pcdc.heat['relative'], len(pcdc.numbers('element'))
-print('front on the straight way after %.3g years; a quarter has come after %.3g, closed form %.3g years; from 1.5 '
+print('front on the straight path after %.3g years; a quarter has come after %.3g, closed form %.3g years; from 1.5 '
       'times the front on at most %.3g %% off'
       % (breakthrough / year, quarter / year, exact_quarter / year, 100 * error))
 pcdc output vtk 'doublet'

@@ -13,12 +13,15 @@ from hpcdem.cases.base import Case, quantity
 
 @dataclass(frozen=True)
 class Slipping:
-    """normal, shear [Pa]: stress on the fault before, compression and shear of the closed form, found_normal,
-    found_shear: means over its joints; onset [Pa]: pressure in the well when the joint beside it yields,
-    exact_onset [Pa]: sigma_n - (tau - c) / mu; slip [m]: in the middle at the end, exact_slip [m]: of a crack of this
-    length in a plane that all has the pressure of the end; pressure [Pa]: mean along the fault at the end; injected
-    [m2]: volume; seconds [s]: of flow until the onset; curve: (time [s], pressure in the well [Pa], injected [m2], slip
-    in the middle [m]); account: what of the volume of fluid does not add up."""
+    """Result of the case.
+
+    normal, shear: initial stress on the fault, compression and shear, closed form [Pa]; found_normal, found_shear:
+    means over its joints [Pa]; onset: well pressure when the joint next to it yields [Pa]; exact_onset: sigma_n - (tau
+    - c) / mu [Pa]; slip: in the middle at the end [m]; exact_slip: slip of a crack of this length in a plane with the
+    final pressure everywhere [m]; pressure: mean along the fault at the end [Pa]; injected: volume [m2]; seconds: flow
+    time until the onset [s]; curve: (time [s], well pressure [Pa], injected [m2], slip in the middle [m]); account:
+    closing error of the fluid budget.
+    """
 
     normal: float
     shear: float
@@ -36,8 +39,9 @@ class Slipping:
 
 
 class FaultInjection(Case):
-    """A fault in rock under stress, closed and locked: a well in its middle raises the pressure until Coulomb's law
-    lets it slip."""
+    """A closed, locked fault in stressed rock: injection into its middle raises the pressure until it slips by
+    Coulomb's law.
+    """
 
     name: ClassVar[str] = "fault-injection"
     title: ClassVar[str] = "Slip of a fault by fluid injection"

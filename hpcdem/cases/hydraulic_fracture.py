@@ -15,8 +15,10 @@ from hpcdem.cases.kgd_solutions import resolution
 class Fracture:
     """length [m]: half length, to the damage 0.2 (toughness) or to the last joint past its peak (viscosity); opening
     [m] and pressure [Pa, above the confinement] in the middle; front [m]: of the fluid; *_error: relative, to the
-    closed form; balance: what of the fluid does not add up; energy_error: what of the energy does not, over what was
-    pumped in; curve: (time [s], length, opening, pressure) at ten times, or at the end; steps: implicit ones."""
+    closed form; balance: closing error of the fluid budget; energy_error: closing error of the energy budget over the
+    energy pumped in; curve: (time [s], length, opening, pressure) at ten times, or at the end; steps: number of
+    implicit steps.
+    """
 
     length: float
     opening: float
@@ -32,7 +34,9 @@ class Fracture:
 
 
 class HydraulicFracture(Case):
-    """Fluid is pumped into the middle of a plane fracture, which grows along a line of joints (half of it is there)."""
+    """Fluid is pumped into the middle of a plane fracture, which grows along a line of joints (one half is
+    modelled).
+    """
 
     name: ClassVar[str] = "hydraulic-fracture"
     title: ClassVar[str] = "Plane hydraulic fracture (KGD)"

@@ -13,10 +13,13 @@ from hpcdem.cases.water import WARM, Warm
 
 @dataclass(frozen=True)
 class Front:
-    """error: largest difference of the water's temperature from the closed form at the given times, over that
-    between inflow and beginning; rock_error: the same of the rock at the distance `aside`; water, rock: (time [s],
-    distance along the fracture [m], part of the difference of temperature, of the closed form) at quarters of the way;
-    account: what of the heat does not add up."""
+    """Result of the case.
+
+    error: largest deviation of the water temperature from the closed form at the given times, over the difference of
+    inflow and initial temperature; rock_error: the corresponding deviation in the rock at the distance `aside`; water,
+    rock: (time [s], distance along the fracture [m], relative temperature difference, that of the closed form) at
+    quarters of the distance; account: closing error of the heat budget.
+    """
 
     error: float
     rock_error: float

@@ -13,11 +13,12 @@ from hpcdem.cases.kgd_solutions import resolution
 
 @dataclass(frozen=True)
 class Penny:
-    """radius [m]: of the circle with the area that is damaged by 0.2 (toughness) or past its peak (viscosity);
-    opening [m] in the middle; pressure [Pa, above the confinement] at half the radius, pressure_well: in the middle;
-    *_error: relative, to the closed form, means over the last fifth of the time; balance: what of the fluid does not
-    add up; energy_error: what of the energy does not, over what was pumped in; curve: (time [s], radius, opening,
-    pressure) at twenty times; steps: implicit ones."""
+    """radius [m]: of the circle with the area that is damaged by 0.2 (toughness) or past its peak (viscosity); opening
+    [m] in the middle; pressure [Pa, above the confinement] at half the radius, pressure_well: in the middle; *_error:
+    relative, to the closed form, means over the last fifth of the time; balance: closing error of the fluid budget;
+    energy_error: closing error of the energy budget over the energy pumped in; curve: (time [s], radius, opening,
+    pressure) at twenty times; steps: number of implicit steps.
+    """
 
     radius: float
     opening: float
@@ -33,7 +34,9 @@ class Penny:
 
 
 class PennyFracture(Case):
-    """Fluid is pumped into the middle of a round fracture, which grows in a plane of joints (a sector is there)."""
+    """Fluid is pumped into the middle of a circular fracture, which grows in a plane of joints (a sector is
+    modelled).
+    """
 
     name: ClassVar[str] = "penny-fracture"
     title: ClassVar[str] = "Penny-shaped hydraulic fracture"

@@ -13,14 +13,14 @@ from hpcdem.cases.rock import CRACKS, PROPERTIES, WAVES, Rock
 
 @dataclass(frozen=True)
 class PillarTest:
-    """stages: per stage of the excavation (opening of the rooms [m], width of the pillar [m], mean vertical stress in
-    it [Pa], that of the tributary area [Pa], unbalanced ratio); strength [Pa]: the largest mean stress that the pillar
-    bears, at_strength [m] the convergence there, as the pillar is shortened; residual [Pa]: the stress at the end;
-    empirical [Pa]: the strength after Lunder and Pakalnis; factor: strength over the stress after the excavation;
-    curve: (convergence [m], mean stress [Pa]) pairs; profiles: per stage, and at the strength, (x [m], vertical stress
-    [Pa]) pairs at half the height; stresses are positive in compression. tension, mixed, shear: broken joints by mode
-    (without joints: 0); energy_error: closing error of the energy budget over its largest flow (without joints: NaN,
-    as it is solved statically)."""
+    """stages: per stage of the excavation (width of the rooms [m], width of the pillar [m], mean vertical stress in it
+    [Pa], that of the tributary area [Pa], unbalanced ratio); strength [Pa]: largest mean stress of the pillar,
+    at_strength [m]: convergence there; residual [Pa]: stress at the end; empirical [Pa]: strength after Lunder and
+    Pakalnis; factor: strength over the stress after the excavation; curve: (convergence [m], mean stress [Pa]) pairs;
+    profiles: per stage, and at the strength, (x [m], vertical stress [Pa]) pairs at half the height; stresses are
+    positive in compression. tension, mixed, shear: broken joints by mode (without joints: 0); energy_error: closing
+    error of the energy budget over its largest flow (without joints: NaN, as it is solved statically).
+    """
 
     stages: list[tuple[float, float, float, float, float]]
     strength: float
@@ -37,7 +37,7 @@ class PillarTest:
 
 
 class Pillar(Rock):
-    """A pillar between rooms, deep below ground: rooms are opened in stages, then the roof comes down on the pillar."""
+    """A pillar between two rooms at depth: the rooms are opened in stages, then the roof is lowered onto the pillar."""
 
     name: ClassVar[str] = "pillar"
     title: ClassVar[str] = "A pillar of rock between rooms, excavated in stages and loaded until it fails"

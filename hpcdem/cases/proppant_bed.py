@@ -12,12 +12,15 @@ from hpcdem.cases.base import Case, quantity
 
 @dataclass(frozen=True)
 class Bed:
-    """bed: (time [s], part of the slot that is bed, its largest height [m], part of the slot above it with slurry at
-    least as thick as what comes in); beside: (time [s], bed of the simulation of Huang et al. 2021); difference:
-    largest between both, part of the slot, NaN before the first of these times; measured: (time [s], part of the slot
-    with proppant above the bed, Chun et al. 2020); settled: part of the proppant that lies in the bed at the end; fed:
-    part of the slot that all of it would take as bed; speed [m/s]: of a single grain, by drag and weight; lost: part of
-    the proppant that is lost or made."""
+    """Result of the case.
+
+    bed: (time [s], fraction of the slot filled by the bed, its largest height [m], fraction of the slot above it with
+    slurry at least as dense as the inflow); beside: (time [s], bed in the simulation of Huang et al. 2021); difference:
+    largest deviation between both, fraction of the slot, NaN before the first of these times; measured: (time [s],
+    fraction of the slot with proppant above the bed, Chun et al. 2020); settled: fraction of the proppant in the bed at
+    the end; fed: fraction of the slot that all proppant would fill as bed; speed: settling speed of a single grain by
+    drag and weight [m/s]; lost: closing error of the proppant budget, relative.
+    """
 
     bed: list[tuple[float, float, float, float]] = field(repr=False)
     beside: list[tuple[float, float]] = field(repr=False)
@@ -30,8 +33,9 @@ class Bed:
 
 
 class ProppantBed(Case):
-    """The slot of Chun et al. (2020), a flat vertical fracture: slurry comes in at three inlets of its left side, what
-    is left of it goes out on the right, and sand of 0.45 mm settles to a bed in between."""
+    """The slot of Chun et al. (2020), a flat vertical fracture: slurry enters at three inlets on the left and leaves on
+    the right; sand of 0.45 mm settles to a bed in between.
+    """
 
     name: ClassVar[str] = "proppant-bed"
     title: ClassVar[str] = "Proppant bed in a slot"

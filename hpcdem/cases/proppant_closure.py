@@ -12,11 +12,14 @@ from hpcdem.cases.base import Case, quantity
 
 @dataclass(frozen=True)
 class Closed:
-    """opened, exact_opened [m]: aperture in the middle under pressure, by the model and after Sneddon; left,
-    exact_left: volume of the fracture at the end over that at the beginning, by the model and of a pack that all of it
-    closes on likewise; curve: (time [s], volume over that of the beginning, mean pressure of the fluid [Pa], mean
-    stress of the pack [Pa]); profile: (place [m], aperture at the beginning [m], at the end [m]); lost: part of the
-    proppant that is lost or made."""
+    """Result of the case.
+
+    opened, exact_opened: aperture in the middle under pressure, of the model and after Sneddon [m]; left, exact_left:
+    volume of the fracture at the end over that at the beginning, of the model and for a uniform pack that carries the
+    load; curve: (time [s], volume over initial volume, mean pressure of the fluid [Pa], mean stress of the pack [Pa]);
+    profile: (position [m], initial aperture [m], final aperture [m]); lost: closing error of the proppant budget,
+    relative.
+    """
 
     opened: float
     exact_opened: float
@@ -28,7 +31,9 @@ class Closed:
 
 
 class ProppantClosure(Case):
-    """A straight fracture full of slurry, shut in: its fluid goes into the rock, its walls come to rest on a pack."""
+    """A straight fracture filled with slurry is shut in: the fluid leaks off into the rock, and the walls close
+    on a pack.
+    """
 
     name: ClassVar[str] = "proppant-closure"
     title: ClassVar[str] = "A fracture closes on its proppant"

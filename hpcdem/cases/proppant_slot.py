@@ -12,10 +12,13 @@ from hpcdem.cases.base import Case, quantity
 
 @dataclass(frozen=True)
 class Settled:
-    """speed [m/s]: of a single grain; front, exact_front [m/s]: of the clear fluid above, downwards; bed, exact_bed
-    [m/s]: of the pack below, upwards; error: mean difference of concentration from Kynch's solution at three times,
-    over that of the beginning; profiles: (time [s], height [m], concentration, that of the solution); pack, exact_pack
-    [m]: height of the pack at the end; lost: part of the proppant that is lost or made."""
+    """Result of the case.
+
+    speed: settling speed of a single grain [m/s]; front, exact_front: downward speed of the front of clear fluid [m/s];
+    bed, exact_bed: upward speed of the top of the pack [m/s]; error: mean deviation of the concentration from Kynch's
+    solution at three times, over the initial concentration; profiles: (time [s], height [m], concentration, that of the
+    solution); pack, exact_pack: final height of the pack [m]; lost: closing error of the proppant budget, relative.
+    """
 
     speed: float
     front: float
@@ -30,7 +33,7 @@ class Settled:
 
 
 class ProppantSlot(Case):
-    """A closed vertical fracture full of slurry: concentration over height and time, and the pack at its end."""
+    """A closed vertical fracture filled with slurry: concentration over height and time, and the final pack."""
 
     name: ClassVar[str] = "proppant-slot"
     title: ClassVar[str] = "Proppant settles in a vertical fracture"

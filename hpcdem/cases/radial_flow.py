@@ -16,7 +16,7 @@ class Radial:
     """inflow, outflow [m2/s]: through the hole and the outer circle; imbalance: their difference over the inflow;
     error: largest difference of the mean pressure on RINGS circles from the closed form, over the difference of both
     pressures; permeability [m2]: that with which the closed form has this inflow; profile: (radius [m], mean pressure
-    [Pa], closed form [Pa]) of these rings; account: what of the volume of fluid does not add up."""
+    [Pa], closed form [Pa]) of these rings; account: closing error of the fluid budget."""
 
     inflow: float
     outflow: float

@@ -39,7 +39,7 @@ class Rock(Case):
     penalty_overlay: float = quantity(100.0, "1", "penalty of closed joints, over young", gt=0)
 
     def not_too_many(self, area: float, thickness: float | None = None) -> None:
-        """ValueError if `size` makes too many elements of an area [m2], in space of this thickness [m]."""
+        """Raise ValueError if `size` makes too many elements of an area [m2], in space of this thickness [m]."""
         if thickness is None:
             number = area / (math.sqrt(3.0) / 4.0 * self.size**2)
         else:
@@ -86,5 +86,5 @@ energy_error = pcdc.energies['relative']         # of the energy budget, part of
 
 
 def in_space(text: str) -> str:
-    """The text for three dimensions, where charts have no model beside them."""
+    """Return the text for three dimensions, where charts do not show the model."""
     return text.replace(".png' cracks\n", ".png'\n")

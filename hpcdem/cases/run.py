@@ -35,9 +35,9 @@ class Carrier:
         self.names: dict[str, Any] = {}
 
     def carry_out(self, text: str) -> None:
-        """Collective. ScriptError with the line of the text, and of the script around it."""
+        """Execute the text. Raises ScriptError with the line of the text, and of the script around it. Collective."""
         self.interpreter.include(text, self.file, self.names)
 
     def close(self) -> None:
-        """Collective: the end of a model of its own."""
+        """End a model created for the case. Collective."""
         self.session.leave(self.interpreter.project)

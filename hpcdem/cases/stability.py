@@ -12,9 +12,12 @@ from hpcdem.cases.base import Case, choice, quantity
 
 @dataclass(frozen=True)
 class Stability:
-    """factor: of safety, in the middle of `stands`, the greatest factor with which the slope was in balance, and
-    `falls`, the least with which it was not; movement [m]: the largest displacement since gravity settled, with the
-    factor that stands; trials: per trial (factor, largest displacement [m], unbalanced ratio, steps)."""
+    """Result of the case.
+
+    factor: factor of safety, the mean of `stands`, the largest factor at which the slope reached equilibrium, and
+    `falls`, the smallest at which it did not; movement: largest displacement since gravity settled, at the factor
+    `stands` [m]; trials: per trial (factor, largest displacement [m], unbalanced ratio, steps).
+    """
 
     factor: float
     stands: float
@@ -24,7 +27,7 @@ class Stability:
 
 
 class SlopeStability(Case):
-    """A slope of one soil under gravity, whose strength is divided by a factor until it comes down."""
+    """A slope of one soil under gravity, whose strength is divided by a factor until it fails."""
 
     name: ClassVar[str] = "stability"
     title: ClassVar[str] = "Factor of safety of a slope by strength reduction"

@@ -14,12 +14,13 @@ from hpcdem.cases.tunnel import MESH, OUTLINE, ROUND, STRESSED
 
 @dataclass(frozen=True)
 class Supported:
-    """convergence [m]: mean displacement of the wall towards the centre, at_support: when the bolts were put in; crown
-    [m]: displacement of the crown into the tunnel; plastic_radius [m]: of a circle with the area of the tunnel and of
-    the rock that has yielded; axial_force [N]: largest of a bolt, tension positive; yielded, broken: elements of bolts;
-    slipped: nodes of bolts whose grout has slipped; thrust [N/m]: largest axial force of the liner, tension positive;
-    moment [N m/m]: largest of the liner; hinges: elements of the liner that have yielded; ratio: unbalanced forces over
-    all at the end."""
+    """convergence [m]: mean displacement of the wall towards the centre, at_support: when the bolts were installed;
+    crown [m]: displacement of the crown into the tunnel; plastic_radius [m]: of a circle with the area of the tunnel
+    and of the rock that has yielded; axial_force [N]: largest of a bolt, tension positive; yielded, broken: elements of
+    bolts; slipped: nodes of bolts whose grout has slipped; thrust [N/m]: largest axial force of the liner, tension
+    positive; moment [N m/m]: largest of the liner; hinges: elements of the liner that have yielded; ratio: unbalanced
+    forces over all at the end.
+    """
 
     convergence: float
     at_support: float
@@ -36,8 +37,9 @@ class Supported:
 
 
 class Support(Case):
-    """A circular tunnel in Mohr-Coulomb rock under stress. Bolts and a liner are put in when a part of the stress is
-    released."""
+    """A circular tunnel in Mohr-Coulomb rock under stress. Bolts and a liner are installed after part of the stress is
+    released.
+    """
 
     name: ClassVar[str] = "support"
     title: ClassVar[str] = "A tunnel in yielding rock, supported by bolts and shotcrete"
@@ -170,7 +172,7 @@ def into():
     px, py = px - ux, py - uy
     return float(np.nanmean(-(ux * px + uy * py) / radius)), -float(uy[np.hypot(px, py - radius).argmin()])
 
-# In balance before; then what the core did to the rock dies down, and on the way the support is put in.
+# In balance before; then what the core did to the rock dies down, and meanwhile the support is installed.
 pcdc model option dynamic off
 pcdc model option collision off
 pcdc model solve ratio 1e-7 cycles 1000
@@ -188,8 +190,8 @@ for part in sorted({k / 20 for k in range(21)} | {release}):
     at_support = into()[0]
     for k in range(bolts):
         angle = math.radians(90 + around * ((k + 0.5) / bolts - 0.5))
-        way = Vector(math.cos(angle), math.sin(angle)FLAT)
-        head, tail = radius * wayMIDDLE, (radius + bolt_length) * wayMIDDLE
+        direction = Vector(math.cos(angle), math.sin(angle)FLAT)
+        head, tail = radius * directionMIDDLE, (radius + bolt_length) * directionMIDDLE
         pcdc bolt create polyline [head] [tail] length [size] PLATE group 'bolts'
     if bolts:
         pcdc bolt c-model mech-e-p property density 7850 young [bolt_young] diameter [bolt_diameter] \\

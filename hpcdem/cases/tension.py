@@ -119,12 +119,13 @@ pcdc model step 1                                # the time step is known from h
 every = max(1, round(0.05 * transit / pcdc.time))
 for name in ('bottom', 'top'):
     pcdc history create 'force [name]' node value reaction-y sum every [every] range group '[name]' set 'ends'
-    pcdc history create 'way [name]' node value displacement-y mean every [every] range group '[name]' set 'ends'
+    pcdc history create 'displacement [name]' node value displacement-y mean every [every] \\
+        range group '[name]' set 'ends'
 pcdc history create 'point' joint value normal-stress-largest maximum every [every] range face-of 'rock' set 'body'
 pcdc history create 'joint' joint value normal-stress maximum every [every] range face-of 'rock' set 'body'
 pcdc history create 'cracks' model value broken-joints every [every]
 
-# Load until the stress has fallen; at the latest at four times the elastic way and twice that of softening.
+# Load until the stress has fallen; at the latest at four times the elastic displacement and twice that of softening.
 softening = 2.6 * gf1 / tensile_strength
 longest = transits * transit * (4 + 2 * softening * young / (tensile_strength * length))
 stress = peak = 0.0
@@ -135,7 +136,8 @@ while pcdc.time < longest and (peak == 0.0 or stress >= stop * peak):
 pcdc output vtk 'tension'
 
 import numpy as np
-bottom, top, low, up = (pcdc.history(name)[:, 2] for name in ('force bottom', 'force top', 'way bottom', 'way top'))
+bottom, top, low, up = (pcdc.history(name)[:, 2] for name in (
+    'force bottom', 'force top', 'displacement bottom', 'displacement top'))
 stress, strain = (top - bottom) / (2 * neck), (up - low) / length
 curve = list(zip(strain.tolist(), stress.tolist()))
 peak = float(stress.max())

@@ -15,7 +15,7 @@ class Stresses:
     """error: largest difference of the temperature of a node from the closed form, over that between the circles;
     radial, tangential: the same of mean stresses over rings, over the largest stress of the closed form; inside,
     outside [Pa]: tangential stress of the closed form at both circles; profile: (radius [m], temperature, radial and
-    tangential stress [Pa]) of the rings; account: what of the heat does not add up."""
+    tangential stress [Pa]) of the rings; account: closing error of the heat budget."""
 
     error: float
     radial: float

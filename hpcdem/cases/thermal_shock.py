@@ -29,7 +29,7 @@ class Shock:
 
 
 class ThermalShock(Rock):
-    """A slab between walls without friction; its surface is cooled at once, and the cold goes down."""
+    """A slab between frictionless walls; its surface is cooled at once, and the cold front moves down."""
 
     name: ClassVar[str] = "thermal-shock"
     title: ClassVar[str] = "Thermal shock of a slab"
@@ -82,7 +82,7 @@ pcdc mesh create from-layer 'outline' size [size] irregular group 'rock' set 'bo
 HEATED = (
     WAVES
     + """
-# The cold needs as long for its way as waves need for `transits` ways through the slab.
+# The cold needs as long to pass the slab as waves need to pass it `transits` times.
 duration = transits * depth / speed_of_waves
 diffusivity = front**2 / (4 * duration)
 capacity = conductivity / (density * diffusivity)

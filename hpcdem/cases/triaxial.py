@@ -29,7 +29,7 @@ class Strength:
 
 
 class Triaxial(Rock):
-    """A cube under a pressure along x and another along y, pressed along z."""
+    """A cube under one pressure along x and another along y, compressed along z."""
 
     name: ClassVar[str] = "triaxial"
     title: ClassVar[str] = "True triaxial compression of a cube, in three dimensions"
@@ -95,7 +95,8 @@ pcdc model step 1                                # the time step is known from h
 every = max(1, round(0.1 * transit / pcdc.time))
 for name in ('below', 'above'):
     pcdc history create 'force [name]' node value reaction-z sum every [every] range group '[name]' set 'moved'
-    pcdc history create 'way [name]' node value displacement-z mean every [every] range group '[name]' set 'moved'
+    pcdc history create 'displacement [name]' node value displacement-z mean every [every] \\
+        range group '[name]' set 'moved'
 pcdc history create 'cracks' model value broken-joints every [every]
 pcdc output vtk 'triaxial' every [50*every]
 
@@ -113,7 +114,7 @@ pcdc output vtk 'triaxial'
 
 # The curve: compression is positive from here on.
 below, above, rise, fall = (pcdc.history(name)[:, 2]
-                            for name in ('force below', 'force above', 'way below', 'way above'))
+                            for name in ('force below', 'force above', 'displacement below', 'displacement above'))
 stress, strain = (below - above) / (2 * side**2), (rise - fall) / side
 curve = list(zip(strain.tolist(), stress.tolist()))
 peak, peak_strain = float(stress.max()), float(strain[stress.argmax()])

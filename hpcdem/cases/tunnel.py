@@ -35,7 +35,7 @@ class Excavation:
 
 
 class Tunnel(Rock):
-    """A tunnel: rock under stress, from which a circle or a horseshoe is excavated gradually."""
+    """A tunnel: a circle or a horseshoe is excavated gradually from rock under stress."""
 
     name: ClassVar[str] = "tunnel"
     title: ClassVar[str] = "Excavation of a tunnel in stressed rock"
@@ -123,10 +123,10 @@ STRESSED = """
 pcdc element initial stress-xx [stress_xx] stress-yy [stress_yy] stress-zz [poisson*(stress_xx + stress_yy)]
 pcdc element-face boundary m-s-b-c stress-xx [stress_xx] stress-yy [stress_yy] range geometry 'outline'
 near = 1e-6 * side
-for name, x, y, way in (('left', -side, 0, Vector(1,0)), ('right', side, 0, Vector(1,0)),
+for name, x, y, direction in (('left', -side, 0, Vector(1,0)), ('right', side, 0, Vector(1,0)),
                         ('below', 0, -side, Vector(0,1)), ('above', 0, side, Vector(0,1))):
     pcdc node group '[name]' set 'held' range x [x - near] [x + near] y [y - near] [y + near]
-    pcdc node boundary mech-m-b-c type 2 [way] range group '[name]' set 'held'
+    pcdc node boundary mech-m-b-c type 2 [direction] range group '[name]' set 'held'
 """
 RELAXING = """
 # In balance before, and again after what the core did to the rock has died down.

@@ -14,7 +14,8 @@ from hpcdem.cases.base import Case, quantity
 class Closure:
     """behind [m]: closure of the wall far behind the face; theory [m]: (1 + nu) p r / E, of a long tunnel; at_face:
     closure at the face, over that behind; profile: (distance from the face over the radius, closure over that far
-    behind), positive where the rock is still there."""
+    behind), positive ahead of the face.
+    """
 
     behind: float
     theory: float
@@ -23,7 +24,7 @@ class Closure:
 
 
 class TunnelFace(Case):
-    """A quarter of a round tunnel, driven along y into rock under the same pressure from all sides."""
+    """A quarter of a circular tunnel, driven along y into rock under isotropic pressure."""
 
     name: ClassVar[str] = "tunnel-face"
     title: ClassVar[str] = "Convergence of a tunnel ahead of and behind its face, in three dimensions"

@@ -29,8 +29,7 @@ class Compression:
 
 
 class UCS(Rock):
-    """Uniaxial compression: a rectangle, in three dimensions a cylinder, of rock between two platens that approach each
-    other."""
+    """Uniaxial compression of rock between two platens: a rectangle, in three dimensions a cylinder."""
 
     name: ClassVar[str] = "ucs"
     title: ClassVar[str] = "Uniaxial compression of a specimen of rock"
@@ -138,7 +137,7 @@ pcdc model step 1                                # the time step is known from h
 every = max(1, round(0.1 * transit / pcdc.time))
 for name, at in (('below', 'bottom'), ('above', 'top')):
     pcdc history create 'force [name]' node value reaction-UP sum every [every] range group '[name]' set 'moved'
-    pcdc history create 'way [at]' node value displacement-UP mean every [every] range group '[at]' set 'ends'
+    pcdc history create 'displacement [at]' node value displacement-UP mean every [every] range group '[at]' set 'ends'
 pcdc history create 'cracks' model value broken-joints every [every]
 pcdc output vtk 'ucs' every [50*every]
 
@@ -156,7 +155,7 @@ pcdc output vtk 'ucs'
 
 # The curve: compression is positive from here on.
 below, above, bottom, top = (pcdc.history(name)[:, 2]
-                             for name in ('force below', 'force above', 'way bottom', 'way top'))
+                             for name in ('force below', 'force above', 'displacement bottom', 'displacement top'))
 stress, strain = (below - above) / (2 * AREA), (bottom - top) / height
 curve = list(zip(strain.tolist(), stress.tolist()))
 peak, peak_strain = float(stress.max()), float(strain[stress.argmax()])

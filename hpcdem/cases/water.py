@@ -6,7 +6,7 @@ from hpcdem.cases.base import Case, quantity
 
 
 class Water(Case):
-    """Parameters of the fluid; where flow is steady its bulk modulus does not count."""
+    """Parameters of the fluid; its bulk modulus does not affect steady flow."""
 
     fluid_density: float = quantity(1000.0, "kg/m3", "density of the water", gt=0)
     viscosity: float = quantity(1e-3, "Pa s", "dynamic viscosity of the water", gt=0)
@@ -14,7 +14,7 @@ class Water(Case):
 
 
 class Warm(Case):
-    """Parameters of water and rock with heat; flow is steady, so the water's bulk modulus does not count."""
+    """Parameters of water and rock with heat; flow is steady, so the bulk modulus of the water has no effect."""
 
     fluid_density: float = quantity(1000.0, "kg/m3", "density of the water", gt=0)
     viscosity: float = quantity(1e-3, "Pa s", "dynamic viscosity of the water", gt=0)

@@ -13,10 +13,13 @@ from hpcdem.cases.base import Case, quantity
 
 @dataclass(frozen=True)
 class Release:
-    """factor: of safety, in the middle of `stands`, the greatest factor with which the wedge stayed, and `slides`, the
-    least with which it did not; equilibrium: that of the closed form, error: the difference over it; plunge, trend
-    [degrees]: of the line along which the joints meet, and trend_moved of the way that the wedge went; volume [m3];
-    trials: per trial (factor, displacement [m], unbalanced ratio, steps)."""
+    """Result of the case.
+
+    factor: factor of safety, the mean of `stands`, the largest factor at which the wedge stayed, and `slides`, the
+    smallest at which it slid; equilibrium: factor of the closed form; error: relative deviation from it; plunge, trend:
+    of the line of intersection of the joints [degrees]; trend_moved: of the displacement of the wedge [degrees]; volume
+    [m3]; trials: per trial (factor, displacement [m], unbalanced ratio, steps).
+    """
 
     factor: float
     stands: float
@@ -31,7 +34,7 @@ class Release:
 
 
 class Wedge(Case):
-    """A slope of sound rock with two joints, which cut a wedge out of its face and its top."""
+    """A slope of intact rock with two joints, which cut a wedge out of its face and its crest."""
 
     name: ClassVar[str] = "wedge"
     title: ClassVar[str] = "Sliding of a wedge between two joints of a slope"
@@ -171,8 +174,8 @@ while math.isinf(slides) or slides - stands > precision * slides or shown != sli
     while steps < patience and moved < collapse * height:
         pcdc model solve ratio [balance] cycles 500
         steps += pcdc.solved['steps']
-        way = pcdc.node(spot).displacement
-        moved = math.sqrt(way.X**2 + way.Y**2 + way.Z**2)
+        moved_by = pcdc.node(spot).displacement
+        moved = math.sqrt(moved_by.X**2 + moved_by.Y**2 + moved_by.Z**2)
         if pcdc.ratio <= balance:
             break
     shown = factor
@@ -182,7 +185,7 @@ while math.isinf(slides) or slides - stands > precision * slides or shown != sli
         if stays:
             stands = factor
         else:
-            slides, trend_moved = factor, math.degrees(math.atan2(way.X, way.Y))
+            slides, trend_moved = factor, math.degrees(math.atan2(moved_by.X, moved_by.Y))
         what = 'stays' if stays else 'slides'
         print('factor %.4g: %s, moved by %.4g mm, %d steps' % (factor, what, 1e3 * moved, steps))
 factor = 0.5 * (stands + slides)

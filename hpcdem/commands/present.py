@@ -21,7 +21,7 @@ from hpcdem.runtime import run_folder
 
 
 def particles(sim: Simulation) -> Path | None:
-    """`now/all_<step>.vtkhdf` of particles; None if missing. Collective, for one rank."""
+    """Write `now/all_<step>.vtkhdf` of particles. Return its path, None without particles. Collective, for one rank."""
     if not len(sim.particles.hot[sim.particles.owned]):
         return None
     sim.close_model()
@@ -31,8 +31,9 @@ def particles(sim: Simulation) -> Path | None:
 
 
 def blocks(project: Project) -> Path | None:
-    """`now/now_<step>.vtkhdf` of blocks, before they have models of their mesh; None without one. Collective, for one
-    rank."""
+    """Write `now/now_<step>.vtkhdf` of blocks, also before they have models, and return its path; None without a mesh.
+    Collective, for one rank.
+    """
     try:
         project.ready(use=False)
     except CommandError:

@@ -21,7 +21,7 @@ def of_polygons(
     attribute: str | None = None,
     only: Sequence[str] = (),
 ) -> tuple[float, tuple[float, float, float, float]]:
-    """Area of all polygons [m2], and x1, x2, y1, y2 of the rectangle about them [m]. Raises HpcdemError."""
+    """Return the area of all polygons [m2], and the bounds x1, x2, y1, y2 of the polygons [m]. Raises HpcdemError."""
     found = read(file, Placement(scale, origin, to, line), legend, attribute, only)
     corners = np.concatenate([one.points for shape in found.polygons for one in shape.rings] or [np.zeros((1, 2))])
     (x1, y1), (x2, y2) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()

@@ -33,9 +33,10 @@ Writer = Callable[[Path], object]
 
 @dataclass(frozen=True)
 class Style:
-    """Format of the files. layout and angle_factor: of the PPDEM file ("full": polygons with the roundness of their
-    edges); gap: between outlines and discs of clumps, over the size; formats of the figures; falling: sizes of the
-    grading curve fall to the right."""
+    """Format of the files. layout, angle_factor: of the PPDEM file ("full": polygons with the roundness of their
+    edges); gap: distance between outlines and discs of clumps over the grain size; formats: of the figures; falling:
+    bool, sizes of the grading curve decrease to the right.
+    """
 
     layout: str = "sample"
     angle_factor: float = 1.0
@@ -46,19 +47,19 @@ class Style:
 
 @dataclass(frozen=True)
 class Outputs:
-    """A specimen and its files."""
+    """A specimen and the files that describe it."""
 
     specimen: Specimen
     style: Style = field(default_factory=Style)
 
     @cached_property
     def clumps(self) -> tuple[Clumps, Discs]:
-        """Discs for the outlines; of shapes other than circles."""
+        """Discs that fill the outlines, for shapes other than circles."""
         return to_clumps(self.specimen, self.style.gap)
 
     @cached_property
     def files(self) -> dict[str, Writer]:
-        """Name of each file, and the function that writes it to a path."""
+        """Return the name of each file and the function that writes it to a path."""
         made, style = self.specimen, self.style
         layout = "sample" if style.layout == "full" and made.request.shape not in SIDES else style.layout
         grains: Writer = lambda path: write_ppdem(path, to_ppdem(made), layout, style.angle_factor)  # noqa: E731
@@ -116,7 +117,7 @@ class Outputs:
         return text.getvalue()
 
     def summary(self) -> dict[str, Any]:
-        """Request and result as JSON values; lengths in mm."""
+        """Return request and result as JSON values; lengths in mm."""
         made = self.specimen
         asked, d = made.request, made.density
         facts: dict[str, Any] = {

@@ -15,8 +15,9 @@ Given = tuple[str, str, Any]
 
 
 def declared(before: str, name: str, log: Any, late: bool) -> str:
-    """The system that a model has from here on. before: the one it has, "" none; late: values were given already.
-    CommandError for an unknown one, or if another one was declared before."""
+    """Return the system of units that applies from here on. before: the present one, "" none; late: values were given
+    already. CommandError for an unknown system, or if another one was declared before.
+    """
     new = units.system(name).name
     if before not in ("", new):
         raise CommandError(

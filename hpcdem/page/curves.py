@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core import units
+from hpcdem.core.deprecated import present_history
 from hpcdem.core.errors import HpcdemError
 from hpcdem.post.view import filter
 
@@ -110,7 +111,7 @@ class Curves:
                 y = [self._positive(loads, "({0} - {1}) / 2", "load")]
             else:
                 x, y = _quoted(displacements[0]), [*map(_quoted, loads[:MOST])]
-            found.append({"kind": "load_way", "x": x, "y": y})
+            found.append({"kind": "load_displacement", "x": x, "y": y})
         return found
 
     def _positive(self, two: Sequence[Record], form: str, name: str) -> str:
@@ -133,6 +134,7 @@ class Curves:
         if not 1 <= len(y) <= MOST:
             raise HpcdemError(f"a chart has 1 to {MOST} curves, not {len(y)}")
         records = {record.name: record for record in self.records()}
+        x, *y = (_present(text, records) for text in (x, *y))
         x_title, x_unit, x_text = self._asked(x, records)
         curves = []
         for one in y:
@@ -256,6 +258,11 @@ def _word(value: float | None) -> str:
 
 def _quoted(record: Record) -> str:
     return f"'{record.name}'" if "'" not in record.name else f'"{record.name}"'
+
+
+def _present(text: str, records: dict[str, Record]) -> str:
+    """An expression with the present names of histories of ready-made models."""
+    return _QUOTED.sub(lambda found: found[0][0] + present_history(found[0][1:-1], records) + found[0][-1], text)
 
 
 def _used(text: str, records: dict[str, Record]) -> dict[str, Record]:

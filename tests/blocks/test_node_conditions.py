@@ -35,10 +35,10 @@ E = np.eye(3).tolist()
 )
 def test_constraints_meet_in_what_they_leave(one, other, both):
     for first, second in ((one, other), (other, one)):
-        kind, way = bound(first[0], tuple(first[1]), second[0], tuple(second[1]), len(one[1]))
+        kind, direction = bound(first[0], tuple(first[1]), second[0], tuple(second[1]), len(one[1]))
         assert kind == both[0]
         if kind != FIXED:
-            assert abs(np.dot(way, both[1])) == pytest.approx(1.0)
+            assert abs(np.dot(direction, both[1])) == pytest.approx(1.0)
 
 
 def moves(**given) -> NodeCondition:
@@ -49,13 +49,16 @@ def moves(**given) -> NodeCondition:
 @pytest.mark.parametrize(
     ("one", "speed"),
     [
-        (moves(at_x=3.0, constraint=ALONG, way=(0.6, 0.8)), (3.0, 4.0)),
-        (moves(at_x=3.0, at_y=4.0, constraint=ALONG, way=(0.6, 0.8)), (3.0, 4.0)),
-        (moves(at_x=0.0, constraint=ALONG, way=(0.6, 0.8)), (0.0, 0.0)),
-        (moves(at_x="table", constraint=ALONG, way=(1.0, 0.0)), ("table", 0.0)),
-        (moves(at_y=4.0, constraint=ACROSS, way=(0.0, 0.8, 0.6)), (None, 4.0, -4.0 * 0.8 / 0.6)),
-        (moves(at_y=4.0, at_z=-4.0 * 0.8 / 0.6, constraint=ACROSS, way=(0.0, 0.8, 0.6)), (None, 4.0, -4.0 * 0.8 / 0.6)),
-        (moves(at_x=2.0, constraint=ACROSS, way=(0.0, 0.0, 1.0)), (2.0, None, 0.0)),
+        (moves(at_x=3.0, constraint=ALONG, direction=(0.6, 0.8)), (3.0, 4.0)),
+        (moves(at_x=3.0, at_y=4.0, constraint=ALONG, direction=(0.6, 0.8)), (3.0, 4.0)),
+        (moves(at_x=0.0, constraint=ALONG, direction=(0.6, 0.8)), (0.0, 0.0)),
+        (moves(at_x="table", constraint=ALONG, direction=(1.0, 0.0)), ("table", 0.0)),
+        (moves(at_y=4.0, constraint=ACROSS, direction=(0.0, 0.8, 0.6)), (None, 4.0, -4.0 * 0.8 / 0.6)),
+        (
+            moves(at_y=4.0, at_z=-4.0 * 0.8 / 0.6, constraint=ACROSS, direction=(0.0, 0.8, 0.6)),
+            (None, 4.0, -4.0 * 0.8 / 0.6),
+        ),
+        (moves(at_x=2.0, constraint=ACROSS, direction=(0.0, 0.0, 1.0)), (2.0, None, 0.0)),
     ],
 )
 def test_a_velocity_beside_a_constraint(one, speed):
@@ -69,9 +72,9 @@ def test_a_velocity_beside_a_constraint(one, speed):
 
 
 def test_a_component_of_a_plane_that_stays_leaves_a_line():
-    found = acting(moves(at_y=0.0, constraint=ACROSS, way=(0.6, 0.64, 0.48)), 3)
+    found = acting(moves(at_y=0.0, constraint=ACROSS, direction=(0.6, 0.64, 0.48)), 3)
     assert found.constraint == ALONG and found.does_y == nodes.FREE
-    assert found.way[1] == 0.0 and np.dot(found.way, (0.6, 0.64, 0.48)) == pytest.approx(0.0, abs=1e-15)
+    assert found.direction[1] == 0.0 and np.dot(found.direction, (0.6, 0.64, 0.48)) == pytest.approx(0.0, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -79,18 +82,24 @@ def test_a_component_of_a_plane_that_stays_leaves_a_line():
     [
         (moves(at_x=0.1, constraint=FIXED), r"held \(type 1\) and velocity-x 0.1"),
         (moves(at_y="table", constraint=FIXED), r"held \(type 1\) and velocity-y 'table'"),
-        (moves(at_x=1.0, constraint=ALONG, way=(0.0, 1.0)), r"direction \(0, 1\) \(type 2\) and velocity-x 1"),
-        (moves(at_x=3.0, at_y=5.0, constraint=ALONG, way=(0.6, 0.8)), "velocity-x 3 and velocity-y 5"),
-        (moves(at_x="table", constraint=ALONG, way=(0.6, 0.8)), "numbers of one kind"),
-        (moves(at_x=3.0, at_y=4.0, does_y=A, constraint=ALONG, way=(0.6, 0.8)), "acceleration-y 4"),
-        (moves(at_z=1.0, constraint=ACROSS, way=(0.0, 0.0, 1.0)), r"across \(0, 0, 1\) \(type 3\) and velocity-z 1"),
-        (moves(at_y=1.0, at_z=1.0, constraint=ACROSS, way=(0.0, 0.8, 0.6)), "velocity-y 1 and velocity-z 1"),
-        (moves(at_x=1.0, constraint=ACROSS, way=(0.6, 0.64, 0.48)), "prescribe the value 0 or a second component"),
+        (moves(at_x=1.0, constraint=ALONG, direction=(0.0, 1.0)), r"direction \(0, 1\) \(type 2\) and velocity-x 1"),
+        (moves(at_x=3.0, at_y=5.0, constraint=ALONG, direction=(0.6, 0.8)), "velocity-x 3 and velocity-y 5"),
+        (moves(at_x="table", constraint=ALONG, direction=(0.6, 0.8)), "numbers of one kind"),
+        (moves(at_x=3.0, at_y=4.0, does_y=A, constraint=ALONG, direction=(0.6, 0.8)), "acceleration-y 4"),
+        (
+            moves(at_z=1.0, constraint=ACROSS, direction=(0.0, 0.0, 1.0)),
+            r"across \(0, 0, 1\) \(type 3\) and velocity-z 1",
+        ),
+        (moves(at_y=1.0, at_z=1.0, constraint=ACROSS, direction=(0.0, 0.8, 0.6)), "velocity-y 1 and velocity-z 1"),
+        (
+            moves(at_x=1.0, constraint=ACROSS, direction=(0.6, 0.64, 0.48)),
+            "prescribe the value 0 or a second component",
+        ),
     ],
 )
 def test_what_contradicts(one, told):
     with pytest.raises(Contradiction, match=told):
-        acting(one, len(one.way) if one.constraint != FIXED else 2)
+        acting(one, len(one.direction) if one.constraint != FIXED else 2)
 
 
 def on_rollers(how: str, sim: Blocks, x: np.ndarray, y: np.ndarray) -> Blocks:
@@ -127,12 +136,12 @@ def test_a_corner_between_base_and_roller_stays(shape):
         x, y = mesh.points[:, 0], mesh.points[:, 1]
         on_rollers(how, sim, x, y)
         equilibrium.solve_elastic(sim)
-        way = diagnostics.values(sim, "displacement_y")
-        assert (way[y < 1e-9] == 0.0).all() and way.min() < -1e-8
+        direction = diagnostics.values(sim, "displacement_y")
+        assert (direction[y < 1e-9] == 0.0).all() and direction.min() < -1e-8
         assert diagnostics.total(sim, "reaction_y") == pytest.approx(ROCK["density"] * 10.0, rel=1e-9)
-        found.append((way, diagnostics.values(sim, "reaction_x")))
-    for way, reaction in found[1:]:
-        assert way == pytest.approx(found[0][0], abs=1e-18) and reaction == pytest.approx(found[0][1], abs=1e-6)
+        found.append((direction, diagnostics.values(sim, "reaction_x")))
+    for direction, reaction in found[1:]:
+        assert direction == pytest.approx(found[0][0], abs=1e-18) and reaction == pytest.approx(found[0][1], abs=1e-6)
 
 
 def test_refused_by_name_and_nothing_is_changed(tmp_path):
@@ -256,9 +265,9 @@ def test_what_each_condition_makes_of_a_velocity_in_space():
     table[1, [space.DOES, space.AT, space.DOES + 2, space.AT + 2]] = V, 7.0, A, 4.0
     table[1, [space.FORCE, space.FORCE + 1, space.FORCE + 2]] = 10.0, 20.0, 30.0
     table[2, space.CONSTRAINT] = FIXED
-    way = np.array([0.6, 0.0, 0.8])
+    direction = np.array([0.6, 0.0, 0.8])
     for row, kind in ((3, ALONG), (4, ACROSS), (5, ALONG)):
-        table[row, space.CONSTRAINT], table[row, space.WAY : space.WAY + 3] = kind, way
+        table[row, space.CONSTRAINT], table[row, space.WAY : space.WAY + 3] = kind, direction
     table[5, space.NODE_DAMP] = 0.0
     outside, felt, share = np.full((6, 3), np.nan), np.zeros((6, 6)), np.full(6, 0.5)
     args = begin, corner, begin, corner, np.full(6, k), condition, share, table, True, force, applied, v, alpha
@@ -278,11 +287,11 @@ def test_what_each_condition_makes_of_a_velocity_in_space():
     assert now[2] == pytest.approx([7.0, -2.0, 5.0], rel=1e-14)
     assert outside[1] == pytest.approx([4.0 / k - 14.0, 0.0, 4.0 / k - 18.0], rel=1e-13)
     assert (now[3] == 0.0).all() and outside[2] == pytest.approx(-before / k - f[2], rel=1e-14)
-    speed, pull = before @ way, f[3] @ way
-    assert now[4] == pytest.approx((speed + k * damped(pull, speed)) * way, rel=1e-13)
-    assert outside[3] == pytest.approx(-(f[3] - pull * way), rel=1e-13)
-    pull = f[4] @ way
-    w = np.array([b + k * damped(a, b) for a, b in zip(f[4] - pull * way, before)])
-    assert now[5] == pytest.approx(w - (w @ way) * way, rel=1e-13, abs=1e-15)
-    assert outside[4] == pytest.approx(-pull * way, rel=1e-13)
-    assert now[6] == pytest.approx((before + k * f[5]) @ way * way, rel=1e-13)
+    speed, pull = before @ direction, f[3] @ direction
+    assert now[4] == pytest.approx((speed + k * damped(pull, speed)) * direction, rel=1e-13)
+    assert outside[3] == pytest.approx(-(f[3] - pull * direction), rel=1e-13)
+    pull = f[4] @ direction
+    w = np.array([b + k * damped(a, b) for a, b in zip(f[4] - pull * direction, before)])
+    assert now[5] == pytest.approx(w - (w @ direction) * direction, rel=1e-13, abs=1e-15)
+    assert outside[4] == pytest.approx(-pull * direction, rel=1e-13)
+    assert now[6] == pytest.approx((before + k * f[5]) @ direction * direction, rel=1e-13)

@@ -28,8 +28,8 @@ def pressed(folder: Path, steps: range = range(0, 50, 10)) -> None:
     """Two ends that approach each other, as `hpcdem case ucs` records them."""
     write(folder, "force above", "reaction_y [N/m]", {s: -3e4 * s for s in steps})
     write(folder, "force below", "reaction_y [N/m]", {s: 5e4 * s for s in steps})
-    write(folder, "way bottom", "displacement_y [m]", {s: 1e-6 * s for s in steps})
-    write(folder, "way top", "displacement_y [m]", {s: -2e-6 * s for s in steps})
+    write(folder, "displacement bottom", "displacement_y [m]", {s: 1e-6 * s for s in steps})
+    write(folder, "displacement top", "displacement_y [m]", {s: -2e-6 * s for s in steps})
 
 
 def test_any_history_over_any_other_where_both_have_steps(tmp_path: Path):
@@ -44,20 +44,32 @@ def test_any_history_over_any_other_where_both_have_steps(tmp_path: Path):
 
 def test_what_is_computed_has_a_title_and_a_unit(tmp_path: Path):
     pressed(tmp_path)
-    told = Curves(tmp_path).drawn("strain [%] = 100 * ('way bottom' - 'way top') / 0.1", ["'force below' / 0.05"])
+    told = Curves(tmp_path).drawn(
+        "strain [%] = 100 * ('displacement bottom' - 'displacement top') / 0.1", ["'force below' / 0.05"]
+    )
     assert (told["x"]["title"], told["x"]["unit"], told["x"]["size"]) == ("strain", "%", 1.0)
     np.testing.assert_allclose(told["curves"][0]["x"], 100 * 3e-6 * np.arange(0, 50, 10) / 0.1)
     np.testing.assert_allclose(told["curves"][0]["y"], 5e4 * np.arange(0, 50, 10) / 0.05)
 
 
+def test_an_earlier_name_of_a_history_is_the_present_one(tmp_path: Path):
+    """Ready-made models called displacements `way`; a history that has that name itself is meant first."""
+    pressed(tmp_path)
+    curves = Curves(tmp_path)
+    new, old = (curves.drawn("step", [f"2 * '{name} top'", f'"{name} top"']) for name in ("displacement", "way"))
+    assert [one["y"] for one in old["curves"]] == [one["y"] for one in new["curves"]]
+    write(tmp_path, "way top", "displacement_y [m]", {0: 7.0})
+    assert Curves(tmp_path).drawn("step", ["'way top'"])["curves"][0]["y"] == [7.0]
+
+
 @pytest.mark.parametrize(
     ("x", "y", "said"),
     [
-        ("time", ["'none'"], "there is no history 'none'; known: 'force above', 'force below'"),
-        ("time", ["2 *"], "expected a history, such as 'force above'"),
-        ("time", ["__import__('way top')"], "unknown function __import__"),
-        ("'way top' < 1", ["'way top'"], "expected"),
-        ("time", ["'way top'" + " " * 10**6], "at most 500 characters"),
+        ("time", ["'none'"], "there is no history 'none'; known: 'displacement bottom', 'displacement top'"),
+        ("time", ["2 *"], "expected a history, such as 'displacement bottom'"),
+        ("time", ["__import__('displacement top')"], "unknown function __import__"),
+        ("'displacement top' < 1", ["'displacement top'"], "expected"),
+        ("time", ["'displacement top'" + " " * 10**6], "at most 500 characters"),
         ("time", [], "1 to 12 curves"), ("time", "a", "a list of y"), (3, ["a"], "an x"),
     ],
 )  # fmt: skip
@@ -81,7 +93,7 @@ def test_the_loads_of_a_laboratory_are_ready_made(tmp_path: Path):
     (tmp_path / "any.csv").write_text("curve,x,y\na,0.0,1.0\n")
     first, *others = curves.presets()
     assert [(one["kind"], one.get("chart")) for one in others] == [
-        ("stress_strain", "ucs.csv"), ("of_script", "any.csv"), ("load_way", None),
+        ("stress_strain", "ucs.csv"), ("of_script", "any.csv"), ("load_displacement", None),
     ]  # fmt: skip
     assert first == {"kind": "stress_strain", "x": "'1'", "y": ["'2'"]}
     told = curves.drawn(first["x"], first["y"])
@@ -90,18 +102,18 @@ def test_the_loads_of_a_laboratory_are_ready_made(tmp_path: Path):
 
 def test_a_line_that_is_being_written_is_left_out(tmp_path: Path):
     pressed(tmp_path)
-    path = tmp_path / "history_way top.csv"
+    path = tmp_path / "history_displacement top.csv"
     path.write_text(path.read_text() + "50,0.0")
-    assert Curves(tmp_path).drawn("step", ["'way top'"])["curves"][0]["x"] == [0.0, 10.0, 20.0, 30.0, 40.0]
+    assert Curves(tmp_path).drawn("step", ["'displacement top'"])["curves"][0]["x"] == [0.0, 10.0, 20.0, 30.0, 40.0]
 
 
 def test_a_history_that_grows_or_begins_anew_is_read_on(tmp_path: Path):
     """Only what is new is read; a file of the same name with something else in it is another."""
     pressed(tmp_path)
-    curves, path = Curves(tmp_path), tmp_path / "history_way top.csv"
+    curves, path = Curves(tmp_path), tmp_path / "history_displacement top.csv"
 
     def steps() -> list[float]:
-        return curves.drawn("step", ["'way top'"])["curves"][0]["x"]
+        return curves.drawn("step", ["'displacement top'"])["curves"][0]["x"]
 
     assert steps() == [0.0, 10.0, 20.0, 30.0, 40.0]
     with path.open("a") as file:
@@ -110,10 +122,10 @@ def test_a_history_that_grows_or_begins_anew_is_read_on(tmp_path: Path):
     with path.open("a") as file:
         file.write("0.06,2.0\n")
     assert steps()[-2:] == [50.0, 60.0]
-    write(tmp_path, "way top", "velocity_y [m/s]", {s: 1.0 for s in range(0, 100, 5)})
+    write(tmp_path, "displacement top", "velocity_y [m/s]", {s: 1.0 for s in range(0, 100, 5)})
     assert steps() == list(range(0, 100, 5))
-    write(tmp_path, "way top", "velocity_y [m/s]", {7: 1.0})
-    assert steps() == [7.0] and curves.drawn("step", ["'way top'"])["curves"][0]["unit"] == "m/s"
+    write(tmp_path, "displacement top", "velocity_y [m/s]", {7: 1.0})
+    assert steps() == [7.0] and curves.drawn("step", ["'displacement top'"])["curves"][0]["unit"] == "m/s"
 
 
 def test_a_long_history_keeps_its_peak(tmp_path: Path):
@@ -185,8 +197,8 @@ def test_columns_are_chosen_and_several_curves_have_names(page: Tab):
     page.tab.click("#chart-columns summary")
     page.tab.check("[data-column=\"'force below'\"]")
     page.until(lambda: words(page, "name") == ["force above", "force below"])
-    page.tab.select_option("#chart-x", "'way top'")
-    page.until(lambda: words(page, "axis")[0] == "way top (µm)")
+    page.tab.select_option("#chart-x", "'displacement top'")
+    page.until(lambda: words(page, "axis")[0] == "displacement top (µm)")
     page.tab.check("[data-column=\"'cracks'\"]")  # another unit has an axis on the right
     page.until(lambda: len(words(page, "axis")) == 3 and words(page, "axis")[2] == "cracks")
     assert page.tab.input_value("#history") == "own"
@@ -197,7 +209,7 @@ def test_a_large_chart_its_expressions_and_files(page: Tab, tmp_path: Path):
     page.until(lambda: page.tab.is_visible("#chart"))
     page.tab.click("#chart")
     assert page.tab.locator("#chart-figure svg").bounding_box()["width"] > 700
-    page.tab.fill("#chart-x-text", "strain [%] = 100 * ('way bottom' - 'way top') / 0.1")
+    page.tab.fill("#chart-x-text", "strain [%] = 100 * ('displacement bottom' - 'displacement top') / 0.1")
     page.tab.fill("#chart-y-text", "stress [Pa] = 'force below' / 0.05")
     page.tab.press("#chart-x-text", "Enter")
     page.until(lambda: words(page, "axis", "#chart-figure") == ["strain (%)", "stress (MPa)"])

@@ -155,6 +155,17 @@ def test_a_history_is_stopped_and_its_file_stays(bench):
         bench("pcdc history create 't' model value time\n")
 
 
+def test_an_earlier_name_of_a_history_is_the_present_one(bench):
+    """A script of a ready-made model that asks for `way top`; a name that is neither is still refused."""
+    bench(BOX + "pcdc history create 'displacement top' node id 12 value displacement-y\npcdc model step 2\n")
+    bench("found = pcdc.history('way top')\npcdc history export 'one.csv' names 'way top'\n")
+    assert bench["found"][:, 2].tolist() == [row[2] for row in bench.project.histories["displacement top"].rows] != []
+    with pytest.raises(HpcdemError, match="there is no history 'way low'"):
+        bench("pcdc.history('way low')\n")
+    bench("pcdc history delete 'way top'\n")
+    assert not bench.project.histories
+
+
 def test_charts(bench):
     bench(
         BOX + "pcdc history create 'load' node value reaction-y sum every 10 range y 2 2\n"

@@ -78,10 +78,10 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model reset thermal current-time 2", "sim.reset_clock('thermal', current_time=2)"),
     ("pcdc model reset hydraulic time-step 2", "sim.reset_clock('hydraulic', time_step=2)"),
     ("pcdc model reset proppant-transport current-time 2", "sim.reset_clock('proppant-transport', current_time=2)"),
-    ("pcdc model query mechanical time", "sim.tell_time('mechanical')"),
-    ("pcdc model query thermal time", "sim.tell_time('thermal')"),
-    ("pcdc model query hydraulic time", "sim.tell_time('hydraulic')"),
-    ("pcdc model query proppant-transport time", "sim.tell_time('proppant-transport')"),
+    ("pcdc model query mechanical time", "sim.report_time('mechanical')"),
+    ("pcdc model query thermal time", "sim.report_time('thermal')"),
+    ("pcdc model query hydraulic time", "sim.report_time('hydraulic')"),
+    ("pcdc model query proppant-transport time", "sim.report_time('proppant-transport')"),
     ("pcdc device list", "sim.report_devices()"),
     ("pcdc model time-step table 'dt'", "sim.time_step(value='dt')"),
     ("pcdc model time-step auto on update-frequency 20", "sim.time_step(auto=True, update_frequency=20)"),
@@ -1069,7 +1069,7 @@ def test_a_script_keeps_its_own_blocks(resident: Resident, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("name, old, new", [
     ("Elements", "tell", "report"), ("Faces", "tell", "report"), ("Joints", "tell", "report"),
-    ("BlockCommands", "tell_devices", "report_devices"),
+    ("BlockCommands", "tell_devices", "report_devices"), ("BlockCommands", "tell_time", "report_time"),
 ])  # fmt: skip
 def test_earlier_names_still_work_with_a_warning(monkeypatch, name, old, new) -> None:
     from hpcdem.api import blocks
@@ -1078,3 +1078,19 @@ def test_earlier_names_still_work_with_a_warning(monkeypatch, name, old, new) ->
     monkeypatch.setattr(of, new, lambda self, **options: options)
     with pytest.deprecated_call(match=f"{old} of {name} is deprecated: use {new}"):
         assert getattr(object.__new__(of), old)(where="id 1") == {"where": "id 1"}
+
+
+def test_an_earlier_name_of_an_argument_warns_and_acts(bench: Bench, monkeypatch: Any) -> None:
+    """`way` of translate is `vector` now; with both, the earlier one is an unknown argument."""
+    sim, recorder = program(bench), Recorder()
+    for module in (bindings, execute, api, simulation):
+        monkeypatch.setattr(module, "fdem", recorder)
+    for of in (sim.geometry, sim.mesh):
+        of.translate(vector=(2, 1))
+        with pytest.warns(DeprecationWarning, match="way of translate is deprecated: use vector") as warned:
+            of.translate(way=(2, 1))
+        assert warned[0].filename == __file__
+        with pytest.raises(ScriptError, match="there is no argument 'way'"):
+            of.translate(way=(2, 1), vector=(2, 1))
+    first, second, third, fourth = recorder.calls
+    assert first == second != third == fourth

@@ -213,7 +213,7 @@ def test_forces_and_work_of_walls(folder: Path, tmp_path: Path) -> None:
     assert sorted({row["wall"] for row in rows}) == ["0", "1"]
     mine = [row for row in rows if row["wall"] == "1"]
     assert [row["step"] for row in mine] == ["2000", "3000", "4000"]  # from where it begins to move
-    assert column(mine, "way[m]") == pytest.approx([0.0, HEAVE, 2 * HEAVE])
+    assert column(mine, "path[m]") == pytest.approx([0.0, HEAVE, 2 * HEAVE])
     assert column(mine, "fx[N]") == pytest.approx([0.0, -2e5 * HEAVE, -4e5 * HEAVE])
     assert column(mine, "work[J]")[-1] == pytest.approx(2e5 * (2 * HEAVE) ** 2 / 2.0)
     run(folder, "wallforce", "--wall", 0, "--from", 0, "-o", tmp_path)
@@ -463,7 +463,7 @@ def test_a_run_of_the_program(tmp_path: Path, launch: Any) -> None:
     log, broken = table(folder, "cracks_log")[-1], table(folder, "cracks")[-1]
     assert int(broken["broken"]) == int(log["tension"]) + int(log["shear"]) > 0
     push = [row for row in table(folder, "wallforce") if row["wall"] == "1"]
-    assert float(push[-1]["way[m]"]) == pytest.approx(400.0)
+    assert float(push[-1]["path[m]"]) == pytest.approx(400.0)
     assert column(push, "fx[N]").max() < 0.0 and np.diff(column(push, "work[J]")).min() > 0.0
     shortening = column([row for row in all_rows], "step")
     assert shortening[0] == 1500.0 and shortening[-1] > 1500.0

@@ -188,9 +188,9 @@ def test_work_is_the_integral_of_the_force_over_the_way() -> None:
     s = np.linspace(0.0, 300.0, 31)
     curve = walls.Curve(np.arange(31), 0.1 * np.arange(31), np.stack([s, 0.0 * s], 1), np.stack([-4.0 * s, 7.0 + s], 1))
     assert curve.work[-1] == pytest.approx(4.0 * 300.0**2 / 2.0, rel=1e-12)
-    assert curve.way.tolist() == pytest.approx(s.tolist()) and curve.work[0] == 0.0
+    assert curve.path_length.tolist() == pytest.approx(s.tolist()) and curve.work[0] == 0.0
     back = walls.Curve(curve.step, curve.time, curve.place[::-1], curve.force[::-1])
-    assert back.work[-1] == pytest.approx(-curve.work[-1]) and back.way[-1] == pytest.approx(300.0)
+    assert back.work[-1] == pytest.approx(-curve.work[-1]) and back.path_length[-1] == pytest.approx(300.0)
 
 
 def test_broken_made_and_lost_bonds() -> None:

@@ -43,28 +43,28 @@ def bond(
     conserving: bool = False,
     moment: bool = False,
 ) -> int:
-    """PROP with bond keys: bond the pairs that touch, renew the bonds that are there.
+    """PROP with bond keys: bond touching pairs and update existing bonds.
 
-    Pairs are those with d - (Ra + Rb) rext <= tolerate. Either ebmod, gbmod, tstrength, sstrength (elastic bonds)
-    or n_bond, s_bond (contact bonds). What is left out stays, or is 0 in a new bond.
+    Pairs are those with d - (Ra + Rb) rext <= tolerate. Either ebmod, gbmod, tstrength, sstrength (elastic bonds) or
+    n_bond, s_bond (contact bonds). Omitted properties keep their values; in new bonds they are 0.
 
     Parameters
     ----------
-    where : particles; both of a pair are among them.
+    where : particles whose pairs are bonded; both particles of a pair must be selected.
     ebmod, gbmod : Young's and shear modulus of elastic bonds [Pa].
     tstrength, sstrength : their tensile strength and cohesion [Pa].
     n_bond, s_bond : tensile and shear strength of contact bonds [N].
-    tolerate : largest gap that is bonded [m]; 1e-6.
-    rext : factor on the radii in the search for pairs; 1.
+    tolerate : largest gap across which a pair is bonded [m] (default: 1e-6).
+    rext : factor on the radii in the search for pairs (default: 1).
     fric : friction coefficient of the particles.
-    rubber : mark the bonds as those of a membrane, without any effect on the motion.
-    conserving : one shear stiffness, touching or open, so that opening and closing make no energy (of a contact bond of
-        Hertz particles that at the moment of bonding).
-    moment : elastic bonds resist relative rotation, and break in tension by the stress at their outer fibre.
+    rubber : bool: mark the bonds as those of a membrane; the motion does not depend on it.
+    conserving : bool: use one shear stiffness for open and touching bonds, so that opening and closing conserve energy;
+        for contact bonds of Hertz particles, the stiffness at the moment of bonding.
+    moment : bool: elastic bonds resist relative rotation and break in tension by the stress at their outer fibre.
 
     Returns
     -------
-    int : how many are new.
+    int : number of new bonds.
     """
     kind, given = _law_of((ebmod, gbmod, tstrength, sstrength), (n_bond, s_bond))
     given |= _marks(sim, given, rubber, conserving, moment)
@@ -174,9 +174,10 @@ def _warn_of_overstretched(sim: Simulation, which: np.ndarray) -> None:
 
 
 def warn_of_stiffnesses(sim: Simulation) -> None:
-    """Warn of bonds without a normal stiffness, which never break in tension; and say it if there are bonds whose shear
-    stiffness is not that of their contacts: each opening and closing under shear then changes the energy. A warning
-    where nothing damps the motion, else a line. Collective."""
+    """Warn of bonds without normal stiffness, which never break in tension, and report bonds whose shear stiffness
+    differs from that of their contacts: opening and closing under shear then changes the energy. The report is a
+    warning if nothing damps the motion. Collective.
+    """
     state = len(sim.bond_types), len(sim.materials), sim.bonds, sim.settings.lsm
     if state == sim.bonds_checked or not sim.bonds_left():
         return
@@ -238,13 +239,12 @@ def _warn_of_loose_bonds(sim: Simulation, ids: list[list[int]]) -> None:
 
 
 def break_bonds(sim: Simulation, where: Selection | None = None, across: Sequence[np.ndarray] | None = None) -> int:
-    """BOND break: remove the bonds with both ends in `where`; how many. Shear forces stay, limited by friction from
-    then on.
+    """BOND break: remove the bonds between particles of a selection; friction limits their shear forces from then on.
 
     Parameters
     ----------
-    where : particles; both of a pair are among them.
-    across : lines, of points (n, 2) [m]: only bonds that cross one of them; left out, all.
+    where : particles; a bond is removed if both of its particles are selected (default: all).
+    across : polylines, arrays of points (n, 2) [m]: remove only bonds that cross one of them (default: no restriction).
     """
     sim.close_model()
     lists = sim.lists
@@ -264,8 +264,9 @@ def break_bonds(sim: Simulation, where: Selection | None = None, across: Sequenc
 
 
 def renew(sim: Simulation, where: Selection | None, across: Sequence[np.ndarray], **values: float | None) -> int:
-    """New properties of the bonds with both ends in `where` that cross one of the lines, of points (n, 2) [m]; those
-    that are left out stay. How many. values: as of `bond`."""
+    """Assign properties to the bonds between particles of `where` that cross one of the polylines `across`, arrays of
+    points (n, 2) [m], and return their number. Omitted properties keep their values; values: as of `bond`.
+    """
     kind, given = _law_of([values.get(n) for n in ELASTIC], [values.get(n) for n in ("n_bond", "s_bond")])
     sim.close_model()
     slots, own = _across(sim, where, across)

@@ -9,12 +9,12 @@ from hpcdem.physics.dem.simulation import Simulation
 
 
 def save(sim: Simulation, file: Path | str) -> None:
-    """SAV: write the state to this name."""
+    """SAV: write the state to a checkpoint of this name."""
     saved_state.save(sim, file)
 
 
 def restore(sim: Simulation, file: Path | str) -> None:
-    """RES: resume from a file written by SAV; the place in the present script stays."""
+    """RES: load a checkpoint written by SAV; the script continues with its next line."""
     saved_state.restore(sim, file)
     sim.restored = Path(file), sim.clock.step
     if sim.energy is not None and sim.energy.running:

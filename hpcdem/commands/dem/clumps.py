@@ -46,21 +46,22 @@ def clump(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """CLUMP file: rigid bodies of discs from a clump file, scaled, turned about its origin, then moved.
+    """CLUMP file: create rigid bodies of discs from a clump file, scaled, rotated about the origin of the file, then
+    translated.
 
     Mass and inertia are density times the area and polar second moment of area in the file.
 
     Parameters
     ----------
-    file : the file.
-    x, y : way [m].
-    angle : of the turn [rad].
+    file : path of the clump file.
+    x, y : translation [m].
+    angle : rotation angle, anticlockwise [rad].
     scale : factor on all lengths.
-    color, group : name or number; name.
+    color, group : colour by name or number; name of the group.
 
     Returns
     -------
-    int : how many bodies.
+    int : number of rigid bodies created.
     """
     _need_discs(sim)
     sim.prepare_kernels("clumps")
@@ -118,7 +119,9 @@ def _reach(bodies: File) -> float:
 
 
 def widest(x: np.ndarray, y: np.ndarray) -> float:
-    """Largest distance between two of these points [m]; of many points a bound above it, by less than a tenth."""
+    """Return the largest distance between two of these points [m]; of many points an upper bound, too large by less
+    than a tenth.
+    """
     if len(x) <= 256:
         return float(np.hypot(x[:, None] - x, y[:, None] - y).max())
     turns = np.linspace(0.0, math.pi, 8, endpoint=False)
@@ -127,11 +130,11 @@ def widest(x: np.ndarray, y: np.ndarray) -> float:
 
 
 def join(sim: Simulation, where: Selection | None = None, group: str | None = None, color: int | None = None) -> int:
-    """CLUMP RANGE: make one clump of the chosen particles; returns how many they are.
+    """CLUMP RANGE: join the selected particles into one clump and return their number.
 
-    Area and polar second moment of area are the sums of those of the discs, overlaps counted twice; it moves on with
-    their momentum and angular momentum. CommandError if the particles are bonded to each other, or differ in density,
-    damping or fixed directions.
+    Area and polar second moment of area are the sums of those of the discs, overlaps counted twice; the clump keeps the
+    momentum and angular momentum of the particles. Raises CommandError if the particles are bonded to each other or
+    differ in density, damping or fixed directions.
     """
     _need_discs(sim)
     sim.prepare_kernels("clumps")

@@ -40,7 +40,9 @@ TOUCHING = 8
 
 
 def cycle(sim: Simulation, steps: int) -> None:
-    """CYC: so many steps. Output at those that are multiples of the SET intervals, an `_ini` frame before the first."""
+    """CYC: take so many steps. Write output at multiples of the SET intervals, and an `_ini` frame before the first
+    step.
+    """
     if steps < 0:
         raise CommandError(f"CYC needs a number of steps that is not negative, got {steps}")
     intervals = {kind: getattr(sim.settings, kind) for kind in OUTPUTS}
@@ -54,10 +56,10 @@ def imple(
     ymove: float | None = None,
     **every: float | None,
 ) -> None:
-    """IMPLE: step until the wall has gone xmove or ymove [m]; every: of kinds of OUTPUTS, the distance that it goes
-    between two of them [m], from the start of the command.
+    """IMPLE: step until the displacement of the wall reaches xmove or ymove [m]. every: displacement of the wall
+    between two outputs of a kind of OUTPUTS [m], from the start of the command.
 
-    Kinds of output that are left out are off during the command; a frame is always written at its end.
+    Kinds of output that are not given are off during the command; a frame is always written at its end.
     """
     if unknown := every.keys() - OUTPUTS:
         raise CommandError(f"IMPLE has no option {min(unknown)}; expected {', '.join(OUTPUTS)}")
@@ -101,7 +103,7 @@ def _nearest(steps: float) -> int:
 
 
 def prepare(sim: Simulation, dt_known: bool = False) -> None:
-    """Closed, checked and with a time step: ready for the first cycle. Collective."""
+    """Close and check the model and determine its time step, before the first cycle. Collective."""
     _check_materials(sim)
     surface.check(sim)
     if sim.clumps and sim.settings.disk != "on":
@@ -184,13 +186,13 @@ def _check_laws(sim: Simulation) -> None:
 
 
 def time_step(sim: Simulation) -> float:
-    """The time step [s]: SET DT, or SET frac f: f sqrt(m_min / k_max). Collective.
+    """Return the time step [s]: SET DT, or for SET frac f, f sqrt(m_min / k_max). Collective.
 
-    m_min: the smallest mass of a particle with a free degree of freedom (of clumps see observe.lightest); k_max: the
-    largest pair stiffness, linear: of any two materials or material and wall in use; Hertz: tangent at the largest
-    overlap (1 % of R if none is larger than a millionth of it: discs of a grid touch without pressing); bonds: normal
-    or shear, open, whether they are or not.
-    Source: step count published with Li et al. 2021; of bonds it says nothing.
+    m_min: smallest mass of a particle with a free degree of freedom (for clumps see observe.lightest). k_max: largest
+    pair stiffness. Linear contacts: of any two materials, or material and wall, in use. Hertz contacts: tangent
+    stiffness at the largest overlap (at 1 % of R if none exceeds 1e-6 R, as in a grid of discs that touch without
+    force). Bonds: normal or shear stiffness of an open bond, whether the bonds are open or not. Source: step count
+    published with Li et al. 2021, which does not mention bonds.
     """
     s = sim.settings
     if s.dt > 0.0:
@@ -250,8 +252,9 @@ def start(
     final_frame: bool = False,
     initial_frame: bool = True,
 ) -> None:
-    """Begin a command that steps particles: sim.progress, the energy budget, the `_ini` frame. steps: None if their
-    number is unknown. The model is ready to step. Collective."""
+    """Begin a command that steps particles: sim.progress, the energy budget and the `_ini` frame. steps: None if the
+    number is unknown. The model must be ready to step. Collective.
+    """
     if sim.settings.energy > 0 and sim.energy is None:
         sim.prepare_kernels("energy")
         sim.energy = Budget()
@@ -368,11 +371,11 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
 
 
 class Due:
-    """Output and checks that are due while the running command (sim.progress) steps the particles; used by every such
-    loop.
+    """Output and checks that are due while the running command (sim.progress) steps the particles; every such loop uses
+    them.
 
-    checkpoint: writes one at the SET save intervals, last of all, so that it knows everything else was written; None:
-    somebody else does. at_reports: is called where rows of walls.csv are written.
+    checkpoint: write checkpoints at the SET save intervals, after all other output, so that each one knows that the
+    rest is complete; None: the caller writes them. at_reports: called where rows of walls.csv are written.
     """
 
     def __init__(
@@ -417,7 +420,7 @@ class Due:
         self._at_reports()
 
     def next(self) -> int:
-        """The next step at which something is due, or a function waits."""
+        """Return the next step at which output is due or a function must be called."""
         return first_after(self.sim.clock.step, [*self._tasks, *_calls(self.sim)])
 
     def finish(self) -> None:
@@ -429,8 +432,9 @@ class Due:
             self._report()
 
     def serve(self) -> None:
-        """Call the functions that wait for this step and write what is due at it. If one of them wants the command to
-        end here, progress["last"] is this step. Collective."""
+        """Call the functions registered for this step and write the output due at it. If one of them ends the command,
+        progress["last"] becomes this step. Collective.
+        """
         sim, step = self.sim, self.sim.clock.step
         assert sim.progress is not None
         if _call_watchers(sim):

@@ -53,19 +53,19 @@ def flexure(
 
     Parameters
     ----------
-    wall : id of the wall, which becomes a polyline; or where: the particles of the row.
-    rigidity : flexural rigidity [N m]; or young, poisson, te: Young's modulus [Pa], Poisson's ratio, elastic thickness
-        [m].
-    contrast : density of the fluid below minus that of what fills the deflection, without the particles [kg/m3].
+    wall : id of the wall, which becomes a polyline; or instead where: the particles of the row.
+    rigidity : flexural rigidity [N m]; or instead young [Pa], poisson and te: Young's modulus, Poisson's ratio and
+        elastic thickness [m].
+    contrast : density of the fluid below minus density of the infill of the deflection, particles excluded [kg/m3].
     x : left and right end of the plate, if it is longer than the base [m].
     left, right : "infinite" (continues without load), "free" or "broken", "clamped" or "fixed".
-    load : a constant line load: x [m] and size, downwards [N/m].
-    compensated : the mean load of the first interval is in equilibrium with the undeformed base.
-    interval : steps between two solutions of the plate: the base moves in the first half and rests in the second.
-    relax : share of the distance to equilibrium that the base moves in an interval.
-    speed : largest speed of the base [m/s]; otherwise 1e-3 of the largest radius in a step.
-    segments : of the base; otherwise 20 per flexural parameter, at least 50.
-    off : the base stays where it is.
+    load : constant line load: x [m] and size, positive downwards [N/m].
+    compensated : bool: the mean load of the first interval is in equilibrium with the undeformed base.
+    interval : steps between two solutions of the plate: the base moves in the first half and rests in the second half.
+    relax : fraction of the distance to equilibrium by which the base moves in an interval, 0 to 1.
+    speed : largest speed of the base [m/s] (default: 1e-3 of the largest radius per step).
+    segments : number of segments of the base (default: 20 per flexural parameter, at least 50).
+    off : bool: end the flexure; the base keeps its present shape.
     """
     if (wall is None) == (where is None):
         raise CommandError("give either a wall or the particles of a row")
@@ -261,14 +261,14 @@ def _check(sim: Simulation, base: Base) -> None:
 
 
 def check(sim: Simulation) -> None:
-    """CommandError for what became impossible since FLEXURE."""
+    """Raise CommandError if the model no longer allows flexure since FLEXURE was given."""
     for base in sim.bases:
         _check(sim, base)
         base.plate(sim)
 
 
 def tasks(sim: Simulation) -> list[Task]:
-    """Samples, exchanges and halts of the bases."""
+    """Return the periodic tasks of the bases: samples, solutions and halts."""
     found = []
     for base in sim.bases:
         every = max(1, (base.interval - base.motion) // SAMPLES)

@@ -32,8 +32,9 @@ WRITTEN = (*(name for name, one in PROPERTIES.items() if one.in_frames), "hertz"
 def load_frame(
     sim: Simulation, path: Path | str, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None
 ) -> int:
-    """A new model from a frame; x, y: keep only centres in these ranges [m]. Returns the number of particles.
-    Collective."""
+    """Make a new model from a frame and return the number of particles. x, y: keep only centres in these ranges [m].
+    Collective.
+    """
     comm = sim.comm
     try:
         frame = _checked(comm, read_dat(path, comm=comm), str(path))

@@ -15,9 +15,10 @@ DRAW_INTERVAL = 1000
 
 
 def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
-    """HIST: record kinetic, step, time, unbalanced, contacts, bonds, energy, deflection, sxx, syy or sxy, or
-    "gstress group a", "gstrain group a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in
-    hist_id_<id>.dat and hist_<id>.csv; strains begin at 0 here."""
+    """HIST: record a quantity every `interval` steps in hist_id_<id>.dat and hist_<id>.csv: kinetic, step, time,
+    unbalanced, contacts, bonds, energy, deflection, sxx, syy or sxy, or "gstress group a", "gstrain group a|b",
+    "xstress wall 3", "ystrain wall 0|3". Strains are zero at this command.
+    """
     if interval <= 0:
         raise CommandError(f"HIST INTERVAL must be positive, got {interval}")
     if what == "energy" and (law := sim.own_laws.unaccounted()):
@@ -45,12 +46,13 @@ def plot_hist(sim: Simulation, y: int, x: int) -> None:
 
 
 def draw(sim: Simulation, interval: int | None, what: list[str], off: Sequence[str] = ()) -> None:
-    """DRAW: `draw_<step>.jpg` every `interval` steps (in an IMPLE from its start), if the run was started with --draw.
+    """DRAW: write `draw_<step>.jpg` every `interval` steps (in an IMPLE from its start), if the run was started with
+    --draw.
 
-    what: bfill bline ball wall bondc cforce bang bid mesh, by default filled particles and walls; off: words of these
-    that are not wanted.
+    what: bfill bline ball wall bondc cforce bang bid mesh (default: filled particles and walls); off: words of this
+    list to omit.
 
-    Scripts draw far more often than pictures are viewed, so without --draw it is noted in the log only.
+    Scripts request far more figures than are viewed; without --draw the command only adds a line to the log.
     """
     if interval is not None and interval <= 0:
         raise CommandError(f"DRAW INTERVAL must be positive, got {interval}")

@@ -47,9 +47,9 @@ ENERGY_COLUMNS = ",".join(["step", "time", *(name for name in budget.NAMES if na
 
 
 class Snapshot:
-    """The model at one moment, gathered once for all files that are due.
+    """The present state of the model, gathered once for all files that are due.
 
-    waits: files have their names when a method returns; otherwise when `settle` does.
+    waits: a method returns when its file is complete; otherwise files are complete after `settle`.
     """
 
     def __init__(self, sim: Simulation, initial: bool = False, waits: bool = True) -> None:
@@ -59,7 +59,7 @@ class Snapshot:
 
     @property
     def frame(self) -> Frame:
-        """The frame, made when first requested; what was under way is settled then."""
+        """The frame, made on first use; files still being written are completed first."""
         if self._frame is None:
             settle(self.sim)
             self._frame = diagnostics.frame(self.sim)
@@ -134,12 +134,12 @@ def draw_last_state(sim: Simulation) -> None:
 
 
 def settle(sim: Simulation) -> None:
-    """Wait until all files have their names. Raises HpcdemError on all ranks if one could not be written."""
+    """Wait until all files are complete. Raises HpcdemError on all ranks if one could not be written."""
     _under_way.settle(sim.comm)
 
 
 def wait_for_disk() -> None:
-    """Wait for the disk on this rank alone, whatever it says: the way out after an error. Not collective."""
+    """Wait for the files of this rank and ignore errors: the last action after another error. Not collective."""
     _under_way.wait()
 
 
@@ -162,8 +162,9 @@ def folder(sim: Simulation) -> Path:
 
 
 def write_checkpoint(sim: Simulation, _: Snapshot | None = None, automatic: bool = False) -> Path:
-    """`<step>.sav`, once everything else is written; returns its path. automatic: `auto_<step>.sav`, of which the last
-    two are kept. Checkpoints that are too many are removed when the new one is safe."""
+    """Write `<step>.sav` after all other output and return its path. automatic: write `auto_<step>.sav` and keep the
+    last two. Surplus checkpoints are removed when the new one is complete.
+    """
     with sim.timers("output"):
         settle(sim)
         path = folder(sim) / run_folder.checkpoint_name(sim.clock.step, automatic)
@@ -174,7 +175,7 @@ def write_checkpoint(sim: Simulation, _: Snapshot | None = None, automatic: bool
 
 
 def write_crash_frame(sim: Simulation) -> None:
-    """A frame of a state that makes no sense any more, for the user to look at."""
+    """Write a frame of an invalid state for inspection."""
     with np.errstate(all="ignore"):
         sim.refresh_tables()
         Snapshot(sim).write_print()
@@ -184,13 +185,14 @@ def write_crash_frame(sim: Simulation) -> None:
 
 
 def unbalanced(sim: Simulation) -> float:
-    """Largest unbalanced force of a free particle over the mean normal contact force; 0 without contacts.
-    Collective."""
+    """Return the largest unbalanced force of a free particle over the mean normal contact force; 0 without contacts.
+    Collective.
+    """
     return diagnostics.survey(sim).unbalanced
 
 
 def deflection(sim: Simulation) -> float:
-    """Largest deflection of the bases of FLEXURE [m]; NaN after the last one has ended."""
+    """Return the largest deflection of the bases of FLEXURE [m]; NaN after the last one has ended."""
     return max((float(base.now(sim.clock.step)[base.nodes, 0].max()) for base in sim.bases), default=math.nan)
 
 
@@ -209,12 +211,12 @@ HISTORIES: dict[str, tuple[str, Callable[[Simulation], float]]] = {
 
 
 def followed(sim: Simulation) -> dict[str, tuple[str, Callable[[Simulation], float]]]:
-    """Quantities that HIST can record in this model: HISTORIES, and the diagnostics of its physics."""
+    """Return the quantities that HIST can record in this model: HISTORIES and the diagnostics of its physics."""
     return HISTORIES | {name: what for physics in sim.physics for name, what in physics.diagnostics().items()}
 
 
 def unit_of(sim: Simulation, what: str) -> str:
-    """The unit of what a HIST follows, as declared."""
+    """Return the declared unit of a quantity that HIST records."""
     name = what.split()[0]
     unit = OF_PARTS[name].unit if name in OF_PARTS else followed(sim)[what][0]
     return label(sim.settings.units, unit)
@@ -223,8 +225,8 @@ def unit_of(sim: Simulation, what: str) -> str:
 def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> None:
     """Append (step, time, value) to `hist_<id>.csv`, and (step, value) to `hist_id_<id>.dat`.
 
-    The layout of the latter is that of which public readers of ZDEM's histories take the numbers: a line with the word
-    hist, two lines of headings, rows, and a last line that is skipped (written by `finish`).
+    The second file has the layout that public readers of ZDEM histories expect: a line with the word hist, two header
+    lines, rows, and a last line that readers skip (written by `finish`).
     """
     what = sim.history_requests[ident][1]
     step, time = sim.clock.step, sim.clock.time
@@ -237,7 +239,7 @@ def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> Non
 
 
 def report(sim: Simulation, _: Snapshot | None = None) -> None:
-    """A row per wall in `walls.csv`, and the progress line where one is due."""
+    """Write a row per wall to `walls.csv`, and the progress line if one is due."""
     with sim.timers("output"):
         _under_way.look(sim.comm)
         force = diagnostics.wall_forces(sim)
@@ -280,7 +282,7 @@ def warn_of_overlaps(sim: Simulation) -> None:
 
 
 def write_energy(sim: Simulation, _: Snapshot | None = None) -> None:
-    """A row of `energy.csv`: the budget now."""
+    """Write a row of `energy.csv`: the present energy budget."""
     with sim.timers("output"):
         seen = dataclasses.asdict(sim.energy.look(sim))
         of_rolling = {name: seen.pop(name) for name in OF_ROLLING}
@@ -290,13 +292,13 @@ def write_energy(sim: Simulation, _: Snapshot | None = None) -> None:
 
 
 def physics_energies(sim: Simulation) -> dict[str, float]:
-    """The energies [J] of the physics of a model, by name. Collective."""
+    """Return the energies of the added physics [J] by name. Collective."""
     known = followed(sim)
     return {name: known[name][1](sim) for physics in sim.physics for name in physics.energies}
 
 
 def report_energy(sim: Simulation) -> None:
-    """The budget as a table in the log, at the end of a run; nothing without SET energy. Collective."""
+    """Log the energy budget as a table at the end of a run; does nothing without SET energy. Collective."""
     if sim.energy is None or sim.energy.start is None:
         return
     seen, of_physics = sim.energy.look(sim), physics_energies(sim)
@@ -344,7 +346,7 @@ ENERGY_WORDS = {
 
 
 def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus:
-    """Quantities of a progress line. Collective."""
+    """Return the quantities of a progress line. Collective."""
     clock, seen = sim.clock, diagnostics.survey(sim)
     tension, shear = sim.broken()
     if seen.deepest > DEEP and sim.log is not None:
@@ -359,8 +361,9 @@ def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus
 
 
 def append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
-    """Add rows to a text file whose rows begin with the step. The first time in a run, a new model starts a new file, a
-    restarted one cuts what lies after its step. If the header has gained columns, earlier rows are 0 there."""
+    """Append rows to a text file whose rows begin with the step. On the first call of a run, a new model starts a new
+    file and a restarted one removes rows after its step. If the header has gained columns, these are 0 in earlier rows.
+    """
     path = folder(sim) / name
     since, before = None, sim.series_open.get(name)
     if before is None:  # a row of this step, if there is one, was written after the checkpoint
@@ -372,7 +375,9 @@ def append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
 
 
 def secure_series(sim: Simulation) -> None:
-    """A restart takes rows up to its step for granted, so they must be as safe as the checkpoint. Collective."""
+    """Flush series to disk: a restart relies on all rows up to its step, so they must be as safe as the checkpoint.
+    Collective.
+    """
 
     def flush() -> None:
         for name in sorted(sim.series_open):
@@ -383,7 +388,7 @@ def secure_series(sim: Simulation) -> None:
 
 
 def close_histories(sim: Simulation) -> None:
-    """The last line of each `hist_id_<id>.dat`, which its readers pass over; once. Collective."""
+    """Write the last line of each `hist_id_<id>.dat`, which readers skip; once. Collective."""
     for ident in sim.history_requests:
         name = f"hist_id_{ident}.dat"
         if name in sim.series_open and name not in sim.series_closed:

@@ -43,18 +43,18 @@ def load(
     x: tuple[float, float] | None = None,
     y: tuple[float, float] | None = None,
 ) -> int:
-    """LOAD: a new model from rows "x y r [group]" [m], or from a frame all_<step>.dat of ZDEM or hpcdem with all that
-    it holds (commands/dem/frame_state.py).
+    """LOAD: make a new model from rows "x y r [group]" [m], or from a frame all_<step>.dat of ZDEM or hpcdem with its
+    complete state (commands/dem/frame_state.py).
 
     Parameters
     ----------
-    file : the file.
-    scale : factor on all lengths, of rows.
-    x, y : only centres in these ranges, (least, greatest), in the numbers of the file.
+    file : path of the file.
+    scale : factor on all lengths, if the file has rows.
+    x, y : load only centres in these ranges, (least, greatest), in the units of the file.
 
     Returns
     -------
-    int : how many there are.
+    int : number of particles.
     """
     if sim.comm.bcast(is_frame(file) if sim.comm.rank == 0 else None):
         if scale != 1.0:
@@ -135,14 +135,14 @@ def _agree(sim: Simulation, error: str | None) -> None:
 def ball(
     sim: Simulation, id: int | None, x: float, y: float, rad: float, color: int = 0, group: str = NO_GROUP
 ) -> None:
-    """BALL: one particle.
+    """BALL: create one particle.
 
     Parameters
     ----------
-    x, y : place of its centre [m].
+    x, y : coordinates of the centre [m].
     rad : radius [m].
-    id : number; left out, the next free one.
-    color, group : name or number; name.
+    id : id of the particle (default: the next free one).
+    color, group : colour by name or number; name of the group.
     """
     limits.check_circle(x, y, rad)
     if id is not None:
@@ -162,21 +162,21 @@ def gen(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """GEN num: random insertion without overlap; also across periodic sides, if x are these.
+    """GEN num: insert particles at random positions without overlap; across periodic boundaries too, if these bound x.
 
-    Scripts ask for far more than fit: it gives up after FAILURES attempts in a row that found no room, or after SET
-    gentry attempts per particle requested, if that is set.
+    Scripts request far more particles than fit. The command stops after FAILURES consecutive attempts without success
+    or, with SET gentry, after that many attempts per requested particle.
 
     Parameters
     ----------
-    num : number of particles to place.
-    rad : radii that are drawn from [m].
-    x, y : sides of the rectangle, (least, greatest) [m].
-    color, group : name or number; name.
+    num : number of particles requested.
+    rad : radii, of which each particle gets one at random; a repeated one is more likely [m].
+    x, y : bounds of the rectangle, (least, greatest) [m].
+    color, group : colour by name or number; name of the group.
 
     Returns
     -------
-    int : how many found room.
+    int : number of particles created.
     """
     limits.check_rectangle(rad, x, y, grid=False)
     limits.check_attempts(num, sim.settings.gentry)
@@ -206,18 +206,18 @@ def gen_grid(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad).
+    """GEN grid: create a particle at each node of a square lattice of spacing 2 max(rad).
 
     Parameters
     ----------
-    rad : radii that are drawn from [m].
-    x, y : sides of the rectangle, (least, greatest) [m].
-    idmin : first number; left out, the next free one.
-    color, group : name or number; name.
+    rad : radii, of which each particle gets one at random; a repeated one is more likely [m].
+    x, y : bounds of the rectangle, (least, greatest) [m].
+    idmin : id of the first particle (default: the next free one).
+    color, group : colour by name or number; name of the group.
 
     Returns
     -------
-    int : how many were made.
+    int : number of particles created.
     """
     limits.check_rectangle(rad, x, y, grid=True)
     total = math.prod(packing.nodes(np.array(rad), x, y))
@@ -241,19 +241,19 @@ def gline(
     color: int = 0,
     group: str = NO_GROUP,
 ) -> int:
-    """GLINE: a row of particles from p1 towards p2, of spacing 2 rad cratio; overlaps are not checked.
+    """GLINE: create a row of particles from p1 towards p2 with spacing 2 rad cratio; overlaps are not checked.
 
     Parameters
     ----------
-    p1, p2 : ends, (x, y) [m].
+    p1, p2 : end points, (x, y) [m].
     rad : radius [m].
-    cratio : distance of neighbours over the sum of their radii.
+    cratio : distance of neighbouring centres over the sum of their radii.
     kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient.
-    color, group : name or number; name.
+    color, group : colour by name or number; name of the group.
 
     Returns
     -------
-    int : how many were made.
+    int : number of particles created.
     """
     limits.check_row(p1, p2, rad, cratio)
     centres = row(p1, p2, rad, cratio)
@@ -264,7 +264,7 @@ def gline(
 
 
 def delete(sim: Simulation, where: Selection | None = None) -> int:
-    """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
+    """DEL: remove particles with their contacts and bonds, and return their number. Their ids are not reused."""
     which = chosen(sim, where)
     if not sim.comm.any(bool(which.any())):
         return 0
@@ -273,20 +273,20 @@ def delete(sim: Simulation, where: Selection | None = None) -> int:
 
 
 def twin(sim: Simulation, number: int, where: Selection | None = None) -> int:
-    """TWIN: move one free particle by 1e-5 of its radius, for runs that differ by no more than that.
+    """TWIN: displace one free particle by 1e-5 of its radius, to compare runs that differ only by this displacement.
 
     Parameters
     ----------
-    number : of the twin; it draws the particle and the direction. 0 is the model itself: nothing moves.
-    where : the particles of which one is drawn; members of clumps and particles fixed in x or y are not.
+    number : number of the twin; it determines the particle and the direction. 0 is the undisturbed model.
+    where : particles from which one is drawn; members of clumps and particles fixed in x or y are excluded.
 
     Returns
     -------
-    int : id of the particle, -1 for twin 0.
+    int : id of the particle; -1 for twin 0.
 
     Raises
     ------
-    CommandError : if no such particle is free.
+    CommandError : if the selection contains no free particle.
     """
     which = chosen(sim, where) & (sim.particles["fix"] & (FIX_BITS["x"] | FIX_BITS["y"]) == 0)
     if sim.clumps:
@@ -309,13 +309,13 @@ def twin(sim: Simulation, number: int, where: Selection | None = None) -> int:
 
 
 def export(sim: Simulation, file: Path | str, group: bool = False, where: Selection | None = None) -> None:
-    """EXP: rows "x y r [group]" in the order of ids, 13 significant digits.
+    """EXP: write rows "x y r [group]" in the order of ids, with 13 significant digits.
 
     Parameters
     ----------
-    file : the file.
-    group : with the names of groups.
-    where : the particles.
+    file : path of the file.
+    group : bool: write the names of groups as a fourth column.
+    where : particles to write (default: all).
     """
     p = sim.particles
     which = chosen(sim, where)
@@ -370,8 +370,9 @@ def add(
     first_gid: int | None = None,
     material: int = 0,
 ) -> int:
-    """New particles from (n, 3) rows x, y, r, the same on all ranks; each takes its share of them until the next cycle
-    sends them to their owners."""
+    """Add particles from (n, 3) rows x, y, r [m], equal on all ranks. Each rank stores a share of them until the next
+    cycle sends them to their owners.
+    """
     first, end = share(len(rows), sim.comm)
     return add_part(sim, rows[first:end], first, len(rows), group, color, first_gid, material)
 
@@ -386,8 +387,9 @@ def add_part(
     first_gid: int | None = None,
     material: int = 0,
 ) -> int:
-    """Add rows of which each rank has its own part: the `before`-th to the last of them, of `total`;
-    group: of all or (n,) i8 of each of these rows."""
+    """Add rows of which each rank has its own part, beginning at row `before` of `total`. group: one for all rows or
+    (n,) i8, one per row.
+    """
     sim.open_model()
     if sim.settings.period:
         periodic.refuse_outside(sim, rows[:, 0], sim.settings.side, sim.settings.side + sim.settings.period)

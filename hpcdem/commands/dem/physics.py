@@ -8,14 +8,17 @@ from hpcdem.physics.dem.simulation import Simulation
 
 
 def add(sim: Simulation, name: str, **parameters: float) -> None:
-    """Physics on the particles beside their motion, from the next step on. There is "diffusion": heat through
-    contacts; conductance of each [W/K], capacity [J/(kg K)]; fields temperature [K], heat_source [W], heat_given
-    [J]; HIST follows heat and heat_given [J], which are columns of energy.csv."""
+    """Add physics to the particles, effective from the next step. "diffusion": heat conduction through contacts, with
+    conductance of each contact [W/K] and capacity [J/(kg K)]; fields temperature [K], heat_source [W], heat_given [J];
+    HIST can record heat and heat_given [J], which are also columns of energy.csv.
+    """
     saved_state.add_physics(sim, name, parameters)
 
 
 def check_time_step(sim: Simulation) -> None:
-    """CommandError if the time step is too large for the physics of the model; it is closed. Collective."""
+    """Raise CommandError if the time step exceeds the stability limit of the added physics. The model must be closed.
+    Collective.
+    """
     for physics in sim.physics:
         limit = physics.stable_time_step(sim)
         if sim.clock.dt > limit:

@@ -19,8 +19,9 @@ from hpcdem.physics.dem.user_laws import LINEAR, PairLaw
 
 
 def chosen(sim: Simulation, where: Selection | None) -> np.ndarray:
-    """Flags (n_own,) of the owned particles in a selection; None is all. Clumps are chosen as a whole: by the place of
-    their centre, or if a member's id or group is requested. Collective."""
+    """Return flags (n_own,) of the owned particles in a selection; None selects all. Clumps are selected as a whole: by
+    the position of their centre, or if the selection names a member's id or group. Collective.
+    """
     p = sim.particles
     if where is None:
         return np.ones(len(p), bool)
@@ -59,24 +60,24 @@ def prop(
     folder: Path = Path(),
     **properties: Unpack[Material],
 ) -> None:
-    """PROP: properties, velocities, colour and group of particles; what is left out stays.
+    """PROP: assign properties, velocities, colour and group to particles; omitted ones keep their values.
 
-    A density is per volume, or per area when SET disk makes disks. Properties of Hertz and Mindlin are taken with
-    `hertz`; kn or ks without it give the linear law. Contacts use the new values from the next step. Velocities of
-    a clump are those of its centre; its members follow.
+    A density is per volume, or per area when SET disk makes disks. With `hertz`, contacts follow Hertz and Mindlin; kn
+    or ks without it select the linear law. Contacts use the new values from the next step. Velocities of a clump are
+    those of its centre; its members follow.
 
     Parameters
     ----------
-    where : the particles.
-    hertz : contacts of Hertz and Mindlin, by shear [Pa] and poiss.
+    where : particles to change (default: all).
+    hertz : bool: contacts of Hertz and Mindlin, defined by shear [Pa] and poiss.
     xv, yv, spin : velocity [m/s] and angular velocity, anticlockwise [rad/s].
-    color, group : name or number; name.
+    color, group : colour by name or number; name of the group.
     law : 'file.py:function' beside the program (docs/user_laws.md), or "linear".
-    between : the law is that of pairs of discs with these two laws; nothing else is set.
-    parameter : properties that the law declares.
+    between : bool: assign the law to pairs of discs with these two laws; nothing else is changed.
+    parameter : values of the properties that the law declares.
     properties : density [kg/m3], of discs of unit thickness [kg/m2]; fric; shear [Pa]; poiss; damp; kn, ks [N/m];
-        rfric, rdamp: coefficient of rolling resistance, damping over the critical one;
-        xp, yp: pressures that push along x and y, on 2 R thickness of each particle [Pa].
+        rfric, rdamp: coefficient of rolling resistance, damping over the critical one; xp, yp: pressures along x and y,
+        each acting on the area 2 R thickness of a particle [Pa].
     """
     if between:
         others = (*properties.values(), xv, yv, spin, color, group, where)
@@ -117,7 +118,7 @@ def prop(
 
 
 def load_law(sim: Simulation, law: str, folder: Path) -> PairLaw:
-    """Read, check and compile a law 'file.py:function' of the user. Collective."""
+    """Read, check and compile a user law 'file.py:function'. Collective."""
     return user_laws.load(sim, folder / law.rpartition(":")[0], law)
 
 
@@ -184,12 +185,12 @@ def _log_between(sim: Simulation, law: str, pair: Sequence[str], parameter: Mapp
 
 
 def fix(sim: Simulation, dofs: tuple[str, ...], where: Selection | None = None) -> None:
-    """FIX: these of "x", "y", "spin" keep the velocity they have."""
+    """FIX: keep the present velocity of particles in these directions: "x", "y", "spin"."""
     sim.particles["fix"][chosen(sim, where)] |= sum(FIX_BITS[d] for d in set(dofs))
     sim.tables_changed()
 
 
 def free(sim: Simulation, dofs: tuple[str, ...], where: Selection | None = None) -> None:
-    """FREE: undo `fix`."""
+    """FREE: undo `fix` for these directions."""
     sim.particles["fix"][chosen(sim, where)] &= ~sum(FIX_BITS[d] for d in set(dofs))
     sim.tables_changed()

@@ -54,31 +54,32 @@ def section(
     s_bond: float | None = None,
     where: Selection | None = None,
 ) -> int:
-    """SECTION: use the polygons or the lines of a file .geojson, .json, .shp, .svg, .dxf or of an image.
+    """SECTION: apply the polygons or lines of a file .geojson, .json, .shp, .svg, .dxf or of an image to the particles.
 
-    Without further words, particles with their centres in a polygon get its name as group, and its attributes that are
+    By default, particles whose centres lie in a polygon get its name as group, and those of its attributes that are
     properties (density, fric, kn, ...) or color; later polygons of the file cover earlier ones. With rad, the polygons
-    are filled with new particles. With cut, bonds that cross a line are removed; with bond properties they get these.
+    are filled with new particles. With cut, bonds that cross a line are removed; with bond properties, these are
+    assigned to them.
 
     Parameters
     ----------
-    file : the section.
-    scale : metres per unit of the file; left out, as the file says, else 1.
-    origin, to : point of the file, in its units, and where it is in the model [m].
+    file : path of the section.
+    scale : metres per unit of the file (default: as given in the file, else 1).
+    origin, to : point of the file, in its units, and the corresponding point of the model [m].
     line : two points of a map, in its units: x is the distance along the line through them, y the height (z).
-    legend : of an image: a file with lines colour, name.
-    attribute : whose value is the name, of GeoJSON and shapefiles; left out, name, layer, unit, ... or id.
-    only : names of the polygons and lines that are used; left out, all.
-    rad : radii of new particles that are drawn from [m].
-    porosity : of the filled polygons; 0.2.
-    cut : remove the bonds that cross a line.
-    ebmod, gbmod, tstrength, sstrength : of elastic bonds that cross a line [Pa].
-    n_bond, s_bond : of contact bonds that cross a line [N].
-    where : the particles, of new ones none; of a bond both.
+    legend : for an image: path of a file with rows colour, name.
+    attribute : attribute whose value is the name, for GeoJSON and shapefiles (default: name, layer, unit, ... or id).
+    only : names of the polygons and lines to use (default: all).
+    rad : radii of new particles, drawn at random; a repeated one is more likely [m].
+    porosity : porosity of the filled polygons (default: 0.2).
+    cut : bool: remove the bonds that cross a line.
+    ebmod, gbmod, tstrength, sstrength : properties of elastic bonds that cross a line [Pa].
+    n_bond, s_bond : strengths of contact bonds that cross a line [N].
+    where : particles to change (default: all); of a bond both must be selected; not for new particles.
 
     Returns
     -------
-    int : how many particles got a group or are new, or how many bonds changed.
+    int : number of particles that got a group or were created, or number of bonds changed.
     """
     weak = any(v is not None for v in (ebmod, gbmod, tstrength, sstrength, n_bond, s_bond))
     if (rad is not None) + cut + weak > 1:

@@ -31,7 +31,7 @@ CHOICES = {"disk": tuple(SPHERES), "wallside": ("left", "both"), "rolling": ("a"
 
 
 def set_option(sim: Simulation, name: str, value: Any) -> None:
-    """Set one option of model.settings.Settings; SI units, intervals in steps (0 or less: off)."""
+    """Set one option of model.settings.Settings, in SI units; intervals in steps (0 or less: off)."""
     s = sim.settings
     if name in NUMBERS:
         kind, holds, wanted = NUMBERS[name]

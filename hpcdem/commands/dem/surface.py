@@ -80,28 +80,28 @@ def surface(
 
     Parameters
     ----------
-    id : number of the process; a second command with it replaces the first.
+    id : id of the process; a second command with this id replaces the first.
     interval : steps between two applications.
-    x : range in which it acts, (least, greatest) [m]; left out, as far as the particles reach.
-    spacing : width of the columns [m]; left out, four times the largest radius.
+    x : range in which it acts, (least, greatest) [m] (default: the extent of the particles).
+    spacing : width of the columns [m] (default: four times the largest radius).
     diffuse : coefficient of diffusion of the heights [m2/s].
-    slope : largest angle of the surface [deg]; what is steeper slides down.
+    slope : largest stable angle of the surface [deg]; steeper parts slide down.
     erode, above : rate of erosion [m/s], and the level down to which it acts [m]; a level alone acts at once.
-    deposit, below : rate of deposition [m/s], and the level up to which it acts [m]; a level alone: a layer as thick as
-        a column is wide at each application, until the level is met.
-    rise : velocity of the levels, upwards, from the command on [m/s].
+    deposit, below : rate of deposition [m/s], and the level up to which it acts [m]; a level alone: each application
+        deposits a layer as thick as a column is wide, until the level is reached.
+    rise : upward velocity of the levels, from the command on [m/s].
     years : years that a second of the model stands for; diffuse, erode, deposit and rise are then per year.
-    only : groups of which discs may be eroded; others protect what is under them. Left out, all.
-    rad : radii of deposited discs that are drawn from [m].
-    porosity : of what is eroded and deposited: bulk area is area of discs / (1 - porosity); 0.15.
-    compact : of the deposit: porosity of the sediment at the surface, and depth at which it is smaller by e [m]; discs
-        shrink as they are buried and keep their mass.
-    group : of the deposit; growth.
-    episode : steps after which a new group begins, growth1, growth2, ...
-    colors : of these groups in turn, names.
-    off : end the process.
-    hertz : contacts of Hertz and Mindlin, by shear [Pa] and poiss.
-    properties : of the deposit, as in PROP.
+    only : groups whose discs may be eroded; other groups protect what lies below them (default: all).
+    rad : radii of deposited discs, drawn at random; a repeated one is more likely [m].
+    porosity : porosity of eroded and deposited material: bulk area = area of discs / (1 - porosity) (default: 0.15).
+    compact : compaction of the deposit: porosity at the surface, and depth at which it has decreased by a factor e [m];
+        discs shrink during burial and keep their mass.
+    group : group of the deposited discs (default: growth).
+    episode : number of steps after which a new group begins: growth1, growth2, ...
+    colors : names of the colours of these groups, in turn.
+    off : bool: end the process.
+    hertz : bool: contacts of Hertz and Mindlin, defined by shear [Pa] and poiss.
+    properties : properties of the deposit, as in PROP.
     """
     radii = () if rad is None else tuple(float(r) for r in np.atleast_1d(np.asarray(rad, np.float64)))
     optional = {
@@ -205,7 +205,7 @@ def _refuse_contradictions(sim: Simulation, id: int, land: Land) -> None:
 
 
 def check(sim: Simulation) -> None:
-    """CommandError where the processes cannot act in this model. Collective."""
+    """Raise CommandError if the processes cannot act in this model. Collective."""
     if not sim.lands:
         return
     first = min(sim.lands)
@@ -316,8 +316,9 @@ def _heights(land: Land, near: _Near, sides: np.ndarray, walls: np.ndarray, larg
 
 
 def act(sim: Simulation, ident: int) -> None:
-    """Apply a process for the time since its last application. Collective; leaves the model open if particles came or
-    went."""
+    """Apply a process for the time since its last application. Leaves the model open if particles were added or
+    removed. Collective.
+    """
     sim.close_model()
     land = sim.lands[ident]
     _count_settled(sim, land)
@@ -559,15 +560,15 @@ COLUMNS = (
 
 
 def balance(sim: Simulation, id: int) -> dict[str, float]:
-    """The balance of a process of SURFACE.
+    """Return the mass and area balance of a process of SURFACE.
 
     Returns
     -------
-    dict : bulk areas [m2] eroded, deposited (discs at rest), settling (not yet at rest), lost (deleted before they were
-        at rest), carried (demanded, less than a disc, not yet met; negative: erosion), demanded (the sum that the
-        processes wanted: deposited + settling + lost - eroded + carried), compacted (lost by discs of the deposit as
-        they shrink, part of the deposited area); discs_eroded, discs_deposited,
-        discs_settling; mass_eroded, mass_deposited [kg].
+    dict : bulk areas [m2]: eroded; deposited (discs at rest); settling (discs not yet at rest); lost (deleted before
+        they came to rest); carried (demand smaller than a disc, not yet met; negative: erosion); demanded (sum
+        requested by the processes: deposited + settling + lost - eroded + carried); compacted (lost as discs of the
+        deposit shrink, part of the deposited area). Numbers: discs_eroded, discs_deposited, discs_settling. Masses
+        [kg]: mass_eroded, mass_deposited.
     """
     if id not in sim.lands:
         raise CommandError(f"there is no process {id} of SURFACE; active: {', '.join(map(str, sim.lands)) or 'none'}")

@@ -22,16 +22,17 @@ def wall(
     yv: float | None = None,
     delete: bool = False,
 ) -> None:
-    """WALL: make a wall from node to node, or change or delete the one with this id; what is left out stays.
+    """WALL: make a wall from node to node, or change or delete the wall with this id; omitted properties keep their
+    values.
 
     Parameters
     ----------
-    id : number of the wall.
-    nodes : its ends, ((x, y), (x, y)) [m]; both sides act, unless set(wallside="left").
+    id : id of the wall.
+    nodes : end points, ((x, y), (x, y)) [m]; both sides act, unless set(wallside="left").
     kn, ks, fric : normal and shear stiffness [N/m], for particles of the linear law, and friction coefficient.
-    color : name or number.
-    xv, yv : velocity, until it is changed [m/s].
-    delete : remove the wall with its contacts; accepts only id.
+    color : colour by name or number.
+    xv, yv : velocity [m/s]; it holds until it is changed.
+    delete : bool: remove the wall with its contacts; accepts only id.
     """
     if id < 0:
         raise CommandError(f"wall id must not be negative, got {id}")
@@ -68,11 +69,11 @@ def box(
     ks: float = 0.0,
     fric: float = 0.0,
 ) -> None:
-    """BOX: four walls around the space of the model; particles that leave it are deleted.
+    """BOX: make four walls around the model; particles that leave the box are deleted.
 
     Parameters
     ----------
-    left, right, bottom, height : its sides [m]; the height is measured from the bottom.
+    left, right, bottom, height : left, right and bottom coordinate and height above the bottom [m].
     kn, ks, fric : normal and shear stiffness [N/m] and friction coefficient of the walls.
     """
     if right <= left or height <= 0.0:
@@ -115,12 +116,13 @@ def _place(sim: Simulation, id: int, nodes: tuple[tuple[float, float], tuple[flo
 
 
 def periodic(sim: Simulation, x: tuple[float, float]) -> None:
-    """PERIODIC: the sides x = left and x = right become one: particles that leave through one enter through the other,
-    and touch across them. Horizontal walls that span both continue without an end; BOX loses its left and right wall.
+    """PERIODIC: make x = left and x = right periodic boundaries: particles that leave through one enter through the
+    other, and are in contact across them. Horizontal walls that span both continue without an end; BOX loses its left
+    and right walls.
 
     Parameters
     ----------
-    x : the sides, (left, right) [m]; those of BOX, if there is one.
+    x : coordinates of the boundaries, (left, right) [m] (default: those of BOX).
     """
     left, right = x
     limits.check_nodes((left, 0.0), (right, 0.0), name="PERIODIC")
@@ -189,7 +191,7 @@ def _remove(sim: Simulation, rows: np.ndarray) -> None:
 
 
 def forget(sim: Simulation, row: int | None) -> None:
-    """Open the model for a new or replaced wall; contacts with the old one are forgotten."""
+    """Open the model for a new or replaced wall and discard contacts with the old one."""
     sim.open_model()
     if row is not None:
         sim.hist = sim.hist.keep(sim.hist.partner != -1 - row)

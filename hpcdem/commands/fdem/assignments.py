@@ -28,8 +28,9 @@ Number = float | str
 
 
 def group(project: Project, kind: str, group: str, set_name: str = DEFAULT, where: Range | None = None) -> None:
-    """Put objects of a kind (model.blocks.groups) into a group, also of elements that were removed: these may come
-    back. They leave the one of the set that they were in."""
+    """Add objects of a kind (model.blocks.groups) to a group, including removed elements, which may be reinstated. Each
+    object leaves its previous group of the set.
+    """
     found = everything(project, kind, where, null_too=True)
     project.groups[kind] = project.comm.per_node(lambda: _grouped(project, kind, group, set_name, found))
 
@@ -50,8 +51,9 @@ def _grouped(project: Project, kind: str, name: str, set_name: str, found: np.nd
 
 
 def element_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """A constitutive model of elements, with its properties (model.blocks.properties). Elements in the range that were
-    removed come back, free of stress where their place is now; without a range these stay away."""
+    """Assign a constitutive model with its properties (model.blocks.properties) to elements. Removed elements in the
+    range are reinstated free of stress at their present position; without a range they stay removed.
+    """
     blocks = project.ready()
     elements = chosen(project, ELEMENT, where, null_too=True)
     if elements is not None and "heat" in blocks.surface_loads and not blocks.alive[elements].all():
@@ -62,29 +64,32 @@ def element_model(project: Project, name: str, properties: Mapping[str, Value], 
 
 
 def around(project: Project, where: Range | None) -> Range | None:
-    """Joints of which a side is one of these elements; None: all."""
+    """Return a range of the joints next to the selected elements; None: all."""
     return None if where is None else (Around(tuple(everything(project, ELEMENT, where).tolist())),)
 
 
 def load_law(project: Project, law: str) -> UserLaw:
-    """Read, check and compile a law 'file.py:function' of the user. Collective."""
+    """Read, check and compile a user law 'file.py:function'. Collective."""
     return user_laws.load(project.blocks, project.to_read(law.rpartition(":")[0]), law)
 
 
 def load_function(project: Project, function: str) -> str:
-    """Read, check and compile a function 'file.py:function' of place and time; returns its name as value of a
-    condition. Collective."""
+    """Read, check and compile a user function 'file.py:function' of position and time. Return its name, which
+    conditions accept as a value. Collective.
+    """
     return user_functions.load(project.blocks, project.to_read(function.rpartition(":")[0]), function)
 
 
 def user_model(project: Project, law: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Elements get a user law, with its properties. Collective."""
+    """Assign a user law with its properties to elements. Collective."""
     project.ready()
     element_model(project, load_law(project, law).name, properties, where)
 
 
 def null(project: Project, relax: float = 0.0, where: Range | None = None) -> None:
-    """Take elements out; relax: time, or steps of a static run, over which their forces on the others die down."""
+    """Remove elements. relax: time [s], or steps of a static run, over which their forces on the remaining elements
+    decay to zero.
+    """
     blocks = project.ready()
     elements = everything(project, ELEMENT, where)
     left = project.alive.copy()
@@ -96,12 +101,12 @@ def null(project: Project, relax: float = 0.0, where: Range | None = None) -> No
 
 
 def element_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Change some properties of elements."""
+    """Change properties of elements."""
     project.ready().element_property(chosen(project, ELEMENT, where), properties)
 
 
 def face_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """A contact model of faces. Without penalty_normal it is 10 E of the element."""
+    """Assign a contact model to faces. Default of penalty_normal: 10 E of the element."""
     blocks = project.ready()
     faces = chosen(project, FACE, where)
     if "penalty_normal" not in properties:
@@ -113,17 +118,19 @@ def face_model(project: Project, name: str, properties: Mapping[str, Value], whe
 
 
 def face_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Change some properties of contact models."""
+    """Change properties of contact models."""
     project.ready().face_property(chosen(project, FACE, where), properties)
 
 
 def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Change some properties of models of joints."""
+    """Change properties of joint models."""
     project.ready().joint_property(chosen(project, JOINT, where), properties)
 
 
 def joint_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """A model of joints. A cohesive one without penalty_normal has 10 E of the softer of both elements."""
+    """Assign a model to joints. Default of penalty_normal of a cohesive model: 10 E of the softer of the two
+    elements.
+    """
     blocks = project.ready()
     joints = chosen(project, JOINT, where)
     if "penalty_normal" not in properties and name == COHESIVE.name:
@@ -154,13 +161,14 @@ def initial_stress(
     gradient: Mapping[str, tuple[float, ...]] | None = None,
     where: Range | None = None,
 ) -> None:
-    """Stress [Pa] by component xx, yy, xy, zz, in space xz and yz too; gradient: by component, per metre. In the plane
-    zz, if nothing is assigned to it, is that of plane strain."""
+    """Set the initial stress [Pa] by component xx, yy, xy, zz, in space xz and yz too. gradient: by component, per
+    metre [Pa/m]. In the plane, zz defaults to the value of plane strain.
+    """
     project.ready().initial_stress(chosen(project, ELEMENT, where), **stress, gradient=gradient or None)
 
 
 def initial_velocity(project: Project, velocity: tuple[float | None, ...], where: Range | None = None) -> None:
-    """Velocity (2,), in space (3,), [m/s] of nodes now; None: this component stays."""
+    """Set the present velocity of nodes (2,), in space (3,), [m/s]; None keeps a component."""
     if len(velocity) != project.dim:
         raise CommandError(f"velocity: a vector of {project.dim} numbers is needed, got {len(velocity)}")
     changes.set_velocity(project.ready(), chosen(project, NODE, where), *velocity)
@@ -179,7 +187,7 @@ def velocity(
     vz: Number | None = None,
     az: Number | None = None,
 ) -> None:
-    """Velocity [m/s] or acceleration [m/s2] of nodes; a text is the name of a table of time."""
+    """Prescribe velocity [m/s] or acceleration [m/s2] of nodes; a string is the name of a table of time."""
     _known(project, vx, vy, ax, ay, vz, az)
     blocks, given = project.ready(), {"vx": vx, "vy": vy, "ax": ax, "ay": ay, "vz": vz, "az": az}
     nodes = chosen(project, NODE, where)
@@ -193,14 +201,14 @@ def force(
     where: Range | None = None,
     fz: Number | None = None,
 ) -> None:
-    """Force on each node [N per m of thickness, in space N]."""
+    """Prescribe a force on each node [N per m of thickness, in space N]."""
     _known(project, fx, fy, fz)
     blocks, nodes = project.ready(), chosen(project, NODE, where)
     blocks.force_condition(nodes, *from_now(project, blocks.time_now(), {"fx": fx, "fy": fy, "fz": fz}).values())
 
 
 def damp(project: Project, local: float, where: Range | None = None) -> None:
-    """Local damping of nodes, from 0 to 1, instead of that of the model."""
+    """Set local damping of nodes, 0 to 1, in place of that of the model."""
     blocks = project.ready()
     if local > 0.0 and blocks.budget is not None:
         raise CommandError("the energy budget does not support local damping of nodes: use model option energy off")
@@ -208,8 +216,9 @@ def damp(project: Project, local: float, where: Range | None = None) -> None:
 
 
 def move(project: Project, type: Sequence[Any], where: Range | None = None) -> None:
-    """Freedom of nodes: 0 free, 1 held, 2 along a direction only, which follows the number, 3 (in space) across it
-    only."""
+    """Constrain nodes: 0 free, 1 fixed, 2 free only along the direction that follows the number, 3 (in space) free only
+    across it.
+    """
     kind, direction = type if len(type) == 2 else (type[0], (0.0,) * project.dim)
     if kind not in (0, 1, 2) and (kind != 3 or project.dim == 2):
         raise CommandError(
@@ -237,8 +246,9 @@ def stress(
     xz: Number | None = None,
     yz: Number | None = None,
 ) -> None:
-    """Traction of faces [Pa], dip: along them; quiet: waves leave through them; incoming_x, _y, _z: velocity [m/s] of
-    one that comes in. Without a range: all faces on the surface of the model."""
+    """Prescribe the traction of faces [Pa]; dip: component along them. quiet: absorb outgoing waves; incoming_x, _y,
+    _z: velocity of an incoming wave [m/s]. Without a range: all faces on the surface of the model.
+    """
     given = {
         "xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz, "normal": normal, "incoming_x": incoming_x,
         "incoming_y": incoming_y, "incoming_z": incoming_z, "dip": dip,
@@ -250,8 +260,9 @@ def stress(
 
 
 def water(project: Project, surface: str, density: float, where: Range | None = None) -> None:
-    """Water of a density [kg/m3] stands before faces of elements below the lines, in space the planes and polygons, of
-    a layer; 0: no more."""
+    """Apply water pressure to faces of elements below the water lines (in space planes and polygons) of a layer.
+    density: of the water [kg/m3]; 0 removes it.
+    """
     levels = [_level(one, surface) for one in project.layers[surface]]
     blocks = project.ready()
     faces = Water.create(blocks, chosen(project, ELEMENT, where), levels, density)
@@ -277,8 +288,9 @@ def _level(shape: Any, layer: str) -> tuple[tuple[float, ...], ...]:
 
 
 def free_field(project: Project, where: Range | None = None) -> None:
-    """Faces are free-field sides (in the plane), see free_field.py. Without a range: all faces on the surface of the
-    model."""
+    """Make faces free-field boundaries (in the plane), see free_field.py. Without a range: all faces on the surface of
+    the model.
+    """
     project.ready().refuse_in_space("free-field")
     FreeField.create(project.ready(), chosen(project, FACE, (OnBoundary(),) if where is None else where))
 
@@ -286,12 +298,12 @@ def free_field(project: Project, where: Range | None = None) -> None:
 def remove_node_conditions(
     project: Project, where: Range | None = None, kinds: Sequence[str] = node_conditions.KINDS
 ) -> None:
-    """Nodes are free again of these kinds of conditions."""
+    """Remove conditions of these kinds from nodes."""
     project.ready().remove_conditions(chosen(project, NODE, where), kinds)
 
 
 def remove_face_conditions(project: Project, where: Range | None = None) -> None:
-    """Faces are without traction again, and no free-field sides."""
+    """Remove tractions and free-field boundaries from faces."""
     faces = chosen(project, FACE, where)
     FreeField.remove(project.ready(), faces)
     project.ready().remove_stress_conditions(faces)
@@ -309,8 +321,9 @@ def _known(project: Project, *values: Number | None) -> None:
 def table(
     project: Project, name: str, values: list[tuple[float, float]] | None = None, relative: bool | None = None
 ) -> None:
-    """A function of time, linear from point to point; relative: its times count from when a condition takes it. What is
-    not given stays."""
+    """Create or change a piecewise linear function of time. relative: its times count from the moment at which a
+    condition begins to use it. Omitted arguments keep their values.
+    """
     if values is not None:
         project.blocks.table(name, values)
     elif name not in project.blocks.tables:
@@ -335,17 +348,17 @@ def _begun(project: Project, now: float, value: Any) -> Any:
 
 
 def random_field(project: Project, name: str, **about: Any) -> None:
-    """A random field, see physics.random_field.RandomField."""
+    """Create a random field, see physics.random_field.RandomField."""
     project.blocks.random_field(name, RandomField.of(**about))
 
 
 def remove_field(project: Project, name: str) -> None:
-    """Forget a random field; properties that were drawn from it stay."""
+    """Remove a random field; properties drawn from it keep their values."""
     project.blocks.remove_field(name)
 
 
 def remove_table(project: Project, name: str) -> None:
-    """Forget a table."""
+    """Remove a table."""
     if name not in project.blocks.tables:
         _known(project, name)
     if name == project.step_table:

@@ -32,7 +32,7 @@ def create(
     group: str | None = None,
     set_name: str = DEFAULT,
 ) -> None:
-    """Install a bolt, as things are now, see `Bolts.create`; group: that its elements and nodes are put into."""
+    """Install a bolt at the present positions, see `Bolts.create`. group: group of its elements and nodes."""
     with begun(project, Bolts) as bolts:
         nodes, elements = bolts.create(points, segments, length, grout, plate)
     supports.put_into(project, group, set_name, {BOLT_NODE: nodes, BOLT_ELEMENT: elements})
@@ -47,8 +47,9 @@ def between(
     set_name: str = DEFAULT,
     where: Range | None = None,
 ) -> None:
-    """Install a bolt from a point to another [m] in elements no longer than mesh_size, in each part that lies in the
-    rock, or in these elements of it. CommandError if none does."""
+    """Install a bolt between two points [m], with elements no longer than mesh_size [m], in each segment inside the
+    selected elements. Raises CommandError if no segment lies inside them.
+    """
     blocks = project.ready()
     alive = np.zeros(len(blocks.alive), bool)
     alive[everything(project, ELEMENT, where)] = True
@@ -76,7 +77,7 @@ def velocity(
     az: Number | None = None,
     where: Range | None = None,
 ) -> None:
-    """Velocity [m/s] or acceleration [m/s2] of nodes of bolts; a text is the name of a table of time."""
+    """Prescribe velocity [m/s] or acceleration [m/s2] of bolt nodes; a string is the name of a table of time."""
     changes: dict[str, Number] = {}
     for axis, speed, push in (("x", vx, ax), ("y", vy, ay), ("z", vz, az)):
         if speed is not None and push is not None:
@@ -95,7 +96,7 @@ def force(
     fz: Number | None = None,
     where: Range | None = None,
 ) -> None:
-    """Force [N] on each of these nodes of one bolt."""
+    """Prescribe the force on each bolt node [N]."""
     given = {"force_x": fx, "force_y": fy, "force_z": fz}
     changes = {name: value for name, value in given.items() if value is not None}
     supports.condition(project, BOLT_NODE, changes, where)

@@ -27,7 +27,7 @@ from hpcdem.physics.proppant.model import Proppant
 
 
 def create(project: Project, name: str, title: str = "", x_label: str = "", y_label: str = "") -> None:
-    """An empty diagram; one of this name is replaced."""
+    """Create an empty chart; it replaces one with this name."""
     project.charts[name] = Chart(title, x_label, y_label)
 
 
@@ -44,8 +44,9 @@ def add(
     profile: str = "",
     where: Range | None = None,
 ) -> None:
-    """Add a curve: history y against history x (or time), or points, or what fluid has at this moment along the line of
-    channels that a range chooses, over the distance from its left end (profile: a quantity of channels). Collective."""
+    """Add a curve: history y against history x (or time), given points, or a profile, which is a present quantity of
+    the fluid against distance along a line of channels from its left end. Collective.
+    """
     chart = _chart(project, name)
     if profile:
         found, label = _profile(project, profile.replace("-", "_"), where), label or profile.replace("-", " ")
@@ -91,9 +92,10 @@ def export(
     project: Project, name: str, file: str, cracks: bool = False, plastic: bool = False, fluid: str = "",
     temperature: bool = False,
 ) -> None:  # fmt: skip
-    """Write the diagram as a figure into the folder of the results, and its curves as CSV beside it: curve, x, y, one
-    row per point. cracks, plastic, temperature, fluid (pressure, saturation, aperture, velocity or concentration): the
-    figure also shows the model at this moment, with one of them. Collective."""
+    """Write the chart as a figure into the output folder, and its curves as CSV: curve, x, y, one row per point. With
+    cracks, plastic, temperature or fluid (pressure, saturation, aperture, velocity or concentration), the figure also
+    shows the present state of the model. Collective.
+    """
     from hpcdem.post.charts import draw
 
     chart, figure = _chart(project, name), project.result(file)

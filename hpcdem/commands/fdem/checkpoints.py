@@ -30,18 +30,21 @@ SUFFIX = ".sav"
 
 
 def named(path: str) -> str:
-    """The file of a name without an ending."""
+    """Return the file name; `SUFFIX` is appended to a name without an extension."""
     return path if Path(path).suffix else path + SUFFIX
 
 
 def save(project: Project, file: str) -> None:
-    """The whole state to a file beside the script, `SUFFIX` behind a name without an ending. Collective."""
+    """Write the complete state to a file in the folder of the script; `SUFFIX` is appended to a name without an
+    extension. Collective.
+    """
     _write(project, project.to_write(project.path(named(file))), {"names": project.names()})
 
 
 def write_checkpoint(project: Project, automatic: bool = False) -> Path:
-    """The whole state into the folder of the results, `<step>.sav`, and the place in the script with it; returns its
-    path. Checkpoints that are too many are removed. Collective."""
+    """Write the complete state, with the position in the script, to `<step>.sav` in the output folder and return its
+    path. Surplus checkpoints are removed. Collective.
+    """
     path = project.folder() / run_folder.checkpoint_name(project.step, automatic)
     try:
         names = project.names()
@@ -68,15 +71,15 @@ def _write(project: Project, path: Path, more: dict[str, Any]) -> None:
 
 
 def found(project: Project, path: str) -> str:
-    """The name of a file that is there: as it is given, or with the ending that `save` gives. Collective."""
+    """Return the name of an existing file: as given, or with the extension that `save` appends. Collective."""
     there = project.comm.bcast(project.path(path).exists() if project.comm.rank == 0 else None)
     return path if there else named(path)
 
 
 def restore(project: Project, path: str) -> dict[str, Any]:
-    """The state of a file; returns the names (of variables and functions) that were saved with it. Collective.
+    """Load the state of a file. Return the names (of variables and functions) that were saved with it. Collective.
 
-    CommandError if there is no such file, or if it is no checkpoint of blocks; the model is then as it was.
+    Raises CommandError if the file does not exist or is not a checkpoint of blocks; the model is then unchanged.
     """
     project.refuse_inside("model restore")
     flush(project)
@@ -88,10 +91,13 @@ def restore(project: Project, path: str) -> dict[str, Any]:
 
 
 def take_up(project: Project, before: float = math.inf) -> list[Any] | None:
-    """Take the state of the newest whole checkpoint in the folder of the results, which a run of the same script wrote;
-    returns its journal (lang.pcdc.journal), None if there is no checkpoint. before: that of this time of the model [s]
-    or the last one before it, UsageError if missing. Collective. A damaged file is named in the
-    log and the one before it is tried. UsageError if the script cannot be brought back to where it was written."""
+    """Load the newest complete checkpoint of this script in the output folder. Return its journal (lang.pcdc.journal),
+    None without a checkpoint. Collective.
+
+    before: load the checkpoint at this model time [s] or the last one before it; UsageError if missing. A damaged file
+    is reported in the log and the previous one is tried. UsageError if the script cannot be resumed from the
+    checkpoint.
+    """
     found = _newest(project, before)
     if found is None:
         return None
@@ -108,8 +114,9 @@ def take_up(project: Project, before: float = math.inf) -> list[Any] | None:
 
 
 def restore_newest(project: Project, before: float = math.inf) -> bool:
-    """Restore the newest checkpoint for a Python program, which is not run again; False if there is no checkpoint.
-    CommandError for that of a script. Then `steps.resume` finishes the command in which it was written. Collective."""
+    """Load the newest checkpoint for a Python program, which is not executed again. Return False without a checkpoint.
+    Raises CommandError if a script wrote it. `steps.resume` then finishes the interrupted command. Collective.
+    """
     found = _newest(project, before)
     if found is None:
         return False

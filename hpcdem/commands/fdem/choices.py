@@ -26,9 +26,9 @@ NEAR = 1e-9
 
 
 def chosen(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray | None:
-    """Ascending numbers of the objects of this kind that a range chooses among those that are there; None stands for
-    all. null_too: also among elements that were removed, and what belonged to them. CommandError if it chooses
-    nothing."""
+    """Return the ascending numbers of the objects of a kind that a range selects; None selects all and returns None.
+    null_too: include removed elements and their objects. Raises CommandError if nothing is selected.
+    """
     if where is None:
         return None
     return _once(project, where, lambda: _chosen(project, kind, where, null_too))
@@ -54,19 +54,19 @@ def _chosen(project: Project, kind: str, where: g.Range, null_too: bool) -> np.n
 
 
 def everything(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray:
-    """Numbers of what a range selects, also if it selects all."""
+    """Return the numbers of the objects that a range selects, also if it is None."""
     found = chosen(project, kind, where, null_too)
     return _once(project, None, lambda: _Objects(project, kind, null_too).numbers) if found is None else found
 
 
 def points(project: Project, where: g.Range | None) -> np.ndarray | None:
-    """Nodes that a range chooses, by points: for what both sides of a joint have together."""
+    """Return the points of the nodes that a range selects, for quantities that both sides of a joint share."""
     found = chosen(project, g.NODE, where)
     return found if found is None else sides.points(project.whole_mesh().cells, found)
 
 
 def places(project: Project, kind: str) -> np.ndarray:
-    """(n, 2), in space (n, 3) [m] where the objects of a kind that are there are now: their middle."""
+    """Return the present positions of the existing objects of a kind, their centres: (n, 2), in space (n, 3) [m]."""
     objects = _Objects(project, kind)
     objects.now = True
     return objects.places()[:, :3].mean(axis=1)

@@ -21,21 +21,21 @@ MECHANICAL, THERMAL, HYDRAULIC, PROPPANT = PARTS = "mechanical", "thermal", "hyd
 
 
 def run_time(project: Project, time: float) -> None:
-    """The time that model solve takes at most from now on [s]; 0: no end."""
+    """Set the longest time that model solve may take from now on [s]; 0: no limit."""
     if time < 0.0:
         raise CommandError(f"a run-time must not be negative, got {time:g}")
     project.run_time = time
 
 
 def solve_check(project: Project, steps: int) -> None:
-    """Steps between two looks at the ratio."""
+    """Set the number of steps between two evaluations of the ratio."""
     if steps < 1:
         raise CommandError(f"solve-check: a whole number above 0 is needed, got {steps}")
     project.look = steps
 
 
 def cycle_option(project: Project, **parts: Mapping[str, Any]) -> None:
-    """time_step [s] and cycle_number of each part in a cycle, see `PARTS`."""
+    """Set time_step [s] and cycle_number of each part in a cycle, see `PARTS`."""
     for part in (HYDRAULIC, PROPPANT):
         other = parts.get(HYDRAULIC if part == PROPPANT else PROPPANT, {})
         for name, value in parts.get(part, {}).items():
@@ -58,7 +58,7 @@ def _time_step(project: Project, part: str, value: float) -> None:
 
 
 def reset(project: Project, **parts: Mapping[str, Any]) -> None:
-    """start_time, from which run-time counts, current_time and time_step [s] of parts, see `PARTS`. Collective."""
+    """Set start_time, from which run-time counts, current_time and time_step [s] of parts, see `PARTS`. Collective."""
     project.refuse_inside("model reset")
     for part, given in parts.items():
         if "current_time" in given:
@@ -109,7 +109,7 @@ def time(project: Project, part: str) -> float:
 
 
 def query(project: Project, **parts: Mapping[str, Any]) -> None:
-    """Say in the log what time these parts have come to, and their time step. Collective."""
+    """Log the present time and the time step of these parts. Collective."""
     for part in parts:
         of = project.blocks.clock if part == MECHANICAL else _physics(project, part)
         step = f", time step {of.dt:.6g} s" if of.dt else ""
@@ -118,7 +118,7 @@ def query(project: Project, **parts: Mapping[str, Any]) -> None:
 
 
 def devices(project: Project) -> None:
-    """Say in the log what a run computes with. Collective."""
+    """Log the number of ranks and threads of the run. Collective."""
     ranks, threads = project.comm.size, project.blocks.threads
     if project.log is not None:
         project.log.info(

@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
 
 def couple(project: Project, particles: Simulation, friction: float | None = None, dt: float = 0.0) -> Coupled:
-    """Couple particles and blocks, so that they step together. friction: largest coefficient between discs and faces;
-    dt [s]: time step of both, 0: the assigned one of either, else the smaller stable one. Collective."""
+    """Couple particles and blocks, which are then stepped together. friction: largest coefficient between discs and
+    faces; dt: time step of both [s]; 0: the time step assigned to either, else the smaller stable one. Collective.
+    """
     from hpcdem.commands.dem import cycles
     from hpcdem.physics.coupling.model import Coupled
 
@@ -124,8 +125,9 @@ def _warn_of_walls(both: Coupled) -> None:
 
 @contextmanager
 def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
-    """Around a command that steps: what a run of particles writes and tells at its beginning and its end. steps: None
-    if their number is not known. Collective; without particles nothing."""
+    """Wrap a command that steps: write and log what a run of particles writes and logs at its beginning and end. steps:
+    None if their number is unknown. Does nothing without particles. Collective.
+    """
     both = project.coupled
     if both is None:
         yield
@@ -172,8 +174,9 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
 
 
 def advance(project: Project, steps: int) -> int:
-    """Take up to `steps` steps of the blocks and their particles; returns the external request. Due output of the
-    particles is written; if one of their functions ends the command, project.progress["done"] is set. Collective."""
+    """Take up to `steps` steps of the blocks and their particles. Return the external request. Due output of the
+    particles is written; if one of their functions ends the command, project.progress["done"] is set. Collective.
+    """
     both, due = project.coupled, project.due
     if both is None or due is None:
         return convergence.advance(project.blocks, steps)
@@ -189,7 +192,7 @@ def advance(project: Project, steps: int) -> int:
 
 
 def next_checkpoint(project: Project) -> float:
-    """The step of the blocks at which SET save of the particles asks for the next checkpoint of both."""
+    """Return the step of the blocks at which SET save of the particles requires the next checkpoint of both."""
     every = _save_interval(project)
     if not every:
         return math.inf
@@ -209,7 +212,7 @@ def _save_interval(project: Project) -> int:
 
 
 def refuse(project: Project, what: str) -> None:
-    """CommandError for what cannot be done of blocks that touch particles."""
+    """Raise CommandError for a command that blocks coupled to particles do not support."""
     if project.coupled is not None:
         raise CommandError(
             f"{what} would step these blocks without the particles coupled to them: use model step or model solve"
@@ -217,7 +220,7 @@ def refuse(project: Project, what: str) -> None:
 
 
 def take_up(project: Project) -> None:
-    """A run that resumes from a checkpoint: both as they were when it was written, in the middle of a command."""
+    """Restore particles and blocks from the checkpoint of the run that is resumed, inside the interrupted command."""
     both = project.coupled
     if both is not None and project.continues is not None:
         from hpcdem.physics.coupling import saved_state
@@ -229,7 +232,7 @@ def take_up(project: Project) -> None:
 
 
 def release(project: Project) -> None:
-    """Part them."""
+    """Decouple particles and blocks."""
     project.refuse_inside("end")
     if project.coupled is not None:
         project.coupled.release()
@@ -237,7 +240,7 @@ def release(project: Project) -> None:
 
 
 def save(project: Project, path: Path, extra: dict[str, Any]) -> None:
-    """Write all that is stepped together. Collective."""
+    """Write the state of blocks and of the particles coupled to them. Collective."""
     if project.coupled is not None:
         from hpcdem.commands.dem import output
         from hpcdem.physics.coupling import saved_state
@@ -250,8 +253,9 @@ def save(project: Project, path: Path, extra: dict[str, Any]) -> None:
 
 
 def restore(project: Project, path: Path, begins: bool) -> dict[str, Any]:
-    """Take the state of a file; begins: the script has still to run, particles are taken when it steps first after
-    hpcdem.couple. Collective."""
+    """Load the state of a file. begins: the script still has to run; particles are restored at its first step after
+    hpcdem.couple. Collective.
+    """
     if project.coupled is not None:
         from hpcdem.physics.coupling import saved_state
 

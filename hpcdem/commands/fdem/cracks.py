@@ -14,7 +14,7 @@ NAME = "cracks.csv"
 
 
 def columns(dim: int) -> dict[str, str]:
-    """Names of `diagnostics.events` and of the columns, in their order, by dimensions of space."""
+    """Return names of `diagnostics.events` and of the columns, in their order, by dimensions of space."""
     joule = unit_in("J/m", dim)
     size = {2: {"length": "length [m]"}, 3: {"joint_area": "joint_area [m2]"}}[dim]
     return {
@@ -25,12 +25,12 @@ def columns(dim: int) -> dict[str, str]:
 
 
 def record(project: Project) -> None:
-    """Add what is known to have broken: steps look for broken joints from time to time. Collective."""
+    """Record the broken joints detected so far; steps search for them at intervals. Collective."""
     _write(project, project.blocks.event_rows)
 
 
 def flush(project: Project) -> None:
-    """Add all that has broken so far. The file of another model goes, if this one has no joints. Collective."""
+    """Write all joints broken so far. Remove the file of an earlier model if this one has no joints. Collective."""
     if project.taken:
         _write(project, diagnostics.crack_rows(project.blocks))
         if project.cracks_filed is None and project.folder_made and project.comm.rank == 0:

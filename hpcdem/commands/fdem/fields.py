@@ -18,7 +18,7 @@ from hpcdem.physics.fields import kinds
 
 
 def of(project: Project, name: str) -> Any:
-    """The field of the model; CommandError without one."""
+    """Return the field of the model. Raises CommandError if the model lacks it."""
     if name not in kinds():
         raise CommandError(f"there is no field {name}; available: {', '.join(kinds())}")
     found = kinds()[name].load_type().there(project.ready())
@@ -28,12 +28,12 @@ def of(project: Project, name: str) -> Any:
 
 
 def model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """The field diffuses in elements, with these properties."""
+    """Let the field diffuse in elements with these properties."""
     assign(project, kinds()[name].load_type(), name, chosen(project, ELEMENT, where), properties)
 
 
 def condition(project: Project, name: str, value: Number, where: Range | None = None) -> None:
-    """The value at nodes."""
+    """Prescribe the value at nodes."""
     found = of(project, name)
     found.prescribe(points(project, where), **assignments.from_now(project, found.time, {"value": value}))
 
@@ -46,8 +46,9 @@ def face_condition(
     environment: Number | None = None,
     where: Range | None = None,
 ) -> None:
-    """Prescribe the inflow through faces, or exchange with an environment of this value; without a coefficient that of
-    the elements is used. Without a range: all faces on the surface of the model."""
+    """Prescribe the inflow through faces, or exchange with an environment of this value; the default coefficient is
+    that of the elements. Without a range: all faces on the surface of the model.
+    """
     every = {"flux": flux, "transfer": transfer, "environment": environment}
     given: dict[str, Any] = {word: value for word, value in every.items() if value is not None}
     if not given:
@@ -67,7 +68,7 @@ def remove(project: Project, name: str, kind: str, where: Range | None = None) -
 
 
 def initial(project: Project, name: str, value: float, where: Range | None = None) -> None:
-    """The value at nodes now; elements around them are free of the stress that the field brings."""
+    """Set the present value at nodes; the elements around them are then free of stress caused by the field."""
     of(project, name).initial(points(project, where), value)
 
 

@@ -28,7 +28,7 @@ _DOES = {"pressure": kernels.PRESSURE, "flow_surface": kernels.SURFACE, "flow_ra
 
 
 def model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Joints become channels with these properties (physics.flow.properties)."""
+    """Make joints channels with these properties (physics.flow.properties)."""
     joints = chosen(project, JOINT, where)
     assign(project, Flow, "fluid in their joints", joints, properties)
     proppant = Proppant.there(project.blocks)
@@ -51,8 +51,9 @@ def proppant_condition(
     proppant_volumetric_flow_rate: Number | None = None,
     where: Range | None = None,
 ) -> None:
-    """Concentration of the slurry that comes in at flow nodes [1], or volume of proppant that does [m2/s, at each]; the
-    last one holds."""
+    """Prescribe the concentration of inflowing slurry at flow nodes [1], or the volume rate of inflowing proppant at
+    each [m2/s]; the latest condition applies.
+    """
     given = {CONCENTRATION: proppant_volumetric_concentration, RATE: proppant_volumetric_flow_rate}
     chosen = {kind: value for kind, value in given.items() if value is not None}
     if len(chosen) != 1:
@@ -66,8 +67,9 @@ def proppant_condition(
 
 
 def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Change some properties of cohesive models, of channels, and of heat in these, each of the joints that a range
-    chooses; without a range of all that have them."""
+    """Change properties of cohesive models, of channels, and of heat in channels; without a range, of all joints that
+    have them.
+    """
     of_fluid = {name: value for name, value in properties.items() if POROUS.has(name)}
     of_heat = {name: value for name, value in properties.items() if FLUID_HEAT.has(name)}
     of_grains = {name: value for name, value in properties.items() if PROPPANT.has(name)}
@@ -91,8 +93,9 @@ def condition(
     flow_rate: Number | None = None,
     where: Range | None = None,
 ) -> None:
-    """Pressure [Pa], level of a free surface [m], or a point of it, or rate [m2/s, of each node] at flow nodes; the
-    last one holds."""
+    """Prescribe at flow nodes a pressure [Pa], the level of a free surface [m] or a point on it, or the rate of each
+    node [m2/s]; the latest condition applies.
+    """
     if isinstance(flow_surface, (tuple, list)):
         flow_surface = _level(project, flow_surface)
     given: dict[str, Number | None] = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
@@ -130,8 +133,9 @@ def initial(
     concentration: float | None = None,
     where: Range | None = None,
 ) -> None:
-    """Fluid that flow nodes hold now: its pressure [Pa], or the part of their room that is filled; concentration of
-    proppant in it."""
+    """Set the present fluid of flow nodes: its pressure [Pa] or saturation [1], and the concentration of proppant in it
+    [1].
+    """
     nodes = points(project, where)
     grains = None if concentration is None else needed(project, Proppant)
     if (pressure, saturation) != (None, None) or grains is None:
@@ -141,7 +145,7 @@ def initial(
 
 
 def well(project: Project, name: str, where: Range | None = None) -> None:
-    """Flow nodes are a well, see physics/flow/wells.py."""
+    """Make flow nodes a well, see physics/flow/wells.py."""
     needed(project, Flow).drill(name, points(project, where))
 
 
@@ -154,8 +158,9 @@ def stage(
     time: float | None = None,
     limit: float | None = None,
 ) -> None:
-    """Add a stage of a well: a rate [m2/s] up to a pressure (limit [Pa]), a pressure [Pa], or shut in; time: duration
-    in flow time [s], None: no end."""
+    """Add a stage of a well: a rate [m2/s] limited by a pressure (limit [Pa]), a pressure [Pa], or shut in. time:
+    duration in flow time [s]; None: unlimited.
+    """
     given = {w.RATE: rate, w.PRESSURE: pressure, w.SHUT: 0.0 if shut_in else None}
     chosen = {does: value for does, value in given.items() if value is not None}
     if len(chosen) != 1:
@@ -168,7 +173,7 @@ def stage(
 def sub_step(
     project: Project, mechanical: int | None = None, hydraulic: int | None = None, thermal: int | None = None
 ) -> None:
-    """Steps of the blocks between two cycles of flow and heat, and sub-steps of such cycles."""
+    """Set the steps of the blocks between two cycles of flow and heat, and the sub-steps of such a cycle."""
     if (mechanical, hydraulic) != (None, None):
         project.blocks.flow_clock(every=mechanical, steps=hydraulic)
     if thermal is not None:

@@ -32,8 +32,9 @@ from hpcdem.physics.flow.model import Flow
 
 
 def vtk(project: Project, file: str, every: int | None = None, off: bool = False) -> None:
-    """Write `<file>_<step>.vtkhdf` into the folder of the results: now, or every so many steps; off: no more of this
-    name. Collective."""
+    """Write `<file>_<step>.vtkhdf` into the output folder, now or every so many steps; off: end the frames of this
+    name. Collective.
+    """
     if off:
         if file not in project.frames:
             known = quoted(project.frames, "none")
@@ -49,7 +50,7 @@ def vtk(project: Project, file: str, every: int | None = None, off: bool = False
 
 
 def write_due(project: Project) -> None:
-    """The frames that are due at this step, once each; `settle` waits for them. Collective."""
+    """Write the frames that are due at this step, once each; `settle` waits for them. Collective."""
     due = [
         name for name, every in project.frames.items()
         if project.count % every == 0 and project.framed.get(name) != project.step
@@ -64,7 +65,7 @@ def write_due(project: Project) -> None:
 
 
 def settle(project: Project) -> None:
-    """Wait until all files have their names. Raises HpcdemError on all ranks if one could not be written."""
+    """Wait until all files are complete. Raises HpcdemError on all ranks if one could not be written."""
     with project.blocks.timers.around("output"):
         under_way.settle(project.comm)
 
@@ -76,7 +77,7 @@ def _particles_just_wrote(project: Project) -> bool:
 
 
 def write_last(project: Project) -> None:
-    """A frame of each name of a state that makes no sense any more, for the user to look at. Collective."""
+    """Write a frame of each name of an invalid state for inspection. Collective."""
     with np.errstate(all="ignore"):
         for name in project.frames:
             _write(project, name, sound=False)
@@ -109,7 +110,7 @@ def _kept(moment: MeshFrame) -> MeshFrame:
 
 
 def whole(project: Project) -> MeshState | None:
-    """The present state as a frame, on rank 0. Collective."""
+    """Return the present state as a frame, on rank 0. Collective."""
     return vtkhdf_mesh.whole(frame(project), project.comm)
 
 
@@ -232,8 +233,9 @@ def _of_mesh(project: Project) -> MeshFrame:
 
 
 def frame(project: Project, sound: bool = True) -> MeshFrame:
-    """Collect the quantities of a frame; sound: with forces between elements and on them; only the mesh before all
-    elements have a model. Collective."""
+    """Collect the quantities of a frame; before all elements have a model, only the mesh. sound: include forces between
+    elements and on them. Collective.
+    """
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
     if len(readiness.bare(blocks)):
         return _of_mesh(project)

@@ -32,11 +32,12 @@ SHAPES: dict[str, Callable[..., shapes.Curve]] = {
 
 
 def shape(kind: str, *values: Any) -> list[Any]:
-    """The curves [m] of a polyline or polygon (points), rectangle (two corners), circle (centre, radius; or, as
-    segmented-circle, with the length of its sides), arc (centre, radius and two angles [degrees], counter-clockwise;
-    or, as arc-between, centre and ends), or of single points (point); in space the solid [m] of a box (two corners),
-    sphere (centre, radius), cylinder or cone (middles of its ends, its radius or radii), or the surface of a polygon
-    (corners), disc (centre, normal, radius) or plane (point, normal)."""
+    """Return the shapes of a kind. In the plane, curves [m] of a polyline or polygon (points), rectangle (two corners),
+    circle (centre, radius; as segmented-circle also the length of its sides), arc (centre, radius, two angles
+    [degrees], counter-clockwise; as arc-between centre and end points) or single points (point). In space, a solid [m]:
+    box (two corners), sphere (centre, radius), cylinder or cone (centres of the end faces, radius or radii); or a
+    surface: polygon (corners), disc (centre, normal, radius) or plane (point, normal).
+    """
     if kind in solids.KINDS and (kind not in SHAPES or len(values[0][0]) == 3):
         return [solids.made(kind, *values)]
     return [shapes.point(at) for at in values[0]] if kind == "point" else [SHAPES[kind](*values)]
@@ -50,7 +51,7 @@ def create(project: Project, kind: str, layer: str, *values: Any) -> None:
 
 
 def extrude(project: Project, layer: str, along: Vector, as_layer: str = DEFAULT_LAYER) -> None:
-    """The polygons of a layer, drawn along a vector [m], as bodies of another."""
+    """Extrude the polygons of a layer along a vector [m] into bodies of another layer."""
     project.layers.add(as_layer, *(solids.made("extrude", one.corners, along) for one in _polygons(project, layer)))
 
 
@@ -58,7 +59,9 @@ def revolve(
     project: Project, layer: str, axis: Vector, about: Vector = (0.0, 0.0, 0.0), angle: float = solids.FULL,
     as_layer: str = DEFAULT_LAYER,
 ) -> None:  # fmt: skip
-    """The polygons of a layer, turned about an axis through a point [m] by an angle [degrees], as bodies of another."""
+    """Revolve the polygons of a layer about an axis through a point [m] by an angle [degrees] into bodies of another
+    layer.
+    """
     made = (solids.made("revolve", one.corners, about, axis, angle) for one in _polygons(project, layer))
     project.layers.add(as_layer, *made)
 
@@ -84,10 +87,10 @@ def import_file(
     attribute: str | None = None,
     simplify: float = 0.0,
 ) -> None:
-    """The lines of a DXF file, or of one of its layers, or of a section in another format; in space the solids of a
-    STEP or BREP file, or what the triangles of an STL or DXF file enclose. Collective.
+    """Import the lines of a DXF file, of one of its layers, or of a section in another format; in space the solids of a
+    STEP or BREP file, or the bodies bounded by the triangles of an STL or DXF file. Collective.
 
-    scale: metres per unit of the file; None: as given in the file, else 1. Of sections: named: each name becomes a
+    scale: metres per unit of the file (default: as given in the file, else 1). For sections, named: each name becomes a
     layer, and as_layer the outline of all polygons; origin, to, line: see `Placement`; legend, attribute, simplify: see
     `read`.
     """
@@ -178,8 +181,9 @@ def transform(
     move: Vector | None = None,
     axis: Vector | None = None,
 ) -> None:
-    """Scale, then turn [degrees, counter-clockwise, in space right-handed about an axis] about a point, then move [m] a
-    layer."""
+    """Scale a layer, then rotate it about a point [degrees, counter-clockwise, in space right-handed about an axis],
+    then translate it [m].
+    """
     if scale <= 0.0:
         raise CommandError(f"a scale is above 0, got {scale:g}")
     given = {"about": about, "translate": move, "axis": axis}
@@ -187,13 +191,13 @@ def transform(
 
 
 def scale(project: Project, factors: Vector, layer: Sequence[str] | None = None) -> None:
-    """Multiply the coordinates of layers; None: of all of them."""
+    """Multiply the coordinates of layers by factors; None: of all layers."""
     _move(project, layer, scale=factors)
 
 
-def translate(project: Project, way: Vector, layer: Sequence[str] | None = None) -> None:
-    """Move layers [m]; None: all of them."""
-    _move(project, layer, translate=way)
+def translate(project: Project, vector: Vector, layer: Sequence[str] | None = None) -> None:
+    """Translate layers by a vector [m]; None: all layers."""
+    _move(project, layer, translate=vector)
 
 
 def _move(project: Project, layers: Sequence[str] | None, **how: Any) -> None:
@@ -217,8 +221,9 @@ def export(
     to: Vector = (0.0, 0.0),
     line: tuple[Vector, Vector] | None = None,
 ) -> None:
-    """Write layers to a DXF, GeoJSON or CSV file in the folder of the results, under their names. In metres, or with
-    scale, origin, to and line in the coordinates from which `import_file` makes those of the model. Collective."""
+    """Write layers to a DXF, GeoJSON or CSV file in the output folder under their names: in metres or, with scale,
+    origin, to and line, in the coordinates that `import_file` converts to those of the model. Collective.
+    """
     if not file.lower().endswith(FORMATS):
         raise CommandError(f"'{file}': layers are exported to files *.dxf, *.geojson or *.csv")
     placement = Placement(scale, _pair(origin), _pair(to), None if line is None else (_pair(line[0]), _pair(line[1])))
@@ -237,6 +242,6 @@ def export(
 
 
 def delete(project: Project, layers: Sequence[str]) -> None:
-    """Forget layers. Meshes that were made from them keep their edges."""
+    """Delete layers. Meshes made from them keep their edges."""
     for layer in dict.fromkeys(layers):
         project.layers.remove(layer)

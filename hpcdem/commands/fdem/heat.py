@@ -21,15 +21,16 @@ from hpcdem.physics.heat.properties import ISO_HEAT
 
 
 def model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Elements conduct heat, with these properties (physics.heat.properties)."""
+    """Let elements conduct heat with these properties (physics.heat.properties)."""
     assign(project, Heat, "heat", chosen(project, ELEMENT, where), properties)
 
 
 def assign(
     project: Project, physics: type[Any], what: str, numbers: np.ndarray | None, properties: Mapping[str, Value]
 ) -> None:
-    """Give a physics of blocks (Heat, Flow) properties; if they are refused and it is new with them, it goes again.
-    CommandError beside particles, where blocks do not have `what`."""
+    """Assign properties to a physics of blocks (Heat, Flow). If they are rejected, a physics created for them is
+    removed again. Raises CommandError next to particles, where blocks do not support `what`.
+    """
     if project.coupled is not None:
         raise CommandError(f"coupled blocks do not support {what}")
     with begun(project, physics) as found:
@@ -37,8 +38,7 @@ def assign(
 
 
 def element_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Change some properties of elements, mechanical and thermal ones, each of the elements that a range chooses;
-    without a range of all that have them."""
+    """Change mechanical and thermal properties of elements; without a range, of all elements that have them."""
     thermal = {name: value for name, value in properties.items() if ISO_HEAT.has(name)}
     others = {name: value for name, value in properties.items() if name not in thermal}
     if thermal:
@@ -56,25 +56,25 @@ def element_property(project: Project, properties: Mapping[str, Value], where: R
 
 
 def fluid_model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """The fluid of channels has heat, with these properties; without a range that of all channels."""
+    """Assign thermal properties to the fluid of channels; without a range, of all channels."""
     needed(project, Heat).of_fluid().assign(chosen(project, JOINT, where), properties)
 
 
 def condition(project: Project, temperature: Number, where: Range | None = None) -> None:
-    """Temperature of nodes."""
+    """Prescribe the temperature of nodes [K]."""
     heat = needed(project, Heat)
     heat.prescribe(points(project, where), **assignments.from_now(project, heat.time, {"value": temperature}))
 
 
 def fluid_condition(project: Project, temperature: Number, where: Range | None = None) -> None:
-    """Temperature of the fluid at flow nodes."""
+    """Prescribe the temperature of the fluid at flow nodes [K]."""
     heat = needed(project, Heat)
     given = assignments.from_now(project, heat.time, {"temperature": temperature})
     heat.prescribe_fluid(points(project, where), **given)
 
 
 def initial_fluid(project: Project, temperature: float, where: Range | None = None) -> None:
-    """Temperature of the fluid at flow nodes now."""
+    """Set the present temperature of the fluid at flow nodes [K]."""
     needed(project, Heat).of_fluid().initial(project.blocks.numbers_of_nodes(points(project, where)), temperature)
 
 
@@ -85,8 +85,9 @@ def face_condition(
     environment_temperature: Number | None = None,
     where: Range | None = None,
 ) -> None:
-    """Heat flux into faces [W/m2], or transfer [W/(m2 K)] from an environment of this temperature; without a
-    coefficient with that of the elements. Without a range: all faces on the surface of the model."""
+    """Prescribe the heat flux into faces [W/m2], or heat transfer [W/(m2 K)] from an environment of this temperature;
+    the default coefficient is that of the elements. Without a range: all faces on the surface of the model.
+    """
     given: dict[str, Any] = {"flux": heat_flux, "transfer": transfer_coeficient, "environment": environment_temperature}
     values = {name: value for name, value in given.items() if value is not None}
     if not values:
@@ -97,19 +98,21 @@ def face_condition(
 
 
 def remove_conditions(project: Project, where: Range | None = None, rock: bool = True, fluid: bool = True) -> None:
-    """Remove prescribed temperatures of nodes and their fluid; does nothing without heat."""
+    """Remove prescribed temperatures of nodes and of the fluid at them; does nothing without heat."""
     found = Heat.there(project.ready())
     if found is not None:
         found.remove_conditions(points(project, where), rock, fluid)
 
 
 def remove_face_conditions(project: Project, where: Range | None = None) -> None:
-    """Faces are adiabatic again; without heat there is nothing to do."""
+    """Make faces adiabatic again; does nothing without heat."""
     found = Heat.there(project.ready())
     if found is not None:
         found.remove_face_conditions(chosen(project, FACE, where))
 
 
 def initial(project: Project, temperature: float, where: Range | None = None) -> None:
-    """Temperature of nodes now, and of the fluid at them; elements around them are free of thermal stress."""
+    """Set the present temperature of nodes and of the fluid at them [K]; the elements around them are then free of
+    thermal stress.
+    """
     needed(project, Heat).initial(points(project, where), temperature)

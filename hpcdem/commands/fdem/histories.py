@@ -12,6 +12,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.recorded import LAW_STATE, MODEL, UNITS, WELL
 from hpcdem.commands.fdem.records import ENERGIES, History
 from hpcdem.commands.fdem.values import history_name, result_name
+from hpcdem.core.deprecated import present_history
 from hpcdem.core.errors import CommandError
 from hpcdem.core.nearest import quoted
 from hpcdem.core.units import label
@@ -46,9 +47,10 @@ def create(
     variable: str = "",
     well: str = "",
 ) -> None:
-    """Record a number every so many steps: of one object (by number, or the one nearest to a point [m]) or of those of
-    a range or of all (how: sum, mean, minimum, maximum), of a well, by its name, or of the model. variable: with the
-    value law_state, a state variable of user laws that elements have."""
+    """Record a quantity at an interval of steps: of one object (by number, or the object nearest to a point [m]); of
+    the objects of a range, or all (how: sum, mean, minimum, maximum); of a well, by its name; or of the model.
+    variable: for the value law_state, a state variable of user laws.
+    """
     history_name(name)
     if name in project.histories:
         raise CommandError(f"history '{name}' exists already")
@@ -143,17 +145,25 @@ def _nearest_side(project: Project, at: tuple[float, ...]) -> int:
 
 
 def delete(project: Project, name: str) -> None:
-    """Stop a history. Its file stays."""
+    """End a history. Its file is kept."""
     find(project, name)
     flush(project)
-    del project.histories[name]
+    del project.histories[named(project, name)]
 
 
 def find(project: Project, name: str) -> History:
-    """A history by its name. CommandError if missing."""
-    if name not in project.histories:
+    """Return a history by its name. Raises CommandError if missing."""
+    return project.histories[named(project, name)]
+
+
+def named(project: Project, name: str) -> str:
+    """Return the present name of a history. Raises CommandError if missing."""
+    present = present_history(name, project.histories)
+    if present != name and project.log is not None:
+        project.log.warn_once(f"history {name}", f"history '{name}' is deprecated: use '{present}'")
+    if present not in project.histories:
         raise CommandError(f"there is no history '{name}'; available: {quoted(project.histories)}")
-    return project.histories[name]
+    return present
 
 
 def record(project: Project, goes_on: bool = False) -> None:
@@ -171,12 +181,12 @@ def record(project: Project, goes_on: bool = False) -> None:
 
 
 def wait(project: Project) -> bool:
-    """Records of this step come with the forces of the next one."""
+    """Return whether records of this step need the forces of the next one."""
     return any(history.waits for history in project.histories.values())
 
 
 def flush(project: Project) -> None:
-    """Bring what was recorded to the files `history_<name>.csv` in the folder of the results. Collective."""
+    """Write the records to the files `history_<name>.csv` in the output folder. Collective."""
     blocks = project.blocks
     if wait(project):
         with blocks.timers.around("history"), blocks.one_moment():
@@ -204,8 +214,9 @@ def _line(row: Sequence[float]) -> str:
 
 
 def export(project: Project, file: str, names: Sequence[str] = ()) -> None:
-    """Write histories side by side as CSV into the folder of the results: step, time, one column each, empty where one
-    has no record. Collective."""
+    """Write histories as columns of one CSV file in the output folder: step, time, one column each, empty without a
+    record. Collective.
+    """
     result_name(file)
     wanted = {name: find(project, name) for name in names} or project.histories
     if not wanted:

@@ -15,8 +15,9 @@ Number = float | str
 
 
 def create(project: Project, group: str | None = None, set_name: str = DEFAULT, where: Range | None = None) -> None:
-    """Put a liner on the free faces of a range, as things are now, see `Liners.create`; group: that its elements and
-    nodes are put into."""
+    """Install a liner on the free faces of a range at their present positions, see `Liners.create`. group: group of its
+    elements and nodes.
+    """
     faces = everything(project, FACE, where)
     with begun(project, Liners) as liners:
         nodes, elements = liners.create(faces)
@@ -34,8 +35,9 @@ def velocity(
     spin_y: Number | None = None,
     spin_z: Number | None = None,
 ) -> None:
-    """Velocity [m/s] and rate of rotation [rad/s] of nodes of liners, in the plane spin, in space about the axes; a
-    text is the name of a table of time."""
+    """Prescribe velocity [m/s] and angular velocity [rad/s] of liner nodes, in the plane spin, in space about the axes;
+    a string is the name of a table of time.
+    """
     turn = spin if spin_z is None else spin_z
     given = {"x": vx, "y": vy, "z": vz, "turn_x": spin_x, "turn_y": spin_y, "turn": turn}
     changes: dict[str, Number] = {}
@@ -56,7 +58,7 @@ def force(
     moment_y: Number | None = None,
     moment_z: Number | None = None,
 ) -> None:
-    """Force [N/m] and moment [N m/m] on each of these nodes, in space [N] and [N m] about the axes."""
+    """Prescribe force [N/m] and moment [N m/m] on each liner node, in space [N] and [N m] about the axes."""
     about_z = moment if moment_z is None else moment_z
     given = {
         "force_x": fx, "force_y": fy, "force_z": fz, "moment_x": moment_x, "moment_y": moment_y, "moment": about_z,

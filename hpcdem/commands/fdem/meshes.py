@@ -61,14 +61,13 @@ def create(
     smooth: bool = False,
     bodies: bool = False,
 ) -> None:
-    """Mesh the inside of a layer with Gmsh; type: "tri" or "quad"; irregular: triangles in no pattern; smooth: inner
-    points in the middle of their neighbours. Collective.
+    """Mesh the inside of a layer with Gmsh. type: "tri" or "quad"; irregular: unstructured triangles; smooth: place
+    inner points at the mean of their neighbours. Collective.
 
-    refine_layer: (layer, size there [m], distance over which it grows [m] or None); hole: layers whose inside stays
-    empty; region: (layer, group, else its name) of parts with a group of their own; embed: layers that become edges;
-    crack: layers that become edges with a crack. In space embed and crack are layers of surfaces, which become faces;
-    bodies: each body of the outline is a group of its own, by its name in the file it is of, else by the layer and its
-    number.
+    refine_layer: (layer, element size there [m], distance over which it grows [m] or None); hole: layers whose inside
+    is not meshed; region: (layer, group, default its name) of parts with their own group; embed: layers that become
+    edges; crack: layers that become edges with a crack. In space embed and crack are layers of surfaces, which become
+    faces; bodies: each body of the outline is a group, named as in its file, otherwise by the layer and its number.
     """
     regions = [(layer, name or layer) for layer, name in region]
     named = (*(one[0] for one in refine_layer), *(one[0] for one in regions))
@@ -150,9 +149,10 @@ def brick(
     group: str = DEFAULT,
     set_name: str = DEFAULT,
 ) -> None:
-    """A regular mesh of the parallelogram, in space the parallelepiped, whose edges lead from a corner p0 to the other
-    points [m]; n: cells along each, and ratio: each is so many times as large as the one before. triangle: into
-    triangles or tetrahedra, else quads or hexahedra. Its sides are the layers of `grid`."""
+    """Make a regular mesh of a parallelogram, in space a parallelepiped, with edges from the corner p0 to the other
+    points [m]. n: cells along each edge; ratio: size of each cell over that of the previous one; triangle: make
+    triangles or tetrahedra, else quads or hexahedra. Its sides are the layers of `grid`.
+    """
     name = (set_name, group)
 
     def make() -> Mesh:
@@ -172,10 +172,11 @@ def patch(
     group: str = DEFAULT,
     set_name: str = DEFAULT,
 ) -> None:
-    """Triangles in the inside of closed lines, by Gmsh, with sizes per piece. Collective.
+    """Mesh the inside of closed lines with triangles by Gmsh; each piece may have its own size. Collective.
 
-    pieces: the lines and points; size [m]: where no piece says one, the largest of the pieces' otherwise; tolerance
-    [m]: ends of lines and points nearer than this to an earlier one lie on it."""
+    pieces: lines and points; size [m]: element size of pieces without their own (default: the largest size of the
+    pieces); tolerance [m]: an end or point nearer than this to an earlier one coincides with it.
+    """
     if project.dim == 3:
         raise CommandError("lines bound a mesh in two dimensions only")
     shaped = [(piece, shape(*piece.shape) if piece.shape else []) for piece in pieces]
@@ -200,9 +201,10 @@ def grid(
     set_name: str = DEFAULT,
     ratio: tuple[float, ...] | None = None,
 ) -> None:
-    """A regular mesh of the rectangle, in space the box, between two corners [m]; cells along x and y (and z); type:
-    "tri" or "quad", in space "tet" (split: tetrahedra of each cell) or "hex"; ratio: each is so many times as large as
-    the one before. Its sides are the layers left, right, bottom and top, in space front and back too."""
+    """Make a regular mesh of the rectangle, in space the box, between two corners [m]. cells: along x and y (and z);
+    type: "tri" or "quad", in space "tet" (split: tetrahedra per cell) or "hex"; ratio: size of each cell over that of
+    the previous one. Its sides are the layers left, right, bottom and top, in space also front and back.
+    """
     lines = values.grid_lines(first, second, cells, ratio or (1.0,) * len(first))
     name = (set_name, group)
 
@@ -222,7 +224,7 @@ def equilateral(
     group: str = DEFAULT,
     set_name: str = DEFAULT,
 ) -> None:
-    """Nearly equilateral triangles with edges of about `size` [m] in the rectangle between two corners [m]."""
+    """Mesh the rectangle between two corners [m] with nearly equilateral triangles with edges of about `size` [m]."""
     corner = min(first[0], second[0]), min(first[1], second[1])
     width, height = abs(second[0] - first[0]), abs(second[1] - first[1])
     _add(project, lambda: structured.equilateral(corner, width, height, size, (set_name, group)))
@@ -236,8 +238,9 @@ def import_file(
     merge: float = 0.0,
     scale: float = 1.0,
 ) -> None:
-    """A mesh file of another program. Collective. group: one that all elements are put into; merge: points nearer than
-    this are one [m]; scale: metres per unit of the file."""
+    """Import a mesh file of another program. group: of all elements; merge: merge points nearer than this [m]; scale:
+    metres per unit of the file. Collective.
+    """
     path = project.to_read(file)
     found = project.comm.per_node(lambda: imported.read(path, merge, scale, project.dim), once=True)
     for included in found.files:
@@ -268,8 +271,9 @@ def import_file(
 
 
 def intersect(project: Project, layer: str, follow: bool = False) -> None:
-    """The joints on a layer become cracks. follow: its lines are no edges of the mesh, those that follow them best are
-    taken; in space its surfaces are no faces of the mesh, those between the elements on either side are."""
+    """Turn the joints on a layer into cracks. follow: the lines of the layer are not edges of the mesh, and the edges
+    that follow them best are used; in space, the faces between elements on opposite sides of a surface.
+    """
     mesh = project.whole_mesh()
     cracked = project.comm.per_node(lambda: _cracked(project, mesh, layer, follow))
     if len(cracked.cracks) == len(mesh.cracks):
@@ -312,9 +316,10 @@ def glue(
     set_name: str = DEFAULT,
     where: Range | None = None,
 ) -> None:
-    """Bodies that were meshed separately are connected where their faces lie on each other: these become joints, as
-    inside of a body; where the faces differ, elements are cut. tolerance [m]: points nearer than this are one; between:
-    only faces between the elements of two groups; where: only faces of elements of a range, with any. Collective."""
+    """Connect bodies that were meshed separately where their faces coincide; these become joints. Elements whose faces
+    differ are cut. tolerance: merge points nearer than this [m]; between: only faces between the elements of two
+    groups; where: only faces between elements of a range and any others. Collective.
+    """
     mesh = project.whole_mesh()
     project.refuse_in_use("bodies are glued")
     sides = None
@@ -347,8 +352,9 @@ def glue(
 
 
 def delete(project: Project, where: Range | None = None) -> None:
-    """Elements are gone: before the first model or condition the mesh is without them, numbers of others close up;
-    later they are removed. Collective."""
+    """Delete elements. Before the first model or condition they are deleted from the mesh and the others are
+    renumbered; later they are removed as by `null`. Collective.
+    """
     elements = everything(project, ELEMENT, where)
     if project.in_use:
         assignments.null(project, where=where)
@@ -362,9 +368,10 @@ def delete(project: Project, where: Range | None = None) -> None:
 def densify(
     project: Project, maximum_length: Sequence[float], pattern: tuple[int, int] = (1, 1), where: Range | None = None
 ) -> None:
-    """Quads are halved along x, along y or both (pattern, 0 or 1) until they are no longer than this [m], one number
-    for both; neighbours follow, so that no side has more than one point on it; quads with such points become triangles.
-    Collective."""
+    """Halve quads along x, along y or both (pattern, 0 or 1) until they are no longer than maximum_length [m], one
+    number or one per direction. Neighbours are refined so that no side has more than one hanging point; quads with
+    hanging points become triangles. Collective.
+    """
     project.refuse_in_use("elements are densified")
     mesh = project.whole_mesh()
     elements, most = everything(project, ELEMENT, where), (maximum_length[0], maximum_length[-1])
@@ -374,8 +381,9 @@ def densify(
 
 
 def six_nodes(project: Project) -> None:
-    """Turn each triangle into a six-node triangle: four elements with quadratic displacements together. A node between
-    two of a group of nodes is in the group. Collective."""
+    """Turn each triangle into a six-node triangle: four elements with quadratic displacements. A new node between two
+    nodes of a group joins this group. Collective.
+    """
     project.refuse_in_use("elements get more nodes")
     mesh = project.whole_mesh()
     made = project.comm.per_node(lambda: quadratic.quadratic(mesh), once=True)
@@ -390,7 +398,7 @@ def six_nodes(project: Project) -> None:
 
 
 def add_nodes(project: Project, points: Sequence[tuple[float, ...]]) -> None:
-    """Add nodes [m] for elements that are added next; their numbers follow those of the mesh."""
+    """Add nodes [m] for elements to be added next; their numbers follow those of the mesh."""
     project.refuse_in_use("nodes are added")
     if any(len(at) != project.dim for at in points):
         raise CommandError(f"a node needs {project.dim} coordinates")
@@ -413,23 +421,23 @@ def add_element(project: Project, corners: Sequence[int]) -> None:
 
 
 def scale(project: Project, factors: tuple[float, ...]) -> None:
-    """Multiply x and y (and z) of all points of the mesh."""
+    """Multiply the coordinates x and y (and z) of all points of the mesh by factors."""
     if len(factors) != project.dim or not all(factor > 0.0 for factor in factors):
         raise CommandError(f"scale needs {project.dim} factors above 0, not {factors}")
     _move(project, np.array(factors), 0.0, "scaled")
 
 
-def translate(project: Project, way: tuple[float, ...]) -> None:
-    """Move all points of the mesh [m]."""
-    _move(project, 1.0, np.array(way), "moved")
+def translate(project: Project, vector: tuple[float, ...]) -> None:
+    """Translate all points of the mesh by a vector [m]."""
+    _move(project, 1.0, np.array(vector), "moved")
 
 
-def _move(project: Project, factor: Any, way: Any, what: str) -> None:
+def _move(project: Project, factor: Any, shift: Any, what: str) -> None:
     mesh = project.whole_mesh()
     project.refuse_in_use(f"the mesh is {what}")
 
     def make() -> Mesh:
-        moved = replace(mesh, points=mesh.points * factor + way)
+        moved = replace(mesh, points=mesh.points * factor + shift)
         check(moved)
         return moved
 
@@ -437,7 +445,7 @@ def _move(project: Project, factor: Any, way: Any, what: str) -> None:
 
 
 def report_quality(project: Project) -> None:
-    """Sizes and angles of the mesh, in the log."""
+    """Log sizes and angles of the mesh."""
     mesh = project.whole_mesh()
     for line in project.comm.per_node(lambda: quality.quality(mesh).lines()):
         _log(project, line)
@@ -457,8 +465,9 @@ def fracture_network(
     reached: bool = False,
     least: float = 0.0,
 ) -> None:
-    """A set of fractures with given statistics (see `values.fracture_set`) inside of a layer becomes lines of another;
-    least: shorter pieces at the rim are left out [m]. Collective."""
+    """Generate a set of fractures with given statistics (see `values.fracture_set`) inside one layer and add them as
+    lines to another. least: discard shorter pieces at the boundary [m]. Collective.
+    """
     outline = project.layers[inside]
     for hole in holes:
         _ = project.layers[hole]
@@ -477,8 +486,9 @@ def fracture_network(
 
 
 def disc_network(project: Project, layer: str, inside: str, *, seed: int, **statistics: Any) -> None:
-    """A set of discs with given statistics (see `values.disc_set`) about the bodies of a layer becomes surfaces of
-    another. Collective."""
+    """Generate a set of discs with given statistics (see `values.disc_set`) around the bodies of one layer and add them
+    as surfaces to another. Collective.
+    """
     bodies, one = project.layers[inside], values.disc_set(**statistics)
     number, project.networks = project.networks, project.networks + 1
     found = project.comm.per_node(lambda: fracture_discs.discs(one, bodies, seed, number), once=True)

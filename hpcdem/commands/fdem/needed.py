@@ -22,7 +22,7 @@ _P = TypeVar("_P", bound=SurfaceLoad)
 
 
 def needed(project: Project, physics: type[_P], use: bool = True) -> _P:
-    """Return this physics of the model; CommandError without one. use: see `Project.ready`."""
+    """Return this physics of the model. Raises CommandError if missing. use: see `Project.ready`."""
     found = physics.there(project.ready(use=use))
     if found is None:
         raise CommandError(LACKS[physics])

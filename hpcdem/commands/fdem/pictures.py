@@ -31,10 +31,11 @@ def image(
     where: Range | None = None,
     **looks: Any,
 ) -> None:
-    """Draw the model as it is now into `<file>_<step>.png` in the folder of the results (.pdf or .svg if the name ends
-    so). view: a file *.mv; field: what colours these objects (else the first that have it); looks: values of
-    `hpcdem.post.view.model.Layer`, full: all values have colours; camera: corners of the part of the plane [m]; eye,
-    section: in space, as in `hpcdem.post.view.model.ModelView`; where: the objects that are shown. Collective."""
+    """Draw the present state into `<file>_<step>.png` in the output folder (.pdf or .svg with that extension). view: a
+    file *.mv; field: quantity that colours these objects (default: the first objects that have it); looks: values of
+    `hpcdem.post.view.model.Layer`; full: the colour scale covers all values; camera: corners of the visible part of the
+    plane [m]; eye, section: in space, as in `hpcdem.post.view.model.ModelView`; where: objects to draw. Collective.
+    """
     from hpcdem.post.view.model import ModelView, read_view
     from hpcdem.post.view.moment import of_blocks
     from hpcdem.post.view.paper import draw

@@ -28,30 +28,36 @@ if TYPE_CHECKING:
 
 
 class Project:
-    """blocks: the simulation (its comm, log and stop are used); directory: where file names begin; outdir: folder of
-    the results; job: what was started, for run.json; keep: numbered checkpoints that are kept, 0: all.
+    """A model of blocks and the state of the program or script that controls it.
 
-    dim: dimensions of space; layers: geometry; mesh: of all bodies, None before the first; added: nodes
-    [m] and elements that are not in it yet; groups: by kind of object;
-    alive (ne,) bool: elements that are not null; hidden (ne,) bool: those that pictures and ranges pass over;
-    histories, charts and frames (steps between two by name) that are kept
-    up; cracks_filed: broken joints that are in their file, None: the file is not of this model yet; framed: step of the
-    last frame by name;
-    run_time: that model solve takes at most [s], 0: no end; began: times from which it counts, by part (clocks.PARTS);
-    look: steps between two looks at the ratio, 0: as usual; step_table: a table of the time step over time, "";
-    relative: tables whose times count from when a condition takes them;
-    dynamic: motion in time, not towards equilibrium; adapts: the time step may change during a run; networks: sets of
-    fractures made so far; units: that were declared (core.units.SYSTEMS), "" none;
-    solved: how the last `model solve` ended, reason, ratio and steps; line:
-    of the script, for the log; names: gives what a checkpoint shall hold of the script's own variables, place: and of
-    the way to where the script is; progress: of the command that steps at this moment, see running.py; resumed: this
-    run resumes from a checkpoint of the folder; restored: the checkpoint that the script named, and its step; told:
-    when the log spoke last of a line of the script that steps; coupled: the particles that are stepped with the
-    blocks; continues: the checkpoint from which they continue, asleep: the number of these particles, which are empty
-    until then; due: what is due of the particles in the command that steps; calls_lost: that checkpoint
-    ignores methods of particles; stepping: the name of that command, "" if missing; inputs: files that the script
-    reads, by their real paths, in words; made: files that were written by name; resume_advice: what takes up a
-    checkpoint of a run without a script, "": model restore.
+    blocks: the simulation (its comm, log and stop are used); directory: folder to which file names are relative;
+    outdir: output folder; job: the command that was started, for run.json; keep: number of checkpoints to keep, 0: all.
+
+    Model. dim: dimensions of space; layers: geometry; mesh: of all bodies, None before the first; added: nodes [m] and
+    elements not yet part of the mesh; groups: by kind of object; alive (ne,) bool: elements that are not null; hidden
+    (ne,) bool: elements skipped by pictures and ranges; networks: number of fracture sets made so far; units: declared
+    system (core.units.SYSTEMS), "" none.
+
+    Output. histories, charts, frames (interval in steps by name); framed: step of the last frame by name; cracks_filed:
+    number of broken joints already written, None: the file of this model does not exist yet.
+
+    Steps. run_time: limit of model solve [s], 0: none; began: origin of run_time by part (clocks.PARTS); look: steps
+    between two evaluations of the ratio, 0: default; step_table: name of a table of the time step over time, "" none;
+    relative: tables whose times count from the moment at which a condition begins to use them; dynamic: motion in time
+    instead of towards equilibrium; adapts: the time step may change during a run; solved: outcome of the last `model
+    solve`: reason, ratio and steps.
+
+    Script. line: present line, for the log; names: returns the variables of the script to be saved in a checkpoint;
+    place: returns the path to the present position in the script; progress: of the present command that steps, see
+    running.py; stepping: name of that command, "" none; told: time of the last log entry by line of the script; inputs:
+    files that the script reads, by real path, with a description; made: files written by name.
+
+    Restart. resumed: this run resumes from a checkpoint of the folder; restored: checkpoint that the script named, and
+    its step; calls_lost: that checkpoint has no methods of particles; resume_advice: how to resume from a checkpoint of
+    a run without a script, "": model restore.
+
+    Particles. coupled: particles stepped with the blocks; continues: checkpoint from which they continue; asleep:
+    number of their `Simulation`, which is empty until then; due: output due in the present command.
     """
 
     def __init__(self, blocks: Blocks, directory: Path | str = ".", outdir: Path | str = "data") -> None:
@@ -91,7 +97,7 @@ class Project:
 
     @property
     def step(self) -> int:
-        """Steps done."""
+        """Number of steps taken."""
         return int(self.blocks.clock.step)
 
     @property
@@ -100,12 +106,12 @@ class Project:
         return self.blocks.creep.steps if "creep" in (self.progress or {}) else self.step
 
     def refuse_inside(self, what: str) -> None:
-        """CommandError in a function that is called in the middle of a command that steps."""
+        """Raise CommandError in a function that is called during a command that steps."""
         if self.stepping:
             raise CommandError(f"{what} cannot be used by a function that is called during model {self.stepping}")
 
     def clear(self, dim: int = 2) -> None:
-        """A new model in so many dimensions."""
+        """Start a new model in two or three dimensions."""
         self.refuse_inside("model new")
         if self.coupled is not None:
             self.coupled.release()
@@ -173,8 +179,9 @@ class Project:
             )
 
     def refit(self, made: Remade) -> None:
-        """The mesh after bodies were glued, or elements cut or deleted: groups and histories of what was merged, cut or
-        renumbered continue. Of points that were in several groups of a set the lowest counts."""
+        """Use the mesh after bodies were glued, or elements cut or deleted: groups and histories of merged, cut or
+        renumbered objects continue. A merged point belongs to the group of its lowest-numbered original point.
+        """
         before, mesh, number = self.whole_mesh(), made.mesh, made.points
         self.replace_mesh(mesh)
         self.alive, self.hidden = self.alive[made.parent], self.hidden[made.parent]
@@ -237,7 +244,7 @@ class Project:
         return self._edges[1]
 
     def take_added(self) -> None:
-        """Nodes and elements that were added one by one become part of the mesh. CommandError, with what is wrong."""
+        """Add nodes and elements given one by one to the mesh. Raises CommandError that names an invalid one."""
         points, cells = self.added
         if not points and not cells:
             return
@@ -264,7 +271,7 @@ class Project:
         self.groups[ELEMENT].assign(range(len(mesh.cells) - count, len(mesh.cells)), DEFAULT)
 
     def whole_mesh(self) -> Mesh:
-        """The mesh. CommandError if missing."""
+        """Return the mesh. Raises CommandError if missing."""
         self.take_added()
         if self.mesh is None:
             raise CommandError("no mesh yet: use mesh create, mesh structured or mesh import first")
@@ -276,7 +283,9 @@ class Project:
         self.taken = False
 
     def ready(self, use: bool = True) -> Blocks:
-        """The simulation, with the mesh taken. use: something is assigned to it or it is run, so the mesh stays."""
+        """Return the simulation with the mesh loaded. use: models or conditions are assigned or the model is run, so
+        the mesh can no longer change.
+        """
         mesh = self.whole_mesh()
         if not self.taken:
             self.blocks.place_mesh(mesh)  # each body was checked; those that touch have points in the same places
@@ -285,7 +294,7 @@ class Project:
         return self.blocks
 
     def positions(self) -> np.ndarray:
-        """(np, dim) where the nodes are now [m]; NaN where removed."""
+        """Return the present positions of the nodes (np, dim) [m]; NaN where removed."""
         mesh = self.whole_mesh()
         if not self.taken or self.step == 0:
             return mesh.points
@@ -293,7 +302,9 @@ class Project:
         return np.column_stack([diagnostics.values(self.blocks, f"position_{axis}") for axis in axes])
 
     def corner_positions(self) -> np.ndarray:
-        """(4 ne, dim) where each corner (element * 4 + k) is now [m]; NaN where missing. Collective."""
+        """Return the present positions of the corners, element * 4 + k, (4 ne, dim) [m]; NaN where removed.
+        Collective.
+        """
         mesh = self.whole_mesh()
         if not self.taken or self.step == 0:
             return np.where((mesh.cells >= 0)[:, :, None], mesh.points[mesh.cells], np.nan).reshape(-1, mesh.dim)
@@ -302,11 +313,13 @@ class Project:
     # ---- files ---------------------------------------------------------------------------------------------------
 
     def path(self, name: str) -> Path:
-        """A file of the script: beside it, unless the name says otherwise."""
+        """Return the path of a file of the script, relative to the folder of the script."""
         return self.directory / name
 
     def to_read(self, name: str, what: str = "") -> Path:
-        """A file that the script reads, beside it; nothing is written over it unless this run has made it."""
+        """Return the path of an input file of the script. It is then protected from being overwritten, unless this run
+        wrote it.
+        """
         path = self.path(name)
         real = os.path.realpath(path)
         if real not in self.made:
@@ -314,7 +327,7 @@ class Project:
         return path
 
     def to_write(self, path: Path) -> Path:
-        """A file that is about to be written. CommandError if it is the script, or one that was read."""
+        """Check the path of an output file. Raises CommandError if it is the script or an input file."""
         real = os.path.realpath(path)
         if real in self.inputs:
             raise CommandError(f"{path} would overwrite {self.inputs[real]}; choose another name")
@@ -322,11 +335,11 @@ class Project:
         return path
 
     def result(self, name: str) -> Path:
-        """A file in the folder of the results, unless the name says otherwise."""
+        """Return the path of a result, relative to the output folder."""
         return self.outdir / name
 
     def folder(self) -> Path:
-        """The folder of the results, made and locked on the first call. Collective."""
+        """Return the output folder, created and locked on the first call. Collective."""
         if not self.folder_made:
             job = self.job or run_folder.Job()
             locked = run_folder.enter(self.outdir, self.comm, job, launch.version(), self.resumed, self.restored)
@@ -340,8 +353,9 @@ class Project:
 
 
 def joined(one: Mesh, other: Mesh) -> Mesh:
-    """Join two bodies in one mesh: numbers of the second follow those of the first, equal names are united, nothing is
-    merged."""
+    """Join two bodies in one mesh: numbers of the second follow those of the first; groups and layers of equal names
+    are united; no points are merged.
+    """
     n_points, n_cells = len(one.points), len(one.cells)
     groups = {s: dict(of) for s, of in one.groups.items()}
     for set_name, of in other.groups.items():

@@ -19,14 +19,17 @@ from hpcdem.physics.proppant.model import Proppant
 
 
 def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarray:
-    """Ascending numbers of the objects of a kind that a range chooses, of nodes their points. Collective."""
+    """Return the ascending numbers of the objects of a kind that a range selects; for nodes, their points.
+    Collective.
+    """
     found = everything(project, kind, where)
     return sides.points(project.whole_mesh().cells, found) if kind == NODE else found
 
 
 def values(project: Project, kind: str, name: str, where: Range | None = None) -> np.ndarray:
-    """A quantity of these objects, in the order of their numbers (`numbers`), of nodes on the side that the range
-    means; NaN where missing. Collective."""
+    """Return a quantity of these objects in the order of their numbers (`numbers`), for nodes on the selected side; NaN
+    where undefined. Collective.
+    """
     if kind in SUPPORTS:
         return _of_supports(project, kind, name, where)
     if kind in FLOW:
@@ -35,7 +38,7 @@ def values(project: Project, kind: str, name: str, where: Range | None = None) -
 
 
 def total(project: Project, kind: str, name: str, where: Range | None = None) -> float:
-    """Exact sum of a quantity; of nodes over all corners there that the range means. Collective."""
+    """Return the exact sum of a quantity; for nodes, over all selected corners. Collective."""
     if kind in SUPPORTS:
         return math.fsum(_of_supports(project, kind, name, where).tolist())
     if kind in FLOW:
@@ -62,7 +65,7 @@ def wells(project: Project) -> dict[str, dict[str, float]]:
 
 
 def wet_faces(project: Project) -> dict[str, np.ndarray]:
-    """Free faces that fluid pushes on, see `Flow.wet_faces`; no rows without fluid. Collective."""
+    """Return the free faces loaded by fluid pressure, see `Flow.wet_faces`; no rows without fluid. Collective."""
     found = Flow.there(project.ready(use=False))
     if found is None:
         return {"number": np.empty(0, np.int64), "size": np.empty(0), "pressure": np.empty(0)}
@@ -70,30 +73,30 @@ def wet_faces(project: Project) -> dict[str, np.ndarray]:
 
 
 def fluid(project: Project) -> dict[str, float]:
-    """The account of the fluid [m2], see `Flow.account`. Collective."""
+    """Return the budget of the fluid [m2], see `Flow.account`. Collective."""
     return needed(project, Flow, use=False).account()
 
 
 def fluid_energies(project: Project) -> dict[str, float]:
-    """Energies of blocks and fluid in implicit steps [J/m], see `Flow.energies`. Collective."""
+    """Return the energies of blocks and fluid in implicit steps [J/m], see `Flow.energies`. Collective."""
     return needed(project, Flow, use=False).energies()
 
 
 def proppant(project: Project) -> dict[str, float]:
-    """The account of proppant [m2], see `Proppant.account`. Collective."""
+    """Return the budget of proppant [m2], see `Proppant.account`. Collective."""
     return needed(project, Proppant, use=False).account()
 
 
 def heat(project: Project) -> dict[str, float]:
-    """The account of heat [J/m], see `Heat.account`. Collective."""
+    """Return the heat budget [J/m], see `Heat.account`. Collective."""
     return needed(project, Heat, use=False).account()
 
 
 def energies(project: Project) -> dict[str, float]:
-    """The energy budget. Collective."""
+    """Return the energy budget [J/m, in space J]. Collective."""
     return diagnostics.energies(project.blocks)
 
 
 def ratio(project: Project) -> float:
-    """Unbalanced over all forces of the nodes. Collective."""
+    """Return the ratio of unbalanced to total nodal forces. Collective."""
     return diagnostics.unbalanced_ratio(project.ready(use=False))

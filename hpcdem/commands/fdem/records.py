@@ -98,9 +98,10 @@ ENERGIES = tuple(
 
 @dataclass
 class History:
-    """kind: of object, MODEL, or WELL, whose name is `how`; value: name of the quantity; numbers: of the objects; how:
-    "", or sum, mean, minimum, maximum of several; every: steps between two records; rows: (step, time, value); filed:
-    rows that are in the file; dim: dimensions of space, for the unit."""
+    """A recorded quantity. kind: of object, MODEL, or WELL, whose name is `how`; value: name of the quantity; numbers:
+    of the objects; how: "", or sum, mean, minimum, maximum of several; every: steps between two records; rows: (step,
+    time, value); filed: number of rows already written; dim: dimensions of space, for the unit.
+    """
 
     kind: str
     value: str
@@ -126,8 +127,9 @@ class History:
         return self._waits is not None
 
     def record(self, blocks: Blocks, goes_on: bool) -> None:
-        """Add the number of this step, once. goes_on: steps follow, in which the forces at the present positions are
-        computed anyway; those of supports are taken from there (`take`). Collective."""
+        """Record the value of this step, once. goes_on: more steps follow, in which the forces at the present positions
+        are computed anyway; forces of supports are taken from there (`take`). Collective.
+        """
         clock = blocks.clock
         if self.waits or (self.rows and self.rows[-1][0] == clock.step):
             return
@@ -140,7 +142,7 @@ class History:
             self.rows.append((int(clock.step), float(blocks.reported_time()), self.measure(blocks)))
 
     def take(self, blocks: Blocks) -> None:
-        """Add the record that waits, if there is one. Collective."""
+        """Complete a record that waits for forces. Collective."""
         if self._waits is None:
             return
         step, time, local, passes = self._waits
@@ -156,7 +158,7 @@ class History:
         return self._probe
 
     def measure(self, blocks: Any) -> float:
-        """The number now. Collective, equal on all ranks."""
+        """Return the present value. Collective, equal on all ranks."""
         if self.kind == MODEL:
             return _OF_MODEL[self.value](blocks)
         if self.kind == WELL:
@@ -174,7 +176,9 @@ class History:
 
 @dataclass
 class Curve:
-    """x, y: names of histories (x "": the time), with factors; or points (x, y). style: line or points."""
+    """A curve of a chart. x, y: names of histories (x "": the time), with factors; or points (x, y). style: line or
+    points.
+    """
 
     label: str
     x: str = ""

@@ -16,21 +16,21 @@ from hpcdem.physics.fdem.groups import ELEMENT, JOINT, Range, UseHidden
 
 
 def new(project: Project, dim: int = 2) -> None:
-    """A new model in so many dimensions: no geometry, no mesh, step 0, default options."""
+    """Start a new model in two or three dimensions: no geometry, no mesh, step 0, default options."""
     if dim not in (2, 3):
         raise CommandError(f"a model has 2 or 3 dimensions, not {dim}")
     project.clear(dim)
 
 
 def gravity(project: Project, gravity: tuple[float, ...]) -> None:
-    """Gravity (2,), in space (3,), [m/s2] from now on."""
+    """Set gravity (2,), in space (3,), [m/s2]."""
     if len(gravity) != project.dim:
         raise CommandError(f"gravity: a vector of {project.dim} numbers is needed, got {len(gravity)}")
     project.blocks.gravity(*gravity)
 
 
 def units(project: Project, system: str) -> None:
-    """The units of all that is given from here on, see `commands.units`; they change no value."""
+    """Declare the units of all input from here on, see `commands.units`; no value is converted."""
     project.units = of_values.declared(project.units, system, project.log, late=project.in_use)
 
 
@@ -50,9 +50,10 @@ def option(
     proppant: bool | None = None,
     plane_stress: bool | None = None,
 ) -> None:
-    """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, deep_overlap: later,
-    potential: of contact in space, plane_stress, see `Blocks.option`; energy: keep the energy budget from here on;
-    mechanical, hydraulic, one_way, thermal, proppant: `Blocks.parts`."""
+    """Set options; None keeps one. overlap: treatment of bodies that overlap before the first step, deep_overlap:
+    later; potential: of contact in space; plane_stress: see `Blocks.option`; energy: keep the energy budget from here
+    on; mechanical, hydraulic, one_way, thermal, proppant: see `Blocks.parts`.
+    """
     if mechanical is False:
         coupling.refuse(project, "model option mechanical off")
     parts = {
@@ -86,9 +87,10 @@ def time_step(
     thermal: float | None = None,
     update_frequency: int | None = None,
 ) -> None:
-    """The time step of dynamic runs [s], or the name of a table of it over time; see `Blocks.time_step`. hydraulic,
-    thermal: of flow and of heat, see `Blocks.flow_clock`, `Blocks.heat_clock`; update_frequency: steps after which an
-    automatic one is estimated again."""
+    """Set the time step of dynamic runs [s], or the name of a table of it over time; see `Blocks.time_step`. hydraulic,
+    thermal: of flow and of heat, see `Blocks.flow_clock`, `Blocks.heat_clock`; update_frequency: steps between two
+    estimates of an automatic time step.
+    """
     table = value if isinstance(value, str) else ""
     number = None if isinstance(value, str) else value
     if table:
@@ -113,7 +115,7 @@ def time_step(
 
 
 def rayleigh(project: Project, ratio: float, frequency: float | None = None, part: str = "both") -> None:
-    """Rayleigh damping of dynamic runs, frequency in Hz; see `ModelDefinition.rayleigh`."""
+    """Set Rayleigh damping of dynamic runs, frequency [Hz]; see `ModelDefinition.rayleigh`."""
     project.blocks.rayleigh(ratio, frequency, part)
 
 
@@ -125,7 +127,7 @@ def creep(
     least: float | None = None,
     greatest: float | None = None,
 ) -> None:
-    """Elements creep from now on, or no more; see `creep.switch`."""
+    """Switch creep of elements on or off; see `creep.switch`."""
     coupling.refuse(project, "model creep")
     if on and dt is not None and project.dynamic:
         raise CommandError("dt of creep is for static runs: in dynamic runs elements creep in every time step")
@@ -138,19 +140,19 @@ def reset_velocity(project: Project) -> None:
 
 
 def reset_displacement(project: Project) -> None:
-    """Displacements are counted from here."""
+    """Set all displacements to zero."""
     changes.reset_displacement(project.ready())
 
 
 def hide(project: Project, hidden: bool = True, where: Range | None = None) -> None:
-    """Elements are hidden from pictures and, without use-hidden, from ranges, or seen again."""
+    """Hide elements from pictures and, without use-hidden, from ranges, or show them again."""
     seen_too = where if where is None else (*where, UseHidden())
     project.whole_mesh()
     project.hidden[everything(project, ELEMENT, seen_too, null_too=True)] = hidden
 
 
 def collision(project: Project, on: bool, where: Range | None = None) -> None:
-    """Contact of these elements with others is searched for, or not."""
+    """Switch the search for contacts of these elements on or off."""
     blocks = project.ready()
     elements = everything(project, ELEMENT, where, null_too=True)
     blocks.before_change()
@@ -159,15 +161,15 @@ def collision(project: Project, on: bool, where: Range | None = None) -> None:
 
 
 def reset_elements(project: Project, where: Range | None = None) -> None:
-    """Plastic states are forgotten."""
+    """Reset plastic states of elements."""
     changes.reset_state(project.ready(), chosen(project, ELEMENT, where))
 
 
 def reset_kelvin_strain(project: Project, where: Range | None = None) -> None:
-    """Kelvin units are without strain from here on."""
+    """Set the strain of Kelvin units to zero."""
     changes.reset_kelvin_strain(project.ready(), chosen(project, ELEMENT, where))
 
 
 def reset_joints(project: Project, where: Range | None = None) -> None:
-    """Damage of joints is forgotten."""
+    """Reset the damage of joints."""
     changes.reset_joint_state(project.ready(), chosen(project, JOINT, where))

@@ -53,7 +53,7 @@ def step(project: Project, steps: int) -> None:
 
 
 def resume(project: Project) -> None:
-    """Finish the command in which the checkpoint was written that was just taken (checkpoints.restore_newest)."""
+    """Finish the command interrupted by the checkpoint that was just loaded (checkpoints.restore_newest)."""
     command = (project.progress or {}).get("command")
     if command is None:
         raise CommandError("the checkpoint does not record the command in which it was written")
@@ -75,12 +75,12 @@ def solve(
     on_failure: str = "stop",
     run_time: float | None = None,
 ) -> None:
-    """Steps until the unbalanced forces are so small, so many are done, or so much time [s] has passed: whichever is
-    first. run_time: as `clocks.run_time`, for this call. Without any of them: until the ratio is RATIO, and if nobody
-    watches (window, limit, on_failure) CYCLES at most.
+    """Step until the first of these: the unbalanced forces reach the ratio, the number of cycles is reached, or the
+    time [s] has passed. run_time: as `clocks.run_time`, for this call. Without any of them: until the ratio is RATIO
+    and, without a convergence check (window, limit, on_failure), for CYCLES at most.
 
     window, limit [steps]: when a run towards a ratio has failed, see `convergence.watch`; it ends the script with an
-    EquilibriumError, or, with on_failure CONTINUE, with a warning. project.solved says how it ended.
+    EquilibriumError or, with on_failure CONTINUE, logs a warning. project.solved holds the outcome.
     """
     bare = (ratio, cycles, time) == (None, None, None)
     if run_time is not None and not _time_passes(project):
@@ -160,8 +160,9 @@ def solve_elastic(
     project: Project, cycles: int = 1, ratio: float | None = None, solver: str = "auto", time: float | None = None,
     steps: int | None = None,
 ) -> None:  # fmt: skip
-    """Static equilibrium at once, see `equilibrium.solve_elastic`; the histories and frames that are due then. time: so
-    much creep time [s] passes, each creep step at once."""
+    """Find static equilibrium directly, see `equilibrium.solve_elastic`, and write the histories and frames that are
+    due. time: creep time [s] to pass; each creep step is solved directly.
+    """
     project.refuse_inside("model solve elastic")
     coupling.refuse(project, "model solve elastic")
     if not project.blocks.options.mechanical:
@@ -190,9 +191,10 @@ def solve_hydraulic(
     project: Project, time: float | None = None, dt: float | None = None, steady: bool = False, solver: str = "auto",
     auto: bool = False,
 ) -> None:  # fmt: skip
-    """Flow by implicit steps, see `coupled.Coupled`: for so much flow time [s], with blocks in static equilibrium if
-    they move, or until it is steady. dt: longest time step [s]; a hundredth of the time, if it is not given. auto: by
-    explicit steps instead, as model solve and model step do them, where these cost less."""
+    """Compute flow by implicit steps, see `coupled.Coupled`: for a flow time [s], with blocks in static equilibrium if
+    they move, or until it is steady. dt: longest time step [s] (default: a hundredth of the time); auto: use explicit
+    steps, as model solve and model step, where they cost less.
+    """
     project.refuse_inside("model solve hydraulic")
     coupling.refuse(project, "model solve hydraulic")
     if steady == (time is not None):
@@ -240,9 +242,9 @@ def solve_hydraulic(
 def solve_thermal(
     project: Project, time: float | None = None, dt: float | None = None, steady: bool = False, solver: str = "auto"
 ) -> None:
-    """Heat by implicit steps, see `implicit.Implicit`: for so much time of heat [s], with blocks in static equilibrium
-    if they move, or the steady state at once. dt: longest time step [s]; a hundredth of the time, if it is not
-    given."""
+    """Compute heat by implicit steps, see `implicit.Implicit`: for a heat time [s], with blocks in static equilibrium
+    if they move, or the steady state directly. dt: longest time step [s] (default: a hundredth of the time).
+    """
     project.refuse_inside("model solve thermal")
     coupling.refuse(project, "model solve thermal")
     if steady == (time is not None):
@@ -619,8 +621,9 @@ def _intervals(project: Project) -> list[int]:
 
 
 def stop_here(project: Project, request: int) -> None:
-    """A command is about to be carried out, and none that steps has answered a signal or the time limit that requested
-    the end: between two commands is a good place. Collective; the request is the same on all ranks."""
+    """Stop between two commands if a signal or the time limit requested the end and no stepping command has responded.
+    Collective; the request is the same on all ranks.
+    """
     if request >= STOP:
         _answer(project, request)
 

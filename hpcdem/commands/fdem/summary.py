@@ -88,7 +88,7 @@ ACROSS_WORDS = {
 
 
 def close(project: Project, figure: bool = True) -> None:
-    """Bring what waits to the disk, tell how it was, draw the last state. Collective."""
+    """Write pending files, log the summary and draw the last state. Collective."""
     histories.flush(project)
     blocks, log = project.blocks, project.log
     both = project.coupled
@@ -168,8 +168,9 @@ def _report_both(project: Project) -> None:
 
 
 def last_figure(project: Project) -> Path:
-    """Cracks and stress, in space displacement, at this moment: `all_<step>.jpg` in the folder of the results.
-    Collective."""
+    """Draw cracks and stress, in space displacement, of the present state: `all_<step>.jpg` in the output folder.
+    Collective.
+    """
     path = project.folder() / f"all_{project.step:010d}.jpg"
     with project.blocks.timers.around("figure"):
         whole = frames.whole(project)
@@ -192,8 +193,7 @@ def last_figure(project: Project) -> Path:
 
 
 def listed(project: Project, kind: str, where: Range | None = None) -> None:
-    """Say in the log how many elements, faces or joints there are among those that a range chooses, with which models
-    and in which groups. Collective."""
+    """Log the number of selected elements, faces or joints, their models and their groups. Collective."""
     numbers, blocks = everything(project, kind, where), project.ready(use=False)
     row, rows = {
         ELEMENT: (blocks.element_row, blocks.element_rows), FACE: (blocks.face_row, blocks.face_rows),

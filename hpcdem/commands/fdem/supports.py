@@ -16,20 +16,20 @@ from hpcdem.physics.supports import of
 
 
 def put_into(project: Project, group: str | None, set_name: str, of: Mapping[str, np.ndarray]) -> None:
-    """Objects by their kinds into a group; None: into none."""
+    """Add objects, by kind, to a group; None: to none."""
     if group is not None:
         for kind, numbers in of.items():
             project.groups[kind].assign(numbers, group, set_name)
 
 
 def assign(project: Project, kind: str, properties: Mapping[str, float], where: Range | None) -> None:
-    """Properties of elements of this kind."""
+    """Assign properties to elements of this kind."""
     elements = everything(project, kind, where)
     of(project.ready(), kind).assign(elements, properties)
 
 
 def delete(project: Project, kind: str, where: Range | None) -> None:
-    """Take elements of this kind out; the numbers of the others stay."""
+    """Remove elements of this kind; the numbers of the others do not change."""
     elements = everything(project, kind, where)
     of(project.ready(), kind).delete(elements)
 
@@ -42,7 +42,7 @@ def condition(project: Project, kind: str, changes: Mapping[str, Any], where: Ra
 
 
 def remove_conditions(project: Project, kind: str, where: Range | None = None, stems: tuple[str, ...] = ()) -> None:
-    """Nodes of this kind are free again; stems: only these of what may be prescribed, does and at, or force."""
+    """Remove conditions of nodes of this kind; stems: only these components, does and at, or force."""
     nodes, support = everything(project, kind, where), of(project.ready(), kind)
     if not stems:
         support.remove_conditions(nodes)

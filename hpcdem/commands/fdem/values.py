@@ -29,8 +29,9 @@ DEFAULT_LAYER = "default"
 def grid_lines(
     first: tuple[float, ...], second: tuple[float, ...], cells: tuple[int, ...], ratio: tuple[float, ...]
 ) -> tuple[np.ndarray, ...]:
-    """Coordinates along x, y and in space z [m] of a regular mesh between two corners [m], with so many cells along
-    each; ratio: see `spaced`."""
+    """Return the coordinates along x, y and in space z [m] of a regular mesh between two corners [m], with the given
+    cells along each axis; ratio: see `spaced`.
+    """
     if not len(first) == len(second) == len(cells) == len(ratio):
         raise CommandError("corners, cells and ratio need a number for each dimension of space")
     return tuple(spaced(min(a, b), max(a, b), n, r) for a, b, n, r in zip(first, second, cells, ratio))
@@ -42,7 +43,9 @@ def brick(
     cells: tuple[int, ...],
     ratio: tuple[float, ...] | None = None,
 ) -> np.ndarray:
-    """Points of a regular mesh whose edges lead from a corner to two or three ends [m], see `sizes.skew_grid`."""
+    """Return the points of a regular mesh with edges from a corner to two or three end points [m], see
+    `sizes.skew_grid`.
+    """
     ratio = ratio or (1.0,) * len(corner)
     if not len(corner) == len(ends) == len(cells) == len(ratio) or any(len(end) != len(corner) for end in ends):
         raise CommandError("ends, n and ratio need a number for each dimension of space")
@@ -57,8 +60,9 @@ def fracture_set(
     ends_at: float,
     reached: bool,
 ) -> FractureSet:
-    """Statistics of fractures. orientation: (kind, mean, spread) [degrees], length: (kind, value, spread, least,
-    greatest) [m], density: (p10, p20 or p21, value), scanline [degrees], ends_at, reached: see FractureSet."""
+    """Return the statistics of fractures. orientation: (kind, mean, spread) [degrees]; length: (kind, value, spread,
+    least, greatest) [m]; density: (p10, p20 or p21, value); scanline [degrees]; ends_at, reached: see FractureSet.
+    """
     return FractureSet(
         Orientation(*orientation), length_law(length), *density, scanline,
         "reached" if reached else "random", ends_at,
@@ -72,8 +76,10 @@ def disc_set(
     along: tuple[float, ...],
     reached: bool,
 ) -> DiscSet:
-    """Statistics of discs. orientation: (kind, dip, dip direction, spread) [degrees], radius: (kind, value, spread,
-    least, greatest) [m], density: (p10, p30 or p32, value), along: direction of the scan line, reached: see DiscSet."""
+    """Return the statistics of discs. orientation: (kind, dip, dip direction, spread) [degrees]; radius: (kind, value,
+    spread, least, greatest) [m]; density: (p10, p30 or p32, value); along: direction of the scan line; reached: see
+    DiscSet.
+    """
     return DiscSet(Poles(*orientation), length_law(radius), *density, along, reached)
 
 
@@ -83,14 +89,14 @@ def length_law(given: tuple[str, float, float, float, float | None]) -> Length:
 
 
 def history_name(name: str) -> str:
-    """A name that can be part of a file name. CommandError if it cannot."""
+    """Check a name that becomes part of a file name. Raises CommandError if it cannot."""
     if any(char in '/\\:*?"<>|' for char in name) or len(name.encode()) > 200:
         raise CommandError(f"'{name}' cannot be part of a file name; a history has a file of its name")
     return name
 
 
 def frames_name(name: str) -> None:
-    """CommandError if it cannot be the first part of names of files."""
+    """Check the first part of file names. Raises CommandError if it is invalid."""
     if "/" in name:
         raise CommandError(
             f"'{name}' is the first part of the names of files in the folder of the results; it cannot contain a folder"
@@ -98,13 +104,13 @@ def frames_name(name: str) -> None:
 
 
 def result_name(path: str) -> None:
-    """CommandError if a file of the results would come to lie elsewhere without being told so."""
+    """Raise CommandError if a result would be written outside the output folder."""
     if not os.path.isabs(path) and os.path.normpath(path).split(os.sep)[0] == os.pardir:
         raise CommandError(f"'{path}' lies outside the folder of the results; give an absolute path for another folder")
 
 
 def figure_name(path: str) -> None:
-    """CommandError if figures are not written to files of this kind, or to this place."""
+    """Raise CommandError if figures cannot be written to this kind of file or to this folder."""
     result_name(path)
     if Path(path).suffix.lower() not in FIGURES:
         raise CommandError(f"'{path}': a figure is a file *.png, *.pdf or *.svg")

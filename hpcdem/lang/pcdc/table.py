@@ -1138,7 +1138,7 @@ _GEOMETRY = (
             does="geometry.scale"),
     Command("geom{etry} t{ranslate}", "Moves layers; without layer all of them.",
             ("pcdc geometry translate (10,0) layer 'hole' 'slope'",),
-            (_leading("way", VECTOR, "displacement of all points", "m"),), (_SOME_LAYERS,), dims=BOTH,
+            (_leading("vector", VECTOR, "translation of all points", "m"),), (_SOME_LAYERS,), dims=BOTH,
             does="geometry.translate"),
     Command("geom{etry} exp{ort}", "Writes layers to a DXF, GeoJSON or CSV file under their names: in metres, or in "
             "the coordinates from which geometry import with these options makes those of the model.",
@@ -1212,7 +1212,7 @@ _MESH = (
             dims=BOTH, does="meshes.scale"),
     Command("mod{el} tran{slate}", "Moves all points of the mesh, before the first model or condition is "
             "assigned.", ("pcdc model translate (10,0)",),
-            (_leading("way", VECTOR, "displacement of all points", "m"),), dims=BOTH, does="meshes.translate"),
+            (_leading("vector", VECTOR, "translation of all points", "m"),), dims=BOTH, does="meshes.translate"),
     Command("mesh imp{ort}", "A mesh of another program, for example .msh or .inp; its physical groups and sets of "
             "elements, nodes and faces become groups.",
             ("pcdc mesh import 'rock.msh'",), (_leading("file", FILE, "name of the file"),),

@@ -147,13 +147,13 @@ class Conditions(InitialStress):
             raise CommandError("a move constraint of type 3 (across a vector) is for three dimensions")
         if kind not in (moving.UNBOUND, moving.FIXED, moving.ALONG, space.ACROSS):
             raise CommandError(f"a move constraint is 0 (free), 1 (fixed), 2 or 3 (along, across a vector), got {kind}")
-        way: tuple[float, ...] = (0.0, 0.0)
+        unit: tuple[float, ...] = (0.0, 0.0)
         if kind in (moving.ALONG, space.ACROSS):
             vector = self._vector("direction", direction).tolist()
             if not any(vector):
                 raise CommandError("a move constraint along a vector needs a vector that is not zero")
-            way = tuple(c / math.hypot(*vector) for c in vector)
-        self._condition(nodes, {"constraint": kind, "way": way})
+            unit = tuple(c / math.hypot(*vector) for c in vector)
+        self._condition(nodes, {"constraint": kind, "direction": unit})
 
     def _condition(self, nodes: Any, changes: dict[str, Any]) -> None:
         chosen = self.corners_of_nodes(nodes)
@@ -203,9 +203,11 @@ class Conditions(InitialStress):
             one, mine = self.conditions[row], (old == row) & (side == number)
             wanted = replace(one, **changes, older=one.older & ~clear, **{f"side_{axis}": number for axis in forces})
             if changes.get("constraint"):
-                kind, way = node_conditions.bound(one.constraint, one.way, wanted.constraint, wanted.way, self.dim)
-                more |= mine & ((kind, way) != (wanted.constraint, wanted.way))
-                wanted = replace(wanted, constraint=kind, way=way)
+                kind, direction = node_conditions.bound(
+                    one.constraint, one.direction, wanted.constraint, wanted.direction, self.dim
+                )
+                more |= mine & ((kind, direction) != (wanted.constraint, wanted.direction))
+                wanted = replace(wanted, constraint=kind, direction=direction)
             self._checked(wanted, at[mine])
             self.corner_row[at[mine]] = _row_of(self.conditions, wanted)
         if more.any():
@@ -423,7 +425,7 @@ class Conditions(InitialStress):
         does = (moving.DOES_X, moving.DOES_Y) if plane else range(space.DOES, space.DOES + 3)
         at = (moving.AT_X, moving.AT_Y) if plane else range(space.AT, space.AT + 3)
         force, constraint = (moving.FORCE_X, moving.CONSTRAINT) if plane else (space.FORCE, space.CONSTRAINT)
-        way = moving.DIRECTION_X if plane else space.WAY
+        first = moving.DIRECTION_X if plane else space.WAY
         for row, one in enumerate(self.acting()):
             for k, axis in enumerate("xyz"[: self.dim]):
                 kind, value = getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")
@@ -434,7 +436,7 @@ class Conditions(InitialStress):
                     out[row, at[k]] = self._now(value, time) * dt
                 out[row, force + k] = self._now(getattr(one, f"force_{axis}"), time) * getattr(one, f"part_{axis}")
             out[row, constraint], out[row, moving.DAMP if plane else space.NODE_DAMP] = one.constraint, one.damp
-            out[row, way : way + len(one.way)] = one.way
+            out[row, first : first + len(one.direction)] = one.direction
         return out
 
     def conditions_vary(self) -> bool:

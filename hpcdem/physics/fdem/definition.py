@@ -19,7 +19,6 @@ from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem import node_conditions
 from hpcdem.physics.fdem.conditions import Conditions, Relaxation, Traction
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.node_conditions import NodeCondition
 from hpcdem.physics.fdem.properties import Rows
 from hpcdem.physics.fdem.settings import Options
 from hpcdem.physics.fdem.tables import Table
@@ -93,7 +92,7 @@ class ModelDefinition(Conditions):
         self.element_rows = Rows.restored(state["element_rows"])
         self.face_rows = Rows.restored(state["face_rows"])
         self.joint_rows = Rows.restored(state["joint_rows"])
-        self.conditions = [NodeCondition(**{**one, "way": tuple(one["way"])}) for one in state["conditions"]]
+        self.conditions = [node_conditions.restored(one) for one in state["conditions"]]
         if "sided" not in state:
             self.conditions = [node_conditions.as_before(one, self.dim) for one in self.conditions]
         self.sided, self._acting = state.get("sided", False), None

@@ -259,12 +259,12 @@ class FreeField(SurfaceLoad):
             held = one.constraint == moving.FIXED
             self._given[i] = held or one.does_x != moving.FREE, held or one.does_y != moving.FREE
             if one.constraint == moving.ALONG:
-                if min(abs(edge_vector) for edge_vector in one.way) > UPRIGHT:
+                if min(abs(edge_vector) for edge_vector in one.direction) > UPRIGHT:
                     return (
-                        f"node {point} at the base of a free-field side moves along {one.way}, but must move along x "
-                        "or y"
+                        f"node {point} at the base of a free-field side moves along {one.direction}, but must move "
+                        "along x or y"
                     )
-                self._given[i, 1 if abs(one.way[0]) > 0.5 else 0] = True
+                self._given[i, 1 if abs(one.direction[0]) > 0.5 else 0] = True
             found = quiet[(ends == point).any(axis=1)]
             below[i] = found[0] if len(found) else -1
             if not len(found) and not self._given[i].all():

@@ -7,7 +7,7 @@ one node meet in their common part; components of motion that are prescribed bes
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -43,7 +43,7 @@ class NodeCondition:
     force_x: Number = 0.0
     force_y: Number = 0.0
     constraint: int = moving.UNBOUND
-    way: tuple[float, ...] = (0.0, 0.0)
+    direction: tuple[float, ...] = (0.0, 0.0)
     does_z: int = moving.FREE
     at_z: Number = 0.0
     force_z: Number = 0.0
@@ -59,11 +59,11 @@ class NodeCondition:
     def motion(self, axis: str) -> str:
         """Describe a prescribed component."""
         kind = "velocity" if getattr(self, f"does_{axis}") == moving.VELOCITY else "acceleration"
-        return f"{kind}-{axis} {_told(getattr(self, f'at_{axis}'))}"
+        return f"{kind}-{axis} {_text(getattr(self, f'at_{axis}'))}"
 
     def push(self, axis: str) -> str:
         """Describe a force."""
-        return f"force-{axis} {_told(getattr(self, f'force_{axis}'))}"
+        return f"force-{axis} {_text(getattr(self, f'force_{axis}'))}"
 
 
 KINDS = "motion", "force", "constraint"
@@ -78,7 +78,7 @@ def without(one: NodeCondition, kinds: Sequence[str]) -> NodeCondition:
         if kind in kinds:
             names = [f"{stem}_{axis}" for stem in of[kind] for axis in "xyz"]
             left = replace(left, older=left.older & ~bits, **{name: getattr(blank, name) for name in names})
-    return replace(left, constraint=blank.constraint, way=blank.way) if "constraint" in kinds else left
+    return replace(left, constraint=blank.constraint, direction=blank.direction) if "constraint" in kinds else left
 
 
 _CONSTRAINTS = {
@@ -88,29 +88,36 @@ _CONSTRAINTS = {
 }
 
 
-def _told(value: Number) -> str:
+def _text(value: Number) -> str:
     return f"'{value.partition(MARK)[0]}'" if isinstance(value, str) else format(value, "g")
 
 
-def _vector(way: Sequence[float]) -> str:
-    return f"({', '.join(f'{c:g}' for c in way)})"
+def restored(state: Mapping[str, Any]) -> NodeCondition:
+    """Return the condition of a checkpoint; earlier ones call the direction `way`."""
+    given = dict(state)
+    given["direction"] = tuple(given.pop("way", None) or given["direction"])
+    return NodeCondition(**given)
+
+
+def _vector(direction: Sequence[float]) -> str:
+    return f"({', '.join(f'{c:g}' for c in direction)})"
 
 
 def bound(
-    kind: int, way: tuple[float, ...], other: int, other_way: tuple[float, ...], dim: int
+    kind: int, direction: tuple[float, ...], other: int, other_direction: tuple[float, ...], dim: int
 ) -> tuple[int, tuple[float, ...]]:
     """The constraint of a node that has both of these."""
     if other == moving.UNBOUND or kind == moving.FIXED:
-        return kind, way
+        return kind, direction
     if kind == moving.UNBOUND or other == moving.FIXED:
-        return other, other_way
-    one, two = np.array(way), np.array(other_way)
+        return other, other_direction
+    one, two = np.array(direction), np.array(other_direction)
     across, same = _cross(one, two), abs(float(one @ two))
     if kind == other:
         if math.sqrt(float(across @ across)) <= STRAIGHT:
-            return kind, way
+            return kind, direction
         return (moving.FIXED, (0.0, 0.0)) if kind == moving.ALONG else (moving.ALONG, _unit(across))
-    line = way if kind == moving.ALONG else other_way
+    line = direction if kind == moving.ALONG else other_direction
     return (moving.ALONG, line) if same <= STRAIGHT else (moving.FIXED, (0.0, 0.0))
 
 
@@ -141,7 +148,7 @@ def acting(one: NodeCondition, dim: int) -> NodeCondition:
 
 
 def _constraint(one: NodeCondition) -> str:
-    return _CONSTRAINTS[one.constraint].format(_vector(one.way))
+    return _CONSTRAINTS[one.constraint].format(_vector(one.direction))
 
 
 def _moved(one: NodeCondition, values: dict[str, tuple[int, Number]], keep: bool = False) -> NodeCondition:
@@ -150,41 +157,43 @@ def _moved(one: NodeCondition, values: dict[str, tuple[int, Number]], keep: bool
     for axis in "xyz":
         changes[f"does_{axis}"], changes[f"at_{axis}"] = values.get(axis, (moving.FREE, 0.0))
     if not keep:
-        changes |= {"constraint": moving.UNBOUND, "way": (0.0, 0.0)}
+        changes |= {"constraint": moving.UNBOUND, "direction": (0.0, 0.0)}
     return replace(one, **changes)
 
 
 def _on_a_line(one: NodeCondition, given: list[str]) -> NodeCondition:
-    way = dict(zip("xyz", one.way))
+    direction = dict(zip("xyz", one.direction))
     assigned = {axis: (getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")) for axis in given}
     for axis, (_, value) in assigned.items():
-        if way[axis] == 0.0 and value != 0.0:
+        if direction[axis] == 0.0 and value != 0.0:
             raise Contradiction(f"{_constraint(one)} and {one.motion(axis)}")
-    leading = [axis for axis in given if way[axis] != 0.0]
+    leading = [axis for axis in given if direction[axis] != 0.0]
     if not leading:
         return _moved(one, {}, keep=True)
     kinds = {assigned[axis][0] for axis in leading}
-    alone = [axis for axis in way if way[axis] != 0.0]
+    alone = [axis for axis in direction if direction[axis] != 0.0]
     if len(alone) == 1:  # along an axis
-        return _moved(one, {axis: assigned.get(axis, (assigned[leading[0]][0], 0.0)) for axis in way})
+        return _moved(one, {axis: assigned.get(axis, (assigned[leading[0]][0], 0.0)) for axis in direction})
     if len(kinds) > 1 or any(isinstance(assigned[axis][1], str) for axis in leading):
         if all(value == 0.0 for _, value in assigned.values()):
-            return _moved(one, {axis: (moving.VELOCITY, 0.0) for axis in way})
+            return _moved(one, {axis: (moving.VELOCITY, 0.0) for axis in direction})
         raise Contradiction(
             f"{_constraint(one)} and {' and '.join(map(one.motion, leading))}: along an oblique line all "
             "prescribed components must be numbers of one kind (velocity or acceleration)"
         )
-    first = max(leading, key=lambda axis: abs(way[axis]))
-    speed = float(assigned[first][1]) / way[first]
+    first = max(leading, key=lambda axis: abs(direction[axis]))
+    speed = float(assigned[first][1]) / direction[first]
     for axis in leading:
-        if abs(float(assigned[axis][1]) - speed * way[axis]) > STRAIGHT * abs(speed):
+        if abs(float(assigned[axis][1]) - speed * direction[axis]) > STRAIGHT * abs(speed):
             raise Contradiction(f"{_constraint(one)} and {' and '.join(map(one.motion, given))}")
     kind = assigned[first][0]
-    return _moved(one, {axis: (kind, assigned[axis][1] if axis in assigned else speed * way[axis]) for axis in way})
+    return _moved(
+        one, {axis: (kind, assigned[axis][1] if axis in assigned else speed * direction[axis]) for axis in direction}
+    )
 
 
 def _in_a_plane(one: NodeCondition, given: list[str]) -> NodeCondition:
-    normal = dict(zip("xyz", one.way))
+    normal = dict(zip("xyz", one.direction))
     assigned = {axis: (getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")) for axis in given}
     touched = [axis for axis in normal if normal[axis] != 0.0]
     if len(touched) == 1:  # across an axis
@@ -218,9 +227,9 @@ def _in_a_plane(one: NodeCondition, given: list[str]) -> NodeCondition:
             "prescribe the value 0 or a second component"
         )
     # One component is zero and the others lie in a plane: a line.
-    along = _cross(np.array([float(axis == known[0]) for axis in "xyz"]), np.array(one.way))
+    along = _cross(np.array([float(axis == known[0]) for axis in "xyz"]), np.array(one.direction))
     rest = {axis: of for axis, of in assigned.items() if axis != known[0]}
-    line = replace(_moved(one, rest, keep=True), constraint=moving.ALONG, way=_unit(along))
+    line = replace(_moved(one, rest, keep=True), constraint=moving.ALONG, direction=_unit(along))
     return acting(line, 3) if rest else line
 
 
@@ -231,15 +240,15 @@ def as_before(one: NodeCondition, dim: int) -> NodeCondition:
     except Contradiction:
         given = [getattr(one, f"at_{axis}") for axis in "xyz"[:dim]]
         if one.constraint == moving.ALONG and all(isinstance(value, float) for value in given):
-            speed = sum(way * value for way, value in zip(one.way, given))
-            return _moved(one, {axis: (moving.VELOCITY, speed * way) for axis, way in zip("xyz", one.way)})
+            speed = sum(part * value for part, value in zip(one.direction, given))
+            return _moved(one, {axis: (moving.VELOCITY, speed * part) for axis, part in zip("xyz", one.direction)})
         return _moved(one, {}, keep=True)
     return one
 
 
 def together(rows: Sequence[NodeCondition], dim: int) -> NodeCondition:
     """Combine the conditions of the corners of one node. Raises Contradiction if no motion satisfies them."""
-    found, kind, way = NodeCondition(), moving.UNBOUND, (0.0, 0.0)
+    found, kind, direction = NodeCondition(), moving.UNBOUND, (0.0, 0.0)
     for k, axis in enumerate("xyz"[:dim]):
         motion = _latest([one for one in rows if getattr(one, f"does_{axis}") != moving.FREE], 1 << k)
         force = _latest([one for one in rows if getattr(one, f"force_{axis}") != 0.0], 8 << k)
@@ -251,8 +260,8 @@ def together(rows: Sequence[NodeCondition], dim: int) -> NodeCondition:
                 raise Contradiction(" and ".join(conflicts))
             found = replace(found, **values[0] if values else {})
     for one in rows:
-        kind, way = bound(kind, way, one.constraint, one.way, dim)  # type: ignore[assignment]
-    return replace(found, constraint=kind, way=way, damp=max(one.damp for one in rows))
+        kind, direction = bound(kind, direction, one.constraint, one.direction, dim)  # type: ignore[assignment]
+    return replace(found, constraint=kind, direction=direction, damp=max(one.damp for one in rows))
 
 
 def _latest(assigned: list[NodeCondition], bit: int) -> list[NodeCondition]:

@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hpcdem.core.deprecated import present_history
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.disk import explain
 
@@ -200,9 +201,10 @@ def load_history(folder: Path, name: str | None) -> Curve | None:
     """The history that is drawn beside the events: of this name; None: the first of a force of supports, else of a
     stress of elements. HpcdemError for an unknown name."""
     if name is not None:
-        path = folder / f"history_{name}.csv"
+        names = sorted(p.stem.removeprefix("history_") for p in folder.glob("history_*.csv"))
+        path = folder / f"history_{present_history(name, names)}.csv"
         if not path.is_file():
-            known = ", ".join(sorted(p.stem.removeprefix("history_") for p in folder.glob("history_*.csv"))) or "none"
+            known = ", ".join(names) or "none"
             raise HpcdemError(f"{path} not found; histories in {folder}: {known}")
         return read_history(path)
     found = [read_history(path) for path in sorted(folder.glob("history_*.csv"))]

@@ -318,12 +318,12 @@ def _paint(ax: Any, part: Any) -> None:
 
 
 def wallforce(curves: dict[int, Curve], pusher: Curve | None, name: str) -> Any:
-    """Forces on the walls and work done by them over the way of the wall `name` that pushes; over time without."""
+    """Forces on the walls and work done by them over the path of the pushing wall `name`; over time without one."""
     figure, axes = page([4.6, 4.6, 4.6])
     forces = max((float(np.nanmax(np.abs(c.force), initial=0.0)) for c in curves.values()), default=0.0)
     work = max((float(np.nanmax(np.abs(c.work), initial=0.0)) for c in curves.values()), default=0.0)
     (newton, force_unit), (joule, work_unit) = scale(max(forces, 1e6), "N"), scale(max(work, 1e6), "J")
-    displacements = {} if pusher is None else dict(zip(pusher.step.tolist(), pusher.way.tolist()))
+    displacements = {} if pusher is None else dict(zip(pusher.step.tolist(), pusher.path_length.tolist()))
     size, unit = length_unit(max(displacements.values(), default=1.0))
     for k, (wall, curve) in enumerate(sorted(curves.items())):
         at = (

@@ -406,12 +406,12 @@ def _wallforce(request: Request) -> list[Path]:
     driver = curves.driver(found)
     asked = request.walls or tuple(wall for wall in found if wall not in sides_of_box(found)) or tuple(found)
     chosen = {wall: found[wall] for wall in asked}
-    head = ("step", "time[s]", "wall", "dx[m]", "dy[m]", "way[m]", "fx[N]", "fy[N]", "work[J]")
+    head = ("step", "time[s]", "wall", "dx[m]", "dy[m]", "path[m]", "fx[N]", "fy[N]", "work[J]")
     rows = (
         (*row[:2], wall, *row[2:])
         for wall, c in sorted(chosen.items())
-        for row in zip(c.step.tolist(), c.time.tolist(), *c.moved.T.tolist(), c.way.tolist(), *c.force.T.tolist(),
-                       c.work.tolist())
+        for row in zip(c.step.tolist(), c.time.tolist(), *c.moved.T.tolist(), c.path_length.tolist(),
+                       *c.force.T.tolist(), c.work.tolist())
     )  # fmt: skip
     files = [write_sheet(request.target, Sheet("wallforce", head, rows))]
     if request.formats:

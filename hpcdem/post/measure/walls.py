@@ -37,14 +37,14 @@ class Curve:
         return self.place - self.place[0]
 
     @property
-    def way(self) -> np.ndarray:
-        """(n,): length of its way [m]."""
+    def path_length(self) -> np.ndarray:
+        """(n,): length of the path of the middle since the first row [m]."""
         return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.place, axis=0).T))])
 
     @property
     def work(self) -> np.ndarray:
-        """(n,): work done by the wall on the particles so far [J]: minus the integral of the force over the way, by
-        the trapezoidal rule."""
+        """(n,): work done by the wall on the particles so far [J]: minus the integral of the force over the path,
+        by the trapezoidal rule."""
         mean = (self.force[1:] + self.force[:-1]) / 2.0
         return np.concatenate([[0.0], -np.cumsum((mean * np.diff(self.place, axis=0)).sum(axis=1))])
 
@@ -74,13 +74,13 @@ def read_walls(path: str | os.PathLike, first: int | None = None, last: int | No
     mover = driver(curves) if first is None else None
     if mover is not None:
         curve = curves[mover]
-        began = curve.step[np.flatnonzero(curve.way == 0.0)[-1]]
+        began = curve.step[np.flatnonzero(curve.path_length == 0.0)[-1]]
         curves = {wall: curve.since(int(began)) for wall, curve in curves.items()}
     return curves
 
 
 def driver(curves: dict[int, Curve]) -> int | None:
-    """The wall with the longest way, None where none moved."""
-    ways = {wall: float(curve.way[-1]) for wall, curve in curves.items() if wall not in sides_of_box(curves)}
+    """Return the wall with the longest path, None if none moved."""
+    ways = {wall: float(curve.path_length[-1]) for wall, curve in curves.items() if wall not in sides_of_box(curves)}
     best = max(ways, key=lambda w: ways[w], default=None)
     return best if best is not None and ways[best] > 0.0 else None

@@ -74,7 +74,7 @@ def _touching(of: list[Disc], bodies: Sequence[Any]) -> list[Disc]:
     if not of:
         return of
     far = np.min([body.distance(np.array([disc.centre for disc in of])) for body in bodies], axis=0)
-    return [disc for disc, way in zip(of, far, strict=True) if way < disc.radius]
+    return [disc for disc, gap in zip(of, far, strict=True) if gap < disc.radius]
 
 
 def _until_reached(

@@ -149,11 +149,11 @@ def transformed(
         raise CommandError(f"transform: scale ({sx:g}, {sy:g}) would turn arcs into ellipses")
     if not math.isfinite(rotate):
         raise CommandError(f"transform: the angle must be finite, not {rotate:g}")
-    centre, way = np.array(_pair(about, "transform about")), np.array(_pair(translate, "transform translate"))
+    centre, offset = np.array(_pair(about, "transform about")), np.array(_pair(translate, "transform translate"))
     c, s = _cos_sin(rotate)
     xy = (curve.points - centre) * (sx, sy)
     xy = np.column_stack([c * xy[:, 0] - s * xy[:, 1], s * xy[:, 0] + c * xy[:, 1]])
-    return Curve(xy + centre + way, curve.bulges * math.copysign(1.0, sx * sy), curve.closed)
+    return Curve(xy + centre + offset, curve.bulges * math.copysign(1.0, sx * sy), curve.closed)
 
 
 def _cos_sin(degrees: float) -> tuple[float, float]:
@@ -299,9 +299,9 @@ def distance(curve: Curve, at: np.ndarray) -> np.ndarray:
 def distance_to_segment(a: np.ndarray, b: np.ndarray, bulge: float, at: np.ndarray) -> np.ndarray:
     """(n,) distance of the points `at` (n, 2) from a straight segment or an arc [m]."""
     if bulge == 0.0:
-        way = b - a
-        t = np.clip((at - a) @ way / (way @ way), 0.0, 1.0)
-        return np.hypot(*(at - a - t[:, None] * way).T)
+        offset = b - a
+        t = np.clip((at - a) @ offset / (offset @ offset), 0.0, 1.0)
+        return np.hypot(*(at - a - t[:, None] * offset).T)
     centre, radius, start, sweep = arc_of(a, b, bulge)
     rel = at - centre
     turn = (np.arctan2(rel[:, 1], rel[:, 0]) - start) * math.copysign(1.0, sweep) % (2.0 * math.pi)

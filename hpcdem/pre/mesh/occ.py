@@ -50,7 +50,7 @@ def body(occ: Any, one: Any, middle: np.ndarray, unit: float) -> Tags:
             return [(3, occ.addCone(*a, *(b - a), one.radius / unit, one.other / unit))]
         case s.Extruded():
             face = _face(occ, [at(corner) for corner in one.corners])
-            return _volumes(occ.extrude([(2, face)], *(np.array(one.way) / unit)))
+            return _volumes(occ.extrude([(2, face)], *(np.array(one.vector) / unit)))
         case s.Revolved():
             face = _face(occ, [at(corner) for corner in one.corners])
             turn = math.radians(one.angle)

@@ -166,19 +166,19 @@ class Cone(_Round):
 
 @dataclass(frozen=True)
 class Extruded(Body):
-    """A polygon (its corners) that is drawn along a way [m]."""
+    """A polygon (its corners) extruded along a vector [m]."""
 
     corners: tuple[Point, ...]
-    way: Point
+    vector: Point
 
     def check(self) -> None:
         Polygon(self.corners).check()
         _, normal = _plane(self.corners)
-        if abs(normal @ np.array(self.way)) <= IN_PLANE * float(np.linalg.norm(self.way)):
+        if abs(normal @ np.array(self.vector)) <= IN_PLANE * float(np.linalg.norm(self.vector)):
             raise CommandError("the extrusion vector must not lie in the plane of the polygon")
 
     def bounds(self) -> np.ndarray:
-        ends = np.concatenate([np.array(self.corners), np.array(self.corners) + self.way])
+        ends = np.concatenate([np.array(self.corners), np.array(self.corners) + self.vector])
         return np.array([ends.min(axis=0), ends.max(axis=0)])
 
     def distance(self, points: np.ndarray) -> np.ndarray:
@@ -187,25 +187,25 @@ class Extruded(Body):
         beyond = np.maximum(ends[0], ends[1])
         outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(beyond, 0.0) ** 2)
         _, normal = _plane(self.corners)
-        if abs(normal @ _unit(self.way)) < 1.0 - 1e-9:
+        if abs(normal @ _unit(self.vector)) < 1.0 - 1e-9:
             outside = np.maximum(np.maximum(beside, beyond), 0.0)
         return outside + np.minimum(np.maximum(beside, beyond), 0.0)
 
     def parts(self, points: np.ndarray) -> list[np.ndarray]:
-        frame = _frame(_unit(self.way))
+        frame = _frame(_unit(self.vector))
         at, corners = points @ frame.T, np.array(self.corners) @ frame.T
         return [*self._ends(points), *(_from_line(a, b, at) for a, b in _sides(corners))]
 
     def _beside(self, points: np.ndarray) -> np.ndarray:
         """Distance from the infinite lateral surface, negative inside."""
-        frame = _frame(_unit(self.way))
+        frame = _frame(_unit(self.vector))
         return outline_distance(np.array(self.corners) @ frame.T, points @ frame.T)
 
     def _ends(self, points: np.ndarray) -> list[np.ndarray]:
         """Distance beyond the planes of the ends."""
         at, normal = _plane(self.corners)
-        normal = normal * math.copysign(1.0, normal @ np.array(self.way))
-        return [-(points - at) @ normal, (points - at - self.way) @ normal]
+        normal = normal * math.copysign(1.0, normal @ np.array(self.vector))
+        return [-(points - at) @ normal, (points - at - self.vector) @ normal]
 
 
 @dataclass(frozen=True)
@@ -488,9 +488,13 @@ def made(kind: str, *values: Any) -> Any:
     return solid
 
 
-_PLACES, _WAYS, _LENGTHS = {"first", "second", "centre", "corners", "about", "point"}, {"way"}, {"radius", "other"}
-"""Fields of solids that are points, go along with them, or are lengths; of the others `normal` stays upright on its
-surface, and `axis` turns as before."""
+_PLACES, _VECTORS, _LENGTHS = (
+    {"first", "second", "centre", "corners", "about", "point"},
+    {"vector"},
+    {"radius", "other"},
+)
+"""Fields of solids that are points, vectors between points, or lengths. Of the others, `normal` stays perpendicular to
+its surface, and `axis` rotates."""
 
 
 def transformed(
@@ -534,7 +538,7 @@ def transformed(
             return ((np.array(value) - centre) @ matrix.T + centre + translate).tolist()
         if field in _LENGTHS:
             return value * abs(factors[0])
-        if field in _WAYS:
+        if field in _VECTORS:
             return (matrix @ value).tolist()
         if field == "normal":
             return (np.linalg.inv(matrix).T @ value).tolist()

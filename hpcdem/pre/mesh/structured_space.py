@@ -52,11 +52,11 @@ def of_grid(grid: np.ndarray, split: int = 6, group: tuple[str, str] | None = No
     elif split == 6:
         parts = []
         for order in permutations(range(3)):
-            at, way = [0, 0, 0], [corner[0, 0, 0]]
+            at, path = [0, 0, 0], [corner[0, 0, 0]]
             for axis in order:
                 at[axis] = 1
-                way.append(corner[tuple(at)])
-            parts.append(way)
+                path.append(corner[tuple(at)])
+            parts.append(path)
         cells = _upright(points, parts)
     else:
         k, j, i = (v.ravel() for v in np.indices(tuple(n[::-1])))
