@@ -262,7 +262,9 @@ class ParticleCommands:
 
         Parameters
         ----------
-        id : id of the process; a second command with this id replaces the first.
+        id : id of the process; a second command with this id replaces its settings, its balance continues, and so do
+            its
+            episodes if group and episode are unchanged.
         interval : steps between two applications.
         x : range in which it acts, (least, greatest) [m] (default: the extent of the particles).
         spacing : width of the columns [m] (default: four times the largest radius).

@@ -102,6 +102,28 @@ def test_along_a_line_of_a_map_and_back(tmp_path):
         read(made.geojson(tmp_path / "flat.geojson"), place)
 
 
+def test_small_coordinates_are_lengths_only_where_a_file_says_so(tmp_path):
+    """A box of 0.8 by 0.1 m might be degrees: scale, the name of a projection, the unit of exported files and .prj
+    decide."""
+    ring = [[0.0, 0.0], [0.8, 0.0], [0.8, 0.1], [0.0, 0.1], [0.0, 0.0]]
+    data = {"type": "Feature", "properties": {"name": "a"}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    path = tmp_path / "box.geojson"
+    path.write_text(json.dumps(data))
+    with pytest.raises(HpcdemError, match="may be degrees"):
+        read(path)
+    scaled = read(path, Placement(unit=1.0))
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32648"}}
+    path.write_text(json.dumps(data | {"crs": crs}))
+    write(tmp_path / "again.geojson", scaled.shapes)
+    for section in (scaled, read(path), read(tmp_path / "again.geojson")):
+        assert areas(section) == pytest.approx({"a": 0.08}, rel=1e-12)
+    write(tmp_path / "again.geojson", scaled.shapes, Placement(1000.0))  # in kilometres
+    with pytest.raises(HpcdemError, match=r"0 to 0.0008 and 0 to 0.0001, may be degrees"):
+        read(tmp_path / "again.geojson")
+    path.write_text(json.dumps(data).replace("0.1]", "90.5]"))  # no latitude
+    assert areas(read(path)) == pytest.approx({"a": 0.8 * 90.5})
+
+
 def test_csv_has_all_points(tmp_path):
     section = read(made.geojson(tmp_path / "section.geojson"))
     write(tmp_path / "out.csv", section.shapes)
@@ -143,7 +165,7 @@ def polygons(folder, *rings, kind="Polygon", names="abcdef"):
         for name, ring in zip(names, rings)
     ]  # fmt: skip
     path = folder / "p.geojson"
-    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    path.write_text(json.dumps({"type": "FeatureCollection", "unit": "m", "features": features}))
     return path
 
 
@@ -202,6 +224,10 @@ HOSTILE = {
         '{"type": "Point", "coordinates": [1, 2], "crs": {"properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}}',
         "its coordinates are degrees",
     ),
+    "likely.geojson": (
+        '{"type": "LineString", "coordinates": [[103.5, 29.5], [104.25, 30.0]]}',
+        r"103.5 to 104.25 and 29.5 to 30, may be degrees: it names no .*RFC 7946. Project .* or give scale",
+    ),
     "cut.svg": ("<svg", "not a readable SVG"),
     "bomb.svg": (
         '<!DOCTYPE s [<!ENTITY a "aaaaaaaaaa">' + "".join(
@@ -246,6 +272,18 @@ def test_degrees_of_a_shapefile_and_a_missing_attribute(tmp_path):
     path.with_suffix(".prj").write_text('GEOGCS["WGS 84",UNIT["degree",0.0174532925]]')
     with pytest.raises(HpcdemError, match=r"degrees .layers.prj.; project"):
         read(path)
+
+
+def test_a_shapefile_of_small_numbers_without_a_unit(tmp_path):
+    import shapefile
+
+    with shapefile.Writer(str(tmp_path / "trace"), shapeType=shapefile.POLYLINE) as out:
+        out.field("name", "C")
+        out.line([[(103.5, 29.5), (104.25, 30.0)]])
+        out.record("F1")
+    with pytest.raises(HpcdemError, match=r"29.5 to 30, may be degrees: it has no .prj file"):
+        read(tmp_path / "trace.shp")
+    assert read(tmp_path / "trace.shp", Placement(unit=1.0)).lines[0].length() == pytest.approx(np.hypot(0.75, 0.5))
 
 
 def test_values_that_make_no_sense(tmp_path):

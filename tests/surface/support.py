@@ -31,7 +31,7 @@ def heights(sim: Simulation, ident: int, width: float) -> tuple[np.ndarray, np.n
     """Sides (n + 1,) of the columns of a process, their heights (n,) of the discs, and those with what it still owes
     and with discs that settle [m]."""
     land = sim.lands[ident]
-    near = surface._near(sim, np.array([gid for gid, _, _ in land.settling], np.int64))
+    near = surface.near_surface(sim)
     first, sides = landscape.edges(0.0, width, land.spacing)
     h = surface._heights(land, near, sides, surface._barriers(sim)[0], LARGEST)
     owed = carried_over(land.owed, first, len(h))

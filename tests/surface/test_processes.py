@@ -102,10 +102,10 @@ def test_erosion_at_a_rate_down_to_a_level(scarp: str, tmp_path) -> None:
     _, h, owed = heights(sim, 1, WIDTH)
     assert (owed - start)[2:12].mean() == pytest.approx(-1.0, abs=0.2)
     assert surface.balance(sim, 1)["discs_deposited"] == 0
-    before = len(sim.particles)
+    before, eroded = len(sim.particles), surface.balance(sim, 1)["eroded"]
     surface.surface(sim, 1, 50, above=18.0, x=(0.0, WIDTH), only=["low"])
     cycles.cycle(sim, 100)
-    assert len(sim.particles) == before and surface.balance(sim, 1)["eroded"] == 0.0
+    assert len(sim.particles) == before and surface.balance(sim, 1)["eroded"] == eroded > 0.0
     surface.surface(sim, 1, 50, above=18.0, x=(0.0, WIDTH), only=["High"])
     cycles.cycle(sim, 300)
     _, h, owed = heights(sim, 1, WIDTH)
@@ -155,6 +155,40 @@ def test_what_is_buried_is_compacted(tmp_path) -> None:
     lost = (math.pi * (original**2 - p["radius"] ** 2)).sum() / (1.0 - surface.POROSITY)
     assert surface.balance(sim, 1)["compacted"] == pytest.approx(lost, rel=1e-5)
     assert_adds_up(sim, 1)
+    with pytest.raises(CommandError, match=r"SURFACE 1: its deposits have porosity 0.5 at the surface"):
+        surface.surface(sim, 1, 100, x=(0.0, 40.0), below=12.0, compact=(0.4, scale), **SAND)
+    surface.surface(sim, 1, 100, x=(0.0, 40.0), below=12.0, compact=(porosity, 5.0), **SAND)
+    cycles.cycle(sim, 200)
+    assert max(sim.lands[1].levels.values()) > levels.max()
+
+
+def test_a_process_given_again_continues_its_balance(scarp: str, tmp_path) -> None:
+    """Rates that change every 130 steps, in mid-interval, with columns of another width: one balance for all, areas at
+    rate x time, episodes that go on, and ids of eroded deposits that BALL cannot take."""
+    sim = restored(scarp, tmp_path)
+    laid, rates = 0.0, (1.0, 2.0, 0.5, 3.0)
+    for rate, spacing in zip(rates, (4.0, 5.0, 4.0, 8.0)):
+        surface.surface(sim, 1, 50, deposit=rate, x=(0.0, WIDTH), spacing=spacing, episode=200, **SAND)
+        cycles.cycle(sim, 130)
+    # Each rate acts from the last application before it, at 0, 100, 250 and 350, to that before the next one.
+    laid = WIDTH * sim.clock.dt * (1.0 * 100 + 2.0 * 150 + 0.5 * 100 + 3.0 * 150)
+    seen = surface.balance(sim, 1)
+    assert seen["demanded"] == pytest.approx(laid, rel=1e-6)
+    assert_adds_up(sim, 1)
+    groups = np.array(sim.groups)[sim.particles["group"]]
+    assert {name for name in set(groups) if name.startswith("growth")} == {"growth1", "growth2", "growth3"}
+    cycles.cycle(sim, 80)
+    surface.surface(sim, 1, 50, above=15.0, x=(0.0, WIDTH))
+    cycles.cycle(sim, 200)
+    seen = surface.balance(sim, 1)
+    made = [gid for first, end in sim.lands[1].made for gid in range(first, end)]
+    gone = sorted(set(made) - set(sim.particles["gid"].tolist()))
+    assert gone and seen["deposited"] > 0.9 * laid and seen["discs_eroded"] > len(gone) // 2
+    assert_adds_up(sim, 1)
+    assert seen["mass_deposited"] == pytest.approx(seen["deposited"] * (1.0 - surface.POROSITY), rel=1e-6)
+    with pytest.raises(CommandError, match=f"id {gone[0]} was that of a disc which SURFACE 1 deposited"):
+        particles.ball(sim, gone[0], 50.0, 55.0, 1.0)
+    particles.ball(sim, sim.next_gid, 50.0, 55.0, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -32,8 +32,9 @@ SURFACE id 2 interval 50 x 2000.0 {{right}} deposit 20.0 below 1250.0 compact 0.
 SET save 325 print 300
 CYC 300
 """
-REST = """\
+REST = f"""\
 CYC 300
+SURFACE id 2 interval 40 x 2500.0 {{right}} deposit 30.0 below 1250.0 compact 0.5 600.0 rad discrete 40 {LAW} group fill
 SURFACE id 3 interval 40 erode 9.0 above 1250.0 only bed|fill
 SURFACE id 1 off
 CYC 200

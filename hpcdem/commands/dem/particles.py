@@ -150,6 +150,9 @@ def ball(
             raise CommandError(f"id must not be negative, got {id}")
         if sim.comm.any(bool((sim.particles["gid"] == id).any())):
             raise CommandError(f"a particle with id {id} exists already")
+        for number, land in sim.lands.items():
+            if land.made_disc(id):
+                raise CommandError(f"id {id} was that of a disc which SURFACE {number} deposited; choose another one")
     add(sim, np.array([[x, y, rad]]), sim.group_number(group), color, first_gid=id)
 
 

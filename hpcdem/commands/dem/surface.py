@@ -80,7 +80,8 @@ def surface(
 
     Parameters
     ----------
-    id : id of the process; a second command with this id replaces the first.
+    id : id of the process; a second command with this id replaces its settings, its balance continues, and so do its
+        episodes if group and episode are unchanged.
     interval : steps between two applications.
     x : range in which it acts, (least, greatest) [m] (default: the extent of the particles).
     spacing : width of the columns [m] (default: four times the largest radius).
@@ -153,8 +154,12 @@ def surface(
         last=sim.clock.time, since=sim.clock.time, stream=sim.streams, unit=smallest_unit(radius),
         compact=None if compact is None else (float(compact[0]), float(compact[1])),
     )  # fmt: skip
-    sim.streams += 1
     _refuse_contradictions(sim, id, land)
+    if id in sim.lands:
+        _refuse_other_porosity(id, land, sim.lands[id])
+        land = land.after(sim.lands[id])
+    else:
+        sim.streams += 1
     sim.lands[id] = land
     sim.lands = dict(sorted(sim.lands.items()))
     sim.tables_changed()
@@ -204,6 +209,15 @@ def _refuse_contradictions(sim: Simulation, id: int, land: Land) -> None:
                 )
 
 
+def _refuse_other_porosity(id: int, land: Land, earlier: Land) -> None:
+    """CommandError where the buried discs of a process would need another porosity than they were deposited with."""
+    if land.compact and earlier.compact and earlier.made and land.compact[0] != earlier.compact[0]:
+        raise CommandError(
+            f"SURFACE {id}: its deposits have porosity {earlier.compact[0]:g} at the surface (compact), which cannot "
+            f"become {land.compact[0]:g}; end it with off, or use another id for the new deposits"
+        )
+
+
 def check(sim: Simulation) -> None:
     """Raise CommandError if the processes cannot act in this model. Collective."""
     if not sim.lands:
@@ -232,9 +246,9 @@ class _Near:
     held: np.ndarray
 
 
-def _near(sim: Simulation, settling: np.ndarray) -> _Near:
-    """Collective. The model is closed."""
-    p = sim.particles
+def near_surface(sim: Simulation) -> _Near:
+    """Return the particles near the surface. Collective. The model is closed."""
+    p, settling = sim.particles, [gid for land in sim.lands.values() for gid, _, _ in land.settling]
     largest = float(sim.comm.max_into(np.array([p["radius"].max(initial=0.0)]))[0])
     held = (p["fix"] & (FIX_X | FIX_Y)) == FIX_X | FIX_Y
     carried = sim.lists.owned_forces()[:, :2].any(axis=1)  # exactly 0 in flight
@@ -321,9 +335,10 @@ def act(sim: Simulation, ident: int) -> None:
     """
     sim.close_model()
     land = sim.lands[ident]
-    _count_settled(sim, land)
+    for other in sim.lands.values():
+        _count_settled(sim, other)
     elapsed, land.last = sim.clock.time - land.last, sim.clock.time
-    near = _near(sim, np.array([gid for gid, _, _ in land.settling], np.int64))
+    near = near_surface(sim)
     walls, barriers = _barriers(sim)
     ends = _range(land, near.circle[near.ground], barriers)
     idle = "there is no ground" if ends is None else _apply(sim, land, near, walls, ends, elapsed)
@@ -347,17 +362,13 @@ def _apply(
     there = np.array([sum(area[k] for k in stack) for stack in stacks], np.int64)
     owed = carried_over(land.owed, first, n)
     height = _heights(land, near, sides, walls, largest)
-    in_flight = np.zeros(n)
-    places = dict(zip(near.ids[:, 0].tolist(), column.tolist()))
-    for gid, falling, _ in land.settling:
-        if gid in places:
-            in_flight[places[gid]] += falling
     measured = height
-    height = height + (owed + in_flight) * land.unit / width
+    unmet, waiting = _unmet(sim, land, sides, dict(zip(near.ids[inside, 0].tolist(), column[inside].tolist())))
+    height = height + (owed * land.unit + unmet) / width
     demanded = _demand(land, height, width, np.maximum(there + owed, 0), elapsed)
     owed += demanded
     land.asked += int(demanded.sum())
-    gone = _eroded(land, near, area, owed, stacks)
+    gone = _eroded(area, owed, stacks, waiting) if land.erodes else []
     rows, full = _deposited(sim, land, near, walls, owed, sides, gone)
     land.owed = {first + k: int(v) for k, v in enumerate(owed.tolist()) if v}
     if gone:
@@ -382,6 +393,22 @@ def _apply(
     if n == 1 and (land.diffuse or land.slope):
         return f"one column (spacing {land.spacing:g} m) covers everything, so diffuse and slope move nothing"
     return ""
+
+
+def _unmet(sim: Simulation, land: Land, sides: np.ndarray, places: dict[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Area (n,) [m2] in each column that discs have not met yet: what other processes owe, and discs that settle; and
+    flags (n,) of columns in which discs of other processes settle. places: column of each particle by id."""
+    unmet, waiting = np.zeros(len(sides) - 1), np.zeros(len(sides) - 1, bool)
+    for other in sim.lands.values():
+        for gid, area, _ in other.settling:
+            if gid in places:
+                unmet[places[gid]] += area * other.unit
+                waiting[places[gid]] |= other is not land
+        for k, area in other.owed.items() if other is not land else ():
+            x = (k + 0.5) * other.spacing
+            if sides[0] <= x < sides[-1]:
+                unmet[int(np.searchsorted(sides, x, side="right")) - 1] += area * other.unit
+    return unmet, waiting
 
 
 def _book(entry: list[float], area: int, mass: float) -> None:
@@ -437,13 +464,17 @@ def _stacks(
     return [stack[::-1] for stack in stacks]
 
 
-def _eroded(land: Land, near: _Near, area: list[int], owed: np.ndarray, stacks: list[list[int]]) -> list[int]:
-    """Rows of the discs that go, from the tops of columns; `owed` and the stacks follow."""
+def _eroded(area: list[int], owed: np.ndarray, stacks: list[list[int]], waiting: np.ndarray) -> list[int]:
+    """Rows of the discs that go, from the tops of columns; `owed` and the stacks follow. Columns with discs of
+    other processes that settle (waiting) keep theirs, because without support these would never come to rest, unless
+    the sum demands a disc."""
     gone: list[int] = []
     total = int(owed.sum())
     upper = np.array([area[stack[-1]] if stack else 0 for stack in stacks], np.int64)
     while True:
-        due = (upper > 0) & (owed < 0) & ((owed <= -upper) | (total <= -upper))
+        may = (upper > 0) & (owed < 0)
+        due = may & ~waiting & ((owed <= -upper) | (total <= -upper))
+        due = due if due.any() else may & (total <= -upper)
         if not due.any():
             return gone
         c = int(np.argmin(np.where(due, owed, 1)))
@@ -538,15 +569,18 @@ def _count_settled(sim: Simulation, land: Land) -> None:
     calm = speed[mine] <= push + CALM * np.sqrt(2.0 * gravity * p["radius"][mine])
     pull = sim.lists.owned_forces()[mine, :2] / sim.body[mine, MASS : MASS + 1] + (s.gx, s.gy)
     calm &= np.hypot(pull[:, 0], pull[:, 1]) <= LIGHT * gravity
-    found: dict[int, bool] = {}
-    for part in sim.comm.allgather(dict(zip(p["gid"][mine].tolist(), calm.tolist()))):
+    density = sim.materials.rows["density"]
+    found: dict[int, tuple[bool, float]] = {}
+    states = zip(calm.tolist(), density[p["material"][mine]].tolist())
+    for part in sim.comm.allgather(dict(zip(p["gid"][mine].tolist(), states))):
         found.update(part)
-    density, left = float(sim.materials.rows["density"][land.material]), []
+    left = []
     for gid, area, r in land.settling:
-        if gid in found and not found[gid]:
+        at_rest, of_disc = found.get(gid, (True, float(density[land.material])))
+        if not at_rest:
             left.append((gid, area, r))
             continue
-        mass = density * float(volume(np.array([r]), s.disk)[0])
+        mass = of_disc * float(volume(np.array([r]), s.disk)[0])
         _book(land.deposited if gid in found else land.lost, area, mass)
     land.settling = left
 

@@ -664,7 +664,7 @@ COMMANDS = (
         "gravity along -y; does not support clumps.",
         source="X",
         options=tuple(replace(option, source="X") for option in (
-            _id("number of the process; a second command with it replaces the first"),
+            _id("number of the process; a second command with it replaces its settings, its balance continues"),
             Option("interval", "steps between two applications", kind=COUNT, unit="steps"),
             Option("x", "range in which it acts, also on a bare floor, up to the next steep walls", kind=INTERVAL,
                    unit="m", default="as far as the particles reach"),

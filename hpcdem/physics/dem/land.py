@@ -69,9 +69,35 @@ class Land:
     compacted: int = 0
 
     @property
+    def erodes(self) -> bool:
+        """Return whether it can remove discs."""
+        return any(value is not None for value in (self.diffuse, self.slope, self.erode, self.above))
+
+    def after(self, earlier: Land) -> Land:
+        """Return this process as the continuation of the one with its id that it replaces: with the budget, the discs
+        and the random numbers of that one, and its episodes if these are unchanged."""
+        same = (self.group, self.episode) == (earlier.group, earlier.episode)
+        scale = earlier.spacing / self.spacing
+        owed: dict[int, int] = {}
+        for column, area in earlier.owed.items():
+            at = math.floor((column + 0.5) * scale)
+            owed[at] = owed.get(at, 0) + area
+        budget = {
+            name: getattr(earlier, name)
+            for name in ("unit", "last", "stream", "drawn", "settling", "eroded", "deposited", "lost", "asked", "made",
+                         "levels", "compacted")
+        }  # fmt: skip
+        begun, material = earlier.begun if same else self.begun, self.material if self.rad else earlier.material
+        return dataclasses.replace(self, **budget, owed=owed, begun=begun, material=material)
+
+    @property
     def deposits(self) -> bool:
         """Return whether it can make discs."""
         return bool(self.rad)
+
+    def made_disc(self, gid: int) -> bool:
+        """Return whether it deposited a disc of this id, present or eroded."""
+        return any(first <= gid < end for first, end in self.made)
 
     def units(self, area: float) -> int:
         """Bulk area [m2] as a whole number of units."""

@@ -21,7 +21,8 @@ MOST_POINTS = 5_000_000
 
 class Found:
     """Shapes in the plane of the section and the unit of the file. metres: of that unit, None where the file names
-    none; unit: about it, in words; dropped: number of things left out, by (kind, layer)."""
+    none; unit: about it, in words; low, high: ranges of the first two coordinates of maps; dropped: number of things
+    left out, by (kind, layer)."""
 
     def __init__(self, path: Path, placement: Placement, attribute: str | None = None) -> None:
         self.path, self.placement, self.attribute = path, placement, attribute
@@ -34,6 +35,7 @@ class Found:
         self.axes = "y upwards"
         self.beside = 0.0
         self.points = 0
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
 
     def refuse(self, message: str) -> HpcdemError:
         """An error that names the file."""
@@ -60,6 +62,8 @@ class Found:
                 self._count(len(points))
                 if not np.isfinite(points).all():
                     raise CommandError(f"{where}: a coordinate is not a finite number")
+                self.low = np.minimum(self.low, points[:, :2].min(axis=0))
+                self.high = np.maximum(self.high, points[:, :2].max(axis=0))
                 if self.placement.line is not None and points.shape[1] == 3:
                     self.beside = max(self.beside, self.placement.beside(points))
                 flat = self.placement.in_plane(points, where)

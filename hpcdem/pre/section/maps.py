@@ -13,10 +13,13 @@ import numpy as np
 from hpcdem.core.selection import even_odd
 from hpcdem.pre.mesh import optional
 from hpcdem.pre.section.found import Found
+from hpcdem.pre.section.shapes import METRES
 
 _PARTS = {
     "Point": 0, "MultiPoint": 0, "LineString": 1, "MultiLineString": 2, "Polygon": 3, "MultiPolygon": 4,
 }  # fmt: skip
+LARGEST_DEGREES = np.array([180.0, 90.0])
+"""Longitude and latitude."""
 _DEGREES = ("EPSG:4326", "EPSG::4326", "CRS84", "EPSG:4490", "EPSG::4490")
 
 
@@ -30,6 +33,8 @@ def read_geojson(found: Found) -> None:
         raise found.refuse("not a GeoJSON file: it has no type")
     _refuse_degrees(found, json.dumps(data.get("crs", "")))
     found.unit = "GeoJSON defines no unit"
+    if data.get("unit") == METRES:
+        found.metres, found.unit = 1.0, f"its unit is {METRES}"
     for number, feature in enumerate(_features(found, data)):
         attributes = feature.get("properties") or {}
         if not isinstance(attributes, dict):
@@ -39,6 +44,10 @@ def read_geojson(found: Found) -> None:
         for part, geometry in enumerate(_geometries(found, feature.get("geometry"), f"feature {number}")):
             where = f"feature {number}" + (f", part {part}" if part else "")
             _geometry(found, geometry, attributes, where)
+    if not data.get("crs"):
+        _refuse_likely_degrees(
+            found, "it names no coordinate system (crs), so they are longitude and latitude by RFC 7946"
+        )
 
 
 def _not_finite(text: str) -> float:
@@ -48,6 +57,17 @@ def _not_finite(text: str) -> float:
 def _refuse_degrees(found: Found, text: str) -> None:
     if any(name in text for name in _DEGREES):
         raise found.refuse("its coordinates are degrees; project the file to metres (for example UTM) first")
+
+
+def _refuse_likely_degrees(found: Found, why: str) -> None:
+    """HpcdemError where coordinates of unknown unit could be longitudes and latitudes."""
+    stated = found.metres or found.placement.unit or not found.shapes
+    if not stated and (np.maximum(-found.low, found.high) <= LARGEST_DEGREES).all():
+        (x0, y0), (x1, y1) = found.low, found.high
+        raise found.refuse(
+            f"its coordinates, {x0:g} to {x1:g} and {y0:g} to {y1:g}, may be degrees: {why}. Project the file to "
+            "metres (for example UTM), or give scale, metres per unit of the file, if they are lengths"
+        )
 
 
 def _features(found: Found, data: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
@@ -131,6 +151,7 @@ def _records(found: Found, shapefile: Any) -> None:
             for number, shape in enumerate(reader.iterShapes()):
                 attributes = reader.record(number).as_dict() if reader.fields else {}
                 _shape(found, shapefile, shape, attributes, f"record {number}")
+            _refuse_likely_degrees(found, found.unit)
     except OSError as error:
         raise found.refuse(f"cannot be read ({error})") from None
     except (shapefile.ShapefileException, ValueError, IndexError, KeyError, AttributeError, MemoryError,

@@ -13,6 +13,8 @@ from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh.geometry import Curve, sampled
 
 Point = tuple[float, float]
+METRES = "m"
+"""Value of `unit`, a member of GeoJSON files that are written in metres."""
 FLAT = 1e-4
 """Largest deviation of a polyline from the arcs that it replaces, over the size of the section."""
 

@@ -14,7 +14,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.pre.mesh import dxf
-from hpcdem.pre.section.shapes import Placement, Section, Shape
+from hpcdem.pre.section.shapes import METRES, Placement, Section, Shape
 
 FORMATS = (".geojson", ".dxf", ".csv")
 
@@ -63,7 +63,8 @@ def _geojson(shapes: Sequence[Shape], placement: Placement, deviation: float) ->
         attributes = {"name": shape.name, **{k: _plain(v) for k, v in shape.attributes.items() if k != "name"}}
         features.append({"type": "Feature", "properties": attributes, "geometry": geometry})
     rows = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
-    return f'{{"type": "FeatureCollection", "features": [\n{rows}\n]}}\n'
+    unit = f' "unit": "{METRES}",' if placement.unit in (None, 1.0) else ""
+    return f'{{"type": "FeatureCollection",{unit} "features": [\n{rows}\n]}}\n'
 
 
 def _turned(ring: np.ndarray, outline: bool) -> np.ndarray:
