@@ -64,6 +64,8 @@ def environment(**more: str) -> dict[str, str]:
     if os.geteuid() == 0:
         env.setdefault("OMPI_ALLOW_RUN_AS_ROOT", "1")
         env.setdefault("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+    env.setdefault("OMPI_MCA_rmaps_base_oversubscribe", "1")  # layouts may have more ranks than this machine has cores
+    env.setdefault("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe")  # the same for Open MPI 5
     env.setdefault("OMPI_MCA_btl_vader_single_copy_mechanism", "none")  # containers forbid it, with a long complaint
     return env
 
