@@ -126,52 +126,82 @@ class Masses:
         )  # fmt: skip
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stiffness (n_own, 4) [N/m per m] at each corner: half the largest penalty of each of its joints, and what the
-        contact of its free faces can have; and what surface loads bring. And the dashpots (n_own, 4) [N s/m per m] of
-        these contacts, and of quiet faces.
+        """Stiffness (n_own, 4) [N/m per m], in space [N/m], at each corner: of its joints, of what the contact of its
+        free faces can have, and of surface loads. And the dashpots (n_own, 4) [N s/m per m], in space [N s/m], of these
+        contacts and of quiet faces. Collective.
 
-        Contact on a face of length L: P (3/2) (L / h + L / h_other), h: altitude on the face, h_other: the smallest
-        altitude of all elements. Where elements are of one size that is about what there is; elsewhere the smallest
-        ones limit the time step by themselves. (It must not follow from who is near: a restart makes new lists.)
+        Other elements appear in it only by the largest 1 / altitude of the model. Where elements are of one size the
+        contact of two faces is about that stiff; elsewhere the smallest elements limit the time step by themselves. (It
+        must not follow from who is near: a restart makes new lists.)
         """
-        sim, mesh, own, shapes = self.sim, self.sim.the_mesh(), self.sim.owned, self.local.shapes
-        number = sim.number[own]
-        cells = mesh.cells[number]
+        sim, n = self.sim, self.sim.n_own
+        springs, dashpots = np.zeros((n, 4)), np.zeros((n, 4))
+        highest, some, ratio = self._of_contact() if sim.options.collision else (0.0, 0.0, 0.0)
+        heavy = self.true[sim.owned].max(axis=1, initial=0.0)
+        for at in pieces(n):
+            self._add_springs(at, highest, some == 0.0, ratio, heavy[at], springs[at], dashpots[at])
+        sim.surface_loads.springs(sim, springs)
+        sim.surface_loads.dashpots(sim, dashpots)
+        return springs, dashpots
+
+    def _of_contact(self) -> list[float]:
+        """Largest 1 / h [1/m], 1 if a face does not leave its contact to joints, largest damping ratio. Collective."""
+        found, cells = np.zeros(3), self.sim.reference.cells
+        for at in pieces(self.sim.n_own):
+            shapes, surfaces = self._surfaces(at)
+            silent = np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal)
+            real = cells[self.sim.number[self.sim.owned][at]].reshape(-1) >= 0
+            steep = self._inverse_altitudes(shapes, at).max()
+            np.maximum(found, [steep, float(silent[real].any()), surfaces.ratio.max()], out=found)
+        most: list[float] = self.sim.comm.max_into(found).tolist()
+        return most
+
+    def _surfaces(self, at: slice) -> tuple[Any, Surfaces]:
+        """Shapes, of which some of the owned elements are a part, and properties of the faces of these."""
+        own, shapes = self.sim.owned, self.local.shapes
+        rows = np.arange(own.start, own.stop)[at]
+        return shapes, Surfaces(self.sim, shapes, _faces(self.sim.number[own][at]), np.repeat(rows, 4))
+
+    def _inverse_altitudes(self, shapes: Any, at: slice) -> np.ndarray:
+        """The largest 1 / altitude (m,) [1/m] of some of the owned elements."""
+        own = self.sim.owned
+        inverse: np.ndarray = shapes.length[own][at].max(axis=1) / shapes.double_area[own][at]
+        return inverse
+
+    def _add_springs(
+        self, at: slice, highest: float, among: bool, ratio: float, heavy: np.ndarray, springs: np.ndarray,
+        dashpots: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Add those of some of the owned elements; heavy: their heaviest corner [kg/m]; the others see `_of_contact`
+        and `Surfaces.most_penalty`. Joint: half the largest penalty. Contact on a face of length L: P (3/2) (L / h + L
+        / h_other), h: altitude on the face, h_other: the smallest altitude of all elements."""
+        sim, shapes, own = self.sim, self.local.shapes, self.sim.owned
+        number = sim.number[own][at]
+        cells = sim.the_mesh().cells[number]
         corners = connectivity.corner_counts(cells)
-        faces = 4 * number[:, None] + np.arange(4)
-        real = cells >= 0
+        faces = _faces(number).reshape(-1, 4)
+        real, length = cells >= 0, shapes.length[own][at]
         penalty = joint_law.stiffest(
-            sim.joint_rows.column, laws_of(sim.joint_rows), sim.joint_row[faces], lambda: shapes.length[own]
+            sim.joint_rows.column, laws_of(sim.joint_rows), sim.joint_row[faces], lambda: length
         )
         closed = sim.closed_faces()[faces] & real
         tied = closed & (sim.joint_row[faces] > 0)
         each, drag = np.where(tied, 0.5 * penalty, 0.0), np.zeros(faces.shape)
         if sim.options.collision:
-            length, double_area = shapes.length[own], shapes.double_area[own]
-            surfaces = Surfaces(sim, shapes, faces.reshape(-1), np.repeat(np.arange(own.start, own.stop), 4))
-            highest = float(np.max(length.max(axis=1) / double_area, initial=0.0))
-            others = bool((np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal))[real.reshape(-1)].any())
-            highest, some = sim.comm.max_into(np.array([highest, float(others)])).tolist()
-            most = surfaces.most_penalty(some == 0.0).reshape(-1, 4)
-            contact = 1.5 * most * (length * length / double_area[:, None] + length * highest)
+            most = self._surfaces(at)[1].most_penalty(among).reshape(-1, 4)
+            contact = 1.5 * most * (length * length / shapes.double_area[own][at][:, None] + length * highest)
             may_touch = real & ~closed
             if sim.options.dynamic:
                 may_touch |= tied  # once they break
             each = np.maximum(each, np.where(may_touch, contact, 0.0))
             # Half of 2 xi sqrt(k m) L, with k L = 2 `contact` and m L no more than two corners of the element have.
-            ratio = float(sim.comm.max_into(np.array([surfaces.ratio.max(initial=0.0)]))[0])
-            heavy = 2.0 * self.true[own].max(axis=1, initial=0.0)[:, None]
-            drag = np.where(may_touch, ratio * np.sqrt(2.0 * contact * heavy), 0.0)
+            drag = np.where(may_touch, ratio * np.sqrt(2.0 * contact * (2.0 * heavy[:, None])), 0.0)
         quiet = sim.quiet_faces()[faces] & real
         if quiet.any():
-            drag = drag + np.where(quiet, 0.5 * impedances(sim, number)[0][:, None] * shapes.length[own], 0.0)
+            drag = drag + np.where(quiet, 0.5 * impedances(sim, number)[0][:, None] * length, 0.0)
         before = np.where(np.arange(4) > 0, np.arange(4) - 1, corners[:, None] - 1)
-        springs, dashpots = (part + np.take_along_axis(part, before, axis=1) for part in (each, drag))
-        springs = np.where(real, springs, 0.0)
-        sim.surface_loads.springs(sim, springs)
-        dashpots = np.where(real, dashpots, 0.0)
-        sim.surface_loads.dashpots(sim, dashpots)
-        return springs, dashpots
+        for part, corner in ((each, springs), (drag, dashpots)):
+            corner[real] = (part + np.take_along_axis(part, before, axis=1))[real]
 
 
 class MassesSpace(Masses):
@@ -203,42 +233,21 @@ class MassesSpace(Masses):
         if self.alike() and self.sim.budget is None:
             self._of_motion = np.empty((0, 4))
 
-    def springs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: of its joints,
-        k = P sqrt(A) / 3 with the largest P, and what the contact of its free faces can have, k = P A (1 / h + 1 /
-        h_other) / 3 per face, h_other: the smallest of all; rho c_p A / 3 of quiet faces."""
-        sim, n = self.sim, self.sim.n_own
-        springs, dashpots = np.zeros((n, 4)), np.zeros((n, 4))
-        highest, some, ratio = self._of_contact() if sim.options.collision else (0.0, 0.0, 0.0)
-        heavy = self.true[sim.owned].max(axis=1, initial=0.0)
-        for at in pieces(n):
-            self._add_springs(at, highest, some == 0.0, ratio, heavy[at], springs[at], dashpots[at])
-        sim.surface_loads.springs(sim, springs)
-        sim.surface_loads.dashpots(sim, dashpots)
-        return springs, dashpots
-
     def _surfaces(self, at: slice) -> tuple[ShapesSpace, Surfaces]:
-        """Shapes of some of the owned elements, and properties of their faces."""
         number = self.sim.number[self.sim.owned][at]
         shapes = ShapesSpace(self.sim, number)
         return shapes, Surfaces(self.sim, shapes, _faces(number), np.repeat(np.arange(len(number)), 4))
 
-    def _of_contact(self) -> list[float]:
-        """Largest 1 / h [1/m], 1 if a face does not leave its contact to joints, largest damping ratio. Collective."""
-        found = np.zeros(3)
-        for at in pieces(self.sim.n_own):
-            shapes, surfaces = self._surfaces(at)
-            silent = np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal)
-            np.maximum(found, [(1.0 / shapes.double_area).max(), float(silent.any()), surfaces.ratio.max()], out=found)
-        most: list[float] = self.sim.comm.max_into(found).tolist()
-        return most
+    def _inverse_altitudes(self, shapes: ShapesSpace, at: slice) -> np.ndarray:
+        inverse: np.ndarray = 1.0 / shapes.double_area
+        return inverse
 
     def _add_springs(
         self, at: slice, highest: float, among: bool, ratio: float, heavy: np.ndarray, springs: np.ndarray,
         dashpots: np.ndarray,
     ) -> None:  # fmt: skip
-        """Add those of some of the owned elements; heavy: their heaviest corner [kg]; the others see `_of_contact` and
-        `Surfaces.most_penalty`."""
+        """Joint: k = P sqrt(A) / 3 with the largest P; contact: P A (1 / h + 1 / h_other) / 3 per face; quiet faces:
+        rho c_p A / 3. heavy in kg."""
         sim = self.sim
         number = sim.number[sim.owned][at]
         faces, slots = _faces(number), slice(4 * at.start, 4 * at.stop)
