@@ -226,3 +226,23 @@ def test_a_script_goes_back_to_a_time(tmp_path, monkeypatch):
     later = Rock(tmp_path / "b", "")
     checkpoints.take_up(later.project)
     assert later.project.step == 40
+
+
+def test_a_history_of_forces_is_whole_across_rebuilds(tmp_path):
+    """A record reads the forces of the next step, whose rebuild may replace their tables: the numbers are those of single
+    steps, after each of which forces are computed anew."""
+    text = """
+pcdc mesh structured (0,0) (4,1) cells 8 2
+pcdc mesh structured (1,1.02) (2,2.02) cells 2 2
+pcdc element c-model mech-iso-elastic property density 2700 young 50e9 poisson-ratio 0.25
+pcdc node boundary mech-m-b-c type 1 range y -0.001 0.001
+pcdc node initial velocity-y 200 range y 1.01 3
+pcdc node initial velocity-y -1 range y 0.9 1.005
+pcdc history create 'r' node value reaction-y sum every 1 range y -0.001 0.001
+"""
+    found = []
+    for steps in ("pcdc model step 100\n", 100 * "pcdc model step 1\n"):
+        rock = Rock(tmp_path / str(len(found)), text)(steps)
+        assert rock.blocks.rebuilds > 2
+        found.append(rock.project.histories["r"].rows)
+    assert found[0] == found[1] and len(found[0]) == 100 and max(abs(value) for *_, value in found[0]) > 1e6

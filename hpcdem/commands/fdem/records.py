@@ -137,6 +137,7 @@ class History:
             probe = self._probe_of(blocks)
             probe.find()
             assert probe.local is not None
+            probe.local.awaited = True  # a rebuild in the next step must not free these tables
             self._waits = int(clock.step), float(blocks.reported_time()), probe.local, probe.local.passes
         else:
             self.rows.append((int(clock.step), float(blocks.reported_time()), self.measure(blocks)))

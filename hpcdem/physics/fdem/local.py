@@ -65,6 +65,8 @@ class Local(JointTables):
     corner_masses = staticmethod(Masses.of_corners)
     whole: SixNodes | None = None
     """Macro-elements of the plane, whose forces stand in place of those of their parts."""
+    awaited = False
+    """A history reads their forces in the next step."""
     solids: Solids
     masses: Masses
     loads: Loads
@@ -389,8 +391,10 @@ class Local(JointTables):
     # ---- what is extracted from the tables ---------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Free all tables. They refer to each other, so they would last until Python next collects such circles."""
-        vars(self).clear()
+        """Free all tables. They refer to each other, so they would last until Python next collects such circles; those
+        whose forces a history still reads do."""
+        if not self.awaited:
+            vars(self).clear()
 
     def histories(self, transfer: bool) -> Histories:
         """Histories of joints and contacts of the owned elements.
