@@ -9,6 +9,8 @@ import pytest
 from tests.conftest import ROOT, run
 
 PROGRAM = """
+from hpcdem.runtime import kept
+kept.install()
 import numpy as np
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -18,19 +19,28 @@ with open('results.json', 'w') if pcdc.rank == 0 else open('/dev/null', 'w') as 
 """
 
 
+_DONE: dict[tuple[str, int], Path] = {}
+"""Folders of what this process has run, by script and number of ranks."""
+
+
 def results(resident: Any, folder: Path, case: Case, ranks: int = 1, more: str = "", timeout: float = 1800.0) -> Any:
-    """The results of a case, as attributes; more: further lines, which may make further `results` of the script."""
+    """The results of a case, as attributes; more: further lines, which may make further `results` of the script. What
+    several tests of a file ask for is run once."""
     if case.needs:
         for name in ("gmsh", "shapely"):
             if importlib.util.find_spec(name) is None:
                 absent(name, f"no package {name} here: install the extra [mesh]")
-    folder.mkdir(parents=True, exist_ok=True)
     names = [field.name for field in dataclasses.fields(case.result)]
     pairs = ", ".join(f"'{name}': {name}" for name in names)
     text = case.script() + "\nmore = {}\n" + more + STORE.replace("NAMES", f"{pairs}, **more")
-    (folder / f"{case.name}.sc").write_text(text)
-    done = resident(ranks, "--no-figure", f"{case.name}.sc", cwd=folder, timeout=timeout)
-    assert done.returncode == 0, done.stderr
+    if (text, ranks) in _DONE:
+        shutil.copytree(_DONE[text, ranks], folder, dirs_exist_ok=True)
+    else:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / f"{case.name}.sc").write_text(text)
+        done = resident(ranks, "--no-figure", f"{case.name}.sc", cwd=folder, timeout=timeout)
+        assert done.returncode == 0, done.stderr
+        _DONE[text, ranks] = folder
     return Results(json.loads((folder / "results.json").read_text()))
 
 

@@ -224,8 +224,9 @@ def test_there_are_enough_of_them():
 ON_RANKS = """
 import json, sys
 from pathlib import Path
-from hpcdem.runtime import launch, shutdown
+from hpcdem.runtime import kept, launch, shutdown
 launch.prepare_environment(1)
+kept.install()
 comm = launch.start_mpi()
 sys.path[:0] = [{root!r}, {here!r}]
 from test_hostile import run_as_the_program_does

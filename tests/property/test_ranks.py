@@ -23,7 +23,7 @@ pytestmark = pytest.mark.mpi
 
 REGRESSIONS = Path(__file__).with_name("regressions")
 QUICK = 20
-SLOW = int(os.environ.get("HPCDEM_PROPERTY_EXAMPLES", "200"))
+SLOW = int(os.environ.get("HPCDEM_PROPERTY_EXAMPLES", "100"))
 
 SETTLING = Model(
     (

@@ -160,12 +160,14 @@ def test_a_pcdc_script_from_a_file_of_settings(tmp_path):
 # --- killed, stopped, taken up again ------------------------------------------------------------------------------
 
 
-def undisturbed_and_killed(tmp_path: Path, seeds: str, steps: int) -> None:
-    """One sweep runs through. Of the other a member is killed as it runs, then the driver, then all is taken up."""
+@pytest.mark.slow
+def test_a_sweep_survives_kills_and_its_report_is_that_of_an_undisturbed_one(tmp_path):
+    """One sweep runs through. Of the other a member is killed as it runs, then the driver while members wait for their
+    turn, then all is taken up."""
     for name in ("quiet", "killed"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "push.py").write_text(parametrised_push(steps))
-    words = ["push.py", "--seed", seeds, "--set", "friction=0.1,0.4"]
+        (tmp_path / name / "push.py").write_text(parametrised_push(8000))
+    words = ["push.py", "--seed", "1:2", "--set", "friction=0.1,0.4"]
     call(*words, cwd=tmp_path / "quiet")
     folder = tmp_path / "killed" / "push_sweep"
     first = popen([sys.executable, "-m", "hpcdem", "sweep", *words], cwd=tmp_path / "killed")
@@ -196,16 +198,6 @@ def undisturbed_and_killed(tmp_path: Path, seeds: str, steps: int) -> None:
         one, other = (tmp_path / name / "push_sweep" / "report" / f"{sheet}.csv" for name in ("quiet", "killed"))
         assert one.read_bytes() == other.read_bytes(), sheet
     assert len(table(one)) > 20
-
-
-@pytest.mark.slow
-def test_a_sweep_survives_kills_and_its_report_is_that_of_an_undisturbed_one(tmp_path):
-    undisturbed_and_killed(tmp_path, "1", 8000)
-
-
-@pytest.mark.slow
-def test_twenty_members_survive_kills(tmp_path):
-    undisturbed_and_killed(tmp_path, "1:10", 8000)
 
 
 def test_a_driver_that_is_asked_to_stop_lets_members_save_and_goes_on(tmp_path):
