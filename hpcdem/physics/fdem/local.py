@@ -65,8 +65,7 @@ class Local(JointTables):
     corner_masses = staticmethod(Masses.of_corners)
     whole: SixNodes | None = None
     """Macro-elements of the plane, whose forces stand in place of those of their parts."""
-    awaited = False
-    """A history reads their forces in the next step."""
+    awaited = False  # whether a history reads their forces in the next step
     solids: Solids
     masses: Masses
     loads: Loads
@@ -391,8 +390,7 @@ class Local(JointTables):
     # ---- what is extracted from the tables ---------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Free all tables. They refer to each other, so they would last until Python next collects such circles; those
-        whose forces a history still reads do."""
+        """Free all tables, unless they are awaited. They refer to each other: Python would only free them later."""
         if not self.awaited:
             vars(self).clear()
 
