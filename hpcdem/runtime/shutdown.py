@@ -172,6 +172,8 @@ def end_mpi(end: ExitStatus) -> int:
         if end.code != EXIT_OK and hasattr(signal, "alarm"):
             signal.signal(signal.SIGALRM, signal.SIG_DFL)
             signal.alarm(EXIT_TIMEOUT)
+        if "petsc4py.PETSc" in sys.modules:  # at the exit of Python, after MPI, its end would be an error
+            sys.modules["petsc4py.PETSc"]._finalize()
         if MPI.Is_initialized() and not MPI.Is_finalized():
             MPI.Finalize()
     if end.rank > 0:

@@ -70,6 +70,14 @@ def test_a_good_end(launch, tmp_path):
 
 
 @pytest.mark.mpi
+@pytest.mark.petsc
+def test_a_good_end_with_petsc(launch, tmp_path):
+    """It ends before MPI does."""
+    done = run(launch, tmp_path, "from hpcdem.physics.fdem import linear; assert linear.petsc_there()", 2)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+@pytest.mark.mpi
 def test_an_error_of_all_ranks_is_printed_once(launch, tmp_path):
     done = run(launch, tmp_path, "raise ScriptError('push.py', 17, 'GENN: unknown command')")
     assert done.returncode == 2

@@ -16,20 +16,6 @@ def test_values_of_the_formulas_worked_out_by_hand():
 
 
 @pytest.mark.slow
-def test_a_beam_bends_as_it_should(resident, tmp_path):
-    """Coarse, without a notch, and not over the peak. Stiffness 6 %: joints take some of it, triangles of a fifth
-    of the height are too stiff. First crack: the outermost element takes the stress of its middle, h/H less than that
-    of the fibre, and the law of the joint is bent before its peak."""
-    case = ThreePointBend(notch=0, size=0.006, coarse=0.012, band=0.006, most=1.8, periods=2, penalty=20)
-    done = results(resident, tmp_path, case)
-    assert done.sagging == pytest.approx(exact.stiffness(case.young, case.poisson, case.span, case.height), rel=0.06)
-    first = exact.first_crack(case.tensile_strength, case.span, case.height)
-    assert first < done.first < first * (1.0 + 2.0 * case.size / case.height)
-    assert done.first < done.peak < 2.0 * first
-    assert done.energy_error < 0.01
-
-
-@pytest.mark.slow
 def test_work_of_fracture_of_a_notched_beam(resident, tmp_path):
     """A crack along a line of edges: G_f over the ligament within 10 %, as tests of materials give it; here the tail, a
     tenth of the whole, is known to about a fifth because of swings."""
@@ -42,11 +28,14 @@ def test_work_of_fracture_of_a_notched_beam(resident, tmp_path):
 
 @pytest.mark.slow
 def test_strength_and_work_of_a_whole_beam(resident, tmp_path):
+    """Stiffness 6 %: joints take some of it. First crack: the outermost element takes the stress of its middle, h/H
+    less than that of the fibre, and the law of the joint is bent before its peak."""
     case = ThreePointBend(notch=0)
     done = results(resident, tmp_path, case)
-    assert done.sagging == pytest.approx(exact.stiffness(case.young, case.poisson, case.span, case.height), rel=0.08)
+    assert done.sagging == pytest.approx(exact.stiffness(case.young, case.poisson, case.span, case.height), rel=0.06)
     first = exact.first_crack(case.tensile_strength, case.span, case.height)
     assert first < done.first < first * (1.0 + 2.0 * case.size / case.height)
+    assert done.first < done.peak < 2.0 * first
     assert (done.work + done.tail) / case.height == pytest.approx(case.gf1, rel=0.10)
     assert done.energy_error < 0.01
 
@@ -58,13 +47,14 @@ def test_mesh_size_and_pattern(resident, tmp_path):
     the path is one of the mesh, and where it branches the work may be twice as much."""
     found = {}
     for path in ("line", "free"):
-        for size in (0.005, 0.0035):
+        for size in (0.005, 0.0025 if path == "line" else 0.0035):
             case = ThreePointBend(path=path, size=size)
             done = results(resident, tmp_path / f"{path}{size}", case)
             assert done.energy_error < 0.01
             found[path, size] = (done.work + done.tail) / (case.height - case.notch) / case.gf1, done.peak
     print(found)
-    for size in (0.005, 0.0035):
+    for size in (0.005, 0.0025):
         assert found["line", size][0] == pytest.approx(1.0, abs=0.10)
+    for size in (0.005, 0.0035):
         assert 1.0 < found["free", size][0] < 2.5
-    assert found["line", 0.005][1] == pytest.approx(found["line", 0.0035][1], rel=0.05)
+    assert found["line", 0.005][1] == pytest.approx(found["line", 0.0025][1], rel=0.05)
