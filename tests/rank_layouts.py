@@ -11,13 +11,13 @@ LAYOUTS: dict[str, tuple[int, list[str]]] = {
     "3 ranks": (3, []),
     "4 ranks": (4, []),
     "3 ranks, borders stay": (3, ["--no-balance"]),
-    "2 threads": (1, ["-j", "2"]),
     "3 threads": (1, ["-j", "3"]),
     "2 ranks x 2 threads": (2, ["-j", "2"]),
 }
 """Number of ranks, and options, by name."""
+SLOW = ("4 ranks", "3 threads", "2 ranks x 2 threads")
 
 
 def layouts(quick: Collection[str]) -> list:
-    """Parameters of a test: the names of all layouts; those that are not in `quick` are slow."""
-    return [pytest.param(name, marks=() if name in quick else pytest.mark.slow) for name in LAYOUTS]
+    """Parameters of a test: the names of quick layouts, and of those that slow tests add."""
+    return [*quick, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW if name not in quick)]

@@ -68,9 +68,7 @@ def test_the_log_tells(one: tuple[Path, str]) -> None:
     ("ranks", "threads"),
     [
         (2, 1),
-        pytest.param(3, 1, marks=pytest.mark.slow),
         pytest.param(4, 1, marks=pytest.mark.slow),
-        pytest.param(1, 2, marks=pytest.mark.slow),
         pytest.param(1, 3, marks=pytest.mark.slow),
         pytest.param(2, 2, marks=pytest.mark.slow),
     ],

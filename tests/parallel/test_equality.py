@@ -73,7 +73,7 @@ def test_the_model_is_busy(reference: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", layouts({"3 ranks, borders stay"}))
+@pytest.mark.parametrize("case", layouts(("3 ranks, borders stay",)))
 def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
     ranks, options = LAYOUTS[case]
     busy(resident, tmp_path / "other", ranks, *options)

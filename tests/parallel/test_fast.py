@@ -102,7 +102,7 @@ def test_the_model_has_what_it_takes(reference: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", layouts({"3 ranks"}))
+@pytest.mark.parametrize("case", layouts(("3 ranks",)))
 def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
     ranks, options = LAYOUTS[case]
     run(resident, tmp_path / "other", ranks, *options)

@@ -110,7 +110,7 @@ def starved(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.slow), 3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_growing_model_on_more_ranks(grown: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     assert_same_files(grown, run_text(resident, GROWING + REST, tmp_path / "more", ranks))
 
@@ -128,7 +128,7 @@ def test_growth_goes_on_after_a_restart(grown: Path, resident: Resident, tmp_pat
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [pytest.param(n, marks=pytest.mark.slow) if n != 3 else n for n in (2, 3, 4)])
+@pytest.mark.parametrize("ranks", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_strips_without_particles(starved: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     """No particles at all, and fewer columns than ranks: the run goes on."""
     assert_same_files(starved, run_text(resident, STARVED, tmp_path / "more", ranks))
@@ -221,7 +221,6 @@ if sim.rank == 0:
 """
 
 WAYS = {
-    "2 threads": (1, ["-j", "2"]),
     "2 ranks": (2, []),
     "3 ranks, borders stay": (3, ["--no-balance"]),
     "4 ranks": (4, []),

@@ -128,7 +128,7 @@ NOTHING = "compiled late: []"
 SLOW, MPI = pytest.mark.slow, pytest.mark.mpi
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=[MPI, SLOW]), pytest.param(3, marks=[MPI, SLOW])])
+@pytest.mark.parametrize("ranks", [1, pytest.param(3, marks=[MPI, SLOW])])
 def test_particles(late, tmp_path: Path, ranks: int) -> None:
     write_lattice(tmp_path / "bodies.clumps", 3.0, 10, 6)
     for name, text, n in (("model.py", PARTICLES, ranks), ("again.py", AGAIN, ranks), ("followed.py", FOLLOWED, 1)):

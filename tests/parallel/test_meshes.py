@@ -83,7 +83,7 @@ def printed() -> dict[int, str]:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("n", [1, pytest.param(2, marks=pytest.mark.slow), 3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("n", [1, 3, pytest.param(4, marks=pytest.mark.slow)])
 def test_meshes_are_equal_on_any_number_of_ranks(n: int, launch: Launcher, tmp_path: Path, printed: dict[int, str]):
     try:
         optional.gmsh(), optional.shapely()

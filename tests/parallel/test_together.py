@@ -84,7 +84,7 @@ def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> tuple
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     ("ranks", "threads"),
-    [(3, 1), pytest.param(1, 2, marks=pytest.mark.slow), pytest.param(2, 2, marks=pytest.mark.slow)],
+    [(3, 1), pytest.param(2, 2, marks=pytest.mark.slow)],
 )
 def test_the_same_on_any_ranks(alone, resident, tmp_path, ranks, threads):
     assert ended(resident, tmp_path, ranks, START + REST, "-j", str(threads)) == alone[0]

@@ -79,7 +79,7 @@ def test_corners_tell_their_nodes(alone):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [3, pytest.param(2, marks=pytest.mark.slow), pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_on_several_ranks(resident, alone, tmp_path, ranks):
     done = start(resident, tmp_path / "a", ranks)
     assert done.returncode == 0, done.stderr

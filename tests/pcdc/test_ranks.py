@@ -22,7 +22,7 @@ def ranks(launch, tmp_path):
     return run
 
 
-@pytest.mark.parametrize("n", [2, pytest.param(1, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("n", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_script_runs_on_every_rank_and_speaks_once(ranks, tmp_path, n):
     text = (
         "import random\n" + BOX + "pcdc model gravity (0,[-9 - random.random()])\n"

@@ -82,11 +82,11 @@ def test_rock_breaks_beside_the_network(alone: Path) -> None:
     assert len({row["step"] for row in rows}) > 5
 
 
-@pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.slow), pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_the_whole_run_on_several_ranks(
-    alone: Path, resident: Resident, tmp_path: Path, ranks: int, needs_parallel_hdf5: None
+    alone: Path, resident: Resident, tmp_path: Path, needs_parallel_hdf5: None
 ) -> None:
-    start(resident, tmp_path, SCRIPT, ranks)
+    start(resident, tmp_path, SCRIPT, 4)
     same(alone, tmp_path)
 
 

@@ -63,7 +63,7 @@ def test_the_model_does_all_that_it_is_for(one: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [pytest.param(n, marks=pytest.mark.slow) if n != 3 else n for n in (2, 3, 4)])
+@pytest.mark.parametrize("ranks", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_ranks(one: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     assert_same_files(one, run_text(resident, MODEL + REST, tmp_path / "more", ranks))
 

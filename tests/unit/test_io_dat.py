@@ -277,7 +277,7 @@ for n in (1, 400):
 
 @pytest.mark.slow
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_any_number_of_ranks_writes_the_same_bytes(launch: Any, tmp_path: Path, ranks: int) -> None:
     from hpcdem.io.ps import write_ps
     from hpcdem.io.vtk import write_vtk, write_wall_vtk

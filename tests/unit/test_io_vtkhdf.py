@@ -137,7 +137,7 @@ for n in (1, 500):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.parametrize("ranks", [1, 3])
 def test_any_number_of_ranks_writes_the_same_file(launch: Any, tmp_path: Path, ranks: int) -> None:
     (tmp_path / "program.py").write_text(PROGRAM)
     done = launch.python(ranks, "program.py", ROOT, cwd=tmp_path, timeout=120)
