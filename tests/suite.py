@@ -201,7 +201,7 @@ def next_file(files: Iterable[str], families: dict[Any, str], node: Any) -> str:
     of the family with most seconds left for each of its workers. families: of the workers; becomes that of now."""
     left: defaultdict[str, dict[str, float]] = defaultdict(dict)
     for file in files:
-        left[_FAMILY.get(file.split("/")[1], "rest")][file] = seconds_of(_file(file))
+        left[_FAMILY.get("".join(Path(file).parts[1:2]), "rest")][file] = seconds_of(_file(file))
     if families.get(node) not in left:
         at = Counter(families.values())
         families[node] = max(left, key=lambda family: sum(left[family].values()) / (1 + at[family]))
@@ -211,8 +211,9 @@ def next_file(files: Iterable[str], families: dict[Any, str], node: Any) -> str:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Whole files, by `next_file`; what else --dist asks for is left to xdist."""
-    if config.getoption("dist") != "loadfile":
+    """Whole files, by `next_file`, also with -n alone: each worker would make again what is made once for a file. What
+    else --dist asks for is left to xdist."""
+    if config.getoption("dist") not in ("load", "loadfile"):
         return None
     from xdist.scheduler import LoadFileScheduling
 
