@@ -20,7 +20,7 @@ from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 Where = str | g.Term | tuple[g.Term, ...] | None
-"""The text of a RANGE, or terms of `hpcdem.physics.fdem.groups`, all of which must hold; None: everything."""
+"""Text of a RANGE, or terms of `hpcdem.physics.fdem.groups` that must all be satisfied; None: everything."""
 _WORDS = {
     g.ELEMENT: "element",
     g.NODE: "node",

@@ -376,7 +376,8 @@ GROUPS: tuple[type[Words], ...] = (
     Geometry, Mesh, Elements, Faces, Joints, Nodes, Bolts, BoltNodes, FlowNodes, Channels, Wells, Liners, LinerNodes,
     Tables, Fields, Histories, Charts, Output,
 )  # fmt: skip
-"""Attributes of a simulation that hold the commands of blocks; what each is called is its `_word`."""
+"""Classes whose instances are attributes of a simulation, with the commands of blocks; the attribute is named
+`_word`."""
 refer((BlockCommands, *GROUPS))
 
 

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from hpcdem.post.view.moment import Moment
 
 NARROWEST = 100
-"""Pixels along a picture, at least."""
+"""Smallest width of a picture [pixels]."""
 MAIN = ("particles", "elements")
-"""Kinds of objects of which a frame is requested if none is named."""
+"""Kinds of objects of a frame used by default."""
 
 
 class Looks(TypedDict, total=False):

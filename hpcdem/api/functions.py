@@ -30,13 +30,13 @@ from hpcdem.lang.zdem.table import COLORS
 
 MATERIAL_WORDS = tuple(Material.__annotations__)
 OF_BOTH = {"start", "save", "restore", "resume", "finish", "cycle", "imple", "energy"}
-"""Methods that may find blocks alone. The others make the particles first: kernels must be settled before modules that
-have some are imported, and these import them when they are named."""
+"""Methods that also apply to models without particles. The others create the particles first: the kernels must be
+chosen before the modules that contain some are imported."""
 FIELDS_READ = {
     "box": "BOX", "wall": "WALL", "ball": "BALL", "gen": "GEN", "gen_grid": "GEN", "gline": "GLINE", "prop": "PROP",
     "bond": "PROP", "set": "SET",
 }  # fmt: skip
-"""Methods whose values are checked against declared units, and the commands whose units they have."""
+"""Methods whose values are checked against declared units, and the commands that define these units."""
 Method = TypeVar("Method", bound=Callable[..., Any])
 Kind = TypeVar("Kind", bound=type)
 
@@ -99,7 +99,7 @@ TAKEN = {
     "num": Taken("int", lambda sim, num: int(num)),
     "list[float]": Taken("Iterable[float]", lambda sim, radii: _radii(radii)),
 }
-"""Conversions by the name of the argument, or its type."""
+"""Conversions by name of the argument or by its type."""
 READ = Taken("File", lambda sim, file: sim._existing(file))
 WRITTEN = Taken("File", lambda sim, file: sim.directory / file)
 

@@ -311,7 +311,7 @@ def _named(option: Option, given: Any) -> dict[str, Any]:
         return {**start, **given}
     parts = (given,) if isinstance(given, str) else tuple(given)
     if not 1 <= len(parts) <= len(names):
-        raise TypeError(f"expected {', '.join(names[1:])} beside the name of the layer, got {given!r}")
+        raise TypeError(f"expected {', '.join(names[1:])} in addition to the name of the layer, got {given!r}")
     return {**start, **dict(zip(names, parts))}
 
 
@@ -329,7 +329,7 @@ def _called(arguments: Iterable[Argument], option: str, words: Mapping[str, Any]
 
 
 _DRESSED: set[type] = {object}
-"""Classes whose methods tell errors so."""
+"""Classes whose methods report errors with file and line of the program."""
 
 
 def commands(cls: Kind) -> Kind:

@@ -14,7 +14,7 @@ from hpcdem.core.place import PACKAGE
 HELP = "see help(hpcdem.Simulation)"
 _BOTH = (("color", "colour"), ("colors", "colours"), ("center", "centre"))
 TWINS = {one: other for pair in _BOTH for one, other in (pair, pair[::-1])}
-"""Words that are spelt in two ways."""
+"""Words with two spellings."""
 _UNKNOWN = re.compile(r"got an unexpected keyword argument '(\w+)'")
 _OWN_NAME = re.compile(r"^\w+(\.\w+)*\(\) ")
 

@@ -14,17 +14,17 @@ from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.tables import Drawn, Over
 
 Point = tuple[float, ...]
-"""Two numbers, three in a model of three dimensions."""
+"""Coordinates: two numbers, three in a model of three dimensions."""
 File = str | Path
 Number = float | str | FunctionName
-"""Value of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
+"""Value of a condition: a number, the name of a table of time, or a function from `nodes.function`."""
 Value = float | Over | Drawn | np.ndarray
-"""Value of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen
-(n,)."""
+"""Value of a property: a number; the result of `tables.over` or `fields.drawn`; an array with one value per selected
+object (n,)."""
 Where = str | g.Term | tuple[g.Term, ...] | None
-"""The text of a RANGE, or terms of `hpcdem.physics.fdem.groups`, all of which must hold; None: everything."""
+"""Text of a RANGE, or terms of `hpcdem.physics.fdem.groups` that must all be satisfied; None: everything."""
 Selected = str | Selection | None
-"""The text of a RANGE of ZDEM, or an object of `hpcdem.core.selection`; None: all particles."""
+"""Text of a RANGE of ZDEM, or an object of `hpcdem.core.selection`; None: all particles."""
 
 
 class Piece(TypedDict, total=False):

@@ -31,7 +31,7 @@ CASES = {
     "lauwerier": "Lauwerier", "doublet": "Doublet", "proppant-slot": "ProppantSlot",
     "proppant-bed": "ProppantBed", "proppant-closure": "ProppantClosure", "thermal-shock": "ThermalShock",
 }  # fmt: skip
-"""Names on the command line, and the classes; a class stands in the module of its name, with _ for -."""
+"""Classes by their names on the command line; the module of a class has its name, with _ for -."""
 __all__ = ["CASES", "find", *CASES.values()]
 
 

@@ -63,7 +63,7 @@ class Brazilian(Rock):
         if self.size > self.diameter / 8:
             raise ValueError(f"size is {self.size:g}, expected at most an eighth of diameter, {self.diameter / 8:g} m")
         if self.dim == 2 and "thickness" in self.model_fields_set:
-            raise ValueError("thickness: expected dim 3 beside it")
+            raise ValueError("thickness requires dim 3")
         self.not_too_many(0.25 * math.pi * self.diameter**2, self.thickness if self.dim == 3 else None)
         return self
 
@@ -204,4 +204,4 @@ PICTURE = """\
 pcdc output image 'brazilian' deformed 10
 pcdc output image 'section' section 'z=[thickness/2]' eye '0,0,1'
 """
-"""The disc, and its middle with what broke."""
+"""Picture of the disc, with broken joints in its centre."""

@@ -10,7 +10,7 @@ from pydantic import model_validator
 from hpcdem.cases.base import Case, quantity
 
 MOST = 1e6
-"""Elements: more are a slip of the pen."""
+"""Largest number of elements; more are probably a mistake."""
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ class Doublet(Warm):
     @model_validator(mode="after")
     def _fits(self) -> Doublet:
         if self.inflow_temperature == self.rock_temperature:
-            raise ValueError("inflow_temperature and rock_temperature are equal, expected heat that flows")
+            raise ValueError("inflow_temperature and rock_temperature are equal, so no heat flows")
         if self.size > 0.1 * self.distance:
             raise ValueError(f"size is {self.size:g}, expected at most a tenth of distance, {0.1 * self.distance:g} m")
         return self

@@ -53,7 +53,7 @@ class Lauwerier(Warm):
     @model_validator(mode="after")
     def _fits(self) -> Lauwerier:
         if self.inflow_temperature == self.rock_temperature:
-            raise ValueError("inflow_temperature and rock_temperature are equal, expected heat that flows")
+            raise ValueError("inflow_temperature and rock_temperature are equal, so no heat flows")
         if not self.first < self.second:
             raise ValueError(f"second is {self.second:g}, expected more than first, {self.first:g} days")
         if self.size > 0.05 * self.length:

@@ -72,8 +72,7 @@ class PennyFracture(Case):
         r = resolution(plane, self.energy, self.tensile_strength, self.confinement, self.size)
         if r > 2.0 and self.regime == "toughness":
             raise ValueError(
-                f"size is {self.size:g}, expected at most {2.0 * self.size / r:.3g} m: longer joints, which must lose "
-                "confinement and strength, snap"
+                f"size is {self.size:g}, expected at most {2.0 * self.size / r:.3g} m: longer joints open in jumps"
             )
         return self
 

@@ -64,9 +64,7 @@ class ProppantBed(Case):
         if self.size > 0.0626 * self.length:
             raise ValueError(f"size is {self.size:g}, expected at most a sixteenth of length, {self.length / 16:g} m")
         if self.grain_density <= 1000.0:
-            raise ValueError(
-                f"grain_density is {self.grain_density:g}, expected grains that settle in water, 1000 kg/m3"
-            )
+            raise ValueError(f"grain_density is {self.grain_density:g}, expected more than that of water, 1000 kg/m3")
         if self.concentration > 0.5 * self.limit:
             most = 0.5 * self.limit
             raise ValueError(f"concentration is {self.concentration:g}, expected at most half of limit, {most:g}")

@@ -59,7 +59,7 @@ class ProppantSlot(Case):
         if self.aperture < 3.0 * self.grain_size:
             raise ValueError(f"aperture is {self.aperture:g}, expected at least 3 grains, {3 * self.grain_size:g} m")
         if self.grain_density <= self.fluid_density:
-            raise ValueError("grain_density is not above fluid_density, expected grains that settle")
+            raise ValueError("grain_density is not above fluid_density, so grains do not settle")
         return self
 
     def model(self) -> str:

@@ -45,7 +45,7 @@ class RadialFlow(Water):
     def _fits(self) -> RadialFlow:
         refuse_thin_ring(self.inner, self.outer, self.size)
         if self.inner_pressure == self.outer_pressure:
-            raise ValueError("inner_pressure and outer_pressure are equal, expected water that flows")
+            raise ValueError("inner_pressure and outer_pressure are equal, so no water flows")
         return self
 
     def model(self) -> str:

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator
 from hpcdem.cases.base import Case, quantity
 
 MOST = 5e6
-"""Elements: more are a slip of the pen."""
+"""Largest number of elements; more are probably a mistake."""
 
 
 def _whole(given: Any) -> Any:
@@ -72,7 +72,7 @@ WAVES = """
 # Waves: how long one needs through the specimen says how fast it is loaded.
 speed_of_waves = math.sqrt(young * (1 - poisson) / (density * (1 + poisson) * (1 - 2 * poisson)))
 """
-"""speed_of_waves [m/s]: that of pressure waves."""
+"""Time scale of waves. speed_of_waves: of pressure waves [m/s]."""
 
 CRACKS = """
 state, mode = pcdc.values('joint', 'state'), pcdc.values('joint', 'mode')

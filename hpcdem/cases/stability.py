@@ -62,7 +62,7 @@ class SlopeStability(Case):
         if self.size > 0.25 * self.height:
             raise ValueError(f"size is {self.size:g}, expected at most a quarter of height, {0.25 * self.height:g} m")
         if self.angle == 90.0 and self.below == 0.0:
-            raise ValueError("angle is 90, expected a model with soil before and below a vertical face")
+            raise ValueError("angle is 90: a vertical face requires soil before and below it")
         if self.dilation > self.friction:
             raise ValueError(f"dilation is {self.dilation:g}, expected at most friction, {self.friction:g} degrees")
         return self

@@ -100,7 +100,7 @@ class Support(Case):
         if self.dim == 3:
             for name in ("elements", "liner"):
                 if name in self.model_fields_set:
-                    raise ValueError(f"{name}: expected dim 2 beside it")
+                    raise ValueError(f"{name} requires dim 2")
             if self.size > 0.7 * self.bolt_spacing:
                 raise ValueError(f"size is {self.size:g}, expected at most 0.7 of bolt_spacing in three dimensions")
         if self.pretension > self.bolt_yield:

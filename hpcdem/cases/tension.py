@@ -67,7 +67,7 @@ class DirectTension(Rock):
             raise ValueError(f"width is {self.width:g}, expected more than neck and less than neck + 2 radius")
         high = (self.radius**2 - (self.radius - deep) ** 2) ** 0.5
         if 2.0 * high >= self.length:
-            raise ValueError(f"length is {self.length:g}, expected more than the arcs take, {2.0 * high:g} m")
+            raise ValueError(f"length is {self.length:g}, expected more than the length of the arcs, {2.0 * high:g} m")
         if self.coarse < self.size:
             raise ValueError(f"coarse is {self.coarse:g}, expected at least size, {self.size:g} m")
         return self

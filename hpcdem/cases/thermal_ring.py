@@ -59,7 +59,7 @@ class ThermalRing(Ring):
     @model_validator(mode="after")
     def _differs(self) -> ThermalRing:
         if self.inner_temperature == self.outer_temperature:
-            raise ValueError("inner_temperature and outer_temperature are equal, expected heat that flows")
+            raise ValueError("inner_temperature and outer_temperature are equal, so no heat flows")
         return self
 
     def model(self) -> str:

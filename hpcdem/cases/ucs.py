@@ -175,4 +175,4 @@ PICTURE = """\
 pcdc output image 'ucs' deformed 10
 pcdc output image 'section' section 'y=0' eye '0,-1,0'
 """
-"""The specimen, and its middle with what broke."""
+"""Picture of the specimen, with broken joints in its middle."""

@@ -35,7 +35,7 @@ pcdc face-joint c-model t-f property conductivity [fluid_conductivity] capacity 
 pcdc model option mechanical off                 # the rock is fixed
 pcdc flow-node initial saturation 1
 """
-"""Channels of a RANGE, full of water, with heat; the elements have theirs."""
+"""Water-filled channels of a RANGE with a thermal model; elements have their own."""
 
 ROCK = """
 pcdc element c-model mech-iso-e property density 2500 young 50e9 poisson-r 0.25
@@ -45,7 +45,7 @@ CHANNELS = """\
 pcdc face-joint c-model hydr-p-m property fluid-density [fluid_density] fluid-bulk 2.2e9 \\
     viscosity [viscosity/fluid_density] aperature-initial [aperture] aperature-minumum [0.01*aperture] RANGE
 """
-"""All joints, or those of a RANGE, are channels."""
+"""Channels: all joints, or those of a RANGE."""
 
 STEADY = """
 import numpy as np

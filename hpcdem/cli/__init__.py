@@ -33,7 +33,7 @@ __all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "
 
 
 STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
-"""`hpcdem ... -s DIR`, as ZDEM has it; the misspelt form is the manual's."""
+"""Options of `hpcdem ... -s DIR`, as in ZDEM; the misspelt one is that of the manual."""
 
 
 _BLOCKS = ("blocks", *OF_BLOCKS)

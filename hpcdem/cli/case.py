@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 PROGRAM = "hpcdem case"
 OWN = ("output", "force")
-"""Options that are no parameters."""
+"""Options that are not parameters of the case."""
 
 
 def start(words: list[str]) -> NoReturn:

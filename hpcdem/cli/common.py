@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 HELP = {"help_option_names": ["-h", "--help", "--hlep"], "max_content_width": 110}
 HELP_WORDS = {"-h", "--help", "--hlep"}
-"""The misspelt form is the manual's."""
+"""Options that show the help; the misspelt one is that of the manual."""
 PATH = click.Path(path_type=Path)
 
 

@@ -28,7 +28,7 @@ LAYER_OPTIONS = {
     "limits": "limits", "log": "log", "colours": "colours", "opacity": "opacity", "edges": "edges", "size": "size",
     "vectors": "vectors", "arrows": "arrows", "filter": "filter", "colour": "colour",
 }  # fmt: skip
-"""Options about one kind of object, and their names in a view."""
+"""Options for one kind of object, and their names in a view."""
 
 
 @click.command(context_settings=HELP, no_args_is_help=True)

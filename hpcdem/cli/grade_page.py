@@ -13,11 +13,11 @@ from hpcdem.core.errors import EXIT_OK, UsageError
 from hpcdem.runtime import launch
 
 NUMBER = 2000
-"""Grains to begin with: enough for a curve of some width, few enough to be drawn at once."""
+"""Initial number of grains: enough for a wide grading curve, few enough to draw immediately."""
 EXAMPLE = (10.0, 7.0, 5.0, 3.0, 2.0, 1.5), (100.0, 82.0, 64.0, 40.0, 22.0, 9.0)
-"""The table to begin with where no file is named: sizes [mm], per cent finer."""
+"""Initial table if no file is given: sizes [mm], per cent finer."""
 NOT_SERVED = ("read", "out", "layout", "width", "as_json")
-"""Options that a page has no use for."""
+"""Options without meaning for a page."""
 
 grade = click.Command(
     "grade",

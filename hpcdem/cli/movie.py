@@ -25,7 +25,7 @@ PANELS_SHOWN = {name: (name,) for name in ("cracks", "stress", "plastic", "tempe
 }
 """Panels by words of --show."""
 PAGE = 17.0
-"""Width [cm] of a page on which fonts and lines have their sizes; a film shows the page with --size pixels."""
+"""Width of a page on which fonts and lines have their nominal sizes [cm]; a film shows this page with --size pixels."""
 
 
 @click.command(cls=ManualCommand, context_settings=HELP, no_args_is_help=True)
@@ -157,7 +157,7 @@ def draw(comm: Comm, log: Log, options: dict[str, Any], scratch: Path) -> list[P
 
 
 IN_PLANE = ("show", "xmin", "xmax", "ymin", "ymax")
-"""Options of films of blocks that do nothing in space."""
+"""Options of films of blocks for two dimensions only."""
 
 
 def jobs_in_space(files: list[Path], options: dict[str, Any], scratch: Path) -> list[ViewJob]:

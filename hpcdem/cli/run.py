@@ -56,7 +56,7 @@ class Options:
     against: Path | None = None
     arguments: tuple[str, ...] = ()
     saved_in: Path | None = None
-    """Take the script out of the newest checkpoint of this folder (cli/resume.py)."""
+    """Folder whose newest checkpoint contains the script (cli/resume.py)."""
 
     @property
     def since(self) -> float:
@@ -286,7 +286,7 @@ def reproduction(session: Session, options: Options) -> Reproduction | None:
 
 _BEGINS_ZDEM = re.compile(rb"(star?t?|res(t(o(r(e)?)?)?)?\b[^=]*|load?\b[^=]*)\s*([#!;].*)?", re.IGNORECASE)
 _SETS = re.compile(rb"\w+\s*=\s*[-+.\d]")
-"""A line that sets a parameter, which may come before."""
+"""Line that sets a parameter; such lines may precede the first command."""
 
 
 def speaks_zdem(path: Path) -> bool:
@@ -333,7 +333,7 @@ STRESS_AND_STRAIN = (
     (("--increment",), None),
     (("--smooth",), None),
 )
-"""Options that go with -s DIR (cli/strain_stress.py), with the name of their value."""
+"""Options of -s DIR (cli/strain_stress.py), with the names of their values."""
 
 
 def only_with_s(context: click.Context, option: click.Parameter, value: Any) -> None:

@@ -196,7 +196,7 @@ _FILE = {
     "sampling-seed": "sampling_seed", "ranks": "ranks", "threads": "threads", "jobs": "jobs", "tries": "tries",
     "with": "links", "output": "output", "sbatch": "sbatch",
 }  # fmt: skip
-"""Keys of a file of settings, besides [set]."""
+"""Keys of a settings file, besides [set]."""
 
 
 def from_file(path: Path, options: Mapping[str, Any]) -> dict[str, Any]:

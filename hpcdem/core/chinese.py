@@ -62,8 +62,8 @@ MESSAGES: tuple[tuple[str, str], ...] = (
     (r"Got unexpected extra argument", "多余的参数"),
     (r"Invalid value for '(.+?)'", "{1} 的值不正确"),
 )
-"""Patterns of English messages, in the order in which they are tried, and what they mean; {1}: what a group read,
-{2:text {}}: text if the group read something."""
+"""Patterns of English messages, in the order in which they are tried, and their translations; {1}: text of a group,
+{2:text {}}: text if the group is not empty."""
 
 
 def wanted(environ: Mapping[str, str] | None = None, encoding: str | None = None) -> bool:

@@ -27,9 +27,9 @@ class Comm(Protocol):
     mpi: Any
     """The communicator of mpi4py, None without MPI."""
     crowded: bool
-    """More ranks than cores on some host."""
+    """True if a host has more ranks than cores."""
     here: int
-    """Ranks on this node of the machine."""
+    """Number of ranks on this node of the machine."""
 
     def barrier(self) -> None:
         """Wait for all ranks."""

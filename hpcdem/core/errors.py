@@ -8,15 +8,14 @@ from __future__ import annotations
 
 EXIT_OK = 0
 EXIT_ERROR = 1
-"""The run stopped on an error: physics (NaN, runaway particle), files, launch."""
+"""Exit code of a run that failed: physics (NaN, runaway particle), files, launch."""
 EXIT_USAGE = 2
-"""Command line or script not understood; nothing was run and nothing was written."""
+"""Exit code of an invalid command line or script; nothing was run or written."""
 EXIT_UNBALANCED = 3
-"""A script requires equilibrium (model solve) and the model does not reach it."""
+"""Exit code of a script that requires equilibrium (model solve) which the model did not reach."""
 EXIT_CHECKPOINT = 85
-"""Stopped before the end on request (signal or time limit) after a checkpoint was written; run again with --resume.
-
-85 is what HTCondor uses for "checkpointed, please start me again"."""
+"""Exit code of a run stopped on request (signal or time limit) after writing a checkpoint; run again with --resume.
+HTCondor uses 85 for "checkpointed, please start me again"."""
 
 
 class HpcdemError(Exception):

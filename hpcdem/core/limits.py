@@ -13,16 +13,16 @@ from typing import Any
 from hpcdem.core.errors import CommandError
 
 LARGEST = 1e60
-"""For any number given to a model, whatever its unit: products of some of them stay within the range of a double.
-"""
+"""Largest number accepted for any quantity: products of several remain within the range of a double."""
 LONGEST, SHORTEST = 1e30, 1e-30
-"""Beyond these, squares and cubes of lengths leave the range of a double."""
+"""Bounds of lengths: squares and cubes remain within the range of a double."""
 FARTHEST = 1e12
-"""Largest coordinate of a particle in radii: a double still resolves 1e-4 of the radius there."""
+"""Largest coordinate of a particle in radii; a double resolves 1e-4 of the radius there."""
 MOST = 10**8
-"""Most particles that one command makes. GEN makes all of them on every rank, a cluster's node could not hold more."""
+"""Largest number of particles per command. GEN creates all of them on every rank; more do not fit a node of a
+cluster."""
 MOST_ATTEMPTS = 10**10
-"""Most attempts of one GEN, about half an hour."""
+"""Largest number of attempts of one GEN, which take about half an hour."""
 
 Point = Sequence[float]
 
@@ -106,7 +106,7 @@ STEEPEST = 80.0
 """Largest angle [deg] to which a slope can be limited."""
 PROCESSES = ("diffuse", "slope", "erode", "above", "deposit", "below")
 OF_EROSION = ("id", "interval", "x", "spacing", "erode", "above", "rise", "years", "only", "porosity")
-"""Options of SURFACE that a process without a deposit accepts."""
+"""Options of SURFACE accepted without a deposit."""
 
 
 def check_surface(given: Mapping[str, Any]) -> None:
@@ -119,9 +119,7 @@ def check_surface(given: Mapping[str, Any]) -> None:
     if not active:
         raise CommandError(f"nothing to do; give one or more of {', '.join(PROCESSES)}, or off")
     if not given.get("interval", 0) >= 1:
-        raise CommandError(
-            f"interval: steps between two applications, 1 or more, are needed, got {given.get('interval')}"
-        )
+        raise CommandError(f"interval must be at least 1 step, got {given.get('interval')}")
     for name in ("diffuse", "erode", "deposit", "years", "spacing"):
         if name in given and not 0.0 < given[name] <= LARGEST:
             raise CommandError(f"{name} must be above 0, got {given[name]:g}")
@@ -157,7 +155,7 @@ def _check_deposit(given: Mapping[str, Any], makers: Sequence[str]) -> None:
     if not makers:
         strange = [name for name in given if name not in OF_EROSION]
         if strange:
-            raise CommandError(f"{strange[0]} describes the deposit, and erosion alone makes none")
+            raise CommandError(f"{strange[0]} describes a deposit, but this process only erodes")
         return
     if not len(given.get("rad", ())):
         raise CommandError(f"{makers[0]} deposits discs: give their radii (rad)")
@@ -173,7 +171,7 @@ def _check_deposit(given: Mapping[str, Any], makers: Sequence[str]) -> None:
             f"{given['compact'][1]:g}"
         )
     if given.get("episode", 1) < 1:
-        raise CommandError(f"episode: steps with one group, 1 or more, are needed, got {given['episode']}")
+        raise CommandError(f"episode must be at least 1 step, got {given['episode']}")
 
 
 def _point(p: Point) -> str:

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterable
 
 LONGEST = 40
-"""Longer words are not typing mistakes, and comparing them would take long."""
+"""Longest word that is compared with known words; longer ones are unlikely to be typing mistakes."""
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:

@@ -10,9 +10,9 @@ OBJECTS = (
     "elements", "particles", "clumps", "walls", "contacts", "bonds", "channels", "joints", "bolts", "liners",
     "face-conditions", "flow-nodes", "node-conditions", "faults",
 )  # fmt: skip
-"""What can be shown, in the order in which it lies over one another."""
+"""Objects that can be shown, in drawing order."""
 HIDDEN = ("clumps", "contacts", "bonds", "face-conditions", "flow-nodes", "node-conditions", "faults")
-"""Of these, what is shown only if somebody asks for it."""
+"""Objects shown only on request."""
 COLOURS = {
     "viridis": "viridis",
     "cividis": "cividis",
@@ -27,8 +27,8 @@ COLOURS = {
     "spectral": "Spectral_r",
     "rainbow": "turbo",
 }
-"""Colours of fields, and their names in matplotlib. blue-red and orange-violet, white in their middle, are for values
-of both signs. The colour-blind can read all but yellow-green, spectral and rainbow."""
+"""Colour maps and their names in matplotlib. blue-red and orange-violet, white in the middle, suit values of both
+signs. All but yellow-green, spectral and rainbow suit colour-blind readers."""
 NUMBERS = {
     "lg": 0, "green": 1, "yellow": 2, "red": 3, "white": 4, "black": 5, "mg": 6, "blue": 7, "gb": 8, "violet": 9,
 }  # fmt: skip
@@ -37,7 +37,7 @@ EYES = {
     "+x": (1.0, 0.0, 0.0), "-x": (-1.0, 0.0, 0.0), "+y": (0.0, 1.0, 0.0), "-y": (0.0, -1.0, 0.0),
     "+z": (0.0, 0.0, 1.0), "-z": (0.0, 0.0, -1.0), "iso": (1.0, -1.0, 1.0),
 }  # fmt: skip
-"""Named places of the eye in space, as directions from the model to it; iso: from the right, the front and above."""
+"""Named positions of the viewer, as directions from the model; iso: from the right, the front and above."""
 
 
 class Section(NamedTuple):

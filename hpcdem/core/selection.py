@@ -20,8 +20,8 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 
 VARIABLES = ("left", "right", "bottom", "top")
-"""Names that an expression may use: min(x - r), max(x + r), min(y - r), max(y + r) of the particles that are not fixed
-in both x and y."""
+"""Names available in expressions: min(x - r), max(x + r), min(y - r), max(y + r) of the particles that are not fixed in
+both x and y."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from time import perf_counter_ns
 from hpcdem.core.comm import Comm
 
 WAITING = frozenset({"halo", "exchange", "migrate", "reduce", "output", "checkpoint", "figure", "callback"})
-"""Stages in which a rank mostly waits for others or for the disk; all others are its own work."""
+"""Stages in which a rank mostly waits for others or for the disk; all others are computation."""
 
 
 class Stopwatch:

@@ -165,9 +165,9 @@ _LADDERS: dict[str, tuple[tuple[float, str], ...]] = {
     "m2/s": ((1e-6, "mm2/s"), (1.0, "m2/s")),
     "%": ((0.01, "%"),),
 }  # fmt: skip
-"""Units that are written with prefixes. Of a compound ("N/m", "Pa s") the first factor has the prefix."""
+"""Units written with prefixes. In a compound ("N/m", "Pa s") the first factor has the prefix."""
 _PLAIN = ("kg/m3", "kg/m2", "m/s2", "s/m")
-"""Compounds that nobody writes with prefixes."""
+"""Compound units written without prefixes."""
 
 
 def ladder(unit: str) -> Sequence[tuple[float, str]]:
@@ -210,7 +210,7 @@ def scale(largest: float, unit: str, digits: int = 4) -> tuple[float, str]:
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 COLDEST = 173.0
-"""No rock is as cold [K]: temperatures below are those of a script that counts in °C."""
+"""Lowest plausible temperature of rock [K]; lower values indicate a script in °C."""
 
 
 def on_bar(low: float, high: float, unit: str) -> tuple[float, str]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 TOLERANCE = 1.1
-"""Largest busy time over the mean that is left alone."""
+"""Largest ratio of the longest to the mean busy time that needs no rebalancing."""
 PATIENCE = 500
-"""Steps of measurement before borders may move again."""
+"""Steps measured before boundaries may move again."""
 
 
 def imbalance(largest: float, mean: float) -> float:

@@ -30,7 +30,7 @@ from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
 
 FRESH, LISTS, STORAGE = 0, 1, 2
-"""Parts that a check finds outdated: nothing; the lists; storage, order and ghosts with them."""
+"""Result of a check: nothing outdated; lists outdated; storage, order and ghosts outdated too."""
 
 
 class Histories(Protocol):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 LONGEST_WAIT = 64
 """Largest number of steps between two checks of the displacements."""
 GLANCE = 10
-"""Steps between two glances: looks that change nothing unless somebody has sped up since the last check."""
+"""Interval of quick checks [steps], which detect particles that have accelerated since the last check."""
 UNSEEN, AT_A_GLANCE, CHECK = 0, 1, 2
 
 

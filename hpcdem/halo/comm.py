@@ -23,9 +23,9 @@ from hpcdem.halo.shared import Nodes
 __all__ = ["MpiComm", "SerialComm"]
 
 PARCELS = 21
-"""Tag of messages of `exchange`; every other call uses the next one."""
+"""Tag of messages of `exchange`; each further call uses the next tag."""
 NAP = 2e-5
-"""Sleep between two questions on a crowded host [s]; the kernel adds some 50 us."""
+"""Sleep between two polls on a crowded host [s]; the kernel adds some 50 us."""
 
 
 class MpiComm(Comm):

@@ -20,9 +20,9 @@ from hpcdem.core.memory import aligned, take_rows
 ROWS = 11
 """Tag of messages."""
 BACK = 1
-"""Added to the tag for a second table of rows."""
+"""Offset of the tag for a second table of rows."""
 ONWARDS = 2
-"""Added to the tag of what goes to a later neighbour: of two periodic ranks each is both neighbours of the other."""
+"""Offset of the tag for messages to a later neighbour: of two periodic ranks, each is both neighbours of the other."""
 
 Sends = dict[int, slice | np.ndarray]
 """Owned rows by the rank that gets them: a range, or ascending indices. Periodic models have one more neighbour at

@@ -22,11 +22,11 @@ import numpy as np
 from hpcdem.core.errors import CommandError, HpcdemError
 
 SMALL = 1 << 16
-"""Bytes of an array that is not worth a file: it travels with the rest."""
+"""Size of an array up to which no shared file is made [bytes]; it is sent with the rest."""
 PIECE = 1 << 30
-"""Bytes of a message at most."""
+"""Largest size of a message [bytes]."""
 FILES = 1 << 16
-"""Files that a rank may have open, as far as the system lets it: each array that is mapped keeps one open."""
+"""Number of files that a rank may open, if the system allows: each mapped array keeps one open."""
 
 
 class Nodes:

@@ -16,9 +16,9 @@ UNITS = ((1e3, 1e3, "km"), (1.0, 1.0, "m"), (0.05, 0.01, "cm"), (1e-3, 1e-3, "mm
 CM = 1.0 / 2.54
 """A centimetre in inches."""
 MOST = 12.0
-"""Steps along an axis at most."""
+"""Largest number of steps along an axis."""
 LEAST = 5
-"""Numbers along a bar of colours at least."""
+"""Smallest number of labels along a colour bar."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from hpcdem.core.comm import Comm
 from hpcdem.core.errors import HpcdemError
 
 BUFFER = 256 << 20
-"""Most bytes that wait to be written; who has more waits."""
+"""Largest number of bytes that wait to be written; a writer with more has to wait."""
 
 
 class Delivered(Protocol):
@@ -137,4 +137,4 @@ class Deliveries:
 
 
 under_way = Deliveries()
-"""The files of this process that are under way, of whatever model."""
+"""Files being written by this process, of any model."""

@@ -41,12 +41,12 @@ FORMAT = "hpcdem checkpoint"
 VERSION = 9
 
 BLOCKS, BOTH = "blocks", "coupled"
-"""`kind` in the state: a model of blocks, one of particles and blocks; particles alone have none."""
+"""Values of `kind` in the state: a model of blocks, one of particles and blocks; a model of particles has none."""
 OF_PARTICLES, LINKS = "discs_", "disc_contacts"
 """Prefix of the names of the particles' tables in a file of both models; table of the contacts between them."""
 
 _PART = 1 << 18
-"""Words that are mixed at a time."""
+"""Number of words mixed at a time."""
 _ALL_BITS = (1 << 64) - 1
 
 

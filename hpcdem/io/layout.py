@@ -3,4 +3,4 @@
 SCI, INT, FIXED, WORD = range(4)
 """Kinds of columns, see textnum.Column."""
 MAX_DIGITS = 15
-"""Significant digits at most."""
+"""Largest number of significant digits."""

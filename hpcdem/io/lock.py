@@ -16,7 +16,7 @@ from typing import Any
 NAME = ".lock"
 
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EROFS, errno.EACCES, errno.EPERM}
-"""The file system has no locks, or nothing can be written there: there is nothing to protect then."""
+"""Errors of file systems without locks, or without write permission; nothing is protected then."""
 
 
 class Taken(Exception):

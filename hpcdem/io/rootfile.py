@@ -14,7 +14,7 @@ from hpcdem.io.behind import Deliveries
 from hpcdem.io.disk import explain, publish, remove
 
 MOST_WAITING = 64 << 20
-"""Bytes of pieces that are collected before they are written."""
+"""Bytes of pieces collected before they are written."""
 
 _Piece = tuple[str, int, memoryview]  # part of the file, place in it, bytes
 Description = tuple[dict[str, int], list[tuple[int, bytearray]], int]

@@ -21,8 +21,8 @@ from hpcdem.io.disk import explain
 
 RECORD = "run.json"
 PROGRESS = "progress.json"
-"""Beside it during the run: `step`, `command`, the last `line` of the log, `speed` [steps/s], `part` of the
-command that is done and seconds `left`, `script_part` and `script_left` of the whole script; null: not known."""
+"""File next to the record during a run: `step`, `command`, last `line` of the log, `speed` [steps/s], completed `part`
+of the command and remaining seconds `left`, `script_part` and `script_left` of the whole script; null: unknown."""
 _FRAME = re.compile(r".+_(\d{10,})(_ini)?\.(vtkhdf|dat)")
 
 

@@ -34,7 +34,7 @@ def sci(name: str, digits: int = 9, width: int = 0) -> Column:
 
 
 _BLOCK = 1 << 18
-"""Bytes of text that are made at a time: they stay in the cache while column after column is filled in."""
+"""Bytes of text made at a time, which remain in the cache while the columns are filled."""
 
 
 class TextTable:

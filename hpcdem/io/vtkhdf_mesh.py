@@ -31,7 +31,7 @@ _LINE, _TRIANGLE, _QUAD, _TETRA = 3, 5, 9, 10
 SUPPORTS = ("bolts", "liners")
 """Groups of a file with tables of their nodes and elements."""
 CONTACTS, NODE_CONDITIONS, FACE_CONDITIONS, FLOW_NODES = "contacts", "node-conditions", "face-conditions", "flow-nodes"
-"""Tables of what else there is, one group of a file each, see hpcdem.commands.fdem.frame_tables."""
+"""Tables of further objects, one group of a file each, see hpcdem.commands.fdem.frame_tables."""
 TABLES = (CONTACTS, NODE_CONDITIONS, FACE_CONDITIONS, FLOW_NODES)
 Supports = Mapping[str, Mapping[str, Mapping[str, np.ndarray]]]
 

@@ -6,7 +6,7 @@ FIELDS = {
     "stress": "应力", "principal": "主应力", "displacement": "位移", "velocity": "速度", "acceleration": "加速度",
     "force": "力", "contact_force": "接触力", "nodal_force": "节点力", "axial_force": "轴力", "shear_force": "剪力",
     "membrane": "薄膜力", "bending": "板弯矩", "transverse": "横向剪力", "plastic_curvature": "塑性曲率",
-    "bond_force": "粘结力", "reaction": "反力", "moment": "弯矩", "torque": "力矩", "spin": "角速度", "angle": "转角",
+    "bond_force": "胶结力", "reaction": "反力", "moment": "弯矩", "torque": "力矩", "spin": "角速度", "angle": "转角",
     "rotation": "转动", "temperature": "温度", "moisture": "含水量", "mean_moisture": "平均含水量", "suction": "基质吸力",
     "mean_temperature": "平均温度", "fluid_temperature": "流体温度",
     "environment_temperature": "环境温度", "heat_flux": "热流密度", "transfer_coefficient": "换热系数",
@@ -23,7 +23,7 @@ FIELDS = {
     "id2": "颗粒二", "node": "节点", "corners": "角点数", "element_model": "单元本构", "joint_model": "节理本构",
     "element_1": "单元一", "element_2": "单元二", "first": "起点", "last": "终点", "second": "第二点",
     "first_node": "起始节点", "second_node": "第二节点", "last_node": "末端节点", "bolt_state": "锚杆状态", "liner_state": "衬砌状态",
-    "bond_state": "粘结状态", "bolt": "锚杆", "liner": "衬砌", "host": "所在单元", "fixed": "固定方向",
+    "bond_state": "胶结状态", "bolt": "锚杆", "liner": "衬砌", "host": "所在单元", "fixed": "固定方向",
     "constraint": "约束类型", "quiet": "无反射", "incoming": "入射波", "group": "组", "color": "颜色", "colour": "颜色",
     "material": "材料", "birth": "生成步", "fix": "固定", "clump": "颗粒簇", "members": "成员数", "kind": "类型",
     "bonded": "胶结", "rubber": "橡胶", "hertz": "Hertz 接触", "link": "类别", "ebmod": "法向模量", "gbmod": "切向模量",
@@ -35,11 +35,11 @@ COMPONENTS = {
     "max": "最大", "middle": "中间", "min": "最小", "mean": "平均", "mises": "Mises", "deviator": "偏", "shear": "剪切",
     "normal": "法向", "first": "起点", "last": "终点", "largest": "最大", "smallest": "最小",
 }  # fmt: skip
-"""Ends of their names; xx, x and so on stay."""
+"""Suffixes of their names; xx, x and so on are unchanged."""
 LEGEND = {
     "tension": "拉裂", "mixed": "拉剪", "shear": "剪裂", "yielded": "屈服", "initial": "初始",
 }  # fmt: skip
-"""Words of legends: how joints broke."""
+"""Words of legends: modes of broken joints."""
 COLOURS = {
     "viridis": "绿黄(viridis)", "cividis": "蓝黄(cividis)", "plasma": "紫黄(plasma)", "yellow-brown": "黄—褐",
     "yellow-blue": "黄—蓝", "yellow-green": "黄—绿", "greys": "灰度", "blue-red": "蓝—红", "blue-yellow-red": "蓝—黄—红",

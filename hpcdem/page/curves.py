@@ -18,13 +18,13 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.post.view import filter
 
 POINTS = 2000
-"""Points of a curve that the page gets at most, its highest and lowest ones among them."""
+"""Largest number of points of a curve sent to the page, including its extrema."""
 MOST = 12
-"""Curves of a chart."""
+"""Largest number of curves of a chart."""
 LONGEST = 500
-"""Characters of a title and an expression."""
+"""Largest number of characters of a title and an expression."""
 OWN = {"time": "s", "step": ""}
-"""Columns that every history has, and their units."""
+"""Columns of every history, and their units."""
 _TITLE = re.compile(r"(.*?)\s*\[([^\]]*)\]\s*")
 _QUOTED = re.compile(r"'([^']*)'|\"([^\"]*)\"")
 _NAMED = re.compile(r"([^='\"<>!]*)=(?!=)(.+)", re.DOTALL)

@@ -28,12 +28,12 @@ from hpcdem.runtime import run_folder
 
 LANGUAGES = ("pcdc", "zdem")
 LINES = 5000
-"""Lines of output that are kept."""
+"""Number of lines of output that are kept."""
 LONGEST_LINE = 2000
 SCRIPT = re.compile(r"[^\W.][\w .+-]{0,99}\.(sc|py)")
 """Names of scripts: in the folder itself, not hidden."""
 LARGEST_SCRIPT = 512 * 1024
-"""Bytes of a script that the page shows."""
+"""Largest size of a script that the page shows [bytes]."""
 
 
 class Console:

@@ -32,9 +32,9 @@ FORMATS = {
 """Media types of the formats."""
 PAPER = Paper(dpi=200.0)
 MOST_VECTORS = 20_000
-"""Objects of a page with vectors; with more it holds a picture of pixels."""
+"""Largest number of objects drawn as vectors; pages with more contain a picture of pixels."""
 _drawing = threading.Lock()
-"""Settings of matplotlib are those of the process."""
+"""Lock of the settings of matplotlib, which the process shares."""
 _filming = threading.Lock()
 """Lock that admits one film at a time; pictures are drawn between its frames."""
 

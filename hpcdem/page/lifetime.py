@@ -30,7 +30,7 @@ KINDS = {
 }
 """The files of the page, and their media types."""
 LONGEST_FILE = 600.0
-"""Seconds that a file may take; the first one waits for kernels to be compiled, once on a machine."""
+"""Longest time to make a file [s]; the first one waits for kernels to be compiled, once per machine."""
 BINARY = "application/octet-stream"
 
 

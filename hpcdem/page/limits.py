@@ -13,7 +13,7 @@ LIMITS: dict[str, tuple[float, float]] = {
 }
 """Least and largest value of each field with a slider or a number."""
 MOST_ROWS = 60
-"""Most rows of the table."""
+"""Largest number of rows of the table."""
 KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("source", "frame", "width", "height", "number", "column", "row", "since"), (int,)),
     **dict.fromkeys(("object", "format", "label", "name", "what", "text", "line", "language", "stamp"), (str,)),
@@ -23,11 +23,11 @@ KINDS: dict[str, tuple[type, ...]] = {
 }  # fmt: skip
 """Kinds of the arguments of requests to `hpcdem view`, by name, for all calls; null means not given."""
 MOST_PIXELS = 3840 * 2160
-"""Pixels of a picture of `hpcdem view`; the window shows fewer, made larger, where it has more."""
+"""Largest number of pixels of a picture of `hpcdem view`; larger windows enlarge the picture."""
 LONGEST_SIDE = 4096
 """Largest number of pixels along a side."""
 PICTURES = 16
-"""Pictures, clicks and lists of fields requested at a time: the rest of the CONVERSATIONS is for what needs no
-picture, such as to interrupt a run."""
+"""Largest number of simultaneous requests for pictures, clicks and lists of fields; the other CONVERSATIONS remain for
+requests without a picture, such as to interrupt a run."""
 LONGEST_FILM = 1000
-"""Frames of a film that the page makes."""
+"""Largest number of frames of a film made by the page."""

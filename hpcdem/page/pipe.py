@@ -1,5 +1,5 @@
 """The words between `hpcdem console --pipe` and the page that started it."""
 
 MARK = "\x1e"
-"""Begins a line that is for the page, not for the reader: JSON with the entry `what`."""
+"""First character of a line for the page instead of the reader: JSON with the entry `what`."""
 READY, DONE = "ready", "done"

@@ -35,21 +35,21 @@ LOOPBACK = "127.0.0.1"
 NAMES = frozenset((LOOPBACK, "localhost", "::1"))
 """Host names of an address that a browser on this machine, or at the other end of `ssh -L`, opens."""
 LARGEST_REQUEST = 1024 * 1024
-"""Bytes of a request's body: a script of the editor, at most."""
+"""Largest body of a request [bytes]: a script of the editor."""
 LARGEST_HEAD = 64 * 1024
-"""Bytes of its first line and headers; what is beyond is not read."""
+"""Largest size of the first line and the headers [bytes]; the rest is not read."""
 DEEPEST = 20
-"""Lists and objects within each other, in a body."""
+"""Largest number of nested lists and objects in a body."""
 CONVERSATIONS = 32
-"""Requests with the key at a time; a browser makes six."""
+"""Largest number of simultaneous requests with the key; a browser makes six."""
 DOOR = 64
-"""Connections that have not shown the key yet."""
+"""Largest number of connections that have not sent the key yet."""
 HEAD_SECONDS = 10.0
 """Time from the connection to the end of the headers [s]."""
 BODY_SECONDS = 20.0
 """Time from there to the end of the body [s]."""
 SLOWEST = 50e3
-"""Bytes per second at which an answer must be taken, after the first seconds (as many as a body has)."""
+"""Smallest rate at which an answer must be received [bytes/s], after the first seconds (as many as for a body)."""
 HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": (

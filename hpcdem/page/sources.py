@@ -21,7 +21,7 @@ from hpcdem.post.view.moment import Moment, read_moment
 from hpcdem.runtime import kernels, run_folder
 
 MOMENTS = 3
-"""Frames that are kept in memory: one on show, and its neighbours."""
+"""Number of frames kept in memory: the present one and its neighbours."""
 OBJECTS = 500_000
 """Largest number of objects in memory at which another frame is kept beside them."""
 SIGNALS = {"stop": signal.SIGUSR1, "save": signal.SIGUSR2}

@@ -62,15 +62,15 @@ KINDS = {
     "server.js": "text/javascript; charset=utf-8",
 }
 KEPT = 24
-"""Layers that are kept put together."""
+"""Number of assembled layers that are kept."""
 BYTES = 20e6
 """Largest size of stored layers of other frames [bytes]."""
 MOVED = ("elements", "joints")
 """Objects drawn deformed; joints in space lie on faces of elements."""
 FINE = 2
-"""Square root of the number of samples of which each pixel of a picture at rest is the mean."""
+"""Square root of the number of samples averaged for each pixel of a still picture."""
 FINEST = 2560 * 1600
-"""Larger pictures, of screens with small pixels, are as fine as these: nobody waits ten seconds for one."""
+"""Number of pixels beyond which still pictures are not refined, as it would take ten seconds."""
 
 
 def serve(

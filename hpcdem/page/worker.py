@@ -20,15 +20,15 @@ from typing import IO, Any
 from hpcdem.core.errors import HpcdemError
 
 OVERTAKEN_AFTER = 0.5
-"""Seconds after which work that nobody wants any more is ended; shorter work is awaited, which is cheaper."""
+"""Time after which superseded work is stopped [s]; shorter work is awaited, which is cheaper."""
 LONGEST = 120.0
-"""Seconds after which work is ended in any case, unless a Worker says otherwise."""
+"""Longest time of a piece of work [s], unless a Worker sets another."""
 WAITING = 4
-"""Requests that may wait where each of them counts."""
+"""Largest number of waiting requests that must all be answered."""
 FRAME = struct.Struct("<BQ")
 """Header of each message: one of the codes below, and its length."""
 READY, ASKED, MADE, REFUSED, BROKEN = range(5)
-"""The maker's kernels are compiled; a request; its answer; a sentence for the user; an error of ours."""
+"""Codes of messages: kernels compiled; request; answer; message for the user; internal error."""
 
 
 class SupersededError(HpcdemError):

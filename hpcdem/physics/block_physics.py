@@ -66,4 +66,4 @@ PHYSICS: Mapping[str, Callable[[], type[Any]]] = {
     "bolts": _bolts, "liners": _liners, "free_field": _free_field, "fluid": _fluid, "proppant": _proppant,
     "heat": _heat, "water": _water, **{name: kind.load_type for name, kind in kinds().items()},
 }  # fmt: skip
-"""Loaders of each class: its import loads numba and kernels, which takes a second."""
+"""Loaders of the classes; importing them loads numba and kernels, which takes a second."""

@@ -73,7 +73,7 @@ def run(comm: Comm, log: Any, options: Options) -> Path:
     if not (np.isfinite(options.size) and options.size > 0.0):
         raise UsageError(f"-g {options.size:g}: the spacing of the grid must be larger than 0")
     if options.smooth and options.volume not in (None, MEAN):
-        raise UsageError(f"--volume {options.volume} cannot be combined with --smooth, which takes means on its grid")
+        raise UsageError(f"--volume {options.volume} cannot be combined with --smooth, which averages on its grid")
     began = time.monotonic()
     frames = on_first(comm, lambda: _frames(options.folder, log))
     results = options.folder / "ss" / "data"

@@ -195,7 +195,7 @@ def test_a_stage_without_an_end_that_begins_now_never_acts_if_another_follows() 
 def test_a_well_in_nothing() -> None:
     sim, flow = line(4, 1.0)
     away = at(sim, 0.0, 0.25)
-    with pytest.raises(CommandError, match=rf"well 'w' has no flow node: no channel ends at node {away[0]}"):
+    with pytest.raises(CommandError, match=rf"well 'w' has no flow node: node {away[0]} .*not at the end of a channel"):
         flow.drill("w", away)
     assert not flow.wells
     flow.drill("w", at(sim, 1.0, 0.0))
@@ -277,7 +277,7 @@ def test_a_script_with_wells(tmp_path: Path) -> None:
         ("well stage 'w' rate 2 time 0", "time"),
         ("well stage 'x' rate 2", "there is no well 'x'; available: 'w'"),
         ("well stage 'w' rate table 'q'", "there is no table 'q'"),
-        ("well create 'v' range y 0.25 0.25", "well 'v' has no flow node: no channel ends at node"),
+        ("well create 'v' range y 0.25 0.25", "well 'v' has no flow node: node"),
         ("history create 'h' well value pressure", "object well and well, its name, are both required"),
         ("history create 'h' model value time well 'w'", "object well and well, its name, are both required"),
         ("history create 'h' well value opening well 'w'", "a history of well can follow pressure, rate"),

@@ -313,7 +313,7 @@ def test_a_wrong_line_is_named_on_all_ranks(tmp_path: Path, wrong: int | None) -
             loaded(comm, path)
         return str(error.value)
 
-    expected = f":{wrong}: read '1.0 2.0 -3.0 bed', expected" if wrong is not None else ": holds no particles"
+    expected = f":{wrong}: read '1.0 2.0 -3.0 bed', expected" if wrong is not None else ": contains no particles"
     assert {refused(SerialComm())} == set(Ranks(16).run(refused)) and expected in refused(SerialComm())
 
 

@@ -144,14 +144,14 @@ WRONG = {
     "power": ("pcdc face-joint property viscosity-power -4", "viscosity"),
     "limit": ("pcdc face-joint property proppant-concentration-limit 0.8", "proppant-concentration-limit"),
     "beyond": ("pcdc flow-node initial concentration 0.61", "between 0 and that of a pack, 0.6"),
-    "no flow node": ("pcdc flow-node initial concentration 0.1 range x 0 0", "no channel ends"),
+    "no flow node": ("pcdc flow-node initial concentration 0.1 range x 0 0", "not at the end of a channel"),
     "dry": ("pcdc flow-node initial saturation 0\npcdc flow-node initial concentration 0.1", "are dry"),
     "plain channel": ("pcdc face-joint c-model hydr-p-m property f-den 1000 f-bulk 2.2e9 vis 1e-6 a-initial 1e-2 a-min "
                       "1e-3 range y 1.5 2 x 0.2 0.2\npcdc flow-node initial concentration 0.1 range y 1.7 2",
-                      "no channel that carries proppant ends at node"),
+                      "at the end of a channel that carries proppant"),
     "plain channels": ("pcdc face-joint c-model hydr-p-m property f-den 1000 f-bulk 2.2e9 vis 1e-6 a-initial 1e-2 "
                        "a-min 1e-3 range x 0.2 0.2\npcdc node boundary hydra-p-b p-v-c 0.1",
-                       "no channel that carries proppant ends at node"),
+                       "at the end of a channel that carries proppant"),
     "table": ("pcdc node boundary hydra-p-b p-v-c table 'no'", "no table"),
 }  # fmt: skip
 

@@ -332,10 +332,10 @@ def test_the_potential_is_for_space() -> None:
         sim.option(potential="other")
     sim.option(potential="munjiza")
     sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], [(0, 1, 2)]))
-    with pytest.raises(CommandError, match="in two dimensions there is no choice of the potential"):
+    with pytest.raises(CommandError, match="model option potential is for three dimensions"):
         sim.option(potential="munjiza")
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
-    with pytest.raises(CommandError, match="in two dimensions there is no choice of the potential"):
+    with pytest.raises(CommandError, match="model option potential is for three dimensions"):
         sim.step()
 
 

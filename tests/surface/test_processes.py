@@ -194,7 +194,7 @@ def test_a_process_given_again_continues_its_balance(scarp: str, tmp_path) -> No
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"interval": 0, "diffuse": 1.0}, "interval: steps between two applications"),
+        ({"interval": 0, "diffuse": 1.0}, "interval must be at least 1 step"),
         ({"interval": 5}, "nothing to do; give one or more of diffuse, slope"),
         ({"interval": 5, "diffuse": -1.0}, "diffuse must be above 0, got -1"),
         ({"interval": 5, "erode": math.nan, "above": 3.0}, "erode must be above 0, got nan"),
@@ -203,9 +203,9 @@ def test_a_process_given_again_continues_its_balance(scarp: str, tmp_path) -> No
         ({"interval": 5, "diffuse": 1.0}, "diffuse deposits discs: give their radii"),
         ({"interval": 5, "diffuse": 1.0, "rad": [1.0]}, "diffuse deposits discs: give their density"),
         ({"interval": 5, "diffuse": 1.0, "rad": [1.0], "density": 1.0}, "give their kn, or shear, poiss and hertz"),
-        ({"interval": 5, "above": 5.0, "density": 1.0}, "density describes the deposit, and erosion alone makes none"),
-        ({"interval": 5, "erode": 1.0, "fric": 0.0}, "fric describes the deposit, and erosion alone makes none"),
-        ({"interval": 5, "erode": 1.0, "hertz": True}, "hertz describes the deposit"),
+        ({"interval": 5, "above": 5.0, "density": 1.0}, "density describes a deposit, but this process only erodes"),
+        ({"interval": 5, "erode": 1.0, "fric": 0.0}, "fric describes a deposit, but this process only erodes"),
+        ({"interval": 5, "erode": 1.0, "hertz": True}, "hertz describes a deposit"),
         ({"interval": 5, "diffuse": 0.0, "slope": 20.0, **SAND}, "diffuse must be above 0, got 0"),
         ({"interval": 5, "above": -3.0}, "above -3 m is not above the base of the model, -0.0"),
         (
@@ -277,7 +277,7 @@ def test_lines_of_a_script() -> None:
         ("SURFACE interval 9 above 3", "id missing"),
         ("SURFACE id 1 interval 9 erode 1 deposit 1 rad discrete 1 density 1 kn 1", "would act at the same heights"),
         ("SURFACE id 1 off interval 3", "off accepts only the id"),
-        ("SURFACE id 1 interval 9 above 3 episode 5", "episode describes the deposit"),
+        ("SURFACE id 1 interval 9 above 3 episode 5", "episode describes a deposit"),
         ("SURFACE id 1 interval 9 slope 30 rad discrete 1 density 1 kn 1 colors red|pink", "colors: expected lg"),
     ):
         with pytest.raises(ScriptError, match=message):

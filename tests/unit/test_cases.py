@@ -124,11 +124,11 @@ def test_what_is_wrong_is_named(given, said):
 
 
 def test_what_is_of_space_is_refused_in_the_plane():
-    with pytest.raises(ScriptError, match="thickness: expected dim 3"):
+    with pytest.raises(ScriptError, match="thickness requires dim 3"):
         find("brazilian")(thickness=0.02)
-    with pytest.raises(ScriptError, match="elements: expected dim 2 beside it"):
+    with pytest.raises(ScriptError, match="elements requires dim 2"):
         find("support")(dim=3, elements="tri")
-    with pytest.raises(ScriptError, match="liner: expected dim 2 beside it"):
+    with pytest.raises(ScriptError, match="liner requires dim 2"):
         find("support")(dim=3, liner=0.3)
     with pytest.raises(ScriptError, match=r"at most 0\.7 of bolt_spacing"):
         find("support")(dim=3, size=0.8)

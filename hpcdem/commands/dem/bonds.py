@@ -22,8 +22,8 @@ ELASTIC = ("ebmod", "gbmod", "tstrength", "sstrength")
 KEPT = (*ELASTIC, "rubber", "conserving", "moment")
 TOLERATE = 1e-6
 FARTHEST = 10.0
-"""Widest gap that can be bonded, in radii of the largest particle. More is a slip of units, and would bond all with
-all."""
+"""Widest gap that can be bonded, in radii of the largest particle; a wider one is probably a mistake of units and would
+bond all particles."""
 
 
 def bond(

@@ -33,7 +33,7 @@ from hpcdem.io.clumps import read_clumps
 from hpcdem.physics.dem.simulation import Simulation
 
 MOST_MEMBERS = 10**5
-"""Most particles that one clump is joined of."""
+"""Largest number of particles in a clump."""
 
 
 def clump(
@@ -86,7 +86,7 @@ def clump(
     sim.clumps.number += len(bodies)
     sim.clumps.reach = max(sim.clumps.reach, _reach(bodies) * scale)
     if sim.log is not None:
-        sim.log.info(f"CLUMP: {len(bodies)} clumps of {len(rows)} discs")
+        sim.log.info(f"CLUMP: {len(bodies)} clumps, {len(rows)} discs in all")
     return len(bodies)
 
 

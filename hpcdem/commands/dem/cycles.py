@@ -24,19 +24,19 @@ from hpcdem.physics.dem.kernels.laws import LINEAR, tangent_normal_stiffness
 from hpcdem.physics.dem.simulation import Simulation
 
 STEPBAR = 1000
-"""Steps between progress reports and rows of walls.csv when the script sets none."""
+"""Default interval of progress reports and rows of walls.csv [steps]."""
 NEAR = 0.5
-"""Time step over the estimate of the critical one from which the true limit is computed."""
+"""Ratio of the time step to the estimated critical one above which the exact limit is computed."""
 REPORT_AGAIN = 1.2
-"""Factor by which the part of the stability limit must grow before it is logged again."""
+"""Growth of the ratio to the stability limit after which it is logged again."""
 MOST_STEPS = 2**53
-"""Steps are counted exactly up to here, in frames and histories too."""
+"""Largest number of steps that frames and histories can store exactly."""
 WATCH = 100
-"""Steps between two looks at the limit of the time step, while contacts form that may come near it."""
+"""Interval of checks of the stability limit while new contacts may approach it [steps]."""
 RELAXED = 10
-"""Longest wait between two such looks, over WATCH."""
+"""Longest interval of such checks, over WATCH."""
 TOUCHING = 8
-"""Contacts of one particle, no more than which are thought of where a time step is called small without a look."""
+"""Number of contacts per particle up to which a small time step is accepted without a check."""
 
 
 def cycle(sim: Simulation, steps: int) -> None:

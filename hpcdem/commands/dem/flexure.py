@@ -21,10 +21,10 @@ from hpcdem.physics.dem.simulation import Simulation
 
 COLUMNS = "step,time,base,x,deflection,equilibrium,load,moment"
 FEWEST, FINE, COARSE, MOST = 50, 20.0, 4.0, 2000
-"""Segments of a base at least; segments in a flexural parameter, where their number is not given; fewest of these;
+"""Smallest number of segments of a base; default number per flexural parameter; smallest number per flexural parameter;
 largest number of segments."""
 STRAIGHT = 1e-6
-"""Difference of heights of a base that counts as straight, over its length."""
+"""Largest difference of heights of a straight base, over its length."""
 
 
 def flexure(
@@ -139,7 +139,7 @@ def _wall_extent(sim: Simulation, wall: int) -> tuple[np.ndarray, float, float, 
         )
     _refuse_twice(sim, wall, np.empty(0, np.int64))
     if len(w.parts(wall)) > 1:
-        raise CommandError(f"wall {wall} was bent already and is not straight any more; create a new wall")
+        raise CommandError(f"wall {wall} has been bent and is no longer straight; create a new wall")
     (x1, y1), (x2, y2) = w.p1[row], w.p2[row]
     if abs(y1 - y2) > STRAIGHT * abs(x1 - x2):
         raise CommandError(
@@ -178,7 +178,7 @@ def _row_extent(sim: Simulation, where: Selection | None) -> tuple[np.ndarray, f
 def _refuse_twice(sim: Simulation, wall: int, row: np.ndarray) -> None:
     for base in sim.bases:
         if (wall >= 0 and base.wall == wall) or len(np.intersect1d(base.row, row)):
-            raise CommandError(f"{base.name} bends already; end it by off first")
+            raise CommandError(f"{base.name} bends already; end it with off first")
 
 
 def _segments(length: float, alpha: float, wanted: int | None) -> int:

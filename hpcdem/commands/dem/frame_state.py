@@ -101,7 +101,7 @@ def _checked(comm: Comm, frame: Frame, path: str) -> Frame:
     p = frame.tables["particles"].columns
     gid = p.get("gid", np.empty(0, np.int64))
     if not comm.any(len(gid) > 0):
-        raise HpcdemError(f"{path}: holds no particles")
+        raise HpcdemError(f"{path}: contains no particles")
     for name in ("x", "y", "radius"):
         if name not in p:
             raise HpcdemError(f"{path}: its particles have no {name}")

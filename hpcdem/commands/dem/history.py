@@ -11,7 +11,7 @@ from hpcdem.physics.dem.platens import OF_PARTS
 from hpcdem.physics.dem.simulation import Simulation
 
 DRAW_INTERVAL = 1000
-"""Steps between pictures where DRAW does not say."""
+"""Default interval of DRAW [steps]."""
 
 
 def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
@@ -26,7 +26,7 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
             f"HIST energy: the stored energy of the law {law} is not known: define it with pair_law(energy=)"
         )
     if what == "deflection" and not sim.bases:
-        raise CommandError("HIST deflection: no base bends; FLEXURE must precede it")
+        raise CommandError("HIST deflection: no base bends yet; give FLEXURE first")
     if what in mean_stress.COMPONENTS:
         mean_stress.heights(sim)
     sim.history_origins.pop(id, None)

@@ -260,7 +260,7 @@ def report(sim: Simulation, _: Snapshot | None = None) -> None:
 
 
 DEEP = 0.5
-"""Overlap over the smaller radius from which contacts are named."""
+"""Overlap over the smaller radius above which contacts are reported."""
 
 
 def warn_of_overlaps(sim: Simulation) -> None:
@@ -318,7 +318,7 @@ def report_energy(sim: Simulation) -> None:
 
 
 ACROSS = "work across contacts of discs and faces"
-"""Name of this entry in the tables of both sides."""
+"""Name of this entry in the tables of particles and blocks."""
 ENERGY_WORDS = {
     "kinetic_translation": "stored: motion",
     "kinetic_rotation": "stored: rotation",

@@ -28,7 +28,7 @@ NO_GROUP = "***"
 STREAM = 2026
 """First of the two streams of random numbers of TWIN."""
 FAILURES = 1000
-"""Attempts without room in a row after which GEN gives up. Found from two published facts: see docs/physics.md."""
+"""Consecutive failed attempts after which GEN stops; derived from two published facts, see docs/physics.md."""
 
 
 def start(sim: Simulation) -> None:
@@ -120,7 +120,7 @@ def _read_xyr(sim: Simulation, path: Path) -> tuple[np.ndarray, np.ndarray]:
         groups.append(words[3] if len(words) == 4 else NO_GROUP)
     _agree(sim, error)
     if not sim.count(len(rows)):
-        raise CommandError(f"{path}: holds no particles, expected rows x y r [group]")
+        raise CommandError(f"{path}: contains no particles, expected rows x y r [group]")
     return np.array(rows).reshape(-1, 3), np.array(groups, dtype=str)
 
 

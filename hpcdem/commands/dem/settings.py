@@ -26,7 +26,7 @@ NUMBERS: dict[str, tuple[type, Callable[[Any], bool], str]] = {
 }
 """Type of each number, its condition, and the text of the message if it is not fulfilled."""
 STEPS = {"dt": "frac", "frac": "dt"}
-"""Two ways to say the time step."""
+"""Settings that exclude each other: both define the time step."""
 CHOICES = {"disk": tuple(SPHERES), "wallside": ("left", "both"), "rolling": ("a", "c")}
 
 

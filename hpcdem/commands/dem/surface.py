@@ -36,19 +36,19 @@ from hpcdem.pre.deposit import is_steep, resting, top
 
 GROUP = "growth"
 COLORS = (2, 8, 1, 9)
-"""Of episodes, in turn: yellow, gb, green, violet."""
+"""Colours of episodes, in turn: yellow, gb, green, violet."""
 POROSITY = 0.15
 BALL = 2.0
-"""Radius of the ball over the largest radius of the particles."""
+"""Radius of the rolling ball over the largest radius of the particles."""
 WIDE = 4.0
-"""Width of columns over the largest radius, by default."""
+"""Default width of columns over the largest radius."""
 SAMPLES = 8
-"""Points of the surface line in a column."""
+"""Number of points of the surface line per column."""
 DEEP = 14.0
 """Depth below the surface, in largest radii, down to which particles matter."""
 CALM, LIGHT = 0.05, 0.5
-"""A disc is at rest if it is slower than this part of its speed after a fall of one radius, beside what pushes the
-model, and if its acceleration is below this part of gravity."""
+"""Limits for a disc at rest: speed in excess of that of the pushing walls, over the speed after a fall of one radius;
+acceleration over gravity."""
 
 
 def surface(

@@ -98,7 +98,9 @@ def _leave_bending(sim: Simulation, id: int, moves: bool) -> None:
     """CommandError for a segment of a wall, and for a wall that a plate bends, where the command would move it."""
     sim.walls.parts(id)
     if moves and any(base.wall == id for base in sim.bases):
-        raise CommandError(f"wall {id} bends on an elastic plate, which alone can move it; end it by FLEXURE off first")
+        raise CommandError(
+            f"wall {id} bends on an elastic plate, which alone can move it; end it with FLEXURE off first"
+        )
 
 
 def _place(sim: Simulation, id: int, nodes: tuple[tuple[float, float], tuple[float, float]]) -> None:
@@ -133,7 +135,7 @@ def periodic(sim: Simulation, x: tuple[float, float]) -> None:
     if sim.clumps:
         raise CommandError(f"PERIODIC does not support clumps, and there are {sim.clumps.number}")
     if sim.bases:
-        raise CommandError(f"PERIODIC does not support FLEXURE, and {sim.bases[0].name} bends; end it by off first")
+        raise CommandError(f"PERIODIC does not support FLEXURE, and {sim.bases[0].name} bends; end it with off first")
     if sim.coupled:
         raise CommandError("PERIODIC does not support particles that are coupled to blocks")
     box = sim.walls.box()

@@ -22,7 +22,7 @@ from hpcdem.physics.fdem.water import Water
 from hpcdem.pre.mesh import geometry, solids
 
 ARC_STEPS = 360
-"""Arcs of a water line stand for so many sides."""
+"""Number of sides that replace an arc of a water line."""
 Number = float | str
 """A number, or the name of a table of time."""
 

@@ -17,7 +17,7 @@ from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE, DEFAULT, ELEMENT, Range
 
 SIZE = 0.2
-"""Length of elements of a bolt between two points, if none is given [m]."""
+"""Default length of elements of a bolt between two points [m]."""
 Number = float | str
 """A number, or the name of a table of time."""
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hpcdem.commands.fdem.project import Project
 
 NEAR = 1e-9
-"""Bounds of x and y reach so much of the size of the model further: coordinates of meshes are rounded."""
+"""Tolerance of bounds of x and y over the size of the model, as coordinates of meshes are rounded."""
 
 
 def chosen(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray | None:
@@ -93,10 +93,10 @@ _NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
 _NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer, g.Along, g.Near, g.Crossed, g.Sized)
 _BY_PLACE = (g.Span, g.OnLayer, g.InCircle, g.Near, g.Crossed, g.Along)
 ASIDE = 1e-4
-"""Distance over the size of a face: how far aside a surface is searched for, and so how well the cosine of its angle is
-known."""
+"""Distance over the size of a face within which a surface is searched for; it limits the accuracy of the cosine of its
+angle."""
 STRAIGHT = 1e-6
-"""Degrees by which an angle that is 0 may be off: coordinates of meshes are rounded."""
+"""Tolerance of an angle of 0 [degrees], as coordinates of meshes are rounded."""
 
 
 class _Objects:
@@ -507,7 +507,7 @@ def _crossings(curves: list[geometry.Curve], points: np.ndarray, direction: tupl
 
 
 SIDES = 1440
-"""Arcs of an outline stand for so many sides per closed curve in queries of what lies inside."""
+"""Number of sides per closed curve that replace its arcs in queries of its inside."""
 
 
 def _inside(curves: list[geometry.Curve], points: np.ndarray, layer: str) -> np.ndarray:

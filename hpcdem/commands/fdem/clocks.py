@@ -17,7 +17,7 @@ from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import Proppant
 
 MECHANICAL, THERMAL, HYDRAULIC, PROPPANT = PARTS = "mechanical", "thermal", "hydraulic", "proppant_transport"
-"""Parts with a clock; proppant shares the one of the fluid."""
+"""Parts with a clock; proppant shares that of the fluid."""
 
 
 def run_time(project: Project, time: float) -> None:

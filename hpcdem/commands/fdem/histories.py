@@ -29,9 +29,9 @@ from hpcdem.physics.flow.model import Flow
 IN_SPACE = tuple(name for name in UNITS[MODEL] if name != "disc_work")
 """Quantities of the model that a history can record in three dimensions."""
 ON_IT = 1e-6
-"""A place that is no farther from a node, over the size of the model, is that of the node: of all its sides."""
+"""Distance over the size of the model within which a position coincides with a node and selects all its sides."""
 FLUSH = 500
-"""Records that wait at most before they go to the file."""
+"""Largest number of records kept in memory before they are written."""
 
 
 def create(

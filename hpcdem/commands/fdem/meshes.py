@@ -42,7 +42,7 @@ from hpcdem.pre.mesh.sizes import Refinement
 from hpcdem.pre.mesh.triangulate import Meshed, MeshSettings, Region, triangulate
 
 ARC_STEPS = 360
-"""Arcs of the outline of a fracture network stand for so many sides per its size."""
+"""Number of sides per size of the outline of a fracture network that replace its arcs."""
 
 
 def create(

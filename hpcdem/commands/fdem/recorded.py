@@ -7,7 +7,8 @@ from hpcdem.physics.fields import kinds
 
 MODEL, WELL = "model", "well"
 LAW_STATE = "law_state"
-"""A state variable of user laws, see user_laws.py; a history has its name as quantity."""
+"""Value of a history of a state variable of user laws, see user_laws.py; the quantity of the history has the name of
+the variable."""
 UNITS: dict[str, dict[str, str]] = {
     g.NODE: {
         "displacement": "m", "velocity": "m/s",

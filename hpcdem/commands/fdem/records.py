@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 _FORCES = ("reaction_x", "reaction_y", "reaction_z")
 OF_LENGTHS = (CHANNEL, BOLT_ELEMENT, BOLT_NODE, LINER_ELEMENT)
-"""Objects whose values are those of a metre, or of one bolt, in space too."""
+"""Objects whose values are per metre, or of one bolt, in space too."""
 
 
 def _of_joints(kind: int) -> Callable[[Any], float]:

@@ -32,19 +32,20 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 CHECK_STATIC, CHECK_DYNAMIC = 50, 100
-"""Steps between two looks at the ratio, counted from the beginning of the command, unless model solve-check says so."""
+"""Interval of evaluations of the ratio, counted from the beginning of the command, without model solve-check
+[steps]."""
 CYCLES = 10_000
-"""Steps of a model solve that is given no aim, if it does not come to RATIO before."""
+"""Largest number of steps of a model solve without a criterion, if RATIO is not reached before."""
 STRIDE = 100
-"""Steps at most between two looks at the model time, as the time step may change."""
+"""Longest interval of checks of the model time, as the time step may change [steps]."""
 CONTINUE = "continue"
-"""Choice of a script after a failed run towards a ratio; otherwise the script stops."""
+"""Value of on_failure with which a script continues after a run that failed to converge; by default it stops."""
 FAILED = ("no progress", "limit")
 """Reasons of `blocks.Watch`; "runaway": a body moved too fast to continue."""
 STEADY_STEP = 1.0
 """First step towards steady flow [s]."""
 QUIET_SECONDS = 10.0
-"""Between two lines of the log."""
+"""Shortest time between two lines of the log [s]."""
 
 
 def step(project: Project, steps: int) -> None:

@@ -23,7 +23,7 @@ from hpcdem.pre.mesh.sizes import skew_grid, spaced
 
 FIGURES = (".png", ".pdf", ".svg")
 DEFAULT_LAYER = "default"
-"""Layer of shapes that name none."""
+"""Layer of shapes without a named layer."""
 
 
 def grid_lines(

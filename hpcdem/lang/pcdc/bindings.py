@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
 
 LAST = 2**53
-"""Beyond all numbers of objects."""
+"""Number larger than that of any object."""
 
 
 class Call:
@@ -430,4 +430,4 @@ PASSED_OVER: dict[str, Callable[[Any, str], Any]] = {
     "history export": lambda project, file: project.to_write(project.result(file)),
     "chart export": lambda project, file: project.to_write(project.result(file)),
 }
-"""Facts still needed of a command that was executed before the checkpoint: the file that it read or wrote."""
+"""Information required of commands that were executed before the checkpoint: the files that they read or wrote."""

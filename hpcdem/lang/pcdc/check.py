@@ -205,7 +205,7 @@ def _names(value: Any) -> Iterator[str]:
 
 
 _GROUPED = {"element": "element", "node": "node", "element-face": "face", "face-joint": "joint"}
-"""Kinds of objects of which a script makes all groups, and how messages call them."""
+"""Kinds of objects whose groups are all defined by the script, and their names in messages."""
 
 
 def _groups_of(statement: Statement) -> Iterator[tuple[str, Any, Any]]:

@@ -44,7 +44,7 @@ from hpcdem.runtime.progress import write
 READ = -1
 """Used instead of the number of a command when a script queries values of the model."""
 SEED = 0
-"""Seed of the random numbers of Python and numpy, so that all ranks draw the same."""
+"""Seed of the random numbers of Python and numpy, equal on all ranks."""
 
 
 class Interpreter:

@@ -24,7 +24,7 @@ from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, Phys
 MOST = 64 << 20
 """Largest size of recorded answers in bytes; a run whose script queried more cannot resume from a checkpoint."""
 ENTRY = 32
-"""Bytes that an entry counts for at least."""
+"""Smallest size counted for an entry [bytes]."""
 
 COMMAND, READ, NAMES, ERROR = "command", "look", "names", "error"
 ASK, ALONE, CALL, DONE = "ask", "alone", "call", "done"

@@ -50,23 +50,23 @@ class Kind:
     meaning: str
     check: Callable[[Any], Any]
     many: bool = False
-    """Takes all values that follow, at least one; or one [expression] that is a list of them."""
+    """Accepts all following values, at least one, or one [expression] that is a list of them."""
     optional: bool = False
-    """May be left out; it is the last one then."""
+    """May be omitted; only for the last value."""
     tabled: bool = False
-    """``table 'name'`` or ``function 'file.py:name'`` may stand for it."""
+    """Also accepts ``table 'name'`` or ``function 'file.py:name'``."""
     words: tuple[str, ...] = ()
-    """Words that are values."""
+    """Words accepted as values."""
     dims: tuple[int, ...] = (2, 3)
-    """Dimensions of space in which it is there."""
+    """Dimensions of space in which the value exists."""
     varied: bool = False
-    """``table 'name' over x`` or ``field 'name'`` may stand for it: it differs from place to place."""
+    """Also accepts ``table 'name' over x`` or ``field 'name'``, for values that vary in space."""
     softens: bool = False
-    """``table 'name' over plastic-strain`` may, too."""
+    """Also accepts ``table 'name' over plastic-strain``."""
     temperature_dependent: bool = False
     """Also accepts ``table 'name' over temperature``, or over another field of elements."""
     python: str = "float"
-    """Type in a Python program, in the words of `hpcdem.api.types`."""
+    """Type in a Python program, a name of `hpcdem.api.types`."""
 
     @property
     def axes(self) -> tuple[str, ...]:

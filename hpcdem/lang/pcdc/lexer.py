@@ -18,7 +18,7 @@ _PLAIN = {quote: re.compile(rf"[^\[\]{quote}]+") for quote in QUOTES}
 _SIGN = re.compile(r"[-+](?=\[)")
 _FULL_WIDTH = dict(zip("（），［］＃“”‘’－．", "(),[]#\"\"''-."))
 LONGEST_INTEGER = 18
-"""Digits of a whole number."""
+"""Largest number of digits of a whole number."""
 
 
 def short(text: str, longest: int = 60) -> str:

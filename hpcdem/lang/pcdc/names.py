@@ -21,7 +21,7 @@ from hpcdem.lang.pcdc.vector import Vector
 
 PREFIX = "m_"
 LONGEST = 1_000_000
-"""Characters of the text of a function."""
+"""Largest number of characters of a function."""
 
 
 def collected(namespace: Mapping[str, Any], sources: Mapping[str, Source]) -> tuple[dict[str, Any], list[str]]:

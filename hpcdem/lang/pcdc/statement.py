@@ -46,7 +46,7 @@ class Statement:
 
 
 LONGEST_TEXT = 200
-"""Characters of a line in a message."""
+"""Largest number of characters of a line in a message."""
 
 
 def shown(text: str) -> str:

@@ -75,9 +75,9 @@ SHORT = {
     **{f"{word}-{axis}": f"{word[0]}{axis}" for word in ("velocity", "acceleration", "force") for axis in "xyz"},
     **{f"stress-{part}": part for part in ("xx", "yy", "zz", "xy", "xz", "yz", "normal")},
 }
-"""Words of the language that programs and functions have shorter."""
+"""Words of the language with shorter names in programs and functions."""
 BOTH, PLANE, SPACE = (2, 3), (2,), (3,)
-"""Dimensions of space in which a word is there."""
+"""Dimensions of space in which a word exists."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ _SPELLINGS = {
     "c-m{odel}": ("c{onstitutive}-m{odel}",), "init{ial}": ("init{ialize}",), "r{emove}": ("r{move}",),
     "p{lot}-f{requency}": ("p{lot}-f{renquency}",),
 }  # fmt: skip
-"""Words of commands that may be written otherwise, too."""
+"""Alternative spellings of words of commands."""
 
 
 def _keywords(notation: str) -> tuple[Keyword, ...]:
@@ -1761,7 +1761,7 @@ INSTEAD = {
     "temperature": "output image of the field temperature",
     "free-field": "quiet on at the sides, with the stress of the static stage",
 }  # fmt: skip
-"""Words in three dimensions that replace words in two."""
+"""Words that replace those of two dimensions in three dimensions."""
 
 COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_ELEMENT_CREATE, *_OBJECTS, *_RECORDS, *_ONLINE)
 PCDC = Table(COMMANDS, RANGE_TERMS)

@@ -28,7 +28,7 @@ OF_FIELDS = tuple(one.model for one in kinds().values())
 _COMPLETED = (
     t.BOLT.of, t.LINER.of, FLUID, GRAINS, HEAT, HEAT_OF_FLUID, *OF_FIELDS, t.COULOMB_JOINT.of, t.BARTON_BANDIS.of,
 )  # fmt: skip
-"""Models whose properties are checked together as soon as all that are required are known."""
+"""Models whose properties are checked together once all required ones are known."""
 _OF_COMMAND = {
     "element property": properties.SOLID,
     "element-face property": properties.CONTACT_MOHR_COULOMB,

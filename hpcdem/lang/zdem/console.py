@@ -15,7 +15,7 @@ WELCOME = (
     "Commands: docs/zdem_reference.md"
 )
 TYPED = "console"
-"""The name of what was typed, in messages."""
+"""Name of the input in messages."""
 
 
 class Conversation:

@@ -23,12 +23,12 @@ from hpcdem.io.dat import is_frame, read_dat
 from hpcdem.lang.zdem.statement import Statement, find
 
 JAMMED = 0.547
-"""Share of the area that equal disks cover when no more fit (Feder 1980, J. Theor. Biol. 87, 237)."""
+"""Fraction of the area covered by equal disks when no further disk fits (Feder 1980, J. Theor. Biol. 87, 237)."""
 SETTLED = {"hertz": 0.95, "linear": 0.90}
 """Area of the disks over the area of a bed settled under its weight. Hertz particles overlap by much: published bed of
 the ZDEM manual, 0.943 to 0.956; linear: a bed of 250 000 disks of 0.1 to 0.3 mm."""
 FAILURES = 1000
-"""Attempts without room in a row after which GEN gives up, unless SET gentry gives a number per particle requested."""
+"""Consecutive failed attempts after which GEN stops, unless SET gentry gives a number per requested particle."""
 
 MAKERS = ("RESTORE", "LOAD", "BALL", "GLINE", "GEN", "CLUMP", "SECTION")
 

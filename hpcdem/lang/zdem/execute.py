@@ -342,4 +342,4 @@ _CONVERTERS: dict[str, Callable[[_Call], None]] = {
     "LOG": lambda call: _log(call, "the log goes to standard output: the command has no effect"),
     "PAUSE": lambda call: _log(call, "runs are not interactive, so it has no effect"),
 }
-"""Commands whose row names no function."""
+"""Converters of commands whose row names no function."""

@@ -23,7 +23,7 @@ LINE_BREAK_MARKS = "↵→↪↩⏎➔⮐"
 """Marks at the ends and beginnings of lines that were too long for a page of the manual."""
 JOIN = "a command is one line, so join the two parts"
 LARGEST_WHOLE = 2**53
-"""Whole numbers beyond this are no longer exact in a C double, which is how ZDEM reads them."""
+"""Largest whole number that a C double represents exactly; ZDEM reads numbers as doubles."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from hpcdem.lang.zdem.parameters import Parameter, Parameters
 from hpcdem.lang.zdem.statement import Statement
 
 LONGEST_NAME = 255
-"""Bytes in the name of a file, on all systems in use."""
+"""Largest number of bytes in a file name, on all supported systems."""
 
 
 @dataclass(frozen=True)

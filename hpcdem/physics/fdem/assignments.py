@@ -270,7 +270,7 @@ class Assignments(Settings):
         new = {name: each.get(name, value) for name, value in given.items()}
         for name in new:
             if self.dim not in model.property(name).dims:
-                raise CommandError(f"in {'two' if self.dim == 2 else 'three'} dimensions there is no {name}")
+                raise CommandError(f"{name} is for {'three' if self.dim == 2 else 'two'} dimensions")
         wanted: dict[str, Any] = keep(dict(before), new) if keep else model.changed(before, new)
         if not each and not before:
             return self._checked_softening(model, np.array([list(model.complete(wanted).values())]))
@@ -352,7 +352,7 @@ class Assignments(Settings):
                 self._value(name, value.table)
             places = self._places(on, of)
             if value.axis >= self.dim:
-                self._only_in_space(f"{AXES[value.axis]} for table '{value.table}' of {name} to be over", value)
+                self._only_in_space(f"{name}: a table over {AXES[value.axis]} ('{value.table}')", value)
             return self.tables[value.table].at(places[:, value.axis])
         if isinstance(value, Drawn):
             if value.field not in self.fields:

@@ -264,7 +264,7 @@ def set_velocity(
 ) -> None:
     """Velocities [m/s] as they are now; not a condition."""
     if vz is not None and sim.dim == 2:
-        raise CommandError("in two dimensions there is no velocity in z")
+        raise CommandError("velocity in z is for three dimensions")
     values = [(c, float(finite("velocity", [v])[0])) for c, v in enumerate((vx, vy, vz)) if v is not None]
     chosen = _chosen_corners(sim, nodes)
     for c, value in values:

@@ -362,7 +362,7 @@ class Conditions(InitialStress):
         its size. They act in dynamic runs; the static stage needs the stress that the ground beyond would give.
         incoming_x, incoming_y, incoming_z [m/s]: velocity of a plane wave along n that comes in through quiet faces:
         their dashpots see the velocity less twice this."""
-        self._only_in_space("stress zz, xz and yz, and incoming z, on faces", zz, xz, yz, incoming_z)
+        self._only_in_space("stress zz, xz, yz or incoming z of faces", zz, xz, yz, incoming_z)
         if dip is not None and self.dim == 3:
             raise CommandError("dip is for two dimensions: in three use stress-xy, -xz and -yz for shear on faces")
         given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal, "zz": zz, "xz": xz, "yz": yz, "dip": dip}

@@ -54,7 +54,7 @@ class InitialStress(Assignments):
         mesh = self._mesh()
         names = COMPONENTS[mesh.dim]
         if mesh.dim == 2 and (xz != 0.0 or yz != 0.0):
-            raise CommandError("in two dimensions there is no stress xz and yz")
+            raise CommandError("stress xz or yz is for three dimensions")
         given = {"xx": xx, "yy": yy, "xy": xy, "zz": 0.0 if zz is None else zz, "xz": xz, "yz": yz}
         values = np.tile(finite("initial stress", [given[name] for name in names]), (len(at), 1))
         for name, slope in (gradient or {}).items():

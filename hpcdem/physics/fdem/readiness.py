@@ -66,17 +66,17 @@ def check_parts(sim: State) -> None:
     """CommandError for what was assigned to parts of the calculation that are not there."""
     o = sim.options
     if sim.dim == 2 and o.potential != DISTANCE:
-        raise CommandError("in two dimensions there is no choice of the potential of contact")
+        raise CommandError("model option potential is for three dimensions")
     if not o.mechanical:
         if not any(load.keeps_time for load in sim.surface_loads):
             raise CommandError("nothing to compute: model option mechanical is off, and neither fluid nor heat flows")
         if not o.dynamic:
-            raise CommandError("without mechanics time passes by flow and heat: use model option dynamic on first")
+            raise CommandError("without mechanics, flow and heat need a dynamic run: use model option dynamic on first")
         others = [load.name for load in sim.surface_loads if not load.own_clock]
         if others:
-            raise CommandError(f"{others[0].replace('_', '-')} move with the blocks: model option mechanical on")
+            raise CommandError(f"{others[0].replace('_', '-')} need moving blocks: use model option mechanical on")
         if sim.creep.on:
-            raise CommandError("elements creep while blocks move: model creep off, or model option mechanical on")
+            raise CommandError("creep needs moving blocks: use model option mechanical on, or model creep off")
     setting = "one-way" if o.one_way else "sub-step" if o.flow_steps > 0 else "time-step" if o.flow_dt > 0.0 else ""
     if o.flow_every != 1 and not o.one_way and "heat" not in sim.surface_loads:
         setting = "sub-step"

@@ -107,7 +107,7 @@ class Settings(Topology):
                 changes[name] = value
         if potential is not None:
             if self.mesh is not None:
-                self._only_in_space("choice of the potential of contact", potential)
+                self._only_in_space("model option potential", potential)
             if potential not in POTENTIAL:
                 raise CommandError(f"the potential of contact is one of {', '.join(POTENTIAL)}, got {potential}")
             changes["potential"] = potential
@@ -120,7 +120,7 @@ class Settings(Topology):
         """CommandError where it is too late for plane stress or plane strain, or in space."""
         word = "model plane-stress" if stress else "model plane-strain"
         if self.mesh is not None and self.mesh.dim == 3:
-            raise CommandError(f"{word} is for models of the plane")
+            raise CommandError(f"{word} is for two dimensions")
         if self.stress0 is not None:
             raise CommandError(f"{word} must precede element initial: the stress across the plane depends on it")
 

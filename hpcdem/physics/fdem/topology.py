@@ -100,7 +100,7 @@ class Topology:
 
     def _only_in_space(self, what: str, *values: Any) -> None:
         if self.dim == 2 and any(value is not None for value in values):
-            raise CommandError(f"in two dimensions there is no {what}")
+            raise CommandError(f"{what} is for three dimensions")
 
     def numbers_of_elements(self, elements: Any) -> np.ndarray:
         """Checked element numbers, ascending; None: all that are there. CommandError for others."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.core.units import counted
 from hpcdem.physics.fdem.groups import FLOW_NODE, JOINT
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.field import assigned
@@ -32,6 +33,12 @@ BY_CONDITION, BY_WELL = 1, 2
 """Bits of what says that water stands before a face, should it be free."""
 
 
+def nodes_not(numbers: np.ndarray) -> str:
+    """Begin a message about nodes that lack something: `node 3 and 4 others are not`."""
+    others = len(numbers) - 1
+    return f"node {numbers[0]} " + (f"and {counted(others, 'other')} are not" if others else "is not")
+
+
 @dataclass(frozen=True)
 class Condition:
     """Condition of a flow node: kernels.FREE, PRESSURE [Pa], SURFACE (its height [m] against gravity) or RATE
@@ -43,7 +50,7 @@ class Condition:
 
 class FlowAssignments(Assigned, Field):
     """row (4 ne,): of the table of properties, by joint, 0: no channel; since (4 ne,): flow time at which leak-off
-    began [s], inf: it has not; condition (np,): row of the conditions; said_wet (4 ne,): bits, see `BY_CONDITION`."""
+    began [s], inf: it has not; condition (np,): row of the conditions; wet_bits (4 ne,): see `BY_CONDITION`."""
 
     of_objects: ClassVar[str] = JOINT
     model = POROUS
@@ -105,7 +112,7 @@ class FlowAssignments(Assigned, Field):
         asked = np.flatnonzero(there) if points is None else self.blocks.numbers_of_nodes(points)
         found = asked[there[asked]]
         if not len(found):
-            raise CommandError(f"no channel ends at node {asked[0]}" + " nor at the others" * (len(asked) > 1))
+            raise CommandError(f"{nodes_not(asked)} at the end of a channel")
         if len(found) < len(asked) and self.blocks.log is not None:
             self.blocks.log.info(
                 f"{len(asked) - len(found)} of {len(asked)} nodes are not flow nodes: their conditions apply to free "

@@ -13,6 +13,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.field import assigned
 from hpcdem.physics.field.assigned import Number
 from hpcdem.physics.field.model import Field, Travelling
+from hpcdem.physics.flow.assignments import nodes_not
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant.properties import PROPPANT
 
@@ -69,8 +70,7 @@ class ProppantAssignments(Travelling, Field):
         asked = self.flow.flow_nodes(points)
         found = np.intersect1d(asked, network.corners[self.carries[network.channels]])
         if not len(found):
-            raise CommandError(f"no channel that carries proppant ends at node {asked[0]}" + " nor at the others" * (
-                len(asked) > 1))  # fmt: skip
+            raise CommandError(f"{nodes_not(asked)} at the end of a channel that carries proppant")
         return found
 
     def adjust(self, given: Mapping[str, Any]) -> None:
